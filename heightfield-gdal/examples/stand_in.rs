@@ -1,11 +1,11 @@
-//! A stand-in for libgdal, for tests: a shared library with the functions that this crate calls.
+//! A fake libgdal for tests: a shared library with the functions that this crate calls.
 //!
-//! It opens any file as one band of 2048 × 2048 heights in blocks of 256 × 256, and makes trouble by
-//! environment variables:
+//! It opens any file as one band of 2048 × 2048 heights in blocks of 256 × 256. Environment
+//! variables inject faults:
 //!
-//! - `STAND_IN_VERSION`: the number that it gives for its version;
-//! - `STAND_IN_SLEEP_MS`: how long it takes to read a block;
-//! - `STAND_IN_CRASH`: a file; once that is there, the next read ends in SIGSEGV.
+//! - `STAND_IN_VERSION`: its version number;
+//! - `STAND_IN_SLEEP_MS`: the time for reading a block;
+//! - `STAND_IN_CRASH`: a file; if it exists, the next read causes a SIGSEGV.
 
 #![allow(non_snake_case)]
 
@@ -14,7 +14,7 @@ use std::path::Path;
 use std::ptr;
 use std::time::Duration;
 
-/// Columns and rows.
+/// Columns and rows of the band, and of a block.
 const SIDE: c_int = 2048;
 const BLOCK: c_int = 256;
 /// `GDT_Float32`.
@@ -22,14 +22,14 @@ const FLOAT: c_int = 6;
 const FINE: c_int = 0;
 const FAILED: c_int = 3;
 
-/// Stands for driver, dataset and band, which nothing looks into.
+/// Represents driver, dataset and band, whose content is never read.
 static HANDLE: u8 = 0;
 
 fn handle() -> *mut c_void {
     ptr::from_ref(&HANDLE).cast_mut().cast()
 }
 
-/// A text that stays for ever, as some of GDAL's do.
+/// Returns a text that is never freed, like some of GDAL's.
 fn text(of: &str) -> *const c_char {
     CString::new(of).map_or(ptr::null(), |text| text.into_raw().cast_const())
 }
@@ -38,14 +38,14 @@ fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok()
 }
 
-/// A hill in each square of 1024 × 1024.
+/// Returns a height; each square of 1024 × 1024 is a hill.
 fn height(column: c_int, row: c_int) -> f32 {
     let part = |at: c_int| (at % 1024) as f32 / 1024.0;
     let bump = |at: f32| 4.0 * at * (1.0 - at);
     200.0 * bump(part(column)) * bump(part(row))
 }
 
-/// Functions that say nothing: each with its arguments, and what it gives.
+/// Declares functions without effect, with their arguments and result.
 macro_rules! silent {
     ($($name:ident($($argument:ty),*) -> $result:ty = $value:expr;)*) => {
         $(
@@ -143,10 +143,10 @@ extern "C" fn GDALVersionInfo(_: *const c_char) -> *const c_char {
 }
 
 /// # Safety
-/// There is room for two numbers.
+/// Both pointers are valid for a write.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn GDALGetBlockSize(_: *mut c_void, columns: *mut c_int, rows: *mut c_int) {
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         *columns = BLOCK;
         *rows = BLOCK;
@@ -154,7 +154,7 @@ unsafe extern "C" fn GDALGetBlockSize(_: *mut c_void, columns: *mut c_int, rows:
 }
 
 /// # Safety
-/// There is room for a window of singles.
+/// The buffer has space for a window of `f32`.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn GDALRasterIO(
     _: *mut c_void,
@@ -171,7 +171,7 @@ unsafe extern "C" fn GDALRasterIO(
     _: c_int,
 ) -> c_int {
     if variable("STAND_IN_CRASH").is_some_and(|file| Path::new(&file).exists()) {
-        // SAFETY: there is none. This is what it is for.
+        // SAFETY: none; this write crashes the process on purpose.
         unsafe { ptr::null_mut::<u8>().write_volatile(1) };
     }
     let pause = variable("STAND_IN_SLEEP_MS").and_then(|pause| pause.parse().ok());
@@ -182,7 +182,7 @@ unsafe extern "C" fn GDALRasterIO(
     let places =
         (row..row + rows).flat_map(|row| (column..column + columns).map(move |at| (at, row)));
     for (at, (column, row)) in places.enumerate() {
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         unsafe { buffer.cast::<f32>().add(at).write(height(column, row)) };
     }
     FINE

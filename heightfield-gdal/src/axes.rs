@@ -1,4 +1,4 @@
-//! Which axis of the ground a variable's samples run along.
+//! The axis on the ground along which a variable's samples are stored.
 
 use std::path::Path;
 use std::ptr;
@@ -7,18 +7,18 @@ use crate::dataset::Dataset;
 use crate::library::Library;
 use crate::text::{from_c, to_c};
 
-/// Along what the samples of a row lie.
+/// Axis along which the samples of a row are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// From west to east, or unknown.
     X,
-    /// From north to south or back.
+    /// North–south, in either direction.
     Y,
 }
 
 impl Library {
-    /// The axis of the last dimension of a variable in a file that GDAL has opened: as a raster it is
-    /// taken for x, whatever it is.
+    /// Returns the axis of a variable's last dimension, in a file that GDAL has opened: in a
+    /// raster, GDAL always treats it as x.
     #[must_use]
     pub fn last_axis(&self, path: &Path, variable: &str) -> Axis {
         let Ok(dataset) = Dataset::open_arrays(self.loaded.clone(), path) else {
@@ -28,8 +28,8 @@ impl Library {
             return Axis::X;
         };
         let functions = &self.loaded.functions;
-        // SAFETY: the dataset stays open until the end; each handle is used before it is given back,
-        // once; the list of dimensions has as many as GDAL says.
+        // SAFETY: the dataset stays open until the end; each handle is used before its single
+        // release; the list of dimensions has GDAL's count.
         let kind = unsafe {
             let group = (functions.GDALDatasetGetRootGroup)(dataset.handle());
             if group.is_null() {

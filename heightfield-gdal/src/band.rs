@@ -1,4 +1,4 @@
-//! A band of a raster: its samples, and what they mean.
+//! A band of a raster: its samples and their meaning.
 
 use std::ffi::{c_int, c_void};
 
@@ -10,7 +10,7 @@ use crate::text::from_c;
 
 /// `GF_Read`.
 const READ: c_int = 0;
-/// `CE_None`, and `CE_Warning`, with which samples have come.
+/// `CE_Warning`; it and `CE_None` mean that the samples were read.
 const WARNING: c_int = 2;
 /// `GMF_ALL_VALID` and `GMF_NODATA`.
 const ALL_VALID: c_int = 1;
@@ -30,18 +30,18 @@ pub struct Window {
     pub column: u32,
     /// Its first row.
     pub row: u32,
-    /// Samples a row.
+    /// Samples per row.
     pub columns: u32,
     /// Rows.
     pub rows: u32,
 }
 
-/// The type in which a band stores samples.
+/// The type of a band's stored samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleType {
     /// Unsigned, 8 bits.
     U8,
-    /// Signed, 8 bits (from GDAL 3.7 on).
+    /// Signed, 8 bits (since GDAL 3.7).
     I8,
     /// Unsigned, 16 bits.
     U16,
@@ -55,7 +55,7 @@ pub enum SampleType {
     U64,
     /// Signed, 64 bits.
     I64,
-    /// Floats of 16 bits (from GDAL 3.11 on).
+    /// Floats of 16 bits (since GDAL 3.11).
     F16,
     /// Floats of 32 bits.
     F32,
@@ -63,17 +63,16 @@ pub enum SampleType {
     F64,
 }
 
-/// Mark of no-data samples, beside a no-data value.
+/// Mask of no-data samples, besides a no-data value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mask {
-    /// Nothing, or the no-data value alone.
+    /// None, or only the no-data value.
     None,
-    /// A band of its own, or an alpha band: 0 marks none.
+    /// A separate band, or an alpha band: 0 marks no-data.
     Band,
 }
 
-/// A type that samples can be read as. GDAL converts, and brings what does not fit within the
-/// type's range.
+/// A type for reading samples. GDAL converts, and clamps to the type's range.
 pub trait Sample: Copy + Default + sealed::Code {}
 
 mod sealed {
@@ -94,7 +93,7 @@ macro_rules! samples {
     };
 }
 
-// 14 is known from GDAL 3.7 on, as are bands of that type.
+// GDAL supports 14, and bands of that type, since 3.7.
 samples!(
     u8 = 1,
     i8 = 14,
@@ -126,12 +125,12 @@ impl SampleType {
 }
 
 impl<'d> Band<'d> {
-    /// A band by its handle; none for a null one.
+    /// Returns a band by its handle; `None` if it is null.
     pub(crate) fn of(loaded: &'d Loaded, handle: Handle) -> Option<Self> {
         (!handle.is_null()).then_some(Self { loaded, handle })
     }
 
-    /// Columns and rows.
+    /// Returns columns and rows.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
         let functions = &self.loaded.functions;
@@ -145,24 +144,24 @@ impl<'d> Band<'d> {
         size.map(|count| count.max(0) as u32)
     }
 
-    /// Columns and rows of a block, which GDAL reads as one, however little of it is asked for.
+    /// Returns columns and rows of a block, which GDAL always reads whole.
     #[must_use]
     pub fn block_size(&self) -> [u32; 2] {
         let (mut columns, mut rows) = (0, 0);
-        // SAFETY: room for two numbers.
+        // SAFETY: both pointers are valid for a write.
         unsafe {
             (self.loaded.functions.GDALGetBlockSize)(self.handle, &raw mut columns, &raw mut rows);
         }
         [columns, rows].map(|count| count.max(1) as u32)
     }
 
-    /// The type of its samples.
+    /// Returns the type of the samples.
     ///
     /// # Errors
-    /// Complex numbers, and types of a GDAL that is newer than this crate, by name.
+    /// The name of a complex type, or of a type that is newer than this crate.
     pub fn sample_type(&self) -> Result<SampleType, String> {
         let functions = &self.loaded.functions;
-        // SAFETY: the band's dataset is open; the name stays, and is copied.
+        // SAFETY: the band's dataset is open; the name is static, and is copied.
         unsafe {
             let code = (functions.GDALGetRasterDataType)(self.handle);
             SampleType::of(code).ok_or_else(|| {
@@ -172,19 +171,19 @@ impl<'d> Band<'d> {
         }
     }
 
-    /// The value that marks a sample as none.
+    /// Returns the value that marks no-data.
     #[must_use]
     pub fn no_data(&self) -> Option<f64> {
         self.number(self.loaded.functions.GDALGetRasterNoDataValue)
     }
 
-    /// Returns the factor of samples, before the [offset](Self::offset) is added.
+    /// Returns the factor of samples, applied before the [offset](Self::offset).
     #[must_use]
     pub fn scale(&self) -> Option<f64> {
         self.number(self.loaded.functions.GDALGetRasterScale)
     }
 
-    /// Returns the summand of samples.
+    /// Returns the offset of samples.
     #[must_use]
     pub fn offset(&self) -> Option<f64> {
         self.number(self.loaded.functions.GDALGetRasterOffset)
@@ -192,12 +191,12 @@ impl<'d> Band<'d> {
 
     fn number(&self, of: unsafe extern "C" fn(Handle, *mut c_int) -> f64) -> Option<f64> {
         let mut is_stated = 0;
-        // SAFETY: one of the three functions above; room for one number.
+        // SAFETY: one of the three functions above; the pointer is valid for a write.
         let number = unsafe { of(self.handle, &raw mut is_stated) };
         (is_stated != 0).then_some(number)
     }
 
-    /// The unit of the heights, as the file calls it.
+    /// Returns the unit of the heights, by its name in the file.
     #[must_use]
     pub fn unit(&self) -> Option<String> {
         // SAFETY: the band's dataset is open; the text is copied.
@@ -211,7 +210,7 @@ impl<'d> Band<'d> {
         unsafe { from_c((self.loaded.functions.GDALGetDescription)(self.handle)) }
     }
 
-    /// An item of its metadata, of the default domain.
+    /// Returns an item of its metadata, from the default domain.
     ///
     /// # Errors
     /// [`Error::ZeroByte`].
@@ -220,11 +219,11 @@ impl<'d> Band<'d> {
         unsafe { self.loaded.metadata(self.handle, name, None) }
     }
 
-    /// Its overviews, in the file's order.
+    /// Returns its overviews, in the file's order.
     #[must_use]
     pub fn overviews(&self) -> Vec<Self> {
         let functions = &self.loaded.functions;
-        // SAFETY: the band's dataset is open; overviews are counted from 0, and are the dataset's.
+        // SAFETY: the band's dataset is open and owns the overviews, whose numbers start at 0.
         unsafe {
             let count = (functions.GDALGetOverviewCount)(self.handle);
             let overviews =
@@ -234,7 +233,7 @@ impl<'d> Band<'d> {
         }
     }
 
-    /// Returns the mark of no-data samples, beside the no-data value.
+    /// Returns the mask of no-data samples, besides the no-data value.
     #[must_use]
     pub fn mask(&self) -> Mask {
         // SAFETY: the band's dataset is open.
@@ -245,19 +244,19 @@ impl<'d> Band<'d> {
         }
     }
 
-    /// The band of its mask: 0 where a sample is none.
+    /// Returns the band of its mask: 0 for no-data.
     #[must_use]
     pub fn mask_band(&self) -> Option<Self> {
-        // SAFETY: the band's dataset is open, and the mask is its.
+        // SAFETY: the band's dataset is open, and owns the mask.
         let handle = unsafe { (self.loaded.functions.GDALGetMaskBand)(self.handle) };
         Self::of(self.loaded, handle)
     }
 
-    /// Reads a window, row after row, each `samples` of it once.
+    /// Reads a window into `samples`, row after row.
     ///
     /// # Errors
-    /// [`Error::Window`] where it is not inside of the band, or `samples` has another size;
-    /// [`Error::Refused`] in GDAL's words.
+    /// [`Error::Window`] if it is not inside the band, or `samples` has another size;
+    /// [`Error::Refused`] with GDAL's message.
     pub fn read<T: Sample>(&self, window: Window, samples: &mut [T]) -> Result<(), Error> {
         let Window {
             column,
@@ -281,13 +280,13 @@ impl<'d> Band<'d> {
         if samples.len() as u64 != u64::from(columns) * u64::from(rows) {
             return Err(misfit(format!("there is room for {}", samples.len())));
         }
-        // At most the band's size, which is a number of GDAL's.
+        // At most the band's size, which GDAL stores as `c_int`.
         let [x, y, width, height] = [column, row, columns, rows].map(|count| count as c_int);
         let buffer = samples.as_mut_ptr().cast::<c_void>();
         self.loaded.prepare_thread();
         let _call = Call::begin();
         let functions = &self.loaded.functions;
-        // SAFETY: the buffer holds as many samples of that type as the window has, without gaps.
+        // SAFETY: the buffer has space for the window's samples of that type, without gaps.
         let said = unsafe {
             (functions.CPLErrorReset)();
             (functions.GDALRasterIO)(

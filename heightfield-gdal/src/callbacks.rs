@@ -1,5 +1,5 @@
-//! The functions by which GDAL reads files through its caller. No panic goes back to C: each
-//! function fails then, as where a file cannot be read.
+//! The callbacks by which GDAL reads files through this crate's user. A panic is not passed to C:
+//! the callback then fails, as for a file that cannot be read.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,12 +13,12 @@ use crate::loaded::Loaded;
 use crate::mount::{Mounted, at};
 use crate::text::{from_c, to_c};
 
-/// [`PREFIX`] for GDAL, which keeps the pointer.
+/// [`PREFIX`] for GDAL, which stores the pointer.
 const PREFIX_FOR_C: &CStr = c"/vsiheightfield/";
-/// The value that `stat`, `seek` and `close` return on failure.
+/// The result of `stat`, `seek` and `close` on failure.
 const FAILED: c_int = -1;
 
-/// A file that GDAL has open, and where it reads.
+/// A file that GDAL has open, and its read position.
 struct OpenFile {
     mounted: Arc<Mounted>,
     file: Box<dyn ReadAt>,
@@ -26,7 +26,7 @@ struct OpenFile {
     is_at_end: bool,
 }
 
-/// Has GDAL call the functions below for all names that begin with [`PREFIX`].
+/// Registers the callbacks below for all names that begin with [`PREFIX`].
 ///
 /// # Errors
 /// [`Error::Refused`].
@@ -38,8 +38,8 @@ pub(crate) fn install(loaded: &Loaded) -> Result<(), Error> {
     }
     let refused = || loaded.refused("it takes no files from its caller");
     let functions = &loaded.functions;
-    // SAFETY: GDAL's own structure, of which the fields that are set are the same in all versions;
-    // GDAL copies it. Prefix and functions stay as long as the process.
+    // SAFETY: GDAL's own structure, whose fields set here are the same in all versions; GDAL copies
+    // it. Prefix and functions exist as long as the process.
     unsafe {
         let callbacks = (functions.VSIAllocFilesystemPluginCallbacksStruct)();
         let own = callbacks.as_mut().ok_or_else(refused)?;
@@ -63,12 +63,12 @@ fn caught<T>(otherwise: T, call: impl FnOnce() -> Option<T>) -> T {
     called.ok().flatten().unwrap_or(otherwise)
 }
 
-/// The file system and the name in it that GDAL asks for.
+/// Returns the file system, and the name in it, of a request by GDAL.
 ///
 /// # Safety
-/// `name` is null or a text that stays for the call.
+/// `name` is null or a text that is valid during the call.
 unsafe fn asked(name: *const c_char) -> Option<(Arc<Mounted>, String)> {
-    // SAFETY: by the caller. GDAL leaves the prefix out.
+    // SAFETY: guaranteed by the caller. GDAL omits the prefix.
     let name = format!("{PREFIX}{}", unsafe { from_c(name) }?);
     let (mounted, name) = at(&name)?;
     Some((mounted, name.to_owned()))
@@ -80,7 +80,7 @@ unsafe extern "C" fn open(
     access: *const c_char,
 ) -> *mut c_void {
     caught(ptr::null_mut(), || {
-        // SAFETY: GDAL's texts, which stay for the call.
+        // SAFETY: GDAL's texts, which are valid during the call.
         let ((mounted, name), access) = unsafe { (asked(name)?, from_c(access)?) };
         if access.contains(['w', 'a', '+']) {
             return None;
@@ -99,14 +99,14 @@ unsafe extern "C" fn open(
     .cast()
 }
 
-/// Sets the number by which GDAL puts into words why a file was not opened.
+/// Sets the error number from which GDAL makes its message for a failed opening.
 fn say_missing() {
-    // SAFETY: the pointer is to this thread's own number.
+    // SAFETY: the pointer is to this thread's own error number.
     #[cfg(target_os = "linux")]
     unsafe {
         *libc::__errno_location() = libc::ENOENT;
     }
-    // SAFETY: the same.
+    // SAFETY: as above.
     #[cfg(target_os = "macos")]
     unsafe {
         *libc::__error() = libc::ENOENT;
@@ -115,7 +115,7 @@ fn say_missing() {
 
 unsafe extern "C" fn stat(_: *mut c_void, name: *const c_char, stat: *mut Stat, _: c_int) -> c_int {
     caught(FAILED, || {
-        // SAFETY: GDAL's text, and its structure, in which all is zero.
+        // SAFETY: GDAL's text, and its structure, which is zeroed.
         let ((mounted, name), stat) = unsafe { (asked(name)?, stat.as_mut()?) };
         let bytes = mounted.open(&name)?.bytes();
         stat.st_mode = libc::S_IFREG as _;
@@ -124,8 +124,8 @@ unsafe extern "C" fn stat(_: *mut c_void, name: *const c_char, stat: *mut Stat, 
     })
 }
 
-/// A list of texts that is GDAL's: the file itself and those beside it; null where they are not
-/// known.
+/// Returns a list of texts owned by GDAL: the file itself and those beside it; null if they are
+/// unknown.
 unsafe extern "C" fn sibling_files(_: *mut c_void, name: *const c_char) -> *mut *mut c_char {
     caught(ptr::null_mut(), || {
         // SAFETY: GDAL's text.
@@ -135,19 +135,19 @@ unsafe extern "C" fn sibling_files(_: *mut c_void, name: *const c_char) -> *mut 
         let mut list = ptr::null_mut();
         for name in own.into_iter().chain(beside) {
             let name = to_c(&name).ok()?;
-            // SAFETY: the text stays for the call, in which it is copied.
+            // SAFETY: the text is valid during the call, which copies it.
             list = unsafe { (mounted.library().functions.CSLAddString)(list, name.as_ptr()) };
         }
         Some(list)
     })
 }
 
-/// The file that GDAL has open.
+/// Returns the file that GDAL has open.
 ///
 /// # Safety
-/// `file` is of [`open`] and not closed; GDAL uses it on one thread at a time.
+/// `file` is from [`open`] and not closed; GDAL uses it on one thread at a time.
 unsafe fn opened<'f>(file: *mut c_void) -> Option<&'f mut OpenFile> {
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     unsafe { file.cast::<OpenFile>().as_mut() }
 }
 
@@ -166,7 +166,7 @@ unsafe extern "C" fn seek(file: *mut c_void, offset: u64, from: c_int) -> c_int 
             libc::SEEK_END => file.file.bytes(),
             _ => return None,
         };
-        // A step back is a number that wraps.
+        // A negative offset is a wrapped number.
         file.at = from.wrapping_add(offset);
         file.is_at_end = false;
         Some(0)
@@ -186,7 +186,7 @@ unsafe extern "C" fn read(
         let left = file.file.bytes().saturating_sub(file.at);
         let bytes = usize::try_from(left).map_or(wanted, |left| wanted.min(left));
         let read = file.mounted.read_at(&*file.file, file.at, bytes)?;
-        // SAFETY: GDAL's buffer has room for all that it wants, and `read` has as many bytes.
+        // SAFETY: GDAL's buffer has space for all requested bytes, and `read` has no more.
         unsafe { ptr::copy_nonoverlapping(read.as_ptr(), buffer.cast(), bytes) };
         file.at += bytes as u64;
         file.is_at_end = bytes < wanted;
@@ -204,7 +204,7 @@ unsafe extern "C" fn close(file: *mut c_void) -> c_int {
         if file.is_null() {
             return None;
         }
-        // SAFETY: of `open`, and GDAL closes it once.
+        // SAFETY: from `open`, and GDAL closes it once.
         drop(unsafe { Box::from_raw(file.cast::<OpenFile>()) });
         Some(0)
     })

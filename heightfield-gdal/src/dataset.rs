@@ -20,10 +20,10 @@ const ARRAYS: u32 = 0x10;
 /// `CE_None`.
 const FINE: i32 = 0;
 
-/// Open options that GDAL has for all drivers.
+/// Open options of all drivers.
 const OF_ALL: [&str; 1] = ["OVERVIEW_LEVEL"];
 
-/// An open raster, closed when it is dropped.
+/// An open raster, closed on drop.
 pub struct Dataset {
     pub(crate) loaded: Arc<Loaded>,
     handle: Handle,
@@ -31,14 +31,14 @@ pub struct Dataset {
     files: Option<Arc<Mounted>>,
 }
 
-// SAFETY: GDAL lets a dataset go to another thread as long as one thread at a time uses it, which
-// is what `Send` without `Sync` says.
+// SAFETY: a dataset may move to another thread if only one thread at a time uses it, which is what
+// `Send` without `Sync` means.
 unsafe impl Send for Dataset {}
 
 /// One of several rasters in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Subdataset {
-    /// Its name for opening, as `NETCDF:"ocean.nc":depth`.
+    /// Its name for opening it, as `NETCDF:"ocean.nc":depth`.
     pub name: String,
     /// As `[180x360] depth (32-bit floating-point)`.
     pub title: String,
@@ -54,7 +54,8 @@ impl Dataset {
         let list = options.iter().map(|option| option.as_ptr());
         let list: Vec<*const c_char> = list.chain([ptr::null()]).collect();
         let functions = &loaded.functions;
-        // SAFETY: texts and list stay for the call; all drivers are asked, and siblings looked for.
+        // SAFETY: texts and list are valid during the call; null means all drivers, and a search
+        // for siblings.
         let handle = unsafe {
             (functions.CPLErrorReset)();
             let (drivers, siblings) = (ptr::null(), ptr::null());
@@ -72,10 +73,10 @@ impl Dataset {
         Ok(dataset)
     }
 
-    /// Checks that the driver has such open options: GDAL leaves out what it does not know.
+    /// Checks that the driver supports the open options: GDAL ignores unknown ones.
     fn check_options(&self, options: &[CString]) -> Result<(), Error> {
         let functions = &self.loaded.functions;
-        // SAFETY: the dataset is open, and its driver stays.
+        // SAFETY: the dataset is open, and its driver is never freed.
         let list = unsafe {
             let driver = (functions.GDALGetDatasetDriver)(self.handle);
             self.loaded.metadata(driver, "DMD_OPENOPTIONLIST", None)?
@@ -102,11 +103,11 @@ impl Dataset {
         Ok(())
     }
 
-    /// The files that belong to it: its own, those beside it, and those that it names.
+    /// Returns the files that belong to it: its own, those beside it, and those that it references.
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
         let functions = &self.loaded.functions;
-        // SAFETY: the dataset is open; the list is copied, and given back once.
+        // SAFETY: the dataset is open; the list is copied, and freed once.
         let names = unsafe {
             let list = (functions.GDALGetFileList)(self.handle);
             let names = list_from_c(list.cast());
@@ -116,13 +117,13 @@ impl Dataset {
         names.into_iter().map(PathBuf::from).collect()
     }
 
-    /// The same file as a tree of arrays.
+    /// Opens the same file as a tree of arrays.
     pub(crate) fn open_arrays(loaded: Arc<Loaded>, path: &Path) -> Result<Self, Error> {
         loaded.prepare_thread();
         let files = mounted_in(path);
         let path = path_to_c(path)?;
         let none = ptr::null();
-        // SAFETY: the path stays for the call.
+        // SAFETY: the path is valid during the call.
         let handle = unsafe {
             (loaded.functions.CPLErrorReset)();
             (loaded.functions.GDALOpenEx)(path.as_ptr(), ARRAYS, none, none, none)
@@ -137,8 +138,8 @@ impl Dataset {
         }
     }
 
-    /// Returns why a file that GDAL reads through its caller could not be read, since the last call.
-    /// The samples that GDAL returns may then be incomplete, even without an error of its own.
+    /// Returns the reason why GDAL could not read a file through its caller, since the last call.
+    /// Samples from GDAL may then be incomplete, even without an error of GDAL.
     #[must_use]
     pub fn take_fault(&self) -> Option<std::io::Error> {
         self.files.as_ref()?.take_fault()
@@ -148,11 +149,11 @@ impl Dataset {
         self.handle
     }
 
-    /// The driver's short name, as `HFA`.
+    /// Returns the driver's short name, as `HFA`.
     #[must_use]
     pub fn driver(&self) -> String {
         let functions = &self.loaded.functions;
-        // SAFETY: the dataset is open, and its driver stays.
+        // SAFETY: the dataset is open, and its driver is never freed.
         let name = unsafe {
             let driver = (functions.GDALGetDatasetDriver)(self.handle);
             if driver.is_null() {
@@ -163,7 +164,7 @@ impl Dataset {
         name.unwrap_or_default()
     }
 
-    /// Bands of its own; none of a file that holds several rasters
+    /// Returns the number of its bands; zero for a file of several rasters
     /// ([`subdatasets`](Self::subdatasets)).
     #[must_use]
     pub fn bands(&self) -> u32 {
@@ -172,7 +173,7 @@ impl Dataset {
         count.max(0) as u32
     }
 
-    /// A band by its number, 1 first.
+    /// Returns a band by its number, from 1.
     ///
     /// # Errors
     /// [`Error::NoSuchPart`].
@@ -188,7 +189,7 @@ impl Dataset {
         if number == 0 || number > self.bands() {
             return Err(no_such());
         }
-        // SAFETY: the number is one of the open dataset's.
+        // SAFETY: the open dataset has a band of this number.
         let handle =
             unsafe { (self.loaded.functions.GDALGetRasterBand)(self.handle, number as i32) };
         Band::of(&self.loaded, handle).ok_or_else(no_such)
@@ -199,21 +200,21 @@ impl Dataset {
     #[must_use]
     pub fn geo_transform(&self) -> Option<[f64; 6]> {
         let mut numbers = [0.0; 6];
-        // SAFETY: room for six numbers.
+        // SAFETY: the array has space for six numbers.
         let said = unsafe {
             (self.loaded.functions.GDALGetGeoTransform)(self.handle, numbers.as_mut_ptr())
         };
         (said == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
     }
 
-    /// The reference system, WKT as GDAL writes it.
+    /// Returns the reference system as GDAL's WKT.
     #[must_use]
     pub fn wkt(&self) -> Option<String> {
         // SAFETY: the dataset is open; the text is copied.
         unsafe { from_c((self.loaded.functions.GDALGetProjectionRef)(self.handle)) }
     }
 
-    /// An item of its metadata, of the domain of that name or the default one.
+    /// Returns an item of its metadata, from the named domain or the default one.
     ///
     /// # Errors
     /// [`Error::ZeroByte`].
@@ -222,7 +223,8 @@ impl Dataset {
         unsafe { self.loaded.metadata(self.handle, name, domain) }
     }
 
-    /// Items of its own metadata whose names end so, each with what stands before that.
+    /// Returns the items of its own metadata whose names end with `end`, each with its name without
+    /// `end`.
     #[must_use]
     pub fn metadata_items(&self, end: &str) -> Vec<(String, String)> {
         let lines = self.list(c"");
@@ -233,7 +235,7 @@ impl Dataset {
         items.collect()
     }
 
-    /// The rasters that a file of several holds; each is opened by its name.
+    /// Returns the rasters in a file of several; each can be opened by its name.
     #[must_use]
     pub fn subdatasets(&self) -> Vec<Subdataset> {
         let lines = self.list(c"SUBDATASETS");
@@ -265,8 +267,8 @@ fn mounted_in(path: &Path) -> Option<Arc<Mounted>> {
 
 impl Drop for Dataset {
     fn drop(&mut self) {
-        // SAFETY: opened, and closed once; bands borrow the dataset. What closing says is of no
-        // use: nothing was written.
+        // SAFETY: opened once, and closed once; bands borrow the dataset. The result is ignored,
+        // because nothing was written.
         unsafe { (self.loaded.functions.GDALClose)(self.handle) };
     }
 }

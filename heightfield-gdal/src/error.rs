@@ -1,20 +1,20 @@
-//! Errors.
+//! Errors of GDAL and of this crate.
 
 use std::path::PathBuf;
 
 use crate::version::Version;
 
-/// Reason for which a raster cannot be read.
+/// Reason why a raster cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is no libgdal on this machine, or not where it is looked for.
+    /// libgdal is not installed, or not found.
     #[error("no libgdal was found ({tried})")]
     NotFound {
         /// Last attempt, and the system's message.
         tried: String,
     },
-    /// A library is there that this crate cannot use.
+    /// The library found cannot be used by this crate.
     #[error("{} is GDAL {version}: versions from {} are read", path.display(), Version::OLDEST)]
     Version {
         /// The library.
@@ -22,23 +22,23 @@ pub enum Error {
         /// Its version.
         version: String,
     },
-    /// A library is there that lacks a function of GDAL's.
+    /// The library found lacks a function of GDAL.
     #[error("{} is no complete libgdal: it lacks {function}", path.display())]
     Incomplete {
         /// The library.
         path: PathBuf,
-        /// The first function that it lacks.
+        /// The first missing function.
         function: &'static str,
     },
-    /// GDAL refuses, in its own words.
+    /// GDAL's message for a rejected request.
     #[error("GDAL: {0}")]
     Refused(String),
-    /// A file that must not be opened, or that names one.
+    /// A file that must not be opened, or that references one.
     #[error("{}: {why}", path.display())]
     NotOpened {
         /// The file.
         path: PathBuf,
-        /// Returns its fault.
+        /// The reason.
         why: String,
     },
     /// GDAL takes too long to open a file.
@@ -46,23 +46,23 @@ pub enum Error {
     Slow {
         /// The file.
         path: PathBuf,
-        /// Time for which it had.
+        /// Time limit, s.
         seconds: u64,
     },
-    /// The driver does not know an open option.
+    /// An open option that the driver does not support.
     #[error("GDAL's driver {driver} has no open option {name} (it has: {known})")]
     OpenOption {
         /// The option.
         name: String,
         /// The driver.
         driver: String,
-        /// Those that it has.
+        /// The options that it supports.
         known: String,
     },
-    /// A text for GDAL has a zero byte in it.
+    /// A text for GDAL that contains a zero byte.
     #[error("{0:?} contains a zero byte, which GDAL's interface cannot carry")]
     ZeroByte(String),
-    /// A part of a raster that is not there.
+    /// A part that the raster does not have.
     #[error("there is no {asked}: {there}")]
     NoSuchPart {
         /// The request.
@@ -70,7 +70,7 @@ pub enum Error {
         /// The available ones.
         there: String,
     },
-    /// A window or a buffer that does not fit.
+    /// A window or a buffer of the wrong size.
     #[error("a window of {window:?} does not fit: {why}")]
     Window {
         /// First column and row, columns and rows.
@@ -81,7 +81,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Returns the commands that install libgdal, one line a system.
+    /// Returns the commands that install libgdal, one line per system.
     #[must_use]
     pub const fn how_to_install() -> &'static str {
         "install GDAL: apt install gdal-bin (Debian, Ubuntu), dnf install gdal-libs (Fedora), \

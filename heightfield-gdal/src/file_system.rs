@@ -1,42 +1,42 @@
-//! Files that GDAL reads through its caller, as those at a server.
+//! Files that GDAL reads through this crate's user, such as files on a server.
 //!
-//! GDAL opens them by the names that a [`Mount`](crate::Mount) has for them, and finds what they name beside
-//! themselves in the same way. A VRT or an MRF among them may name nothing else: each one is looked at
-//! before GDAL reads it.
+//! GDAL opens them by names from a [`Mount`](crate::Mount), and finds the files that they reference
+//! in the same way. A VRT or an MRF among them may reference no other files: each is checked before
+//! GDAL reads it.
 
 use std::io;
 
-/// Names of all files that GDAL reads through its caller begin so.
+/// Prefix of the names of all such files.
 pub(crate) const PREFIX: &str = "/vsiheightfield/";
 
-/// Files by names, as `folder/hills.vrt`.
+/// Files by name, as `folder/hills.vrt`.
 pub trait FileSystem: Send + Sync {
-    /// The file of a name, which is relative to the root and has no `.` or `..` in it.
+    /// Opens a file. The name is relative to the root, without `.` or `..`.
     ///
     /// # Errors
-    /// [`io::ErrorKind::NotFound`] and [`io::ErrorKind::PermissionDenied`] say that there is none;
-    /// GDAL's callers get all other errors from [`Dataset::take_fault`](crate::Dataset::take_fault).
+    /// [`io::ErrorKind::NotFound`] and [`io::ErrorKind::PermissionDenied`] mean that it does not
+    /// exist; all other errors are returned by [`Dataset::take_fault`](crate::Dataset::take_fault).
     fn open(&self, name: &str) -> io::Result<Box<dyn ReadAt>>;
 
-    /// The last parts of the names of files that lie beside one and belong to it.
+    /// Returns the names, without folders, of files beside a file that belong to it.
     ///
     /// # Errors
-    /// The reason for which it is not known.
+    /// The reason why they are unknown.
     fn beside(&self, name: &str) -> io::Result<Vec<String>>;
 
-    /// Beginnings of absolute names, as `https://host/`, by which a VRT may name these files. One
-    /// that contains another comes before it.
+    /// Returns prefixes of absolute names, as `https://host/`, by which a VRT may reference these
+    /// files. A prefix that contains another comes before it.
     fn roots(&self) -> &[String];
 }
 
-/// A file that is open.
+/// An open file.
 pub trait ReadAt: Send {
-    /// Its bytes.
+    /// Returns its size, bytes.
     fn bytes(&self) -> u64;
 
-    /// Bytes at a place, all of them inside the file.
+    /// Reads bytes at an offset, inside the file.
     ///
     /// # Errors
-    /// The reason for which they cannot be read.
+    /// The reason why they cannot be read.
     fn read_at(&self, at: u64, count: usize) -> io::Result<Vec<u8>>;
 }

@@ -1,21 +1,20 @@
-//! The functions of GDAL's C interface that are called, with the types of its headers
-//! (`gdal.h`, `ogr_srs_api.h`, `cpl_error.h`, `cpl_conv.h`, `cpl_minixml.h`, `cpl_vsi.h`), unchanged
-//! from 3.4 on.
+//! The functions of GDAL's C interface that this crate calls, with the types of its headers
+//! (`gdal.h`, `ogr_srs_api.h`, `cpl_error.h`, `cpl_conv.h`, `cpl_minixml.h`, `cpl_vsi.h`),
+//! unchanged since 3.4.
 
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 
-/// A `GDALDatasetH`, `GDALRasterBandH` or `GDALDriverH`; GDAL calls what they have in common a
-/// `GDALMajorObjectH`.
+/// A `GDALDatasetH`, `GDALRasterBandH` or `GDALDriverH`; GDAL's common type is `GDALMajorObjectH`.
 pub(crate) type Handle = *mut c_void;
 
-/// Stops HDF5 from printing its errors on this thread: GDAL says them, too, where they matter. It
-/// does nothing where libgdal has no HDF5, or keeps it to itself.
+/// Stops HDF5 from printing its errors on this thread: GDAL also reports the important ones. It has
+/// no effect if libgdal has no HDF5, or hides it.
 ///
 /// # Safety
 /// The library is GDAL's.
 pub(crate) unsafe fn silence_hdf5(library: &libloading::Library) {
     type SetAuto = unsafe extern "C" fn(i64, *const c_void, *const c_void) -> c_int;
-    // SAFETY: the type is that of HDF5's headers from 1.10 on; 0 is the default stack of errors.
+    // SAFETY: the type is that of HDF5's headers since 1.10; 0 is the default error stack.
     unsafe {
         if let Ok(set) = library.get::<SetAuto>("H5Eset_auto2") {
             set(0, std::ptr::null(), std::ptr::null());
@@ -23,7 +22,7 @@ pub(crate) unsafe fn silence_hdf5(library: &libloading::Library) {
     }
 }
 
-/// A node of XML as `cpl_minixml.h` has it.
+/// A node of XML, from `cpl_minixml.h`.
 #[repr(C)]
 pub(crate) struct XmlNode {
     /// `CXT_Element` and so on.
@@ -34,21 +33,22 @@ pub(crate) struct XmlNode {
     pub(crate) child: *const XmlNode,
 }
 
-/// A file's kind and size as `VSIStatBufL` has them.
+/// A file's kind and size, as `VSIStatBufL`.
 #[cfg(any(target_os = "linux", target_os = "android"))]
 pub(crate) type Stat = libc::stat64;
-/// A file's kind and size as `VSIStatBufL` has them.
+/// A file's kind and size, as `VSIStatBufL`.
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 pub(crate) type Stat = libc::stat;
 
-/// The beginning of `VSIFilesystemPluginCallbacksStruct` of `cpl_vsi.h`. Newer versions have more
-/// fields behind it, so that GDAL itself makes room for one, with a null pointer in each field.
+/// The first fields of `VSIFilesystemPluginCallbacksStruct` of `cpl_vsi.h`. Newer versions add
+/// fields at the end, so GDAL itself allocates it, with zeroed fields.
 #[repr(C)]
 pub(crate) struct Callbacks {
     pub(crate) user_data: *mut c_void,
     pub(crate) stat:
         Option<unsafe extern "C" fn(*mut c_void, *const c_char, *mut Stat, c_int) -> c_int>,
-    /// `unlink`, `rename`, `mkdir`, `rmdir`, `read_dir`: files are read only, and no folder is listed.
+    /// `unlink`, `rename`, `mkdir`, `rmdir`, `read_dir`: files are read-only, and folders are not
+    /// listed.
     of_folders: [*const c_void; 5],
     pub(crate) open:
         Option<unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char) -> *mut c_void>,
@@ -61,7 +61,7 @@ pub(crate) struct Callbacks {
     /// `write`, `flush`, `truncate`.
     of_writing: [*const c_void; 3],
     pub(crate) close: Option<unsafe extern "C" fn(*mut c_void) -> c_int>,
-    /// `nBufferSize`, `nCacheSize`: GDAL keeps nothing of the files.
+    /// `nBufferSize`, `nCacheSize`: GDAL does not cache the files.
     of_caching: [usize; 2],
     pub(crate) sibling_files:
         Option<unsafe extern "C" fn(*mut c_void, *const c_char) -> *mut *mut c_char>,
@@ -69,20 +69,20 @@ pub(crate) struct Callbacks {
 
 macro_rules! functions {
     ($($name:ident: ($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// Each function by its name in C.
+        /// Each function by its C name.
         #[allow(non_snake_case)]
         pub(crate) struct Functions {
             $(pub(crate) $name: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
         }
 
         impl Functions {
-            /// Looks all of them up.
+            /// Loads all functions.
             ///
             /// # Errors
-            /// The name of the first that is not there.
+            /// The name of the first missing one.
             ///
             /// # Safety
-            /// The library is GDAL's, and stays loaded as long as the functions are called.
+            /// The library is GDAL's, and stays loaded while the functions are used.
             pub(crate) unsafe fn of(library: &libloading::Library) -> Result<Self, &'static str> {
                 Ok(Self {
                     // SAFETY: the types are those of GDAL's headers.

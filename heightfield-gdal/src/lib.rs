@@ -1,5 +1,5 @@
-//! Rasters of every format that GDAL reads, block by block, through a libgdal that is found when
-//! the program runs. Nothing is linked: a program builds and starts without GDAL.
+//! Rasters of every format that GDAL reads, in blocks, through a libgdal that is loaded at run
+//! time. Nothing is linked: a program can be built and started without GDAL.
 //!
 //! ```no_run
 //! use heightfield_gdal::{Library, Settings, Window};
@@ -14,17 +14,18 @@
 //! ```
 //!
 //! - [`Library`]: finds and loads libgdal, versions 3.4 and newer, and lists its drivers;
-//! - [`Dataset`]: a file, a folder or whatever else a driver opens, for reading;
-//! - [`Library::mount`]: has GDAL read files through their caller, as those at a server;
-//! - [`Library::entries`], [`Library::length`]: what is in an archive;
-//! - [`Band`]: its samples, overviews and masks, and what they mean;
-//! - [`SpatialReference`]: a reference system by its text or code, as PROJ knows it.
+//! - [`Dataset`]: a file, a folder or other source that a driver opens, for reading;
+//! - [`Library::mount`]: lets GDAL read files through this crate's user, such as files on a server;
+//! - [`Library::entries`], [`Library::length`]: the contents of an archive;
+//! - [`Band`]: its samples, overviews and masks, and their meaning;
+//! - [`SpatialReference`]: a reference system from PROJ, by its text or code.
 //!
-//! A dataset is used by one thread at a time, and may go from thread to thread. A call takes as long
-//! as GDAL takes: no thread that must not wait may read.
+//! A dataset is used by one thread at a time, and may move between threads. Calls block until GDAL
+//! returns, so real-time threads must not read.
 //!
-//! Before a file is opened, it, what lies beside it and what it names as a VRT are looked at: pipes
-//! and devices are refused ([`Error::NotOpened`]). [`Settings`] lists GDAL's own settings.
+//! Before a file is opened, the file, its neighbours and the files that a VRT references are
+//! checked: pipes and devices are rejected ([`Error::NotOpened`]). [`Settings`] lists GDAL's own
+//! settings.
 
 mod axes;
 mod band;

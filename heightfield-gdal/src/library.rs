@@ -1,4 +1,4 @@
-//! A libgdal: its drivers, and what it opens.
+//! A libgdal: its drivers, and the rasters that it opens.
 
 use std::fmt;
 use std::path::Path;
@@ -15,7 +15,7 @@ use crate::text::from_c;
 use crate::version::Version;
 use crate::{callbacks, open_timeout, path_check};
 
-/// A driver of GDAL's that reads rasters.
+/// A GDAL driver that reads rasters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Driver {
     /// As `HFA`.
@@ -24,19 +24,18 @@ pub struct Driver {
     pub title: String,
 }
 
-/// A libgdal that is loaded; it stays loaded until the process ends. Clones are the same one.
+/// A loaded libgdal, which stays loaded until the process ends. Clones share it.
 #[derive(Clone)]
 pub struct Library {
     pub(crate) loaded: Arc<Loaded>,
 }
 
 impl Library {
-    /// Loads libgdal: the one that the environment variable `GDAL_LIBRARY` names, else that of an
-    /// active conda environment, else the newest that the system finds. Once it is loaded the same
-    /// one is given again.
+    /// Loads libgdal: from the environment variable `GDAL_LIBRARY`, else from an active conda
+    /// environment, else the newest that the system finds. Later calls return the same one.
     ///
     /// # Errors
-    /// [`Error::NotFound`], [`Error::Version`], [`Error::Incomplete`]. The next call tries again.
+    /// [`Error::NotFound`], [`Error::Version`], [`Error::Incomplete`]. The next call retries.
     pub fn load(settings: Settings) -> Result<Self, Error> {
         let loaded = Loaded::load(settings)?;
         Ok(Self { loaded })
@@ -48,17 +47,17 @@ impl Library {
         &self.loaded.path
     }
 
-    /// Its version.
+    /// Returns its version.
     #[must_use]
     pub fn version(&self) -> Version {
         self.loaded.version
     }
 
-    /// The drivers that read rasters, in GDAL's order.
+    /// Returns the drivers that read rasters, in GDAL's order.
     #[must_use]
     pub fn drivers(&self) -> Vec<Driver> {
         let functions = &self.loaded.functions;
-        // SAFETY: drivers are counted from 0, and stay.
+        // SAFETY: drivers are numbered from 0, and are never freed.
         let count = unsafe { (functions.GDALGetDriverCount)() };
         let drivers = (0..count).filter_map(|number| {
             // SAFETY: as above; texts are copied.
@@ -85,14 +84,14 @@ impl Library {
     /// Opens a raster for reading, with a driver's open options, each as `NAME=VALUE`.
     ///
     /// # Errors
-    /// [`Error::Refused`] in GDAL's words, [`Error::NotOpened`], [`Error::OpenOption`],
+    /// [`Error::Refused`] with GDAL's message, [`Error::NotOpened`], [`Error::OpenOption`],
     /// [`Error::Slow`], [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
         path_check::check(&self.loaded, path)?;
         open_timeout::open(&self.loaded, path, options)
     }
 
-    /// Has GDAL read files through their caller.
+    /// Lets GDAL read files through this crate's user.
     ///
     /// # Errors
     /// [`Error::Refused`].
@@ -101,31 +100,32 @@ impl Library {
         Ok(Mount(Mounted::new(self.loaded.clone(), files)))
     }
 
-    /// A reference system by its text.
+    /// Returns a reference system by its text.
     ///
     /// # Errors
-    /// [`Error::Refused`] in GDAL's words, also where it is neither geographic nor projected;
+    /// [`Error::Refused`] with GDAL's message, also if it is neither geographic nor projected;
     /// [`Error::ZeroByte`].
     pub fn reference_of_text(&self, text: &str) -> Result<SpatialReference, Error> {
         SpatialReference::of_text(&self.loaded, text)
     }
 
-    /// A reference system by its code of EPSG's.
+    /// Returns a reference system by its EPSG code.
     ///
     /// # Errors
-    /// [`Error::Refused`] in GDAL's words.
+    /// [`Error::Refused`] with GDAL's message.
     pub fn reference_of_epsg(&self, code: u16) -> Result<SpatialReference, Error> {
         SpatialReference::of_epsg(&self.loaded, code)
     }
 
-    /// Opens what a driver or an archive names, as `NETCDF:"ocean.nc":depth` of a file that was
-    /// opened, or `/vsizip/{tiles.zip}/a.tif`.
+    /// Opens a part by a driver's or an archive's name, as `NETCDF:"ocean.nc":depth` of an open
+    /// file, or `/vsizip/{tiles.zip}/a.tif`.
     ///
     /// # Errors
-    /// As [`open`](Self::open), but nothing is looked at before.
+    /// As [`open`](Self::open), but without checks before opening.
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
         let dataset = open_timeout::open(&self.loaded, Path::new(name), options)?;
-        // One on disk is looked into; here, it may name pipes, devices and addresses.
+        // A VRT on disk is checked before; in an archive, it could reference pipes, devices and
+        // URLs.
         let is_in_archive = name.starts_with("/vsi") && !name.starts_with(PREFIX);
         match is_in_archive && dataset.driver() == "VRT" {
             true => Err(Error::NotOpened {

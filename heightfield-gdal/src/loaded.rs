@@ -11,28 +11,28 @@ use crate::settings::Settings;
 use crate::text::{from_c, to_c};
 use crate::version::Version;
 
-/// Names the library itself, before all places where it is looked for.
+/// Environment variable with the library's path, which has priority over all other places.
 const NAMED_BY: &str = "GDAL_LIBRARY";
-/// Numbers of the library's interface on Linux, newest first: 3.4 has 30, and each minor version
-/// one more.
+/// Numbers of the library's interface on Linux: 30 for GDAL 3.4, and one more for each minor
+/// version.
 const SONAMES: std::ops::RangeInclusive<u32> = 30..=60;
 
-/// A libgdal that is loaded, with its functions.
+/// A loaded libgdal with its functions.
 pub(crate) struct Loaded {
     pub(crate) functions: Functions,
     pub(crate) path: PathBuf,
     pub(crate) version: Version,
-    // Last: the functions are its.
+    // Last, because the functions belong to it.
     library: libloading::Library,
 }
 
 thread_local! {
-    /// True if HDF5 is silent on this thread.
+    /// True if HDF5 is silenced on this thread.
     static IS_SILENT: Cell<bool> = const { Cell::new(false) };
 }
 
 impl Loaded {
-    /// Loads the library, or returns the one that is loaded.
+    /// Loads the library, or returns the loaded one.
     pub(crate) fn load(settings: Settings) -> Result<Arc<Self>, Error> {
         static LOADED: Mutex<Option<Arc<Loaded>>> = Mutex::new(None);
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -50,7 +50,7 @@ impl Loaded {
             path: path.clone(),
             function,
         };
-        // SAFETY: it calls itself libgdal, or the user does.
+        // SAFETY: the library is libgdal by its file name, or by the user's statement.
         let number = unsafe { version_number(&library) }.map_err(incomplete)?;
         let version = number.parse().map(Version::of);
         let version = match version {
@@ -60,10 +60,10 @@ impl Loaded {
                 return Err(Error::Version { path, version });
             }
         };
-        // SAFETY: as above; it is kept beside the functions.
+        // SAFETY: as above; it is stored beside the functions.
         let functions = unsafe { Functions::of(&library) }.map_err(incomplete)?;
         settings.apply(&functions)?;
-        // SAFETY: once, before anything is opened.
+        // SAFETY: called once, before anything is opened.
         unsafe { (functions.GDALAllRegister)() };
         Ok(Self {
             functions,
@@ -73,7 +73,7 @@ impl Loaded {
         })
     }
 
-    /// Prepares the present thread for calls that open or read.
+    /// Prepares the current thread for calls that open or read.
     pub(crate) fn prepare_thread(&self) {
         if !IS_SILENT.replace(true) {
             // SAFETY: the library is GDAL's.
@@ -81,12 +81,12 @@ impl Loaded {
         }
     }
 
-    /// An error with the last message of GDAL on this thread.
+    /// Returns an error with GDAL's last message on this thread.
     pub(crate) fn refused(&self, otherwise: &str) -> Error {
-        // SAFETY: the text stays until the next call on this thread, and is copied.
+        // SAFETY: the text is valid until the next call on this thread, and is copied.
         let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
         let said = said.unwrap_or_else(|| otherwise.to_owned());
-        // The text may quote the file: it must not steer a terminal.
+        // The text may quote the file, and must not control a terminal.
         let plain = |c: char| match c {
             '\n' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
@@ -95,10 +95,10 @@ impl Loaded {
         Error::Refused(said.trim().chars().map(plain).collect())
     }
 
-    /// An item of the metadata of a dataset or band.
+    /// Returns an item of the metadata of a dataset or band.
     ///
     /// # Safety
-    /// The handle is of an open dataset.
+    /// The handle belongs to an open dataset.
     pub(crate) unsafe fn metadata(
         &self,
         of: Handle,
@@ -109,7 +109,7 @@ impl Loaded {
         let domain = domain
             .as_ref()
             .map_or(std::ptr::null(), |domain| domain.as_ptr());
-        // SAFETY: the texts stay for the call; what is given is copied.
+        // SAFETY: the texts are valid during the call; the result is copied.
         Ok(unsafe {
             from_c((self.functions.GDALGetMetadataItem)(
                 of,
@@ -120,21 +120,21 @@ impl Loaded {
     }
 }
 
-/// GDAL's number of its version, as 3060200.
+/// Returns GDAL's version number, as 3060200.
 ///
 /// # Safety
 /// The library is GDAL's.
 unsafe fn version_number(library: &libloading::Library) -> Result<String, &'static str> {
     type VersionInfo = unsafe extern "C" fn(*const c_char) -> *const c_char;
     const NAME: &str = "GDALVersionInfo";
-    // SAFETY: the type is that of GDAL's headers; the text that GDAL gives stays, and is copied.
+    // SAFETY: the type is that of GDAL's headers; the returned text is static, and is copied.
     unsafe {
         let info: libloading::Symbol<'_, VersionInfo> = library.get(NAME).map_err(|_| NAME)?;
         Ok(from_c(info(c"VERSION_NUM".as_ptr())).unwrap_or_default())
     }
 }
 
-/// The library that is named, or the first that is there.
+/// Loads the named library, or the first that exists.
 fn found(named: Option<OsString>) -> Result<(libloading::Library, PathBuf), Error> {
     let candidates = match named {
         Some(named) => vec![PathBuf::from(named)],
@@ -142,7 +142,7 @@ fn found(named: Option<OsString>) -> Result<(libloading::Library, PathBuf), Erro
     };
     let mut tried = String::new();
     for path in candidates {
-        // SAFETY: what libgdal does while it is loaded is registering itself.
+        // SAFETY: during loading, libgdal only registers itself.
         match unsafe { libloading::Library::new(&path) } {
             Ok(library) => return Ok((library, path)),
             Err(error) => tried = error.to_string(),
@@ -151,7 +151,7 @@ fn found(named: Option<OsString>) -> Result<(libloading::Library, PathBuf), Erro
     Err(Error::NotFound { tried })
 }
 
-/// Returns the possible paths of libgdal, in the order of attempts.
+/// Returns the possible paths of libgdal, in search order.
 fn candidates(conda: Option<OsString>) -> Vec<PathBuf> {
     let conda = conda.map(PathBuf::from);
     let mut paths = Vec::new();

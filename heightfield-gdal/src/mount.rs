@@ -1,5 +1,5 @@
-//! File systems of callers under names of GDAL's. Each VRT and MRF in them is looked at before GDAL
-//! reads it.
+//! File systems of this crate's user, under GDAL names. Each VRT and MRF in them is checked before
+//! GDAL reads it.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -13,12 +13,12 @@ use crate::file_system::{FileSystem, PREFIX, ReadAt};
 use crate::loaded::Loaded;
 use crate::{mrf, vrt};
 
-/// A file system under names of GDAL's, until the last clone and the last
-/// [`Dataset`](crate::Dataset) in it are dropped.
+/// A file system under GDAL names, until the last clone and the last [`Dataset`](crate::Dataset) in
+/// it are dropped.
 #[derive(Clone)]
 pub struct Mount(pub(crate) Arc<Mounted>);
 
-/// State that all clones share.
+/// State shared by all clones.
 pub(crate) struct Mounted {
     number: u64,
     library: Arc<Loaded>,
@@ -29,24 +29,24 @@ pub(crate) struct Mounted {
 #[derive(Default)]
 struct State {
     fault: Option<io::Error>,
-    /// Depths of VRTs in others, by their names.
+    /// Nesting depths of VRTs, by their names.
     depths: HashMap<String, u32>,
-    /// Threads that wait for a file now, and the time of the first of them.
+    /// Number of threads that are waiting for a file, and the start of the first wait.
     waiting: u32,
     begun: Option<Instant>,
-    /// Time for which GDAL has waited for files.
+    /// Total time in which GDAL has waited for files.
     waited: Duration,
 }
 
-/// All file systems by their numbers.
+/// All file systems, by number.
 static MOUNTED: Mutex<BTreeMap<u64, Weak<Mounted>>> = Mutex::new(BTreeMap::new());
 
 fn mounted() -> MutexGuard<'static, BTreeMap<u64, Weak<Mounted>>> {
-    // Nothing that panics runs while this is held.
+    // No code that panics runs while the lock is held.
     MOUNTED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The file system that a name of GDAL's leads to, and the name there.
+/// Returns the file system of a GDAL name, and the name in it.
 pub(crate) fn at(name: &str) -> Option<(Arc<Mounted>, &str)> {
     let (_, rest) = name.split_once(PREFIX)?;
     let (number, name) = rest.split_once('/')?;
@@ -61,7 +61,7 @@ impl Mount {
         format!("{}{name}", self.0.root())
     }
 
-    /// Takes the reason for which a file could not be read since the last call.
+    /// Returns the reason why a file could not be read, since the last call.
     #[must_use]
     pub fn take_fault(&self) -> Option<io::Error> {
         self.0.take_fault()
@@ -97,7 +97,7 @@ impl Mounted {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // The same.
+        // As above.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -105,13 +105,13 @@ impl Mounted {
         self.state().fault.take()
     }
 
-    /// Returns the time for which GDAL has waited for files, until now.
+    /// Returns the total time in which GDAL has waited for files, including current waits.
     pub(crate) fn waited(&self) -> Duration {
         let state = self.state();
         state.waited + state.begun.map_or(Duration::ZERO, |begun| begun.elapsed())
     }
 
-    /// Reads, and notes how long that takes and what goes wrong.
+    /// Runs a read, and records its time and its error.
     fn read<T>(&self, read: impl FnOnce() -> io::Result<T>) -> Option<T> {
         let mut state = self.state();
         state.waiting += 1;
@@ -132,7 +132,7 @@ impl Mounted {
         None
     }
 
-    /// The file of a name; none where there is none, or it cannot be read.
+    /// Opens a file; `None` if it does not exist or cannot be read.
     pub(crate) fn open(&self, name: &str) -> Option<Box<dyn ReadAt>> {
         let name = plain(name)?;
         self.read(|| {
@@ -149,7 +149,7 @@ impl Mounted {
         })
     }
 
-    /// Checks that an MRF names files of this file system only.
+    /// Checks that an MRF references only files of this file system.
     fn check_mrf(&self, name: &str, file: &dyn ReadAt) -> io::Result<()> {
         if file.bytes() > mrf::MAX_BYTES {
             return Err(not_opened(name, mrf::too_large()));
@@ -160,7 +160,7 @@ impl Mounted {
         checked.map_err(|why| not_opened(name, why))
     }
 
-    /// A VRT that names files of this file system only.
+    /// Returns the text of a VRT if it references only files of this file system.
     fn own_vrt(&self, name: &str, file: &dyn ReadAt) -> io::Result<Text> {
         let refused = |why: String| not_opened(name, why);
         if file.bytes() > vrt::MAX_BYTES {
@@ -193,13 +193,13 @@ impl Mounted {
         Ok(Text(text.into_bytes()))
     }
 
-    /// The names of the files beside one, if they are known.
+    /// Returns the names of the files beside a file, if they are known.
     pub(crate) fn beside(&self, name: &str) -> Option<Vec<String>> {
         let name = plain(name)?;
         self.read(|| self.files.beside(&name))
     }
 
-    /// Bytes of a file that is open.
+    /// Reads bytes of an open file.
     pub(crate) fn read_at(&self, file: &dyn ReadAt, at: u64, count: usize) -> Option<Vec<u8>> {
         let read = self.read(|| file.read_at(at, count));
         read.filter(|bytes| bytes.len() == count)
@@ -229,19 +229,19 @@ impl ReadAt for Text {
     }
 }
 
-/// The refusal of a file.
+/// Returns the error for a rejected file.
 fn not_opened(name: &str, why: String) -> io::Error {
     let path = name.into();
     io::Error::other(Error::NotOpened { path, why })
 }
 
-/// Returns true if an error says that there is no such file.
+/// Returns true if the file does not exist.
 fn is_missing(error: &io::Error) -> bool {
     use io::ErrorKind::{NotFound, PermissionDenied};
     matches!(error.kind(), NotFound | PermissionDenied)
 }
 
-/// A name without `.` and `..`; none of a folder, and of what lies outside of the root.
+/// Normalises a name: removes `.` and `..`. `None` for a folder, or outside the root.
 fn plain(name: &str) -> Option<String> {
     let mut parts = Vec::new();
     for part in name.split('/') {

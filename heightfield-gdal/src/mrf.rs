@@ -1,19 +1,19 @@
-//! Names in an MRF, whose header names the files with its samples and their index.
+//! File names in an MRF's header: its samples and their index.
 
 use crate::error::Error;
 use crate::loaded::Loaded;
 use crate::xml;
 
-/// GDAL tells an MRF by its first bytes.
+/// GDAL recognises an MRF by its first bytes.
 const SIGN: &[u8] = b"<MRF_META";
-/// A longer header is none.
+/// Max size of a header, bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 20;
-/// Elements that name a file beside the header.
+/// Elements with names of files beside the header.
 const BESIDE: [&str; 2] = ["DataFile", "IndexFile"];
-/// The element with another raster, of which GDAL writes a copy.
+/// The element with another raster, which GDAL copies.
 const COPIED: &str = "Source";
 
-/// Returns true if a file is an MRF, by its beginning.
+/// Returns true if a file's first bytes are an MRF's.
 pub(crate) fn begins(head: &[u8]) -> bool {
     head.windows(SIGN.len()).any(|part| part == SIGN)
 }
@@ -22,11 +22,11 @@ pub(crate) fn too_large() -> String {
     format!("an MRF whose header has more than {MAX_BYTES} bytes")
 }
 
-/// Checks that the header of an MRF at a server names nothing but files beside it: GDAL opens other
-/// names on this computer, some of them from the folder in which the program runs.
+/// Checks that the header of an MRF on a server references only files beside it: GDAL opens other
+/// names on this computer, some of them in the program's current folder.
 ///
 /// # Errors
-/// [`Error::Refused`], [`Error::ZeroByte`]; as a text, what it names and what to do.
+/// [`Error::Refused`], [`Error::ZeroByte`]; as a text, the referenced file and a remedy.
 pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>, Error> {
     // GDAL stops at a zero byte, too.
     let header = header.replace('\0', " ");
@@ -46,7 +46,7 @@ pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>
     Ok(Ok(()))
 }
 
-/// Returns true if a name leads neither to the root, nor out of the MRF's folder.
+/// Returns true if a name is neither absolute nor outside the MRF's folder.
 fn is_beside(name: &str) -> bool {
     let mut parts = name.split(['/', '\\']);
     !name.contains(':') && parts.all(|part| !part.is_empty() && !part.starts_with('.'))

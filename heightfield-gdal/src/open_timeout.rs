@@ -1,4 +1,4 @@
-//! A bound on the time that GDAL takes to open a file: some files lead a driver round in circles.
+//! A time limit for opening a file with GDAL: some files cause an endless loop in a driver.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,15 +12,15 @@ use crate::loaded::Loaded;
 use crate::mount;
 use crate::pending_calls::Call;
 
-/// A VRT of 26,000 files opens within a second. The time in which GDAL waits for its caller to read
-/// a file is not counted.
+/// Time limit for opening, without GDAL's waits for files from the caller. A VRT of 26,000 files
+/// opens within a second.
 const OPEN_WITHIN: Duration = Duration::from_secs(6);
-/// The time that is not counted, at most: one request ends in less.
+/// Max time of waits that is not counted: a single request takes less.
 const WAIT_WITHIN: Duration = Duration::from_secs(120);
-/// Between two looks at the time that is not counted.
+/// Interval between checks of the time.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Opens a raster in a thread of its own, which is left behind where it does not come to an end.
+/// Opens a raster in its own thread, which is abandoned if it does not end.
 ///
 /// # Errors
 /// As [`Dataset::open`]; [`Error::Slow`].
@@ -58,7 +58,7 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     Err(slow())
 }
 
-/// The time that is left to open a file, of which some was waiting for its caller.
+/// Returns the time left for opening; `waited` is the time of waits for the caller.
 fn left(elapsed: Duration, waited: Duration) -> Duration {
     (OPEN_WITHIN + waited.min(WAIT_WITHIN)).saturating_sub(elapsed)
 }

@@ -1,5 +1,5 @@
-//! Checks before GDAL opens a file: GDAL would wait for a pipe without end, start a
-//! device, and follow a VRT to whatever that names.
+//! Checks before GDAL opens a file: GDAL would wait for a pipe for ever, start a device, and open
+//! all files that a VRT references.
 
 use std::collections::HashSet;
 use std::fs::{self, File, FileType};
@@ -11,7 +11,7 @@ use crate::loaded::Loaded;
 use crate::vrt;
 use crate::xml::Text;
 
-/// Checks that a file, what lies beside it and what it names as a VRT are regular files.
+/// Checks that a file, its neighbours and the files that a VRT references are regular files.
 ///
 /// # Errors
 /// [`Error::NotOpened`].
@@ -25,7 +25,7 @@ pub(crate) fn check(library: &Loaded, path: &Path) -> Result<(), Error> {
     names.follow(path)
 }
 
-/// A walk through the files that VRTs name.
+/// A traversal of the files that VRTs reference.
 struct Names<'l> {
     library: &'l Loaded,
     seen: HashSet<PathBuf>,
@@ -53,7 +53,7 @@ impl Names<'_> {
         Ok(())
     }
 
-    /// The files that a text names, which were not looked at before.
+    /// Returns the new files in a text.
     fn files_of(&mut self, named: &Text, folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let mut found = Vec::new();
         for part in named.parts() {
@@ -76,7 +76,7 @@ impl Names<'_> {
     }
 }
 
-/// The text of a VRT; none where a file is something else.
+/// Returns the text of a VRT; `None` for another file.
 fn text_of_vrt(path: &Path) -> Result<Option<String>, Error> {
     let Ok(mut file) = File::open(path) else {
         return Ok(None);
@@ -97,7 +97,7 @@ fn text_of_vrt(path: &Path) -> Result<Option<String>, Error> {
     }
 }
 
-/// GDAL opens files beside this one whose names begin as its does.
+/// Checks files beside this one whose names begin like its own, because GDAL opens them.
 fn check_siblings(path: &Path) -> Result<(), Error> {
     let stem = |path: &Path| {
         let stem = path.file_stem().unwrap_or_default();
@@ -124,7 +124,7 @@ fn check_siblings(path: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that what is at a path, if anything, is a file or a folder.
+/// Checks that a path, if it exists, is a regular file or a folder.
 fn check_kind(path: &Path) -> Result<(), Error> {
     match fs::metadata(path).map(|metadata| metadata.file_type()) {
         Ok(kind) if !kind.is_file() && !kind.is_dir() => refused(

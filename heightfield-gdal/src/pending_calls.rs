@@ -1,13 +1,13 @@
-//! Calls of GDAL that have not returned. GDAL's own end would wait for them.
+//! GDAL calls that have not returned. GDAL's exit handlers would wait for them.
 
 use std::ffi::c_int;
 use std::io::Write;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Calls of GDAL that have not returned.
+/// Number of GDAL calls that have not returned.
 static CALLS: AtomicUsize = AtomicUsize::new(0);
 
-/// A call of GDAL, until it is dropped.
+/// A GDAL call, until it is dropped.
 pub(crate) struct Call(());
 
 impl Call {
@@ -24,17 +24,17 @@ impl Drop for Call {
 }
 
 unsafe extern "C" {
-    /// Ends the process without what libraries do at its end.
+    /// Ends the process without exit handlers.
     fn _exit(code: c_int) -> !;
 }
 
-/// Ends the process with an exit code if a call of GDAL has not returned: GDAL's own end would wait
-/// for it. Else does nothing.
+/// Ends the process with an exit code if a GDAL call has not returned, because GDAL's exit handlers
+/// would wait for it. Otherwise has no effect.
 pub fn exit_if_stuck(code: u8) {
     if CALLS.load(Ordering::Acquire) > 0 {
-        // The process ends: an error here has no reader.
+        // The process ends, so errors cannot be reported.
         let _ = (std::io::stdout().flush(), std::io::stderr().flush());
-        // SAFETY: it does not return, and nothing of this process is used after it.
+        // SAFETY: it does not return, and nothing in this process is used after it.
         unsafe { _exit(code.into()) }
     }
 }

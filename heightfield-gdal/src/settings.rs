@@ -1,4 +1,4 @@
-//! GDAL's own settings, all of them in one place.
+//! All of GDAL's own settings.
 
 use std::ffi::c_void;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -7,32 +7,32 @@ use crate::error::Error;
 use crate::functions::Functions;
 use crate::text::to_c;
 
-/// Drivers that ask a server or a data base by themselves.
+/// Drivers that contact a server or a database themselves.
 const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI DAAS \
                        PostGISRaster GeoRaster";
 
-/// Which addresses GDAL may fetch, by how they end.
+/// Setting for the URLs that GDAL may fetch, by their endings.
 const FETCHED: &str = "CPL_VSIL_CURL_ALLOWED_EXTENSIONS";
 
-/// Settings of GDAL. They are one for the process: those of the first that loads it hold.
+/// Settings of GDAL. They apply to the whole process: those of the first load are used.
 ///
-/// | of GDAL | set to | so that |
+/// | GDAL setting | value | effect |
 /// |---|---|---|
 /// | `GDAL_CACHEMAX` | [`cache_bytes`](Self::cache_bytes) | its cache is bounded |
 /// | `GDAL_MAX_DATASET_POOL_SIZE` | 64 | a VRT opens few files at once |
 /// | `GDAL_NUM_THREADS` | 1 | it decodes on the caller's thread |
 /// | `GDAL_VRT_ENABLE_PYTHON` | `NO` | a VRT runs no program |
-/// | `GDAL_SKIP` | drivers of servers and data bases | a file leads to no network |
-/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless the environment has it | the same |
-/// | `CPL_VSIL_GZIP_WRITE_PROPERTIES` | `NO` | nothing is written beside an archive |
+/// | `GDAL_SKIP` | drivers of servers and databases | a file causes no network access |
+/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless set in the environment | the same |
+/// | `CPL_VSIL_GZIP_WRITE_PROPERTIES` | `NO` | no file is written beside an archive |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// Bytes of blocks that GDAL keeps.
+    /// Max size of GDAL's block cache, bytes.
     pub cache_bytes: u64,
 }
 
 impl Default for Settings {
-    /// 64 MiB.
+    /// Returns 64 MiB for the cache.
     fn default() -> Self {
         Self {
             cache_bytes: 64 << 20,
@@ -40,15 +40,15 @@ impl Default for Settings {
     }
 }
 
-/// Returns true if the user's environment says what may be fetched.
+/// Returns true if the user's environment defines which URLs may be fetched.
 pub(crate) fn is_fetching_allowed() -> bool {
     std::env::var_os(FETCHED).is_some()
 }
 
 impl Settings {
-    /// Sets them, before drivers are registered.
+    /// Sets the options, before drivers are registered.
     pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
-        // No address ends so: the number is random.
+        // The number is random, so no URL ends like this.
         let number = RandomState::new().build_hasher().finish();
         let nothing = format!(".nothing-is-fetched-{number:016x}");
         let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
@@ -65,11 +65,11 @@ impl Settings {
         }
         for (name, value) in options {
             let (name, value) = (to_c(name)?, to_c(value)?);
-            // SAFETY: both are copied by GDAL.
+            // SAFETY: GDAL copies both.
             unsafe { (functions.CPLSetConfigOption)(name.as_ptr(), value.as_ptr()) };
         }
         let quiet = functions.CPLQuietErrorHandler as *const c_void;
-        // SAFETY: GDAL's own handler, which says nothing on standard error.
+        // SAFETY: GDAL's own handler, which prints nothing.
         unsafe { (functions.CPLSetErrorHandler)(quiet) };
         Ok(())
     }

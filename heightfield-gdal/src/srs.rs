@@ -1,4 +1,4 @@
-//! Reference systems of PROJ, by their text or code.
+//! Reference systems from PROJ, by their text or code.
 
 use std::ffi::{CStr, c_char, c_int};
 use std::ptr;
@@ -10,17 +10,17 @@ use crate::text::{from_c, to_c};
 
 /// `OGRERR_NONE`.
 const FINE: c_int = 0;
-/// A match at least as sure as this, percent, is the same system under another name.
+/// Min confidence, percent, at which a match counts as the same system.
 const SURE: c_int = 90;
 
-/// A horizontal reference system as PROJ describes it.
+/// A horizontal reference system, as described by PROJ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpatialReference {
     /// As `NAD83 / UTM zone 11N`.
     pub name: String,
-    /// EPSG's code, where the system is one of EPSG's.
+    /// EPSG's code, if it has one.
     pub epsg: Option<u32>,
-    /// EPSG's code of the geographic system that it stands on.
+    /// EPSG's code of its geographic system.
     pub base_epsg: Option<u32>,
     /// Name of its projection's method, as `New_Zealand_Map_Grid`.
     pub method: Option<String>,
@@ -28,23 +28,23 @@ pub struct SpatialReference {
     pub datum: Option<String>,
     /// Unit of its coordinates.
     pub unit: AxisUnit,
-    /// The projection as PROJ writes it; none where PROJ has no short form of it.
+    /// The projection in PROJ's syntax; `None` if it cannot be written so.
     pub proj: Option<String>,
     /// Semi-major axis of its ellipsoid, m, and inverse flattening, 0 for a sphere.
     pub ellipsoid: [f64; 2],
-    /// Degrees east of Greenwich at which longitudes begin.
+    /// Prime meridian, degrees east of Greenwich.
     pub meridian: f64,
-    /// Three or seven parameters of a shift to WGS 84, where the text has them: m, seconds of arc,
-    /// parts in a million, in the position vector's sense.
+    /// Three or seven parameters of a shift to WGS 84, if the text has them: m, arc seconds, parts
+    /// per million, with the position vector convention.
     pub to_wgs84: Option<[f64; 7]>,
 }
 
 /// Unit of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisUnit {
-    /// An angle of so many radians.
+    /// An angle, in radians.
     Radians(f64),
-    /// A length of so many metres.
+    /// A length, in metres.
     Metres(f64),
 }
 
@@ -56,23 +56,24 @@ struct Owned<'l> {
 
 impl Drop for Owned<'_> {
     fn drop(&mut self) {
-        // SAFETY: it was made by GDAL, and is let go once.
+        // SAFETY: created by GDAL, and freed once.
         unsafe { (self.loaded.functions.OSRDestroySpatialReference)(self.handle) };
     }
 }
 
 impl SpatialReference {
-    /// By its text (WKT of any kind).
+    /// Creates a system from its text (WKT of any kind).
     pub(crate) fn of_text(loaded: &Loaded, text: &str) -> Result<Self, Error> {
         let text = to_c(text)?;
         let system = Owned::new(loaded)?;
         let mut at = text.as_ptr().cast_mut();
-        // SAFETY: GDAL moves the pointer behind what it has read, and writes nothing.
+        // SAFETY: GDAL advances the pointer past the text that it has read, and does not write to
+        // it.
         let said = unsafe { (loaded.functions.OSRImportFromWkt)(system.handle, &raw mut at) };
         system.read(said)
     }
 
-    /// By its code.
+    /// Creates a system from its code.
     pub(crate) fn of_epsg(loaded: &Loaded, code: u16) -> Result<Self, Error> {
         let system = Owned::new(loaded)?;
         // SAFETY: the system was made above.
@@ -83,7 +84,7 @@ impl SpatialReference {
 
 impl<'l> Owned<'l> {
     fn new(loaded: &'l Loaded) -> Result<Self, Error> {
-        // SAFETY: null stands for a system of nothing.
+        // SAFETY: null means an empty system.
         let handle = unsafe {
             (loaded.functions.CPLErrorReset)();
             (loaded.functions.OSRNewSpatialReference)(ptr::null())
@@ -101,8 +102,8 @@ impl<'l> Owned<'l> {
             self.loaded
                 .refused("PROJ does not know the reference system")
         };
-        // SAFETY: here and below, the system stays, and each function reads it; null stands for a name
-        // that is not wanted, and numbers have room.
+        // SAFETY: here and below, the system exists, and each function only reads it; null means an
+        // unneeded name, and the pointers to numbers are valid.
         let kind = unsafe {
             [
                 (functions.OSRIsGeographic)(handle),
@@ -123,7 +124,7 @@ impl<'l> Owned<'l> {
         };
         let mut said = FINE;
         let mut to_wgs84 = [0.0; 7];
-        // SAFETY: as above; the text of a name is copied.
+        // SAFETY: as above; the name is copied.
         let (name, major, inverse, meridian, shift) = unsafe {
             (
                 from_c((functions.OSRGetName)(handle)),
@@ -148,7 +149,7 @@ impl<'l> Owned<'l> {
     }
 
     fn attribute(&self, name: &CStr) -> Option<String> {
-        // SAFETY: the system stays; the text is copied.
+        // SAFETY: the system exists; the text is copied.
         unsafe {
             from_c((self.loaded.functions.OSRGetAttrValue)(
                 self.handle,
@@ -158,18 +159,18 @@ impl<'l> Owned<'l> {
         }
     }
 
-    /// The geographic system that it stands on.
+    /// Returns its geographic system.
     fn base(&self) -> Option<Self> {
-        // SAFETY: the system stays; the copy is a new one.
+        // SAFETY: the system exists; the copy is a new one.
         let handle = unsafe { (self.loaded.functions.OSRCloneGeogCS)(self.handle) };
         (!handle.is_null()).then_some(Self { handle, ..*self })
     }
 
-    /// As PROJ writes it.
+    /// Returns the system in PROJ's syntax.
     fn proj(&self) -> Option<String> {
         let functions = &self.loaded.functions;
         let mut text: *mut c_char = ptr::null_mut();
-        // SAFETY: GDAL hands over a text, which is copied and let go.
+        // SAFETY: GDAL returns a text, which is copied and freed.
         unsafe {
             let said = (functions.OSRExportToProj4)(self.handle, &raw mut text);
             let copy = from_c(text);
@@ -178,21 +179,22 @@ impl<'l> Owned<'l> {
         }
     }
 
-    /// EPSG's code, as it is stated, or that of the one system that it surely is.
+    /// Returns EPSG's code as stated, or the code of a single certain match.
     fn epsg(&self) -> Option<u32> {
         self.stated(ptr::null()).or_else(|| self.matching())
     }
 
-    /// The geographic system of the datum's code: in EPSG's oldest thousand, that less 2000.
+    /// Returns the code of the datum's geographic system: for datum codes in EPSG's oldest range,
+    /// the code less 2000.
     fn usual_base(&self) -> Option<u32> {
         let datum = self.stated(c"DATUM".as_ptr())?;
         (6000..7000).contains(&datum).then(|| datum - 2000)
     }
 
-    /// EPSG's code of a part, or of the system itself (null).
+    /// Returns the stated EPSG code of a part, or of the system itself (null).
     fn stated(&self, part: *const c_char) -> Option<u32> {
         let functions = &self.loaded.functions;
-        // SAFETY: the part is null or a text that stays; texts are copied.
+        // SAFETY: the part is null or a valid text; texts are copied.
         let (authority, code) = unsafe {
             (
                 from_c((functions.OSRGetAuthorityName)(self.handle, part)),
@@ -206,8 +208,8 @@ impl<'l> Owned<'l> {
     fn matching(&self) -> Option<u32> {
         let functions = &self.loaded.functions;
         let (mut count, mut sureness) = (0, ptr::null_mut());
-        // SAFETY: GDAL hands over a list of `count` systems and one of as many numbers, which are let go
-        // below.
+        // SAFETY: GDAL returns a list of `count` systems and one of as many numbers, which are
+        // freed below.
         let found = unsafe {
             (functions.OSRFindMatches)(self.handle, ptr::null(), &raw mut count, &raw mut sureness)
         };
@@ -216,7 +218,8 @@ impl<'l> Owned<'l> {
         }
         let mut codes = vec![];
         for at in 0..count.max(0) as usize {
-            // SAFETY: both lists are as long; the system belongs to the list and is not dropped.
+            // SAFETY: both lists have `count` entries; the system belongs to the list and is not
+            // dropped.
             unsafe {
                 if *sureness.add(at) >= SURE {
                     let handle = *found.add(at);
@@ -225,7 +228,7 @@ impl<'l> Owned<'l> {
                 }
             }
         }
-        // SAFETY: what GDAL handed over, once.
+        // SAFETY: GDAL's lists, freed once.
         unsafe {
             (functions.OSRFreeSRSArray)(found);
             (functions.VSIFree)(sureness.cast());

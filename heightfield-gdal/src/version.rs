@@ -5,23 +5,23 @@ use std::fmt;
 /// A version of GDAL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
-    /// 3 of 3.6.2.
+    /// For example, 3 in 3.6.2.
     pub major: u32,
-    /// 6 of 3.6.2.
+    /// For example, 6 in 3.6.2.
     pub minor: u32,
-    /// 2 of 3.6.2.
+    /// For example, 2 in 3.6.2.
     pub patch: u32,
 }
 
 impl Version {
-    /// The oldest that is read.
+    /// The oldest supported version.
     pub const OLDEST: Self = Self {
         major: 3,
         minor: 4,
         patch: 0,
     };
 
-    /// GDAL's number, as 3060200.
+    /// Converts GDAL's number, as 3060200.
     pub(crate) fn of(number: u32) -> Self {
         Self {
             major: number / 1_000_000,

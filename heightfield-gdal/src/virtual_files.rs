@@ -1,4 +1,4 @@
-//! Contents of archives, as files of GDAL's own file systems.
+//! Contents of archives, through GDAL's own file systems.
 
 use std::path::Path;
 
@@ -10,14 +10,15 @@ use crate::text::{list_from_c, path_to_c};
 const END: i32 = 2;
 
 impl Library {
-    /// Names of the files in a folder of GDAL's, as `/vsizip/{tiles.zip}`, and in those in it.
+    /// Returns the names of the files in a GDAL folder, as `/vsizip/{tiles.zip}`, and its
+    /// subfolders.
     ///
     /// # Errors
     /// [`Error::Refused`], [`Error::ZeroByte`].
     pub fn entries(&self, folder: &Path) -> Result<Vec<String>, Error> {
         let path = path_to_c(folder)?;
         let functions = &self.loaded.functions;
-        // SAFETY: the path stays for the call; the list is copied, and given back once.
+        // SAFETY: the path is valid during the call; the list is copied, and freed once.
         let names = unsafe {
             (functions.CPLErrorReset)();
             let list = (functions.VSIReadDirRecursive)(path.as_ptr());
@@ -32,12 +33,13 @@ impl Library {
         Ok(files.collect())
     }
 
-    /// Bytes of a file, also of one in an archive; none where it cannot be read.
+    /// Returns the size of a file in bytes, also in an archive; `None` if it cannot be read.
     #[must_use]
     pub fn length(&self, path: &Path) -> Option<u64> {
         let path = path_to_c(path).ok()?;
         let functions = &self.loaded.functions;
-        // SAFETY: the texts stay for the call; the file is closed once, and not used afterwards.
+        // SAFETY: the texts are valid during the call; the file is closed once, and not used
+        // afterwards.
         unsafe {
             let file = (functions.VSIFOpenL)(path.as_ptr(), c"rb".as_ptr());
             if file.is_null() {

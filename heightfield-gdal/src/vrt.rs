@@ -1,4 +1,4 @@
-//! Names in a VRT.
+//! File names in a VRT.
 
 use std::fs;
 use std::path::Path;
@@ -9,21 +9,20 @@ use crate::loaded::Loaded;
 use crate::settings;
 use crate::xml::{self, Text};
 
-/// VRTs inside VRTs.
+/// Max nesting depth of VRTs.
 pub(crate) const MAX_NESTING: u32 = 16;
-/// A VRT of 40,000 files has half as many bytes.
+/// Max size of a VRT, bytes; one of 40,000 files has half as many.
 pub(crate) const MAX_BYTES: u64 = 32 << 20;
-/// Files that a VRT names, directly or by another VRT.
+/// Max number of files that a VRT references, directly or through others.
 pub(crate) const MAX_FILES: usize = 1 << 17;
-/// GDAL tells a VRT by its first bytes.
+/// GDAL recognises a VRT by this number of first bytes.
 pub(crate) const HEAD_BYTES: u64 = 1024;
-/// A longer text is no name of a file.
+/// Max length of a file name, bytes.
 const MAX_NAME: usize = 4096;
 const SIGN: &str = "<VRTDataset";
-/// Signs that divide a name of a driver's or of a virtual file system's, as in
-/// `NETCDF:"ocean.nc":depth`.
+/// Separators in names for drivers and virtual file systems, as in `NETCDF:"ocean.nc":depth`.
 const DIVIDERS: [char; 7] = [':', '"', ',', '?', '&', '{', '}'];
-/// File systems of GDAL's that ask a server.
+/// GDAL's file systems on servers.
 const SERVERS: [&str; 9] = [
     "/vsicurl",
     "/vsis3",
@@ -35,10 +34,10 @@ const SERVERS: [&str; 9] = [
     "/vsihdfs",
     "/vsiwebhdfs",
 ];
-/// File systems that no file may name: standard input, and those of another file.
+/// File systems that no file may reference: standard input, and this crate's own.
 const REFUSED: [&str; 2] = ["/vsistdin", PREFIX];
 
-/// Returns true if a file is a VRT, by its beginning.
+/// Returns true if a file's first bytes are a VRT's.
 pub(crate) fn begins(head: &[u8]) -> bool {
     head.windows(SIGN.len()).any(|part| part == SIGN.as_bytes())
 }
@@ -51,7 +50,8 @@ pub(crate) fn too_deep(depth: u32) -> String {
     format!("VRTs lie in each other {depth} deep")
 }
 
-/// All texts of a VRT that may name files, also of VRTs in their place. Most others are numbers.
+/// Returns all texts in a VRT that may be file names, also in embedded VRTs. Most others are
+/// numbers.
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
@@ -83,17 +83,17 @@ impl Text {
         self.value.len() <= MAX_NAME && (self.is_file_name() || self.value.parse::<f64>().is_err())
     }
 
-    /// The parts that may be names of files.
+    /// Returns the parts that may be file names.
     pub(crate) fn parts(&self) -> impl Iterator<Item = &str> {
         let whole = self.value.as_str();
         let parts = whole.split(DIVIDERS).chain([whole]);
         parts.filter(|part| !part.is_empty())
     }
 
-    /// Checks that it names nothing that is elsewhere, for a VRT on disk.
+    /// Checks, for a VRT on disk, that the text references no server.
     ///
     /// # Errors
-    /// The named file, and what to do.
+    /// The referenced file, and a remedy.
     pub(crate) fn check_here(&self) -> Result<(), String> {
         let shown = self.shown();
         let is_refused = |part: &str| REFUSED.iter().any(|refused| part.starts_with(refused));
@@ -108,11 +108,11 @@ impl Text {
         }
     }
 
-    /// The name of a file at the same server, relative to the VRT or with the root before it; none
-    /// of a text that is no name.
+    /// Returns the name of a file on the same server, relative to the VRT or with the root as
+    /// prefix; `None` if the text is not a file name.
     ///
     /// # Errors
-    /// The other named file, and what to do.
+    /// The file on another server or computer, and a remedy.
     pub(crate) fn at_server(&self, root: &str) -> Result<Option<&str>, String> {
         let value = self.value.as_str();
         if value.starts_with(root) {
@@ -133,7 +133,7 @@ impl Text {
         Ok(Some(value).filter(|_| self.is_file_name()))
     }
 
-    /// Returns true if it names what a driver would ask a server for.
+    /// Returns true if a driver would contact a server for it.
     fn is_address(&self) -> bool {
         let is_of_gdal = ["/vsi", "vrt://"]
             .iter()
@@ -143,7 +143,7 @@ impl Text {
         self.is_file_name() && (is_url || is_at_server)
     }
 
-    /// The value without what follows a URL, which may be a key.
+    /// Returns the value without a URL's query, which may be a key.
     fn shown(&self) -> &str {
         self.value.split('?').next().unwrap_or_default()
     }

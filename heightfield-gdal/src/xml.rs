@@ -1,4 +1,4 @@
-//! The texts of XML, by GDAL's own reader.
+//! The texts in XML, by GDAL's own parser.
 
 use crate::error::Error;
 use crate::functions::XmlNode;
@@ -13,14 +13,14 @@ const RELATIVE: &str = "relativeToVRT";
 /// A text of a VRT, which may name a file.
 #[derive(Debug)]
 pub(crate) struct Text {
-    /// The element or attribute that it is in.
+    /// Its element or attribute.
     pub(crate) node: String,
     pub(crate) value: String,
-    /// True if it is a name beside the VRT.
+    /// True if it is a name relative to the VRT.
     pub(crate) is_relative: bool,
 }
 
-/// The texts of XML, each with the name of the element or attribute that it is in.
+/// Returns the texts in XML, each with the name of its element or attribute.
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
@@ -28,7 +28,7 @@ pub(crate) fn texts(library: &Loaded, xml: &str) -> Result<Vec<Text>, Error> {
     let xml = to_c(xml)?;
     let functions = &library.functions;
     let mut texts = Vec::new();
-    // SAFETY: the nodes are GDAL's until they are given back, once; none is changed.
+    // SAFETY: GDAL owns the nodes until they are freed, once; none is changed.
     unsafe {
         (functions.CPLErrorReset)();
         let root = (functions.CPLParseXMLString)(xml.as_ptr());
@@ -56,12 +56,12 @@ pub(crate) fn texts(library: &Loaded, xml: &str) -> Result<Vec<Text>, Error> {
     Ok(texts)
 }
 
-/// Returns true if an element has the attribute with which a VRT says that a name is one beside it.
+/// Returns true if an element has the attribute that marks a name as relative to the VRT.
 ///
 /// # Safety
 /// The node is GDAL's.
 unsafe fn is_relative_to_vrt(element: &XmlNode) -> bool {
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         let mut child = element.child.as_ref();
         while let Some(node) = child {

@@ -1,4 +1,4 @@
-//! GDAL reads files through its caller.
+//! Reading of files by GDAL through this crate's user.
 
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
@@ -6,11 +6,11 @@ use std::sync::{Arc, Mutex};
 
 use heightfield_gdal::{Error, FileSystem, Library, Mount, ReadAt, Settings, Window};
 
-/// Files in memory, and what goes wrong with them.
+/// Files in memory, with injected faults.
 #[derive(Clone, Default)]
 struct Files {
     by_name: Arc<BTreeMap<String, Vec<u8>>>,
-    /// Names that no server answers for.
+    /// Names for which the server does not respond.
     silent: Arc<Mutex<Vec<String>>>,
     opened: Arc<Mutex<Vec<String>>>,
     roots: Vec<String>,
@@ -58,7 +58,7 @@ impl FileSystem for Files {
     }
 }
 
-/// ENVI's raw samples, 0 to 11 and as many more, with their header.
+/// Returns 12 of ENVI's raw samples, from `first` on, with their header.
 fn field(first: u32) -> [Vec<u8>; 2] {
     let samples = (0..12).map(|at| (first + at) as f32);
     let header = "ENVI\nsamples = 4\nlines = 3\nbands = 1\ndata type = 4\ninterleave = bsq\n\
@@ -99,7 +99,7 @@ fn mounted(vrts: &[(&str, Vec<u8>)]) -> Option<(Library, Mount, Files)> {
     Some((gdal, mount, files))
 }
 
-/// The last sample of a raster.
+/// Returns the last sample of a raster.
 fn last(gdal: &Library, name: &str) -> Result<f64, Error> {
     let dataset = gdal.open(name.as_ref(), &[])?;
     let window = Window {
@@ -189,7 +189,7 @@ fn what_a_file_names_on_this_computer_is_not_opened() {
     }
 }
 
-/// An MRF of 4 × 3 floats in one tile, as it is.
+/// Returns an uncompressed MRF of 4 × 3 floats in one tile.
 fn mrf(more: &str) -> Vec<u8> {
     format!(
         "<MRF_META><Raster><Size x=\"4\" y=\"3\" c=\"1\"/><PageSize x=\"4\" y=\"3\" c=\"1\"/>\
@@ -198,7 +198,7 @@ fn mrf(more: &str) -> Vec<u8> {
     .into_bytes()
 }
 
-/// The index of one tile of 12 floats.
+/// Returns the index of one tile of 12 floats.
 fn index() -> Vec<u8> {
     [0_u64, 48].into_iter().flat_map(u64::to_be_bytes).collect()
 }
@@ -294,7 +294,7 @@ fn a_file_that_cannot_be_read_is_a_fault_and_one_that_is_missing_is_none() {
     assert_eq!(fault, Some(ErrorKind::ConnectionAborted));
     assert!(last(&gdal, &mount.path("a/gone.vrt")).is_err());
     assert!(mount.take_fault().is_none());
-    // Neither a name outside nor a panic leads further than to an error.
+    // Names outside the root, and panics, only cause errors.
     for name in ["../a/west.dat", "", "a/", "a/../../x.dat", "panic.dat"] {
         assert!(last(&gdal, &mount.path(name)).is_err(), "{name}");
     }

@@ -1,4 +1,4 @@
-//! A libgdal of this machine reads a file that the test writes; without one it reports it.
+//! Reads a file that the test writes through this machine's libgdal; without one, reports that.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn gdal() -> Option<Library> {
         .ok()
 }
 
-/// ENVI's raw samples and their header: 4 × 3 floats, one of them no data.
+/// Writes ENVI's raw samples and their header: 4 × 3 floats, one of them no-data.
 fn write(folder: &Path) -> std::path::PathBuf {
     let path = folder.join("field.dat");
     let samples = (0..12).map(|at| if at == 5 { -1.0 } else { at as f32 });
@@ -92,7 +92,7 @@ fn what_cannot_be_opened_is_said_in_words() {
     assert!(matches!(zero, Error::ZeroByte(_)), "{zero}");
 }
 
-/// A VRT of one file that it names so.
+/// Writes a VRT of one file, referenced as `source`.
 fn vrt(folder: &Path, source: &str) -> std::path::PathBuf {
     let path = folder.join("named.vrt");
     let text = format!(

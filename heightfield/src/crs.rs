@@ -1,10 +1,10 @@
-//! Coordinate reference systems by EPSG code or as text: what they are called, their
-//! units, how long a unit is on the ground, and where that is on the globe.
+//! Coordinate reference systems by EPSG code or as text: their names, their units, the length of a
+//! unit on the ground, and positions on the globe.
 //!
-//! `crs-definitions` and two tables know the codes, `proj4rs` has the projections, and the
-//! shifts between datums come from `crs-definitions`. Texts without a code, systems that keys spell
-//! out and codes that are not known are described by libgdal's PROJ, where there is one (`by_gdal`).
-//! These crates are named in this folder only.
+//! The codes are in `crs-definitions` and two tables, the projections in `proj4rs`, and the shifts
+//! between datums in `crs-definitions`. Texts without a code, systems defined by keys and unknown
+//! codes are described by libgdal's PROJ, if it is installed (`by_gdal`). Only this folder uses
+//! these crates.
 
 mod by_gdal;
 mod datum;
@@ -27,24 +27,24 @@ use wkt::Node;
 /// A vertical reference system.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Vertical {
-    /// EPSG's code, where it is known.
+    /// EPSG's code, if it is known.
     pub(super) code: Option<u16>,
     /// Name of the vertical reference system, as `NAVD88 height (ft)`.
     pub(super) name: String,
-    /// Metres in its unit.
+    /// Metres in a unit of its heights.
     pub(super) metres: f64,
     /// True if its numbers grow downwards.
     pub(super) is_depth: bool,
 }
 
 impl Vertical {
-    /// The one that a text names beside a horizontal system.
+    /// Reads the vertical system in a text, beside a horizontal system.
     fn beside(root: &Node) -> Option<Self> {
         let node = root.child(&["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"])?;
         Self::of(node)
     }
 
-    /// The one that a node describes.
+    /// Reads the vertical system that a node describes.
     fn of(node: &Node) -> Option<Self> {
         let described = || {
             Some(Self {
@@ -89,7 +89,7 @@ mod tests {
             (26911, (386_000.0, 3_790_000.0), 1.000_240),
             (2056, (2_600_000.0, 1_200_000.0), 0.999_992),
             (3857, (0.0, 8_399_737.889_8), 0.500_8),
-            // NAD27 needs no grid of shifts for that.
+            // NAD27 needs no shift grid for that.
             (26711, (386_000.0, 3_790_000.0), 1.000_240),
         ];
         for (code, place, wanted) in cases {
@@ -218,11 +218,11 @@ mod tests {
             let off_m = 111_000.0 * east.hypot(found.1 - latitude);
             assert!(off_m < 1.0, "{code}: {off_m} m off");
         }
-        // Two urban grids of Colombia, whose projection is of no other map.
+        // Two urban grids of Colombia, whose projection no other system uses.
         assert_eq!(unplaced, [6255.0, 6275.0]);
     }
 
-    /// A unit beside a code counts, in a text as in keys.
+    /// A unit beside a code overrides the code's unit, in a text as in keys.
     #[test]
     fn unit_of_a_text_counts_beside_its_code() {
         let text = |unit: &str| {

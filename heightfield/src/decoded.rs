@@ -1,4 +1,4 @@
-//! Result of a decoder, and the conditions on it.
+//! Result of a decoder, and the checks on it.
 
 use std::cell::RefCell;
 
@@ -13,8 +13,7 @@ use super::storage::Storage;
 use super::suspicious_values::{MAX_HEIGHT, Outermost};
 use super::{Certainty, RasterError, VerticalDatum};
 
-/// Result of a decoder: samples in file order and all that the file says
-/// about them.
+/// Result of a decoder: samples in file order, and the file's metadata.
 #[derive(Clone, Debug)]
 pub(super) struct Decoded {
     /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
@@ -23,7 +22,7 @@ pub(super) struct Decoded {
     pub(super) columns: u32,
     /// Rows.
     pub(super) rows: u32,
-    /// Its samples, the file's first row first.
+    /// The samples, the file's first row first.
     pub(super) storage: Storage,
     /// True if the file's first row is the southernmost.
     pub(super) south_up: bool,
@@ -35,34 +34,34 @@ pub(super) struct Decoded {
     pub(super) scale: f64,
     /// See `scale`.
     pub(super) offset: f64,
-    /// The reference system, where the file states it.
+    /// The reference system, if the file states it.
     pub(super) system: Option<ReferenceSystem>,
-    /// Source of that.
+    /// Source of `system`.
     pub(super) system_from: Certainty,
     /// Place of the samples, if the file states it.
     pub(super) place: Option<Place>,
     /// Size of a cell, if the file states it.
     pub(super) cell: Option<CellSize>,
-    /// Its stored values are depths, which were turned into heights.
+    /// True if the stored values are depths, which were turned into heights.
     pub(super) are_depths: bool,
     /// Metres per vertical unit, if the file states it.
     pub(super) metres_per_vertical_unit: Option<f64>,
-    /// Source of that.
+    /// Source of `metres_per_vertical_unit`.
     pub(super) vertical_unit_from: Certainty,
-    /// Zero of the heights, where the file states it.
+    /// Zero of the heights, if the file states it.
     pub(super) vertical_datum: Option<VerticalDatum>,
-    /// Reason for which all samples are in memory, where the format could have left them in the file.
+    /// Reason why all samples are in memory, if the format could have left them in the file.
     pub(super) why_whole: Option<String>,
-    /// Their layout in the file.
+    /// The samples' layout in the file.
     pub(super) file_layout: FileLayout,
     /// Remarks for the user.
     pub(super) remarks: Vec<String>,
 }
 
-/// Columns and rows as numbers of samples that can be addressed.
+/// Converts columns and rows to `u32`.
 ///
 /// # Errors
-/// [`RasterError::AbsurdSize`] when there are more than a `u32` can count.
+/// [`RasterError::AbsurdSize`] if either exceeds a `u32`.
 pub(super) fn sides(columns: u64, rows: u64) -> Result<(u32, u32), RasterError> {
     match (u32::try_from(columns), u32::try_from(rows)) {
         (Ok(columns), Ok(rows)) => Ok((columns, rows)),
@@ -73,7 +72,7 @@ pub(super) fn sides(columns: u64, rows: u64) -> Result<(u32, u32), RasterError> 
 }
 
 impl Decoded {
-    /// Plain heights, north row first, with nothing else known.
+    /// Returns plain heights, north row first, without further metadata.
     pub(super) fn new(
         format: String,
         (columns, rows): (u32, u32),
@@ -105,8 +104,8 @@ impl Decoded {
 }
 
 impl Decoded {
-    /// Takes unit, datum and direction from a vertical reference system; `stated` are
-    /// the metres in a unit that the file states itself.
+    /// Sets unit, datum and direction from a vertical reference system; `stated` is the number of
+    /// metres in a unit, if the file states it.
     pub(super) fn set_vertical(&mut self, system: Option<Vertical>, stated: Option<f64>) {
         self.metres_per_vertical_unit = stated.or(system.as_ref().map(|system| system.metres));
         if let Some(system) = system {
@@ -131,8 +130,7 @@ impl Decoded {
         }
     }
 
-    /// Takes the vertical reference system with a code of EPSG's for what the format
-    /// counts heights from.
+    /// Sets the vertical datum to the EPSG system `code`, which the format implies.
     pub(super) fn set_vertical_datum(&mut self, code: u16) {
         let known = super::crs::vertical(code);
         self.vertical_datum = known.map(|system| VerticalDatum {
@@ -141,7 +139,7 @@ impl Decoded {
         });
     }
 
-    /// Takes the unit of the heights by its name, where the file states one.
+    /// Sets the unit of the heights by its name, if the file states one.
     pub(super) fn set_unit(&mut self, name: Option<&str>) {
         let Some(name) = name.filter(|name| !name.is_empty()) else {
             return;
@@ -152,7 +150,7 @@ impl Decoded {
         }
     }
 
-    /// Takes the metres in a unit of the heights from the user, whatever the file says.
+    /// Overrides the metres per vertical unit of the file with the user's.
     pub(super) fn with_vertical_unit(mut self, metres: Option<f64>) -> Self {
         if metres.is_some() {
             self.metres_per_vertical_unit = metres;
@@ -161,7 +159,7 @@ impl Decoded {
         self
     }
 
-    /// Says so where more samples are held in memory than would be of a file that can be read in
+    /// Adds a remark if more samples are in memory than would be for a file that is read in
     /// windows.
     pub(super) fn tell_if_whole(&mut self, most_bytes: u64) {
         if let Storage::Held { samples, .. } = &self.storage
@@ -177,9 +175,9 @@ impl Decoded {
         }
     }
 
-    /// Turns numbers that grow downwards into heights, and reports it.
+    /// Turns stored depths into heights, and adds a remark.
     pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
-        // Several facts of a file may say that it has depths.
+        // Several facts in a file may each mark it as depths.
         if std::mem::replace(&mut self.are_depths, true) {
             return;
         }
@@ -192,8 +190,8 @@ impl Decoded {
 }
 
 impl Decoded {
-    /// Checks what every format must satisfy, and summarises the heights. `no_data`
-    /// replaces what the file says.
+    /// Checks the requirements for every format, and summarises the heights. `no_data` overrides
+    /// the file's value.
     pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<Survey, RasterError> {
         let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
         if columns < 2 || rows < 2 {
@@ -231,21 +229,21 @@ impl Decoded {
         self.remarks.extend(doubts);
         match survey.summary.has_none() {
             true => Err(RasterError::AllNoData {
-                // Some were looked at twice.
+                // Some samples were read twice.
                 samples: survey.summary.holes.min(columns * rows),
             }),
             false => Ok(survey),
         }
     }
 
-    /// Takes `no_data`, or else what the file says, for no data: as a sample can hold it.
+    /// Sets the no-data value to `no_data`, or else to the file's, as the sample type stores it.
     pub(super) fn settle_no_data(&mut self, no_data: Option<f64>) {
         self.no_data = no_data
             .or(self.no_data)
             .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
     }
 
-    /// Height of a stored value; NaN in a hole. A value that is no height is a hole.
+    /// Returns the height of a stored value; NaN for no-data and for values that are not heights.
     pub(super) fn height_of(&self, stored: f64) -> f64 {
         let height = stored * self.scale + self.offset;
         match self.no_data == Some(stored) || height.abs() > MAX_HEIGHT {
@@ -254,12 +252,12 @@ impl Decoded {
         }
     }
 
-    /// Height of a value read from the file when it is touched, if there is one.
+    /// Returns the height of a value read from the file; NaN for `None`.
     pub(super) fn height_in_file(&self, stored: Option<f64>) -> f64 {
         stored.map_or(f64::NAN, |stored| self.height_of(stored))
     }
 
-    /// The same; the value is counted among those that were looked at.
+    /// As `height_in_file`, and counts the value in `seen`.
     fn counted(&self, stored: Option<f64>, seen: &mut Outermost) -> f64 {
         if let Some(stored) = stored.filter(|stored| self.no_data != Some(*stored)) {
             seen.add(stored);
@@ -267,7 +265,7 @@ impl Decoded {
         self.height_in_file(stored)
     }
 
-    /// One pass over all samples in memory: range and holes.
+    /// Computes range and number of no-data samples in one pass over the samples in memory.
     fn summarise(&self, seen: &mut Outermost) -> HeightSummary {
         let mut summary = HeightSummary::EMPTY;
         let Storage::Held { samples, mask } = &self.storage else {

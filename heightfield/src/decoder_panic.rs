@@ -10,14 +10,12 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs a decoder; a panic inside becomes [`RasterError::DecoderFailed`] and prints
-/// nothing.
+/// Runs a decoder; a panic inside becomes [`RasterError::DecoderFailed`] and prints nothing.
 ///
-/// The decoders of image and science formats are other people's code that is given
-/// whatever is on the user's disk. Some answer a damaged file with an overflow or an
-/// index out of range. All sizes are checked before a decoder
-/// runs; this is for what such checks cannot foresee. A decoder owns all it
-/// touches, so nothing half-done outlives the panic.
+/// The decoders of image and science formats are third-party code that reads arbitrary files. In
+/// some, a damaged file causes an overflow or an index out of range. All sizes are checked before a
+/// decoder runs; this is for faults that such checks miss. A decoder owns all its data, so no
+/// inconsistent state outlives the panic.
 pub(super) fn guarded<T>(
     decoder: &'static str,
     decode: impl FnOnce() -> Result<T, RasterError>,
@@ -29,8 +27,7 @@ pub(super) fn guarded<T>(
     outcome.unwrap_or(Err(RasterError::DecoderFailed(decoder)))
 }
 
-/// Keeps the panics of guarded decoders off the user's screen; all others are
-/// reported as before.
+/// Suppresses the messages of guarded decoders' panics; all others are reported as before.
 fn silence_guarded_panics() {
     static INSTALLED: Once = Once::new();
     INSTALLED.call_once(|| {

@@ -1,10 +1,10 @@
-//! Heights encoded in the colours of a picture, as web maps hand them out.
+//! Heights encoded in the colours of a picture, as in web maps.
 
 use super::decoded::Decoded;
 use super::{Encoding, RasterError, Samples};
 
 impl Encoding {
-    /// Height in metres of the code 0, and metres in a step of the code.
+    /// Returns the height of code 0, and the height of a step of the code, both in metres.
     pub(super) const fn metres(self) -> (f64, f64) {
         match self {
             Self::TerrainRgb => (-10_000.0, 0.1),
@@ -34,7 +34,7 @@ pub(super) fn codes([red, green, blue]: [Vec<u8>; 3]) -> Samples {
     codes.into()
 }
 
-/// Returns the fault of a picture that has no codes.
+/// Returns the error for a picture without codes.
 pub(super) fn no_codes(what: &str) -> RasterError {
     RasterError::NotAHeightField(format!(
         "{what}, and heights are encoded in pictures of red, green and blue of 8 bits"
@@ -42,7 +42,7 @@ pub(super) fn no_codes(what: &str) -> RasterError {
 }
 
 impl Decoded {
-    /// Takes the samples for codes of heights. The code 0, which is below all ground, is no data.
+    /// Interprets the samples as codes of heights. Code 0 is below all ground, so it is no-data.
     pub(super) fn take_codes(&mut self, encoding: Encoding) {
         (self.offset, self.scale) = encoding.metres();
         self.no_data = Some(0.0);

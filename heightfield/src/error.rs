@@ -1,4 +1,4 @@
-//! Errors of terrain files: what is wrong, and where.
+//! Errors of terrain files.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use super::options::Encoding;
 use crate::printable_text::printable;
 use crate::remote::{is_lost, is_missing, is_outage, without_key};
 
-/// A file that could not be opened as a height field: what is wrong with which file.
+/// Error of a file that cannot be opened as a height field.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", printable(&format!("{fault} ({})", without_key(path))))]
 pub struct Error {
@@ -22,7 +22,7 @@ impl Error {
         }
     }
 
-    /// The file.
+    /// Returns the file's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -37,30 +37,30 @@ impl Error {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RasterError {
-    /// The operating system does not let us read it.
+    /// The operating system denies reading it.
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
-    /// A URL that cannot be read, or not at present.
+    /// A URL that cannot be read, perhaps only at present.
     #[error("cannot read what is there: {0}")]
     Remote(std::io::Error),
-    /// Neither content nor extension say what it is.
+    /// Neither content nor extension identifies the format.
     #[error("unknown file format")]
     UnknownFormat,
-    /// GDAL reads it, and there is no libgdal.
+    /// GDAL reads the format, but libgdal is missing.
     #[error("{format} is read through GDAL: {why}")]
     WantsGdal {
         /// Name of the format.
         format: &'static str,
-        /// Reason for which GDAL cannot be asked.
+        /// Reason why GDAL is not available.
         why: heightfield_gdal::Error,
     },
-    /// GDAL has the format, and refuses the file.
+    /// GDAL supports the format, but rejects the file.
     #[error("{0}")]
     ByGdal(heightfield_gdal::Error),
     /// Raw samples carry no header, and none was stated.
     #[error("raw samples, but nothing says how many: no size was stated")]
     RawSizeMissing,
-    /// The format is known, this variant of it is not.
+    /// The format is known, but not this variant.
     #[error("{format}: {feature} is not supported")]
     Unsupported {
         /// Name of the format.
@@ -71,13 +71,13 @@ pub enum RasterError {
     /// Readable, but its samples are not heights.
     #[error("not a height field: {0}")]
     NotAHeightField(String),
-    /// Neither heights nor anything that a converter could make heights of.
+    /// Neither heights nor data that can be converted into heights.
     #[error("not a height field: {0}")]
     NoNumbers(String),
     /// Several parts could hold the heights; none was chosen.
     #[error("several {kind}s may be the heights: {}", names.join(", "))]
     SeveralHeights {
-        /// The file's name for its parts.
+        /// The file's word for a part, as `raster`.
         kind: &'static str,
         /// Their names.
         names: Vec<String>,
@@ -95,10 +95,10 @@ pub enum RasterError {
     NoSuchPart {
         /// The request.
         asked: String,
-        /// The available ones.
+        /// The available parts.
         there: String,
     },
-    /// The user named a cell size, the file states another.
+    /// The user gave a cell size, but the file states another.
     #[error("the file states its own cell size: {0}")]
     CellKnown(String),
     /// A colour picture that looks as if its colours encoded heights.
@@ -107,23 +107,23 @@ pub enum RasterError {
         Encoding::Terrarium => "Terrarium heights",
     })]
     EncodedPicture(Encoding),
-    /// Samples whose header is a file of its own, which is not there.
+    /// Samples whose header is a separate file, which is missing.
     #[error("its header is missing: no {0} lies beside it")]
     HeaderMissing(String),
-    /// The file is what it says, but holds more than is held in memory.
+    /// A valid file with more samples than fit in memory.
     #[error("too large: {columns} × {rows} samples would take {gigabytes} GB of memory")]
     TooLarge {
         /// Samples from west to east.
         columns: u64,
         /// Samples from south to north.
         rows: u64,
-        /// Memory that they would take, 10⁹ bytes, rounded up.
+        /// Memory for the samples, 10⁹ bytes, rounded up.
         gigabytes: u64,
     },
     /// A picture whose channels could each be the height; none was chosen.
     #[error("not a height field: {0}")]
     AmbiguousChannels(String),
-    /// No patch fits.
+    /// Too few samples for a patch.
     #[error("too small: {columns} × {rows} samples; a surface needs at least two samples each way")]
     TooSmall {
         /// Samples from west to east.
@@ -131,29 +131,29 @@ pub enum RasterError {
         /// Samples from south to north.
         rows: u64,
     },
-    /// There is no surface anywhere.
+    /// No sample has a height.
     #[error("no surface: all {samples} samples are no-data")]
     AllNoData {
         /// Number of samples.
         samples: u64,
     },
-    /// A folder or pattern without a file that could be read.
+    /// A folder or pattern without readable files.
     #[error("no terrain: {0}")]
     NoTiles(String),
-    /// Of a STAC item none or several assets could be the heights; none was chosen.
+    /// STAC items in which no asset, or more than one, could be the heights.
     #[error("no terrain: {why} (assets: {})", names.join(", "))]
     WhichAsset {
-        /// Which item, and what is wrong with it.
+        /// The item, and its fault.
         why: String,
-        /// Names of the assets that it has, or of those that could be it.
+        /// Names of all its assets, or of those that could be the heights.
         names: Vec<String>,
     },
-    /// Items of a STAC of which GDAL makes no terrain, but of their files it does.
+    /// STAC items that GDAL cannot open as a terrain, though it can open their files.
     #[error("no terrain: {why}")]
     ToBuild {
         /// The fault.
         why: String,
-        /// The files, as GDAL calls them.
+        /// The files, by GDAL's names.
         files: Vec<String>,
     },
     /// One file of many is at fault.
@@ -161,13 +161,13 @@ pub enum RasterError {
     InTile {
         /// The file.
         file: PathBuf,
-        /// Returns its fault.
+        /// The file's fault.
         fault: Box<RasterError>,
     },
-    /// A file among many that is on no grid.
+    /// One of many files that is not on a grid.
     #[error("cannot be one of many files: {0}")]
     NoPlace(String),
-    /// Files that are to be one terrain have no common grid.
+    /// Files of one terrain without a common grid.
     #[error("its files do not fit together: of {} {why}, as {}", file.display(), other.display())]
     TilesDiffer {
         /// The file that does not fit.
@@ -177,7 +177,7 @@ pub enum RasterError {
         /// The difference.
         why: String,
     },
-    /// Two of many files have other heights on the same samples.
+    /// Two of many files with different heights at the same samples.
     #[error(
         "two rasters lie at one place and differ by up to {difference}: {} and {}",
         without_key(&files[0]),
@@ -186,10 +186,10 @@ pub enum RasterError {
     SamePlace {
         /// The files.
         files: [PathBuf; 2],
-        /// The largest difference that was found.
+        /// The max difference found.
         difference: f64,
     },
-    /// The header promises more than the file can hold or a machine should.
+    /// The header states more than the file can hold, or than fits in memory.
     #[error("absurd size in the header: {0}")]
     AbsurdSize(String),
     /// The file ends too early.
@@ -198,7 +198,7 @@ pub enum RasterError {
     /// The file contradicts itself or its format.
     #[error("damaged file: {0}")]
     Damaged(String),
-    /// A third-party decoder does not understand it.
+    /// A third-party decoder does not support it.
     #[error("not understood: {0}; the file is damaged, or of a kind that is not known here")]
     Unfamiliar(String),
     /// A third-party decoder panicked.
@@ -207,12 +207,12 @@ pub enum RasterError {
 }
 
 impl RasterError {
-    /// Damage described in place.
+    /// Returns a `Damaged` error.
     pub(super) fn damaged(what: impl Into<String>) -> Self {
         Self::Damaged(what.into())
     }
 
-    /// A fault of one file of many.
+    /// Returns the fault of one of many files.
     pub(super) fn in_tile(file: &Path, fault: Self) -> Self {
         Self::InTile {
             file: file.to_owned(),
@@ -220,7 +220,7 @@ impl RasterError {
         }
     }
 
-    /// Returns true if another try may find more: nothing is known of the file's samples.
+    /// Returns true if a retry may succeed: the error says nothing about the file's samples.
     pub(super) fn is_of_the_line(&self) -> bool {
         match self {
             Self::Remote(error) => !is_missing(error),
@@ -229,7 +229,7 @@ impl RasterError {
         }
     }
 
-    /// An input error while decoding: an early end is a truncated file.
+    /// Converts an input error while decoding: an early end is a truncated file.
     pub(super) fn from_io(error: std::io::Error, during: &str) -> Self {
         match error.kind() {
             std::io::ErrorKind::UnexpectedEof => {

@@ -1,15 +1,15 @@
-//! The layout of a file's samples, for those who check it.
+//! The layout of a file's samples, for checks of the file.
 
-/// The layout of a file's samples, as far as its format tells.
+/// The layout of a file's samples, as far as its format states it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileLayout {
-    /// Bands, of which one holds the heights.
+    /// Number of bands, one of which holds the heights.
     pub bands: u32,
-    /// Columns and rows of a strip, tile or block; `None` where rows follow each other.
+    /// Columns and rows of a strip, tile or block; `None` if the file stores row after row.
     pub block: Option<[u32; 2]>,
-    /// Columns and rows of its overviews, the finest first.
+    /// Columns and rows of the overviews, the finest first.
     pub overviews: Vec<[u32; 2]>,
-    /// The meaning of a sample, where the file states it.
+    /// The meaning of a sample, if the file states it.
     pub samples_are: Option<SamplesAre>,
 }
 

@@ -1,12 +1,12 @@
-//! Heights of samples without data, by inverse distance from data along four axes.
+//! Heights for no-data samples, by inverse distance from data along four axes.
 //!
-//! From a sample without data the nearest sample with data is sought to the left, right, up and down.
-//! Those found within the limit are averaged, each weighted by the inverse of its distance in samples;
-//! if none is found, there is no data. Only heights of the file count, never filled ones, so a value
+//! For a no-data sample, the nearest data is searched to the left, right, up and down. The samples
+//! found within the limit are averaged, weighted by the inverse of their distance in samples; if
+//! none is found, the sample stays no-data. Filled heights are not used to fill others, so a value
 //! does not depend on the window that is read.
 //!
-//! GDAL's `FillNodata` weights in the same manner. Its directions are four quadrants, not axes, so its
-//! values differ.
+//! GDAL's `FillNodata` uses the same weights. It searches four quadrants, not axes, so its values
+//! differ.
 
 use std::hash::Hasher;
 
@@ -14,7 +14,7 @@ use twox_hash::XxHash64;
 
 use super::{ReadStatus, ReadTracker};
 
-/// Distance within which samples without data are filled ([`OpenOptions::fill`](crate::OpenOptions)).
+/// Max distance from data at which no-data is filled ([`OpenOptions::fill`](crate::OpenOptions)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fill(u32);
 
@@ -22,19 +22,20 @@ impl Fill {
     /// Max distance, samples.
     pub const MAX: u32 = 64;
 
-    /// Fills from data at most `samples` away; `None` unless that is from 1 to [`Fill::MAX`].
+    /// Returns a fill from data at most `samples` away; `None` unless `samples` is from 1 to
+    /// [`Fill::MAX`].
     #[must_use]
     pub fn within(samples: u32) -> Option<Self> {
         (1..=Self::MAX).contains(&samples).then_some(Self(samples))
     }
 
-    /// Max distance of the data, samples of the level that is read.
+    /// Returns the max distance of the data, in samples of the level that is read.
     #[must_use]
     pub const fn samples(self) -> u32 {
         self.0
     }
 
-    /// The print of a file whose heights are filled, from the print of the file.
+    /// Returns the hash of a file with filled heights, from the file's hash.
     pub(super) fn print_of(self, file: u64) -> u64 {
         let mut hasher = XxHash64::with_seed(0);
         hasher.write_u64(file);
@@ -42,8 +43,8 @@ impl Fill {
         hasher.finish()
     }
 
-    /// The height at a sample of an image of a size, filled if it has none. It is pending while any
-    /// sample that decides it is.
+    /// Returns the height at a sample of an image, filled if it is no-data. It is pending while any
+    /// sample that determines it is.
     pub(super) fn height(
         self,
         at: [u32; 2],
@@ -85,7 +86,7 @@ impl Fill {
         if weights == 0.0 || !reads.status().is_complete() {
             return (f64::NAN, reads.status());
         }
-        // Rounding must not exceed the file's range.
+        // Rounding must not leave the file's range.
         ((sum / weights).clamp(lowest, highest), ReadStatus::Complete)
     }
 }

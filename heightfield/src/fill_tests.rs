@@ -1,4 +1,4 @@
-//! Filled heights against a plain reference over a whole array, whatever reads the file.
+//! Filled heights against a simple reference over a whole array, for each way to read the file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,11 +9,12 @@ use crate::blocks::{Block, BlockImage, BlockReader, Blocks, Part};
 use crate::timeouts::wait_for;
 use crate::{OpenOptions, Raster, RasterError, SampleType, Wait, Window};
 
-/// More than two blocks each way, which have 256 samples.
+/// More than two blocks of 256 samples in both directions.
 const SIZE: [u32; 2] = [600, 530];
 const NO_DATA: f32 = -9999.0;
 
-/// Data with scattered holes, wide ones across the edges of blocks, and one at a corner.
+/// Returns data with scattered no-data, wide areas of it across block edges, and one sample at a
+/// corner.
 fn stored(column: u32, row: u32) -> Option<f32> {
     let mixed = (column.wrapping_mul(7919) ^ row.wrapping_mul(104_729)) % 1009;
     let is_wide = (200..300).contains(&column) && (240..262).contains(&row)
@@ -25,14 +26,14 @@ fn stored(column: u32, row: u32) -> Option<f32> {
     has_data.then_some((column as f32 * 0.37 - row as f32 * 0.11) + mixed as f32 * 0.01)
 }
 
-/// All samples of the file, its first row the northernmost.
+/// Returns all samples of the file, its first row the northernmost.
 fn whole() -> Vec<Vec<Option<f64>>> {
     let row = |row| (0..SIZE[0]).map(move |column| stored(column, row).map(f64::from));
     (0..SIZE[1]).map(|at| row(at).collect()).collect()
 }
 
-/// The definition, written without regard to blocks: all distances to all data in the same row or
-/// column, and the nearest on each side.
+/// Fills by the definition, without blocks: over all distances to data in the same row or column,
+/// the nearest on each side.
 fn reference(all: &[Vec<Option<f64>>], column: usize, row: usize, within: usize) -> Option<f64> {
     if let Some(height) = all[row][column] {
         return Some(height);
@@ -67,7 +68,7 @@ fn reference(all: &[Vec<Option<f64>>], column: usize, row: usize, within: usize)
     (weights > 0.0).then(|| heights / weights)
 }
 
-/// Float samples with a header, which GDAL reads, too.
+/// Writes float samples with a header; GDAL reads this format, too.
 fn write_flt(folder: &Path) -> PathBuf {
     let places = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row)));
     let value = |(column, row)| stored(column, row).unwrap_or(NO_DATA).to_le_bytes();
@@ -81,7 +82,7 @@ fn write_flt(folder: &Path) -> PathBuf {
     path
 }
 
-/// The same as NumPy's array, whose holes are NaN.
+/// Writes the same samples as a NumPy array, with NaN for no-data.
 fn write_npy(folder: &Path) -> PathBuf {
     let shape = format!(
         "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
@@ -171,7 +172,7 @@ fn coarse_levels_are_filled_from_their_own_samples() {
     let raster = Raster::open(write_npy(folder.path()), &options(3, 0)).expect("opened");
     let level = 3;
     let every = 1 << level;
-    // Levels count from the south, and the file's rows from the north.
+    // Levels count from the south, the file's rows from the north.
     let all: Vec<Vec<_>> = (0..SIZE[1])
         .step_by(every)
         .map(|row| {
@@ -217,7 +218,7 @@ fn a_file_without_data_is_refused_and_classes_are_not_filled() {
     );
     std::fs::write(&path, format!("{head}1 -1 3 4 5 6")).expect("written");
     let filled = Raster::open(&path, &options(1, 0)).expect("opened");
-    // Weights are equal: 1, 3, and 5 below.
+    // The weights are equal: 1, 3, and 5 below.
     assert_eq!(filled.height(1, 1), 3.0);
     assert_eq!(
         (filled.summary().holes, filled.fill()),
@@ -244,7 +245,7 @@ fn files_that_are_filled_have_another_print() {
     assert_eq!(prints[1], print(1));
 }
 
-/// Two blocks of 64 samples, the second of which is not here until the test allows it.
+/// Two blocks of 64 samples; the second is pending until the test sets `is_here`.
 struct Late {
     images: Vec<BlockImage>,
     is_here: Arc<AtomicBool>,
@@ -271,7 +272,7 @@ impl BlockReader for Late {
         if part.column > 0 && !self.is_here.load(Ordering::Relaxed) {
             return Err(RasterError::Remote(crate::remote::outage()));
         }
-        // The last two columns of the first block are holes.
+        // The last two columns of the first block are no-data.
         let columns = (0..part.rows).flat_map(|_| part.column..part.column + part.columns);
         let value = |column| {
             if column == 62 || column == 63 {
@@ -324,7 +325,7 @@ fn a_height_is_pending_while_a_neighbour_is() {
                 "{column} {within}"
             );
         }
-        // Nothing of the second block is near enough.
+        // No data of the second block is near enough.
         assert_eq!(read(62, 1, wait), (61.0, ReadStatus::Complete));
     }
     is_here.store(true, Ordering::Relaxed);

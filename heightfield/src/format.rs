@@ -1,18 +1,18 @@
-//! Interface of every terrain format.
+//! Interface of all terrain formats.
 
 use super::input::FileBytes;
 use super::{Decoded, OpenOptions, RasterError};
 
-/// A format that can be read. Each file or folder of `formats` declares one.
+/// A readable format. Each file or folder of `formats` declares one.
 pub(super) struct Format {
     /// Name in messages.
     pub(super) name: &'static str,
-    /// True if a file that begins with these bytes (its first kibibyte, or all of a
-    /// shorter one) is of this format.
+    /// Returns true if a file that begins with these bytes (its first kibibyte, or all of a shorter
+    /// one) is of this format.
     pub(super) begins: fn(head: &[u8]) -> bool,
     /// Extensions in lower case. Inside an archive, a file with one of them is a terrain.
     pub(super) extensions: &'static [(&'static str, Claim)],
-    /// Parts of a file, from which the user may choose.
+    /// Whether the file has parts from which the user may choose.
     pub(super) parts: Parts,
     /// Reads the heights of a file.
     pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, RasterError>,
@@ -21,25 +21,25 @@ pub(super) struct Format {
 /// Parts of a file of a format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Parts {
-    /// Nothing: one field a file.
+    /// A single field.
     One,
     /// Numbered bands.
     Bands,
 }
 
-/// Claim of an extension on a file whose beginning says nothing.
+/// Meaning of a file's extension if its first bytes are not recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Claim {
     /// The file is of this format.
     Decides,
-    /// The file should be of this format, and is damaged.
+    /// The file should be of this format, but is damaged.
     Promises,
-    /// Nothing: other formats use the extension, too.
+    /// No conclusion: other formats use the extension, too.
     Suggests,
 }
 
 impl Format {
-    /// Checks that the user chooses by what the format has.
+    /// Checks that the user's choice of a part is one that the format has.
     ///
     /// # Errors
     /// [`RasterError::NoSuchPart`].
@@ -67,7 +67,7 @@ impl Format {
         }
     }
 
-    /// Returns the claim of an extension, if it is one of this format's.
+    /// Returns the meaning of an extension, if this format uses it.
     pub(super) fn claim(&self, extension: &str) -> Option<Claim> {
         let own = self.extensions.iter().find(|(own, _)| *own == extension);
         own.map(|(_, claim)| *claim)

@@ -1,4 +1,4 @@
-//! Size of a cell on the ground, and of a vertical unit in metres.
+//! Size of a cell on the ground, and of a vertical unit, in metres.
 
 use super::globe::Globe;
 use super::numbers::beginning;
@@ -6,7 +6,7 @@ use super::numbers::beginning;
 /// The unit of a cell's sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CellUnit {
-    /// A length, in metres each.
+    /// A length.
     Length {
         /// Metres per unit.
         metres: f64,
@@ -18,12 +18,12 @@ pub enum CellUnit {
 /// Source of a unit, a reference system or a datum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Certainty {
-    /// The file states it, or its format has no other.
+    /// The file states it, or the format has no other.
     #[default]
     Stated,
     /// It follows from a code of a reference system in the file.
     FromCode,
-    /// Nothing states it: it is taken to be the usual one.
+    /// Not stated: the usual one is assumed.
     Assumed,
     /// The user states it.
     Given,
@@ -37,25 +37,25 @@ pub struct CellSize {
     /// Along a column, south to north, in `unit`s; positive.
     pub north: f64,
     /// Cosine of the angle between a row and a column on the ground: zero where they are
-    /// perpendicular, positive where columns lean to the east. Most maps shear the ground.
+    /// perpendicular, positive where columns lean to the east. Most projections shear the ground.
     pub lean: f64,
-    /// Unit of both.
+    /// Unit of `east` and `north`.
     pub unit: CellUnit,
-    /// Ground metres in a metre of [`CellSize::metres`] along rows and columns, in the middle
-    /// of the field: a projected system is true to scale in few places, and a turned grid of
-    /// degrees is neither as wide as one of longitude nor as high as one of latitude.
+    /// Ground metres per metre of [`CellSize::metres`] along rows and columns, in the middle of the
+    /// field. A projected system is true to scale in few places, and the cells of a rotated grid in
+    /// degrees have other sides than those along meridians and parallels.
     pub map_scale: (f64, f64),
     /// Latitude of the middle of the field in degrees, where known.
     pub latitude: Option<f64>,
-    /// Globe of the degrees.
+    /// Globe to which the degrees refer.
     pub globe: Globe,
     /// Source of the unit.
     pub certainty: Certainty,
 }
 
 impl CellSize {
-    /// A size whose unit the file states, east and north; `latitude` is that of the
-    /// middle of the field, in degrees.
+    /// Returns a size with a stated unit, east and north; `latitude` is the latitude of the middle
+    /// of the field, degrees.
     pub(super) fn stated((east, north): (f64, f64), unit: CellUnit, latitude: Option<f64>) -> Self {
         Self {
             east,
@@ -69,9 +69,9 @@ impl CellSize {
         }
     }
 
-    /// The cell's sides (east, north) in metres: degrees by the radii of curvature of its
-    /// globe at the latitude. Where the latitude is not known, a degree of longitude counts
-    /// as long as one of latitude at 45°.
+    /// Returns the cell's sides (east, north) in metres: degrees by the radii of curvature of the
+    /// globe at the latitude. If the latitude is unknown, a degree of longitude counts as long as
+    /// one of latitude at 45°.
     pub fn metres(&self) -> (f64, f64) {
         match self.unit {
             CellUnit::Length { metres } => (self.east * metres, self.north * metres),
@@ -83,35 +83,34 @@ impl CellSize {
         }
     }
 
-    /// The cell's sides (east, north) on the ground, m: [`CellSize::metres`] of the map,
-    /// at the scale that the map has in the middle of the field.
+    /// Returns the cell's sides (east, north) on the ground, m: [`CellSize::metres`] times the
+    /// map's scale in the middle of the field.
     pub fn ground_metres(&self) -> (f64, f64) {
         let (east, north) = self.metres();
         (east * self.map_scale.0, north * self.map_scale.1)
     }
 
-    /// The side in metres of the square cell that stands for this one.
+    /// Returns the side in metres of the square cell that is rendered in place of this one.
     ///
-    /// It has the same area on the ground, so that the mean slope of cells that are rendered as
-    /// they are stored is kept.
+    /// Its area on the ground is the same, so the mean slope is kept for cells that are rendered as
+    /// they are stored.
     pub fn square_metres(&self) -> f64 {
         let (east, north) = self.ground_metres();
         let sine = (1.0 - self.lean * self.lean).sqrt();
         (east * north * sine).sqrt()
     }
 
-    /// A size in a unit that the file leaves open: degrees when numbers this
-    /// small, at such a place, can hardly be a length, else metres.
+    /// Returns a size whose unit the file does not state: degrees if numbers this small, at such a
+    /// position, can hardly be lengths, else metres.
     ///
-    /// `corner` is the south-west corner in the same unit, `extent` the size of
-    /// the whole field.
+    /// `corner` is the south-west corner in the same unit, `extent` the size of the whole field.
     pub(super) fn guessed(
         (east, north): (f64, f64),
         corner: Option<(f64, f64)>,
         extent: (f64, f64),
     ) -> Self {
         let on_earth = corner.is_some_and(|(x, y)| {
-            // An origin of zero is a local frame, not a point in the Atlantic.
+            // An origin of zero is a local frame, not a position in the Atlantic.
             (x, y) != (0.0, 0.0)
                 && (-360.0..=360.0).contains(&x)
                 && (-360.0..=360.5).contains(&(x + extent.0))
@@ -143,11 +142,11 @@ impl CellSize {
 pub struct VerticalDatum {
     /// Name of the vertical reference system, as `NAVD88 height`.
     pub name: String,
-    /// EPSG's code for it, where it is known.
+    /// EPSG's code for it, if it is known.
     pub code: Option<u16>,
 }
 
-/// Returns the remark on a unit of heights that [`metres_in`] does not know.
+/// Returns the remark on a unit of heights that is unknown to [`metres_in`].
 pub(super) fn unknown_unit(name: &str) -> String {
     let name = beginning(name);
     format!(
@@ -155,7 +154,7 @@ pub(super) fn unknown_unit(name: &str) -> String {
     )
 }
 
-/// Metres in a unit of length by the name files give it, as `ft` or `metre`.
+/// Returns the metres in a unit of length, by its name in files, as `ft` or `metre`.
 pub fn metres_in(unit: &str) -> Option<f64> {
     let name: String = unit
         .to_lowercase()

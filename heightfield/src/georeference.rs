@@ -1,14 +1,13 @@
-//! Georeference of samples in the file's reference system, and what its coordinates
-//! coordinates mean.
+//! Georeference of samples in the file's reference system, and the meaning of its coordinates.
 //!
-//! Coordinates are always (x, y), which is (east, north) or (longitude, latitude),
-//! whatever order the reference system's own definition has.
+//! Coordinates are always (x, y), which is (east, north) or (longitude, latitude), whatever the
+//! order in the reference system's own definition.
 
 use super::crs::{LonLat, ReferenceSystem};
 use super::geometry::{CellSize, CellUnit, Certainty};
 use super::tangents::Tangents;
 
-/// Ends of the range in which longitudes and latitudes are taken, degrees.
+/// Valid longitudes and latitudes, degrees.
 const LONGITUDES: std::ops::RangeInclusive<f64> = -360.0..=360.0;
 const LATITUDES: std::ops::RangeInclusive<f64> = -90.0..=90.0;
 
@@ -22,15 +21,15 @@ pub struct GroundTransform {
 }
 
 impl GroundTransform {
-    /// A column is its own x and a row its own y.
+    /// Identity: x is the column, y is the row.
     const CELLS: Self = Self {
         origin: [0.0; 2],
         column_step: [1.0, 0.0],
         row_step: [0.0, 1.0],
     };
 
-    /// From the coordinates of the sample at column 0 and row 0 and the steps to the next
-    /// column and row; `None` where a number is not finite or all samples lie in a line.
+    /// Returns the map from the coordinates of the sample at column 0 and row 0, and the steps to
+    /// the next column and row; `None` if a number is not finite or all samples lie on a line.
     #[must_use]
     pub fn new(origin: [f64; 2], column_step: [f64; 2], row_step: [f64; 2]) -> Option<Self> {
         let map = Self {
@@ -44,7 +43,7 @@ impl GroundTransform {
         (finite && area > 1e-6).then_some(map)
     }
 
-    /// Coordinates of a place between samples.
+    /// Returns the coordinates of a position in samples, which may be fractional.
     #[must_use]
     pub fn to_ground(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         let along = |axis: usize| {
@@ -53,7 +52,7 @@ impl GroundTransform {
         [along(0), along(1)]
     }
 
-    /// Column and row of coordinates, which may lie outside of the field.
+    /// Returns the column and row of coordinates, which may lie outside the field.
     #[must_use]
     pub fn to_samples(&self, ground: [f64; 2]) -> [f64; 2] {
         let [x, y] = [ground[0] - self.origin[0], ground[1] - self.origin[1]];
@@ -62,19 +61,19 @@ impl GroundTransform {
         [(x * d - y * c) / area, (y * a - x * b) / area]
     }
 
-    /// The step to the next column, in coordinates.
+    /// Returns the step to the next column, in coordinates.
     #[must_use]
     pub const fn column_step(&self) -> [f64; 2] {
         self.column_step
     }
 
-    /// The step to the next row, in coordinates.
+    /// Returns the step to the next row, in coordinates.
     #[must_use]
     pub const fn row_step(&self) -> [f64; 2] {
         self.row_step
     }
 
-    /// The same samples with columns counted from the other side.
+    /// Returns the same samples with columns counted from the other side.
     pub(super) fn with_columns_from(self, last: f64) -> Self {
         Self {
             origin: self.to_ground([last, 0.0]),
@@ -83,7 +82,7 @@ impl GroundTransform {
         }
     }
 
-    /// The same samples with rows counted from the other side.
+    /// Returns the same samples with rows counted from the other side.
     pub(super) fn with_rows_from(self, last: f64) -> Self {
         Self {
             origin: self.to_ground([0.0, last]),
@@ -109,11 +108,10 @@ fn length([x, y]: [f64; 2]) -> f64 {
 /// Kind of a file's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum System {
-    /// The file states no place: coordinates are the columns and rows of its samples,
-    /// counted from the south-west sample.
+    /// The file states no place: coordinates are sample columns and rows, counted from the
+    /// south-west sample.
     Cells,
-    /// Lengths or angles of a reference system that the file does not state, or whose
-    /// projection is not known.
+    /// Lengths or angles of a reference system that is not stated or whose projection is not known.
     Unstated,
     /// Longitude and latitude.
     Geographic {
@@ -129,7 +127,7 @@ pub enum System {
 pub struct Georeference<'r> {
     transform: GroundTransform,
     system: System,
-    /// The reference system, where the file states it.
+    /// The reference system, if the file states it.
     reference: Option<&'r ReferenceSystem>,
     cell: Option<CellSize>,
     /// Columns and rows less one.
@@ -162,20 +160,20 @@ impl<'r> Georeference<'r> {
         self.system
     }
 
-    /// The reference system, where the file states it.
+    /// Returns the reference system, if the file states it.
     #[must_use]
     pub const fn reference(&self) -> Option<&'r ReferenceSystem> {
         self.reference
     }
 
-    /// The map from the raster's columns and rows to coordinates.
+    /// Returns the map from the raster's columns and rows to coordinates.
     #[must_use]
     pub const fn transform(&self) -> &GroundTransform {
         &self.transform
     }
 
-    /// The smallest rectangle of coordinates around all samples: their own places, not the
-    /// edges of the cells around them.
+    /// Returns the smallest rectangle of coordinates around all samples, without the outer half of
+    /// their cells.
     #[must_use]
     pub fn bounds(&self) -> Sides {
         let [columns, rows] = self.last;
@@ -192,7 +190,8 @@ impl<'r> Georeference<'r> {
             .map_or(LonLat::Unstated, ReferenceSystem::lonlat)
     }
 
-    /// Returns true if the coordinates themselves are these longitudes and latitudes, to 4 m.
+    /// Returns true if the coordinates themselves are the longitudes and latitudes of
+    /// [`Georeference::lonlat`], to 4 m.
     #[must_use]
     pub fn counts_lonlat(&self) -> bool {
         let System::Geographic { degrees } = self.system else {
@@ -201,8 +200,8 @@ impl<'r> Georeference<'r> {
         degrees == 1.0 && self.reference.is_none_or(ReferenceSystem::counts_lonlat)
     }
 
-    /// Longitude and latitude (degrees, as [`Georeference::lonlat`] says) of coordinates,
-    /// where the reference system is known and its projection has such a place.
+    /// Returns the longitude and latitude (degrees, see [`Georeference::lonlat`]) of coordinates;
+    /// `None` if the reference system is unknown or its projection has no such position.
     #[must_use]
     pub fn to_lonlat(&self, ground: [f64; 2]) -> Option<[f64; 2]> {
         let (longitude, latitude) = match (self.system, self.reference) {
@@ -213,14 +212,13 @@ impl<'r> Georeference<'r> {
             }
             (System::Projected, None) => None,
         }?;
-        // Files count longitudes from −180 or from 0: people read the former.
+        // Files count longitudes from −180° or from 0°: this is the range that users expect.
         Some([wrapped(longitude), latitude])
     }
 
-    /// Coordinates of a longitude and latitude (degrees, as [`Georeference::lonlat`] says);
-    /// the turn of the longitude is the one in which the place is in the field, or closest to
-    /// it. `None` where the reference system is not known, or its projection has no such
-    /// place.
+    /// Returns the coordinates of a longitude and latitude (degrees, see [`Georeference::lonlat`]).
+    /// The longitude is shifted by full turns into the field, or nearest to it. `None` if the
+    /// reference system is unknown, or its projection has no such position.
     #[must_use]
     pub fn of_lonlat(&self, [longitude, latitude]: [f64; 2]) -> Option<[f64; 2]> {
         if !(LONGITUDES.contains(&longitude) && LATITUDES.contains(&latitude)) {
@@ -238,8 +236,8 @@ impl<'r> Georeference<'r> {
         place.map(|(x, y)| self.nearest_turn([x, y]))
     }
 
-    /// The same place with its longitude in the turn in which it is closest to the
-    /// middle of the field; coordinates that are not angles stay.
+    /// Returns the coordinates with the longitude shifted by full turns to be nearest to the middle
+    /// of the field; coordinates that are not angles are unchanged.
     #[must_use]
     pub fn nearest_turn(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let System::Geographic { degrees } = self.system else {
@@ -250,9 +248,8 @@ impl<'r> Georeference<'r> {
         [x + ((middle - x) / turn).round() * turn, y]
     }
 
-    /// The size of a cell at a place: of an angle or on a map, a cell is as large, and its
-    /// rows and columns are as far from perpendicular, as the latitude or the map makes it at
-    /// the place.
+    /// Returns the size of a cell at a position. For angles and projected maps, size and lean
+    /// depend on the position.
     #[must_use]
     pub fn cell_at(&self, ground: [f64; 2]) -> Option<CellSize> {
         let mut cell = self.cell?;
@@ -272,7 +269,7 @@ impl<'r> Georeference<'r> {
     }
 }
 
-/// The smallest rectangle around places.
+/// Returns the smallest rectangle around positions.
 pub fn around(places: impl IntoIterator<Item = [f64; 2]>) -> Sides {
     let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
     places
@@ -289,7 +286,7 @@ fn system(
 ) -> System {
     let degree = cell.filter(|cell| cell.unit == CellUnit::Degree);
     match (degree, reference) {
-        // A guess that numbers are degrees is no longitude to rely on.
+        // Degrees that are only assumed are no reliable longitudes.
         (Some(cell), None) if cell.certainty == Certainty::Assumed => System::Unstated,
         (Some(cell), _) => System::Geographic {
             degrees: whole(cell.east / length(map.column_step)),
@@ -299,7 +296,7 @@ fn system(
     }
 }
 
-/// One, or the degrees in a grad, where rounding is all that is between.
+/// Rounds the ratio to 1, or to the degrees in a grad, if only rounding separates them.
 fn whole(ratio: f64) -> f64 {
     let whole = |part: f64| (ratio / part - 1.0).abs() < 1e-9;
     [1.0, 0.9]
@@ -308,7 +305,7 @@ fn whole(ratio: f64) -> f64 {
         .unwrap_or(ratio)
 }
 
-/// A longitude from −180 to 180.
+/// Wraps a longitude to −180° to 180°.
 fn wrapped(longitude: f64) -> f64 {
     longitude - 360.0 * (longitude / 360.0).round()
 }

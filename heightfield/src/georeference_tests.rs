@@ -1,4 +1,4 @@
-//! Places there and back in every kind of coordinates.
+//! Conversions to coordinates and back, in every kind of coordinates.
 
 use super::*;
 

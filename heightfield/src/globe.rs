@@ -1,4 +1,4 @@
-//! The size and shape of the body that a reference system belongs to.
+//! The size and shape of a reference system's body.
 
 /// An ellipsoid of revolution: the Earth's, or another body's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,7 +9,7 @@ pub struct Globe {
     e2: f64,
 }
 
-/// Semi-major axes of ellipsoids and spheres that stand for the Earth, m.
+/// Semi-major axes of ellipsoids and spheres that represent the Earth, m.
 const EARTHS: std::ops::RangeInclusive<f64> = 6.3e6..=6.4e6;
 
 impl Globe {
@@ -19,8 +19,9 @@ impl Globe {
         e2: 0.006_694_379_990_141_316,
     };
 
-    /// By semi-major axis in metres and inverse flattening; zero flattening is a sphere,
-    /// written as an inverse of zero or infinity. `None` for what is no body.
+    /// Returns the globe with a semi-major axis in metres and an inverse flattening; zero
+    /// flattening is a sphere, written as an inverse of zero or infinity. `None` for impossible
+    /// values.
     pub(super) fn new(radius_m: f64, inverse_flattening: f64) -> Option<Self> {
         let flattening = match inverse_flattening {
             0.0 => 0.0,
@@ -31,7 +32,7 @@ impl Globe {
         is_body.then_some(Self { radius_m, e2 })
     }
 
-    /// By both axes in metres.
+    /// Returns the globe with both axes in metres.
     pub(super) fn from_axes(major_m: f64, minor_m: f64) -> Option<Self> {
         match major_m == minor_m {
             true => Self::new(major_m, 0.0),
@@ -39,13 +40,13 @@ impl Globe {
         }
     }
 
-    /// Semi-major axis, m.
+    /// Returns the semi-major axis, m.
     #[must_use]
     pub const fn radius_m(&self) -> f64 {
         self.radius_m
     }
 
-    /// Returns true if it stands for the Earth, and not for another body.
+    /// Returns true if it represents the Earth, not another body.
     #[must_use]
     pub fn is_earth(&self) -> bool {
         EARTHS.contains(&self.radius_m)
@@ -57,7 +58,7 @@ impl Globe {
         same_size && (self.e2 - Self::EARTH.e2).abs() < 1e-9
     }
 
-    /// Metres in a degree of longitude and of latitude at a latitude in degrees: the
+    /// Returns the metres in a degree of longitude and of latitude at a latitude in degrees, by the
     /// radii of curvature of the ellipsoid.
     #[must_use]
     pub fn metres_per_degree(&self, latitude: f64) -> [f64; 2] {
@@ -67,7 +68,7 @@ impl Globe {
         [self.radius_m * cos / w, north].map(f64::to_radians)
     }
 
-    /// The point of its surface at a longitude and latitude in degrees, m from its middle.
+    /// Returns the point on the surface at a longitude and latitude in degrees, m from the centre.
     pub(super) fn surface(&self, (longitude, latitude): (f64, f64)) -> [f64; 3] {
         let (sin, cos) = latitude.to_radians().sin_cos();
         let (east, out) = longitude.to_radians().sin_cos();
@@ -79,9 +80,9 @@ impl Globe {
         ]
     }
 
-    /// As PROJ writes it.
+    /// Returns the parameters for PROJ.
     pub(super) fn in_proj(&self) -> String {
-        // PROJ has no inverse of a flattening of zero.
+        // PROJ cannot represent the inverse of a zero flattening.
         match self.e2 {
             0.0 => format!("+R={}", self.radius_m),
             e2 => format!(

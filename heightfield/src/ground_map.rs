@@ -4,7 +4,7 @@ use geotiff_core::transform::GeoTransform;
 
 use super::georeference::GroundTransform;
 
-/// Sines below this are rounding, not a rotation.
+/// Smaller sines are rounding, not a rotation.
 const STRAIGHT: f64 = 1e-6;
 
 /// An affine map in file order: (0, 0) is the outer corner of the cell around the
@@ -26,7 +26,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The smallest rectangle around some points; `None` without a finite point.
+    /// Returns the smallest rectangle around some points; `None` without a finite point.
     pub(super) fn around(points: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
         let nothing = Self {
             west: f64::INFINITY,
@@ -46,7 +46,7 @@ impl Bounds {
 }
 
 impl GroundMap {
-    /// Returns true if both maps put samples into the same places, to a hundredth of a cell.
+    /// Returns true if both maps place samples at the same coordinates, to a hundredth of a cell.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let steps = self.steps();
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
@@ -58,8 +58,8 @@ impl GroundMap {
         })
     }
 
-    /// Of x and y: the value at the outer corner of the first sample's cell, the step
-    /// from column to column and from row to row. `None` unless these are a grid.
+    /// Returns the map from, for x and y each: the value at the outer corner of the first sample's
+    /// cell, the step per column and the step per row. `None` unless these form a grid.
     pub(super) fn new(x: [f64; 3], y: [f64; 3]) -> Option<Self> {
         let map = Self(GeoTransform {
             origin_x: x[0],
@@ -76,13 +76,13 @@ impl GroundMap {
         (finite && steps.0 > 0.0 && steps.1 > 0.0).then_some(map)
     }
 
-    /// The same by the centre of the first sample.
+    /// Returns the same map from the centre of the first sample.
     pub(super) fn from_centre(x: [f64; 3], y: [f64; 3]) -> Option<Self> {
         let corner = |[at, column, row]: [f64; 3]| [at - (column + row) / 2.0, column, row];
         Self::new(corner(x), corner(y))
     }
 
-    /// The map of samples that lie at `ground`.
+    /// Returns the map of samples that lie at `ground`.
     pub(super) fn of_samples(ground: &GroundTransform) -> Option<Self> {
         let ([x, y], along, up) = (
             ground.to_ground([0.0; 2]),
@@ -92,8 +92,8 @@ impl GroundMap {
         Self::from_centre([x, along[0], up[0]], [y, along[1], up[1]])
     }
 
-    /// Returns the map of the samples themselves, which are in the middle of their cells; `None`
-    /// where all of them lie in a line.
+    /// Returns the map of the samples themselves, which are in the middle of their cells; `None` if
+    /// all of them lie on a line.
     pub(super) fn of_centres(&self) -> Option<GroundTransform> {
         let map = &self.0;
         GroundTransform::new(
@@ -103,7 +103,7 @@ impl GroundMap {
         )
     }
 
-    /// North-up cells by the south-west corner of the field.
+    /// Returns the map of north-up cells from the south-west corner of the field.
     pub(super) fn from_south_west(
         (west, south): (f64, f64),
         (east, north): (f64, f64),
@@ -113,12 +113,12 @@ impl GroundMap {
         Self::new([west, east, 0.0], [top, 0.0, -north])
     }
 
-    /// Coordinates of a place in columns and rows.
+    /// Returns the coordinates of a position in columns and rows.
     pub(super) fn at(&self, column: f64, row: f64) -> (f64, f64) {
         self.0.pixel_to_geo(column, row)
     }
 
-    /// Distance between columns, and between rows.
+    /// Returns the distance between columns, and between rows.
     pub(super) fn steps(&self) -> (f64, f64) {
         let map = &self.0;
         (
@@ -133,8 +133,7 @@ impl GroundMap {
         self.0.skew_y.abs() <= STRAIGHT * east && self.0.skew_x.abs() <= STRAIGHT * south
     }
 
-    /// Returns true if the first row is the southernmost; of a rotated grid, whether it is
-    /// mirrored.
+    /// Returns true if the first row is the southernmost; for a rotated grid, if it is mirrored.
     pub(super) fn is_south_up(&self) -> bool {
         let map = &self.0;
         match self.is_straight() {
@@ -148,12 +147,12 @@ impl GroundMap {
         self.is_straight() && self.0.pixel_width < 0.0
     }
 
-    /// Angle of the rows against x, counter-clockwise, in degrees.
+    /// Returns the angle of the rows against x, counter-clockwise, in degrees.
     pub(super) fn rotation(&self) -> f64 {
         self.0.skew_y.atan2(self.0.pixel_width).to_degrees()
     }
 
-    /// Cosine of the angle between a row and a column northwards.
+    /// Returns the cosine of the angle between a row and a northward column.
     pub(super) fn lean(&self) -> f64 {
         let (map, (east, south)) = (&self.0, self.steps());
         let along = map.pixel_width * map.skew_x + map.skew_y * map.pixel_height;
@@ -164,7 +163,7 @@ impl GroundMap {
         }
     }
 
-    /// The steps in coordinates to the next sample eastwards along a row and northwards
+    /// Returns the steps in coordinates to the next sample eastwards along a row and northwards
     /// along a column, whatever the order of the file.
     pub(super) fn steps_east_and_north(&self) -> ([f64; 2], [f64; 2]) {
         let map = &self.0;
@@ -178,7 +177,7 @@ impl GroundMap {
         )
     }
 
-    /// The outer edges of all cells of a field: columns and rows.
+    /// Returns the outer edges of all cells of a field of columns and rows.
     pub(super) fn bounds(&self, (columns, rows): (u32, u32)) -> Option<Bounds> {
         let (columns, rows) = (f64::from(columns), f64::from(rows));
         let corners = [(0.0, 0.0), (columns, 0.0), (0.0, rows), (columns, rows)];

@@ -1,6 +1,6 @@
-//! Range of the heights and number of holes.
+//! Range of the heights and number of no-data samples.
 
-/// Range of the heights and number of holes.
+/// Range of the heights and number of no-data samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightSummary {
     /// Lowest height in the file's vertical unit.
@@ -9,13 +9,13 @@ pub struct HeightSummary {
     pub highest: f64,
     /// Samples without a height.
     pub holes: u64,
-    /// Samples that were looked at: all, or those of a coarser image or of some places
-    /// where the raster stays in its file.
+    /// Samples read for the summary: all, or for a raster that stays in its file, those of a
+    /// coarser image or of some parts.
     pub looked_at: u64,
 }
 
 impl HeightSummary {
-    /// Of no sample.
+    /// Summary of no samples.
     pub(super) const EMPTY: Self = Self {
         lowest: f64::INFINITY,
         highest: f64::NEG_INFINITY,
@@ -23,7 +23,7 @@ impl HeightSummary {
         looked_at: 0,
     };
 
-    /// Counts a height; NaN is a hole.
+    /// Counts a height; NaN is no-data.
     pub(super) fn add(&mut self, height: f64) {
         self.looked_at += 1;
         if height.is_nan() {

@@ -10,21 +10,21 @@ use crate::disk_cache::FileStamp;
 use crate::regular_file;
 use crate::remote::{RemoteFetcher, RemoteFile, RemoteReader, file_name, is_url};
 
-/// Deflate packs at most this many bytes into one.
+/// Max expansion of deflate, bytes per stored byte.
 pub(super) const DEFLATE_RATIO: u64 = 1040;
 
-/// A buffered reader that a decoder may move about in.
+/// A buffered reader in which a decoder may seek.
 pub(super) trait ReadSeek: BufRead + Seek {}
 impl<T: BufRead + Seek> ReadSeek for T {}
 
-/// The bytes to decode, and the name that goes with them.
+/// The bytes to decode, and the name of their file.
 pub(super) struct FileBytes {
     name: String,
     extension: String,
     len: u64,
     data: Data,
     outline: bool,
-    /// Place where neighbours that have URLs are.
+    /// Source of neighbouring files at URLs.
     elsewhere: RemoteFetcher,
 }
 
@@ -35,12 +35,12 @@ pub(super) enum Data {
     /// In memory, for tests.
     #[cfg(test)]
     Memory(Vec<u8>),
-    /// At a server, and its URL.
+    /// On a server, with its URL.
     Remote(Arc<RemoteFile>, String),
 }
 
 impl FileBytes {
-    /// A file on disk or at a URL.
+    /// Opens a file on disk or at a URL.
     pub(super) fn open(path: &Path, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
         let bytes = match path.to_str().filter(|name| is_url(name)) {
             Some(url) => Self::at_url(url, elsewhere)?,
@@ -66,7 +66,7 @@ impl FileBytes {
         Ok(Self::new(&name, metadata.len(), data))
     }
 
-    /// Bytes in memory.
+    /// Returns bytes in memory under a name.
     #[cfg(test)]
     pub(super) fn unpacked(name: &str, bytes: Vec<u8>) -> Self {
         let name = name.rsplit(['/', '\\']).next().unwrap_or(name);
@@ -85,18 +85,18 @@ impl FileBytes {
         }
     }
 
-    /// The same bytes, of which only what their header says is wanted.
+    /// Returns the same bytes; if `outline` is true, only the header's metadata is read.
     pub(super) fn in_outline(self, outline: bool) -> Self {
         Self { outline, ..self }
     }
 
-    /// Returns true if only what the header says is wanted: size, type of samples and place. A
-    /// format that can tells these without reading the samples, and hands over none.
+    /// Returns true if only the header's metadata is requested: size, sample type and place. A
+    /// format that can read these without the samples returns no samples.
     pub(super) const fn is_outline(&self) -> bool {
         self.outline
     }
 
-    /// The file's name without folders, which may tell format and place.
+    /// Returns the file's name without folders; it may imply format and place.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -106,17 +106,17 @@ impl FileBytes {
         &self.extension
     }
 
-    /// Number of bytes.
+    /// Returns the number of bytes.
     pub(super) fn len(&self) -> u64 {
         self.len
     }
 
-    /// Returns the source of the bytes, for decoders that read anywhere.
+    /// Returns the source of the bytes, for decoders that read at any offset.
     pub(super) fn data(&self) -> &Data {
         &self.data
     }
 
-    /// Its path or URL; none of bytes in memory.
+    /// Returns the path or URL; `None` for bytes in memory.
     pub(super) fn path(&self) -> Option<&Path> {
         match &self.data {
             Data::File(_, path) => Some(path),
@@ -126,12 +126,12 @@ impl FileBytes {
         }
     }
 
-    /// The files at URLs among which this one is.
+    /// Returns the fetcher of the files at URLs.
     pub(super) const fn elsewhere(&self) -> &RemoteFetcher {
         &self.elsewhere
     }
 
-    /// The file, where it is at a URL.
+    /// Returns the file, if it is at a URL.
     pub(super) fn remote(&self) -> Option<Arc<RemoteFile>> {
         match &self.data {
             Data::Remote(file, _) => Some(file.clone()),
@@ -141,7 +141,7 @@ impl FileBytes {
         }
     }
 
-    /// A buffered reader at the start.
+    /// Returns a buffered reader at the start.
     pub(super) fn reader(&self) -> Result<Box<dyn ReadSeek + '_>, RasterError> {
         Ok(match &self.data {
             Data::File(file, _) => {
@@ -159,7 +159,7 @@ impl FileBytes {
         })
     }
 
-    /// The same bytes for a caller that keeps them; `None` where they are in memory.
+    /// Returns a second handle on the same bytes, for storage; `None` if they are in memory.
     pub(super) fn again(&self) -> Result<Option<Self>, RasterError> {
         let data = match &self.data {
             Data::File(file, path) => {
@@ -177,7 +177,7 @@ impl FileBytes {
         }))
     }
 
-    /// Returns the stamp of the file in its present state; `None` where it is not known.
+    /// Returns the stamp of the file in its present state; `None` if it is unknown.
     pub(super) fn stamp(&self) -> Option<FileStamp> {
         match &self.data {
             Data::File(file, path) => Some(FileStamp::of(path, &file.metadata().ok()?)),
@@ -187,7 +187,7 @@ impl FileBytes {
         }
     }
 
-    /// Returns true if the file at its path is still this one, in its present state.
+    /// Returns true if the path still leads to this file in its present state.
     pub(super) fn is_at_its_path(&self) -> bool {
         match &self.data {
             Data::File(_, path) => FileStamp::at(path) == self.stamp(),
@@ -197,7 +197,7 @@ impl FileBytes {
         }
     }
 
-    /// Bytes at a place of the file.
+    /// Reads bytes at an offset.
     pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, RasterError> {
         let is_inside = at.checked_add(count).is_some_and(|end| end <= self.len);
         let (true, Ok(room)) = (is_inside, usize::try_from(count)) else {
@@ -217,7 +217,7 @@ impl FileBytes {
         read.map_err(|error| RasterError::from_io(error, "the samples"))
     }
 
-    /// The first bytes, up to `count` of them.
+    /// Reads the first bytes, up to `count`.
     pub(super) fn head(&self, count: u64) -> Result<Vec<u8>, RasterError> {
         let mut head = Vec::new();
         self.reader()?
@@ -227,8 +227,8 @@ impl FileBytes {
         Ok(head)
     }
 
-    /// Checks that so many samples, packed with deflate at its best, fit into the
-    /// bytes there are, before room is made for them.
+    /// Checks, before memory is allocated, that the file's bytes can hold the samples at deflate's
+    /// max ratio.
     ///
     /// # Errors
     /// [`RasterError::AbsurdSize`].
@@ -250,13 +250,13 @@ impl FileBytes {
     }
 }
 
-/// Reads bytes at a place, whatever others read of the same file meanwhile.
+/// Reads bytes at an offset, also while other threads read the same file.
 #[cfg(unix)]
 pub(super) fn read_exact_at(file: &File, into: &mut [u8], at: u64) -> std::io::Result<()> {
     std::os::unix::fs::FileExt::read_exact_at(file, into, at)
 }
 
-/// Reads bytes at a place, whatever others read of the same file meanwhile.
+/// Reads bytes at an offset, also while other threads read the same file.
 #[cfg(windows)]
 pub(super) fn read_exact_at(file: &File, mut into: &mut [u8], mut at: u64) -> std::io::Result<()> {
     while !into.is_empty() {

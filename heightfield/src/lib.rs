@@ -1,4 +1,4 @@
-//! Terrain files of every supported format become one [`Raster`].
+//! Reads terrain files of every supported format as a [`Raster`].
 //!
 //! | format | read by | notes |
 //! |---|---|---|
@@ -6,15 +6,15 @@
 //! | SRTM `.hgt` | here | place from the name |
 //! | Esri ASCII `.asc` | here | |
 //! | `.flt`, `.bil`, `.bip`, `.bsq` | here | by the `.hdr` beside them |
-//! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture, encoded in its colours |
+//! | PNG | `png` | grey, grey + alpha, or depth in the alpha or colours of a colour picture |
 //! | raw samples | here | with a stated [`RawLayout`] |
 //! | NumPy `.npy` | here | |
 //! | all other formats of GDAL | `heightfield-gdal` | where the machine has a libgdal |
 //!
-//! Each format is one file or folder of `formats`, and one line in its table. From a
-//! path to samples: `open` asks the table, and lets the format
-//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder or a pattern
-//! of names is many files as one terrain (`mosaic`).
+//! Each format is one file or folder of `formats`, and one line in its table. From a path to
+//! samples: `open` finds the format in the table; the format decodes (`input`, `read`) into
+//! `decoded`, which [`Raster`] reads. A folder or a pattern of names is many files as one terrain
+//! (`mosaic`).
 //!
 //! A window of a DEM:
 //!
@@ -31,14 +31,14 @@
 //! # Ok::<(), heightfield::Error>(())
 //! ```
 //!
-//! **Places.** A format hands over its map from columns and rows to coordinates
-//! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
-//! once for all (`placed`), as are places of samples for the rest of the program
-//! (`georeference`). World files and `.prj` files are read by `beside`.
+//! **Places.** A format returns its map from columns and rows to coordinates (`ground_map`) and its
+//! reference system (`crs`). All other geometry is derived from these, the same for all formats
+//! (`placed`, and `georeference` for the rest of the program). World files and `.prj` files are
+//! read by `beside`.
 //!
-//! **Holes.** No-data as the format states it, NaN, masked samples and tiles
-//! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. So is a sample
-//! beyond [`MAX_HEIGHT`], with a remark. With [`OpenOptions::fill`] a hole near data has a height.
+//! **No-data** is the format's no-data value, NaN, masked samples and missing tiles of a sparse
+//! file: [`Raster::height`] is NaN there. Samples beyond [`MAX_HEIGHT`] are no-data too, with a
+//! remark. With [`OpenOptions::fill`], no-data near data gets a height.
 
 #![forbid(unsafe_code)]
 
@@ -82,7 +82,7 @@ mod tangents;
 mod unreadable_parts;
 mod xml;
 
-// What the tests of all crates wait with, of which each uses its part.
+// Time-outs for the tests of all crates, each of which uses some.
 #[cfg(test)]
 #[path = "../../tests/src/timeouts.rs"]
 #[allow(dead_code, unreachable_pub)]
@@ -114,10 +114,10 @@ use place::Place;
 use samples::{SampleValue, with_samples};
 use storage::Storage;
 
-/// The libgdal of this machine, which reads what nothing here does; it is loaded the first time.
+/// Loads the libgdal of this machine, on the first call, for formats that this crate does not read.
 ///
 /// # Errors
-/// The reason for which none can be used.
+/// The reason why no libgdal can be used.
 pub fn gdal() -> Result<heightfield_gdal::Library, heightfield_gdal::Error> {
     heightfield_gdal::Library::load(heightfield_gdal::Settings::default())
 }
@@ -140,31 +140,30 @@ pub struct Window {
     pub rows: u32,
 }
 
-/// A height field held once, in the compact type of its file.
+/// A height field, stored once, in the compact type of its file.
 ///
-/// Column 0 is the westernmost, row 0 the **southernmost**, whatever the file's
-/// order. Heights are in the file's vertical unit.
+/// Column 0 is the westernmost, row 0 the **southernmost**, whatever the file's order. Heights are
+/// in the file's vertical unit.
 #[derive(Clone, Debug)]
 pub struct Raster {
     source: Decoded,
     survey: Survey,
     fill: Option<Fill>,
-    /// Empty where it was made in memory.
+    /// Empty if the raster was made in memory.
     path: PathBuf,
 }
 
 impl Raster {
-    /// Opens a terrain file: by its content, and where that says nothing by its
-    /// extension.
+    /// Opens a terrain file. The format follows from its content, or else from its extension.
     ///
     /// # Errors
-    /// The file and its fault; never a panic, and never an allocation
-    /// that the file's own size does not justify.
+    /// Names the file and its fault. Damaged files never cause a panic, or an allocation that the
+    /// file's size does not justify.
     pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
         Self::opened(path.as_ref(), options, open::decode)
     }
 
-    /// Opens files as one terrain, as those of a folder are.
+    /// Opens files as one terrain, like those of a folder.
     ///
     /// # Errors
     /// As [`Raster::open`].
@@ -175,11 +174,11 @@ impl Raster {
         })
     }
 
-    /// Opens a terrain file with GDAL, also one that [`Raster::open`] reads by itself: both
-    /// are to say the same of it.
+    /// Opens a terrain file with GDAL, even if [`Raster::open`] reads its format itself: both must
+    /// agree.
     ///
     /// # Errors
-    /// As [`Raster::open`]; [`RasterError::UnknownFormat`] where there is no libgdal, too.
+    /// As [`Raster::open`], and [`RasterError::UnknownFormat`] without a libgdal.
     pub fn open_by_gdal(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
         Self::opened(path.as_ref(), options, open::decode_by_gdal)
     }
@@ -208,11 +207,11 @@ impl Raster {
             .map_err(|fault| Error::new(path, fault))
     }
 
-    /// A field made in memory, `height(column, row)` with row 0 the
-    /// southernmost; NaN is a hole. Cells are 1 m, heights in metres.
+    /// Makes a field in memory from `height(column, row)`, with row 0 the southernmost; NaN is
+    /// no-data. Cells are 1 m, heights in metres.
     ///
     /// # Errors
-    /// When there are fewer than 2 × 2 samples, or no heights.
+    /// If there are fewer than 2 × 2 samples, or no heights.
     pub fn from_fn(
         columns: u32,
         rows: u32,
@@ -234,7 +233,7 @@ impl Raster {
         Self::checked(decoded, None)
     }
 
-    /// The same samples in cells of another size.
+    /// Returns the same samples with another cell size.
     #[must_use]
     pub fn with_cell(mut self, cell: CellSize) -> Self {
         self.source.cell = Some(cell).filter(CellSize::is_valid);
@@ -251,8 +250,8 @@ impl Raster {
         })
     }
 
-    /// Has what is not here yet of a level read in the background: between two columns and between
-    /// two rows of level 0, all of them included. Waits for nothing, and asks for 16 blocks at most.
+    /// Starts reading in the background the missing data of a level, in an inclusive range of
+    /// columns and of rows of level 0. Returns at once, and requests 16 blocks at most.
     pub fn prefetch(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
         let Storage::Blocks(blocks) = &self.source.storage else {
             return;
@@ -268,7 +267,7 @@ impl Raster {
         blocks.prefetch_full(level, columns, rows);
     }
 
-    /// Number of blocks that were read from the file; none where all samples are in memory.
+    /// Returns the number of blocks read from the file; zero if all samples are in memory.
     pub fn blocks_read(&self) -> u64 {
         match &self.source.storage {
             Storage::Held { .. } => 0,
@@ -276,7 +275,7 @@ impl Raster {
         }
     }
 
-    /// Blocks that the file has; none where all samples are in memory.
+    /// Returns the number of blocks in the file; zero if all samples are in memory.
     pub fn blocks(&self) -> u64 {
         match &self.source.storage {
             Storage::Held { .. } => 0,
@@ -284,8 +283,8 @@ impl Raster {
         }
     }
 
-    /// Returns true if a block of the file is being read in the background, or is going to be
-    /// ([`Wait::Never`]). Coarse samples that are made of the file do not count.
+    /// Returns true if a block of the file is being read in the background, or will be
+    /// ([`Wait::Never`]). Coarse samples that are computed from the file do not count.
     pub fn is_reading(&self) -> bool {
         match &self.source.storage {
             Storage::Held { .. } => false,
@@ -293,7 +292,7 @@ impl Raster {
         }
     }
 
-    /// Checks that every earlier read that waited was complete: a plan over pending heights is wrong.
+    /// Checks that every earlier waiting read was complete: results from missing heights are wrong.
     ///
     /// # Errors
     /// The reason why a height could not be read.
@@ -315,13 +314,14 @@ impl Raster {
         self.source.rows
     }
 
-    /// The height at a sample in the file's vertical unit; NaN in a hole, outside the field, and
-    /// where it cannot be read at present ([`Raster::check_complete`]). Row 0 is the southernmost.
+    /// Returns the height at a sample in the file's vertical unit; NaN for no-data, outside the
+    /// field, and if it cannot be read at present ([`Raster::check_complete`]). Row 0 is the
+    /// southernmost.
     pub fn height(&self, column: u32, row: u32) -> f64 {
         self.sample(column, row, Wait::UntilRead).0
     }
 
-    /// The height at a sample as [`Raster::height`] returns it, and whether it is known.
+    /// Returns the height at a sample as [`Raster::height`] does, and whether it is pending.
     pub fn read_height(&self, column: u32, row: u32, wait: Wait) -> (f64, ReadStatus) {
         self.sample(column, row, wait)
     }
@@ -330,7 +330,7 @@ impl Raster {
     /// [`Raster::read_row`] does.
     ///
     /// # Panics
-    /// If `heights` has not exactly as many places as the window has samples.
+    /// If the length of `heights` is not the window's number of samples.
     pub fn read_window(
         &self,
         level: u8,
@@ -355,11 +355,10 @@ impl Raster {
         reads.status()
     }
 
-    /// Copies heights of a row of level *L* from `first_column` eastwards, one for each place in
-    /// `heights`.
+    /// Copies heights of a row of level *L* from `first_column` eastwards until `heights` is full.
     ///
-    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview in the file has there
-    /// ([`Raster::surface`]); row and column count in it.
+    /// Level *L* is the field with every 2ᴸ-th sample, or an overview's heights there
+    /// ([`Raster::surface`]); row and column count in samples of the level.
     pub fn read_row(
         &self,
         level: u8,
@@ -389,23 +388,22 @@ impl Raster {
         reads.status()
     }
 
-    /// The height between samples, linear along rows and columns, at a place in
-    /// columns and rows of level 0; NaN outside of the field, and where a corner that
-    /// counts has no height.
+    /// Returns the height at a position in columns and rows of level 0, bilinear between samples;
+    /// NaN outside the field, and if a corner with a weight has no height.
     ///
-    /// A raster in memory has one image for all levels. One that stays in its file has the
-    /// heights of level *L* from the coarsest overview that is no coarser than it; of a file
-    /// without overviews, where *L* is at least 3, from every 8th, 64th or 512th sample.
+    /// A raster in memory has one image for all levels. A raster in its file takes level *L* from
+    /// the coarsest overview that is no coarser than *L*; without overviews, and for *L* of 3 or
+    /// more, from every 8th, 64th or 512th sample.
     pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {
         self.read_surface(level, place, Wait::UntilRead).0
     }
 
-    /// The height between samples as [`Raster::surface`] returns it, and whether it is known.
+    /// Returns the height between samples as [`Raster::surface`] does, and whether it is pending.
     pub fn read_surface(&self, level: u8, place: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
         self.surface_of(self.image_of(level), place, wait)
     }
 
-    /// The same of an image of the file.
+    /// As `read_surface`, for an image of the file.
     fn surface_of(&self, image: usize, [column, row]: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
         let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
         if !(0.0..=last[0]).contains(&column) || !(0.0..=last[1]).contains(&row) {
@@ -438,7 +436,7 @@ impl Raster {
         }
     }
 
-    /// The image of the file that serves a level: 0 for the full one.
+    /// Returns the image of the file that serves a level; 0 is the full one.
     fn image_of(&self, level: u8) -> usize {
         match &self.source.storage {
             Storage::Held { .. } => 0,
@@ -446,8 +444,8 @@ impl Raster {
         }
     }
 
-    /// The level of detail at which samples that lie `samples` apart are best read one by one:
-    /// 0 in memory, where all are at hand.
+    /// Returns the level at which samples `samples` apart are best read one by one; 0 for a raster
+    /// in memory, where any sample is available.
     pub fn level_for(&self, samples: f64) -> u8 {
         match self.source.storage {
             Storage::Held { .. } => 0,
@@ -455,7 +453,7 @@ impl Raster {
         }
     }
 
-    /// The height at a sample of the full image.
+    /// Returns the height at a sample of the full image.
     fn sample(&self, column: u32, row: u32, wait: Wait) -> (f64, ReadStatus) {
         if column >= self.columns() || row >= self.rows() {
             return (f64::NAN, ReadStatus::Complete);
@@ -478,7 +476,8 @@ impl Raster {
         })
     }
 
-    /// The height at a sample of an image, in the file's order, filled if that was asked for.
+    /// Returns the height at a sample of an image, in the file's order, filled if
+    /// [`OpenOptions::fill`] is set.
     fn filled(
         &self,
         at: [u32; 2],
@@ -491,7 +490,7 @@ impl Raster {
         }
     }
 
-    /// The height at a sample of an image in blocks, in the file's order.
+    /// Returns the height at a sample of an image in blocks, in the file's order.
     fn in_blocks(
         &self,
         blocks: &Blocks,
@@ -516,29 +515,28 @@ impl Raster {
         }
     }
 
-    /// Distance within which samples without data are filled; `None` where they are not.
+    /// Returns the distance within which no-data is filled; `None` if it is not.
     pub fn fill(&self) -> Option<Fill> {
         self.fill
     }
 
-    /// Range of the heights and number of holes, before any is filled: of all samples where they are in memory,
-    /// else of those that were looked at.
+    /// Returns the range of the heights and the number of no-data samples, before any is filled:
+    /// over all samples if they are in memory, else over those read at opening.
     pub fn summary(&self) -> HeightSummary {
         self.survey.summary
     }
 
-    /// The samples as the file holds them, its own type and order; `None` where they stay in
-    /// the file.
+    /// Returns the samples in the file's own type and order; `None` if they stay in the file.
     pub fn samples(&self) -> Option<&Samples> {
         self.source.storage.held()
     }
 
-    /// Returns true if all samples were looked at: those in memory always are.
+    /// Returns true if the summary covers all samples: always if they are in memory.
     pub fn is_known_whole(&self) -> bool {
         self.samples().is_some()
     }
 
-    /// Bytes of memory that the samples take, at most.
+    /// Returns the max memory of the samples, bytes.
     pub fn memory_bytes(&self) -> usize {
         match &self.source.storage {
             Storage::Held { samples, .. } => samples.bytes(),
@@ -546,14 +544,14 @@ impl Raster {
         }
     }
 
-    /// A hash of the file's index and of the heights that were looked at, where the samples
-    /// stay in the file; of filled heights another than of unfilled ones.
+    /// Returns a hash of the file's index and of the heights read at opening, if the samples stay
+    /// in the file. It depends on the fill.
     pub fn print_in_file(&self) -> Option<u64> {
         let print = self.survey.print?;
         Some(self.fill.map_or(print, |fill| fill.print_of(print)))
     }
 
-    /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
+    /// Returns the name of the format and variant, as `GeoTIFF, int16, deflate`.
     pub fn format(&self) -> &str {
         &self.source.format
     }
@@ -563,17 +561,17 @@ impl Raster {
         &self.source.file_layout
     }
 
-    /// The stored value that means no data, if one does.
+    /// Returns the stored value that means no-data, if there is one.
     pub fn no_data(&self) -> Option<f64> {
         self.source.no_data
     }
 
-    /// Scale and offset: a height is a stored value × scale + offset.
+    /// Returns scale and offset: a height is a stored value × scale + offset.
     pub fn scale_and_offset(&self) -> (f64, f64) {
         (self.source.scale, self.source.offset)
     }
 
-    /// The horizontal reference system, where the file states it.
+    /// Returns the horizontal reference system, if the file states it.
     pub fn reference_system(&self) -> Option<&ReferenceSystem> {
         self.source.system.as_ref()
     }
@@ -583,19 +581,19 @@ impl Raster {
         self.source.system_from
     }
 
-    /// Outer edges of the cells around all samples, in the units of the file's
+    /// Returns the outer edges of the cells around all samples, in the units of the file's
     /// coordinates, if the file states its place.
     pub fn bounds(&self) -> Option<Bounds> {
         self.source.bounds()
     }
 
-    /// The same in degrees of longitude and latitude, as [`Georeference::lonlat`] says,
-    /// where the reference system is known. Longitudes run on over 180° where the field does.
+    /// Returns the bounds in degrees of longitude and latitude, see [`Georeference::lonlat`], if
+    /// the reference system is known. Longitudes continue beyond 180° if the field does.
     pub fn bounds_lonlat(&self) -> Option<Bounds> {
         self.source.bounds_lonlat()
     }
 
-    /// Zero of the heights, where the file states it.
+    /// Returns the zero of the heights, if the file states it.
     pub fn vertical_datum(&self) -> Option<&VerticalDatum> {
         self.source.vertical_datum.as_ref()
     }
@@ -626,8 +624,8 @@ impl Raster {
         Georeference::new(ground, source.system.as_ref(), source.cell, last)
     }
 
-    /// The same samples at a place: the south-west one at `origin`, and the steps to the
-    /// next column and row, in coordinates of the reference system with an EPSG code.
+    /// Returns the same samples at a place: the south-west sample and the steps to the next column
+    /// and row, in coordinates of the reference system with an EPSG code.
     #[must_use]
     pub fn with_ground(mut self, ground: GroundTransform, epsg: Option<u16>) -> Self {
         self.source.place = ground_map::GroundMap::of_samples(&ground).map(Place::new);
@@ -635,18 +633,18 @@ impl Raster {
         self
     }
 
-    /// Size of a cell, if the file states it.
+    /// Returns the size of a cell, if the file states it.
     pub fn cell(&self) -> Option<CellSize> {
         self.source.cell
     }
 
-    /// Metres per vertical unit, if the file states it; most say nothing and
-    /// mean metres.
+    /// Returns the metres per vertical unit, if the file states it; most files state none and mean
+    /// metres.
     pub fn stated_metres_per_vertical_unit(&self) -> Option<f64> {
         self.source.metres_per_vertical_unit
     }
 
-    /// Metres per vertical unit; one where the file does not say.
+    /// Returns the metres per vertical unit; one if the file does not state it.
     pub fn metres_per_vertical_unit(&self) -> f64 {
         self.stated_metres_per_vertical_unit().unwrap_or(1.0)
     }

@@ -1,7 +1,7 @@
-//! Numbers in text files and tags, as programs of many kinds write them.
+//! Numbers in text files and tags, in the notations of many programs.
 
-/// Reads a number: also with a decimal comma, with Fortran's exponent (`5.0D+02`), and what
-/// Microsoft's C library prints for NaN and infinity (`-1.#IND`, `1.#QNAN`, `1.#INF`).
+/// Reads a number, also with a decimal comma, with Fortran's exponent (`5.0D+02`), or as NaN or
+/// infinity in the notation of Microsoft's C library (`-1.#IND`, `1.#QNAN`, `1.#INF`).
 pub(super) fn number(word: &str) -> Option<f64> {
     let word = word.trim();
     let parsed = |word: &str| word.parse::<f64>().ok();
@@ -17,7 +17,7 @@ pub(super) fn number(word: &str) -> Option<f64> {
         })
 }
 
-/// NaN and infinity in the words of C libraries.
+/// Reads NaN and infinity as C libraries print them.
 fn not_a_number(word: &str) -> Option<f64> {
     let lower = word.to_ascii_lowercase();
     let size = lower.trim_start_matches(['+', '-']);
@@ -43,7 +43,7 @@ pub(super) fn beginning(text: &str) -> String {
     beginning
 }
 
-/// A no-data value as a file writes it, with a remark where it is no plain number.
+/// A no-data value from a file's text, with a remark if it is not a plain number.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct NoDataText {
     /// The value, if the text has one.
@@ -52,8 +52,8 @@ pub(super) struct NoDataText {
     pub(super) remark: Option<String>,
 }
 
-/// Reads a no-data value. Of a list with one value for each of `bands` that of `band` (the first
-/// being 0) counts, of another list the first one.
+/// Reads a no-data value. If the text is a list of `bands` values, the value of `band` (from 0) is
+/// used; of a list of another length, the first.
 pub(super) fn no_data(text: &str, band: usize, bands: usize) -> NoDataText {
     if let Some(value) = number(text) {
         return NoDataText {

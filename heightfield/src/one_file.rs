@@ -1,4 +1,4 @@
-//! From one file to decoded samples: tells the format, decodes.
+//! From one file to decoded samples: finds the format and decodes.
 
 use super::beside::{Notes, remark_unread};
 use super::decoder_panic::guarded;
@@ -7,10 +7,10 @@ use super::formats::{FORMATS, flt_bil, gdal, raw};
 use super::input::FileBytes;
 use super::{Decoded, OpenOptions, RasterError};
 
-/// Enough of a file to tell every format by its beginning.
+/// Enough bytes of a file to recognise every format by its beginning.
 const HEAD_BYTES: u64 = 1024;
 
-/// Decodes a file, by GDAL where nothing here reads it.
+/// Decodes a file, with GDAL if no format here reads it.
 pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if let Some(layout) = options.raw {
         check_no_open_options("raw samples", options)?;
@@ -26,7 +26,7 @@ pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded
     or_by_gdal(decoded, input, options)
 }
 
-/// Decodes a file with what GDAL has noted beside it.
+/// Decodes a file with GDAL's notes beside it.
 fn with_notes(
     input: &FileBytes,
     options: &OpenOptions,
@@ -53,7 +53,7 @@ fn decode_here(
     if let Some(format) = by_content(head) {
         return decode_as(format, input, options);
     }
-    // A header beside a file tells more than the file's extension.
+    // A header beside a file is more specific than the file's extension.
     if !flt_bil::is_of_another_kind(head)
         && let Some(decoded) = guarded("raw", || flt_bil::decode_by_header(input, options))?
     {
@@ -67,7 +67,7 @@ fn decode_here(
     decode_as(format, input, options)
 }
 
-/// Opens by GDAL what is not known or not supported here.
+/// Opens formats that are unknown or not supported here with GDAL.
 fn or_by_gdal(
     decoded: Result<Decoded, RasterError>,
     input: &FileBytes,
@@ -86,7 +86,7 @@ fn or_by_gdal(
         (Ok(decoded), _) => Ok(decoded),
         (Err(by_gdal), UnknownFormat) => Err(by_gdal),
         (Err(by_gdal @ RasterError::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
-        // GDAL's words on what is known here, or a refusal that says what is missing.
+        // This crate's fault is more specific than these errors of GDAL, but not than others.
         (Err(UnknownFormat | ByGdal(_) | RasterError::WantsGdal { .. }), fault) => Err(fault),
         (Err(by_gdal), _) => Err(by_gdal),
     }

@@ -1,4 +1,4 @@
-//! From a path to decoded samples: tells many files from one.
+//! From a path to decoded samples: separates single files from many.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use super::formats::gdal;
 use super::input::FileBytes;
 use super::{Decoded, OpenOptions, RasterError, mosaic, one_file};
 
-/// Decodes a terrain: a file, which may be packed, or many that are one.
+/// Decodes a terrain: a file, or many files as one.
 pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if let Some(files) = mosaic::named(path).transpose() {
         return match files.and_then(|files| decode_all(&files, options)) {
@@ -31,7 +31,7 @@ pub(super) fn decode_all(files: &[PathBuf], options: &OpenOptions) -> Result<Dec
     mosaic::of_files(files.to_vec(), options)
 }
 
-/// Decodes a file by GDAL alone.
+/// Decodes a file with GDAL only.
 pub(super) fn decode_by_gdal(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     gdal::decode(path, options)
 }

@@ -1,47 +1,47 @@
-//! Options of the user for a file.
+//! The user's options for a file.
 
 use super::fill::Fill;
 use super::samples::{Endian, SampleType};
 use crate::disk_cache::DiskCache;
 use crate::remote::RemoteFetcher;
 
-/// Options for opening a file. The default believes the file.
+/// Options for opening a file. By default, the file's own metadata is used.
 #[derive(Clone, Debug)]
 pub struct OpenOptions {
-    /// The file is raw samples of this layout, whatever its content looks like.
+    /// The file is raw samples in this layout, whatever its content.
     pub raw: Option<RawLayout>,
-    /// Which channel of a PNG holds the height. Without it: the grey of a grey
-    /// picture, the alpha of one with colours and an alpha that varies.
+    /// The channel of a PNG that holds the height. By default: grey in a grey picture, alpha in a
+    /// colour picture whose alpha varies.
     pub png_channel: Option<PngChannel>,
-    /// Stored sample value that means no data; replaces what the file says.
+    /// Stored sample value that means no-data; overrides the file's.
     pub no_data: Option<f64>,
-    /// Distance within which samples without data are filled from data. Without it, and of
-    /// [`OpenOptions::classes`], they stay without a height.
+    /// Distance within which no-data is filled from data. By default, and with
+    /// [`OpenOptions::classes`], it stays no-data.
     pub fill: Option<Fill>,
-    /// Which band holds the height, the first being 1. Without it: the first.
+    /// The band that holds the height, the first being 1. By default: the first.
     pub band: Option<u32>,
-    /// Which raster of several holds the height: a variable of a NetCDF file, a file of an archive,
-    /// an asset of a STAC's items. Without it: the one that is named as heights are, or the only one.
+    /// The raster that holds the height, if there are several: a variable of a NetCDF file, a file
+    /// of an archive, an asset of STAC items. By default: the one with a usual name for heights, or
+    /// the only one.
     pub variable: Option<String>,
     /// Options of the GDAL driver that opens the file, each as `NAME=VALUE`.
     pub open_options: Vec<String>,
-    /// Side of a cell on the ground, metres, of a file that does not state it.
+    /// Side of a cell on the ground, metres, for a file that does not state it.
     pub ground_cell_m: Option<f64>,
-    /// Metres in a unit of the heights; replaces what the file says.
+    /// Metres in a unit of the heights; overrides the file's.
     pub vertical_unit_m: Option<f64>,
     /// Encoding of heights in a picture's colours, if any.
     pub encoding: Option<Encoding>,
-    /// The numbers are classes and no heights: those of a palette are taken as they are.
+    /// The numbers are classes, not heights: the numbers of a palette are used directly.
     pub classes: bool,
-    /// True if other formats are read by GDAL, where there is a libgdal.
+    /// True if GDAL reads other formats, if libgdal is installed.
     pub gdal: bool,
-    /// Samples that take more bytes than this stay in the file, where its format allows it,
-    /// and are read in blocks when they are touched.
+    /// Samples that need more bytes than this stay in the file, if its format allows it, and are
+    /// read in blocks on access.
     pub most_in_memory_bytes: u64,
-    /// The files at URLs that are read with these options.
+    /// Source of files at URLs.
     pub elsewhere: RemoteFetcher,
-    /// Folder for coarse samples of a terrain in its file. The default
-    /// keeps nothing.
+    /// Folder for coarse samples of a terrain in its file. By default, none are stored.
     pub disk_cache: DiskCache,
 }
 
@@ -73,8 +73,7 @@ impl Default for OpenOptions {
     }
 }
 
-/// Layout of a raw file: rows from north to south, samples from west to east,
-/// nothing before, between or after.
+/// Layout of a raw file: rows from north to south, samples from west to east, without other bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawLayout {
     /// Samples from west to east.
@@ -107,15 +106,15 @@ pub enum PngChannel {
     Green,
     /// Blue
     Blue,
-    /// Alpha, where the paper's data holds the height
+    /// Alpha, which holds the height in the paper's data
     Alpha,
 }
 
 impl Encoding {
-    /// All of them.
+    /// All encodings.
     pub const ALL: &[Self] = &[Self::TerrainRgb, Self::Terrarium];
 
-    /// Its name, as `terrain-rgb`.
+    /// Returns its name, as `terrain-rgb`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -126,10 +125,10 @@ impl Encoding {
 }
 
 impl PngChannel {
-    /// All of them.
+    /// All channels.
     pub const ALL: &[Self] = &[Self::Grey, Self::Red, Self::Green, Self::Blue, Self::Alpha];
 
-    /// Its name, as `grey`.
+    /// Returns its name, as `grey`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

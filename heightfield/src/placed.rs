@@ -1,5 +1,5 @@
-//! Place of decoded samples, from a file's map from columns and rows to
-//! coordinates, whatever its format.
+//! Place of decoded samples, for all formats, from the file's map from columns and rows to
+//! coordinates.
 
 use super::crs::{ReferenceSystem, Unit};
 use super::decoded::Decoded;
@@ -12,16 +12,16 @@ use super::{CellSize, CellUnit, Certainty, Globe, RasterError};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GroundUnit {
     unit: CellUnit,
-    /// Degrees in a unit, where it is an angle.
+    /// Degrees in a unit, if it is an angle.
     degrees: f64,
     from: Certainty,
 }
 
 impl GroundUnit {
-    /// Degrees, which the file or its format states.
+    /// Degrees, as stated by the file or its format.
     pub(super) const DEGREE: Self = Self::angle(1.0);
 
-    /// A stated angle of so many degrees.
+    /// Returns a stated angle in degrees.
     pub(super) const fn angle(degrees: f64) -> Self {
         Self {
             unit: CellUnit::Degree,
@@ -30,7 +30,7 @@ impl GroundUnit {
         }
     }
 
-    /// A length of so many metres.
+    /// Returns a length in metres.
     pub(super) const fn length(metres: f64, from: Certainty) -> Self {
         Self {
             unit: CellUnit::Length { metres },
@@ -39,7 +39,7 @@ impl GroundUnit {
         }
     }
 
-    /// The unit of a reference system.
+    /// Returns the unit of a reference system.
     pub(super) fn of(system: &ReferenceSystem) -> Self {
         let from = match system.code() {
             Some(_) => Certainty::FromCode,
@@ -53,11 +53,11 @@ impl GroundUnit {
     }
 }
 
-/// Angles below this are rounding, degrees.
+/// Smaller angles are rounding, degrees.
 const STRAIGHT_DEGREES: f64 = 0.05;
 
-/// Returns remarks on a rotated or sheared grid. It is rendered along its own rows; only a
-/// mirror image is turned.
+/// Returns remarks on a rotated or sheared grid. It is rendered along its own rows; only a mirrored
+/// grid is turned.
 fn turned(map: &GroundMap) -> Vec<String> {
     let mut words = Vec::new();
     if map.is_straight() {
@@ -78,7 +78,7 @@ fn turned(map: &GroundMap) -> Vec<String> {
 }
 
 impl Decoded {
-    /// The unit of the coordinates of samples that were laid out, where it was not guessed.
+    /// Returns the unit of the coordinates after `lay_out`; `None` if it was guessed.
     pub(super) fn ground_unit(&self) -> Option<GroundUnit> {
         let (cell, place) = (self.cell?, self.place?);
         let is_guess = cell.certainty == Certainty::Assumed && self.system.is_none();
@@ -89,9 +89,8 @@ impl Decoded {
         })
     }
 
-    /// Lays the samples out: sets orientation, cell and place. Where the file states
-    /// no `unit`, that of its reference system counts, which is to be set before; else
-    /// the numbers tell.
+    /// Sets orientation, cell and place. If the file states no `unit`, the unit of its reference
+    /// system is used, which must be set before; without one, the unit is guessed from the numbers.
     pub(super) fn lay_out(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
@@ -107,18 +106,17 @@ impl Decoded {
         self.place = Some(Place { map, degrees });
     }
 
-    /// Remarks on places of single samples, from which no grid follows.
+    /// Adds a remark on positions of single samples, which do not define a grid.
     pub(super) fn remark_control_points(&mut self, count: usize) {
         self.remarks.push(format!(
             "it states the places of {count} samples (tie points, ground control points) and no cell size: they are not used; this brings it onto a map: gdalwarp -r bilinear IN OUT.tif"
         ));
     }
 
-    /// Takes a side of the cells in metres from the user, where the file does not state
-    /// it.
+    /// Sets the side of the cells in metres to the user's value, if the file does not state it.
     ///
     /// # Errors
-    /// [`RasterError::CellKnown`] where it does.
+    /// [`RasterError::CellKnown`] if the file states it.
     pub(super) fn with_ground_cell(mut self, side_m: Option<f64>) -> Result<Self, RasterError> {
         let Some(side_m) = side_m else {
             return Ok(self);
@@ -132,7 +130,7 @@ impl Decoded {
         }
         let metre = CellUnit::Length { metres: 1.0 };
         let sides = match self.cell {
-            // Of cells that are not square it is the smaller side.
+            // For cells that are not square, it is the shorter side.
             Some(cell) => {
                 let shorter = cell.east.min(cell.north);
                 (cell.east / shorter * side_m, cell.north / shorter * side_m)
@@ -143,7 +141,7 @@ impl Decoded {
             certainty: Certainty::Given,
             ..CellSize::stated(sides, metre, None)
         });
-        // Its coordinates are in a unit that stays unknown.
+        // The unit of the coordinates stays unknown.
         self.place = None;
         Ok(self)
     }
@@ -170,11 +168,11 @@ impl Decoded {
         }
     }
 
-    /// A cell as it is on the ground in the middle of the field, where that is known.
+    /// Returns the cell with its scale on the ground in the middle of the field, if that is known.
     fn on_ground(&self, map: &GroundMap, cell: CellSize, degrees: f64) -> Option<CellSize> {
         let middle = map.at(f64::from(self.columns) / 2.0, f64::from(self.rows) / 2.0);
         let tangents = match cell.unit {
-            // Along meridians and parallels a cell is what its latitude makes it.
+            // Along meridians and parallels, the latitude determines the cell.
             CellUnit::Degree if map.is_straight() => return None,
             CellUnit::Degree => Tangents::of_angles(&cell.globe, cell.latitude?, degrees),
             CellUnit::Length { .. } => self.system.as_ref()?.tangents(middle)?,
@@ -183,13 +181,14 @@ impl Decoded {
         tangents.cell(cell, along, up)
     }
 
-    /// Outer edges of all cells in the file's units.
+    /// Returns the outer edges of all cells in the file's units.
     pub(super) fn bounds(&self) -> Option<Bounds> {
         self.place?.map.bounds((self.columns, self.rows))
     }
 
-    /// Outer edges of all cells in degrees of longitude and latitude. Longitudes run on over 180° where the field does. The edges of a projected
-    /// field are curved: they are followed in `STEPS` steps.
+    /// Returns the outer edges of all cells in degrees of longitude and latitude. Longitudes
+    /// continue beyond 180° if the field does. The edges of a projected field are curved: each is
+    /// sampled in `STEPS` steps.
     pub(super) fn bounds_lonlat(&self) -> Option<Bounds> {
         const STEPS: u32 = 32;
         let (columns, rows) = (f64::from(self.columns), f64::from(self.rows));
@@ -214,7 +213,8 @@ impl Decoded {
         Some(self.with_poles(bounds))
     }
 
-    /// A field around a pole has all longitudes, and the pole is not on its edges.
+    /// Extends the bounds of a field around a pole: it covers all longitudes, and the pole is not
+    /// on its edges.
     fn with_poles(&self, mut lonlat: Bounds) -> Bounds {
         let centres = self.place.and_then(|place| place.map.of_centres());
         let (Some(centres), Some(system)) = (centres, self.system.as_ref()) else {
@@ -225,10 +225,10 @@ impl Decoded {
             let Some((x, y)) = system.from_lonlat((0.0, pole)) else {
                 continue;
             };
-            // A rotated field does not fill its bounds. Cells reach half a sample outwards.
+            // A rotated field does not fill its bounds. Cells extend half a sample outwards.
             let at = centres.to_samples([x, y]).map(|sample| sample + 0.5);
             let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&at[axis]));
-            // Others show a pole as a line, or nowhere.
+            // Other projections map a pole to a line, or nowhere.
             if inside
                 && system
                     .to_lonlat((x, y))
@@ -242,7 +242,7 @@ impl Decoded {
         lonlat
     }
 
-    /// Longitude and latitude of a place in columns and rows, file order.
+    /// Returns the longitude and latitude of a position in columns and rows, file order.
     pub(super) fn lonlat(&self, column: f64, row: f64) -> Option<(f64, f64)> {
         let place = self.place?;
         let (x, y) = place.map.at(column, row);

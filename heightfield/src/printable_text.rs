@@ -1,20 +1,20 @@
-//! Texts of files, servers, devices and users, as a terminal, a log or a page may show them.
+//! Makes texts from files, servers, devices and users safe for terminals, logs and pages.
 //!
-//! The author of a file chose the names in it. A terminal obeys control sequences, and characters
-//! that turn the direction of writing hide what a line says, so a name could clear the screen or
-//! write over earlier lines. All output goes through here: what is written to the terminal
-//! (`print_macros`, `cli::terminal::writer`, `cli::report`, errors), to the log (`cli::log`), to readers of
-//! events and to the viewer.
+//! Names in a file are chosen by its author. A terminal obeys control sequences, and characters
+//! that change the writing direction hide a line's content, so a name could clear the screen or
+//! overwrite earlier lines. All output passes through this module: the terminal (`print_macros`,
+//! `cli::terminal::writer`, `cli::report`, errors), the log (`cli::log`), readers of events and the
+//! viewer.
 
 use std::fmt::Write as _;
 
-/// A text on one line: every character that does not print, or that changes how others print,
-/// becomes its escape as in a Rust string (`\u{1b}`, `\n`, `\u{202e}`).
+/// Returns a text on one line: every character that does not print, or that changes how others
+/// print, becomes its escape as in a Rust string (`\u{1b}`, `\n`, `\u{202e}`).
 #[must_use]
 pub fn printable(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     let mut rest = text;
-    // Rust escapes these, too, which print as they are.
+    // Rust also escapes these, though they print as they are.
     while let Some(at) = rest.find(['\'', '"', '\\']) {
         safe.extend(rest[..at].escape_debug());
         safe.push_str(&rest[at..=at]);
@@ -31,7 +31,8 @@ pub fn printable_lines(text: &str) -> String {
     lines.join("\n")
 }
 
-/// As [`printable_lines`], for JSON: the characters become escapes of JSON, so the values stay the same.
+/// As [`printable_lines`], for JSON: the characters become JSON escapes, so the values stay the
+/// same.
 #[must_use]
 pub fn printable_json(json: &str) -> String {
     let mut safe = String::with_capacity(json.len());
@@ -63,7 +64,7 @@ mod tests {
         ] {
             assert_eq!(printable(told), seen);
         }
-        // The last one as file systems of macOS have it, in two characters.
+        // The last one as macOS file systems store it, in two characters.
         for plain in [
             "nucleo-g474re 0.1.0",
             "Brett №3, 'é' \"ü\" \\",

@@ -1,8 +1,8 @@
 //! Uncompressed samples at offsets that follow from column and row: raw files, `.hgt`, `.npy`, and
-//! those with a header beside them.
+//! files with a header beside them.
 //!
-//! A small file is read at once. A large one is read in blocks where it is touched; coarse levels have
-//! every 2ᵏ-th sample.
+//! A small file is read at once. A large one is read in blocks on access; coarse levels have every
+//! 2ᵏ-th sample.
 
 use std::hash::Hasher;
 
@@ -16,39 +16,39 @@ use super::storage::Storage;
 use super::{OpenOptions, RasterError, subsampled};
 use crate::disk_cache::FileStamp;
 
-/// Samples of a block each way.
+/// Side of a block, samples.
 const BLOCK: u32 = 256;
-/// Blocks of coarse images, whose samples lie far apart.
+/// Side of a block of coarse images, whose samples lie far apart.
 const COARSE_BLOCK: u32 = 32;
-/// Samples of a block of a file that is elsewhere: long rows, few of them, because what
-/// lies together comes together.
+/// Columns and rows of a block of a remote file: few long rows, because adjacent bytes arrive in
+/// one response.
 const WIDE_BLOCK: [u32; 2] = [32_768, 2];
-/// Samples that lie farther apart than this, bytes, are read one by one.
+/// Samples farther apart than this, bytes, are read one by one.
 const FAR: u64 = 4096;
-/// Bytes that are read at once, at most, where rows follow each other.
+/// Max bytes of one read, if rows are contiguous.
 const AT_ONCE: u64 = 1 << 20;
-/// Samples of a file at a URL that take no more than this are fetched at once.
+/// Max bytes of samples at a URL that are fetched at once.
 const FEW_BYTES: u64 = 1 << 20;
-/// When a file that is not read as a whole is opened, so many places each way are looked at.
+/// Parts per direction that are read at opening, if a file is not read whole.
 const PLACES: u32 = 6;
 
-/// Positions of samples in a file, in bytes.
+/// Offsets of samples in a file, bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RawSamples {
     pub(super) columns: u32,
     pub(super) rows: u32,
     pub(super) stored: Stored,
     pub(super) endian: Endian,
-    /// The first sample.
+    /// Offset of the first sample.
     pub(super) first: u64,
-    /// From a sample to the one below it.
+    /// Step from a sample to the one below it.
     pub(super) row: u64,
-    /// From a sample to the next in its row.
+    /// Step from a sample to the next in its row.
     pub(super) sample: u64,
 }
 
 impl RawSamples {
-    /// Rows that follow each other, with nothing between.
+    /// Returns the layout of contiguous rows.
     pub(super) fn packed(
         (columns, rows): (u32, u32),
         stored: Stored,
@@ -66,7 +66,7 @@ impl RawSamples {
         }
     }
 
-    /// The same bytes, rows taken for columns.
+    /// Returns the same bytes with rows and columns exchanged.
     pub(super) const fn turned(self) -> Self {
         Self {
             columns: self.rows,
@@ -77,8 +77,8 @@ impl RawSamples {
         }
     }
 
-    /// The samples, all of them inside the file: in memory, or in the file where that is
-    /// large.
+    /// Returns the samples, checked to be inside the file: in memory, or for a large file, in
+    /// blocks.
     ///
     /// # Errors
     /// A file that cannot be read; more samples than memory holds.
@@ -105,7 +105,7 @@ impl RawSamples {
         Ok(self.read(input, &all, Grain::ALL)?.into())
     }
 
-    /// A part of the image that has such samples.
+    /// Reads a part of the image with the samples of `grain`.
     fn read(&self, input: &FileBytes, part: &Part, grain: Grain) -> Result<Samples, RasterError> {
         if self.sample > self.row {
             let part = turned(part);
@@ -150,7 +150,7 @@ impl RawSamples {
         self.first + row * self.row + column * self.sample
     }
 
-    /// The bytes that a part takes, in the order in which they are read.
+    /// Returns the byte ranges of a part, in reading order.
     fn ranges(&self, part: &Part, grain: Grain) -> Vec<std::ops::Range<u64>> {
         if self.sample > self.row {
             return self.turned().ranges(&turned(part), grain.turned());
@@ -169,7 +169,7 @@ impl RawSamples {
     }
 }
 
-/// Which samples an image has: every so many-th, from a first column and row on.
+/// The samples of an image: every `every`-th, from a first column and row.
 #[derive(Clone, Copy, Debug)]
 struct Grain {
     every: u32,
@@ -192,7 +192,7 @@ impl Grain {
     }
 }
 
-/// The same, rows taken for columns.
+/// Returns the same part with rows and columns exchanged.
 pub(super) const fn turned(part: &Part) -> Part {
     Part {
         column: part.row,
@@ -202,7 +202,7 @@ pub(super) const fn turned(part: &Part) -> Part {
     }
 }
 
-/// Rows of columns, of which there are so many of so many samples.
+/// Transposes samples from `columns` × `rows`.
 pub(super) fn transposed(samples: &Samples, columns: u32, rows: u32) -> Samples {
     fn in_rows<T: Copy>(values: &[T], columns: usize, rows: usize) -> Vec<T> {
         let row = |row: usize| (0..columns).map(move |column| column * rows + row);
@@ -224,7 +224,7 @@ pub(super) struct PlainBlocks {
 }
 
 impl PlainBlocks {
-    /// Samples that are all inside of the file.
+    /// Returns blocks of samples that are all inside the file.
     pub(super) fn new(plain: RawSamples, input: FileBytes) -> Self {
         let is_remote = input.remote().is_some();
         let block = |k: u32| match (k, is_remote) {

@@ -1,4 +1,4 @@
-//! Plain samples read at once, in blocks, and with rows and columns in either order.
+//! Plain samples read at once, in blocks, and in row or column order.
 
 use std::path::Path;
 
@@ -9,11 +9,11 @@ use crate::{Raster, RawLayout, RemoteFetcher, Wait};
 const SIZE: [u32; 2] = [1100, 700];
 
 fn value(column: u32, row: u32) -> i16 {
-    // Nothing between two samples is one of them.
+    // No value between two samples equals a sample.
     (column.wrapping_mul(7919) ^ row.wrapping_mul(104_729)) as i16
 }
 
-/// Big-endian samples with a head and bytes between rows and between samples.
+/// Writes big-endian samples with a header and bytes between rows and between samples.
 fn file(folder: &Path) -> (FileBytes, RawSamples) {
     let mut bytes = vec![0xAA; 37];
     for row in 0..SIZE[1] {
@@ -101,7 +101,7 @@ fn samples_that_lie_far_apart_are_read_where_they_are() {
         let at = (37 + row * far.row + column * far.sample) as usize;
         i16::from_be_bytes([bytes[at], bytes[at + 1]])
     };
-    // Every second one, which is farther than what is read in one go.
+    // Every second sample, over more rows than one read covers.
     let grain = Grain {
         every: 2,
         first: [0, 1],

@@ -1,4 +1,4 @@
-//! Samples from bytes, for all formats that store them plainly.
+//! Samples from bytes, for all formats with plain samples.
 
 use half::f16;
 
@@ -8,18 +8,18 @@ use super::samples::{Endian, SampleType, SampleValue, Samples, with_samples};
 /// The type of a sample in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stored {
-    /// A type in which samples are held, too.
+    /// A type that is also used in memory.
     Held(SampleType),
-    /// Half floats, held as single ones.
+    /// Half floats, single floats in memory.
     F16,
-    /// 64-bit integers, held as double floats (exact to 2^53).
+    /// 64-bit integers, double floats in memory (exact to 2^53).
     I64,
-    /// The same without a sign.
+    /// As `I64`, unsigned.
     U64,
 }
 
 impl Stored {
-    /// Bytes of a sample in the file.
+    /// Returns the bytes of a sample in the file.
     pub(super) const fn bytes(self) -> u64 {
         match self {
             Self::Held(sample) => sample.bytes(),
@@ -28,7 +28,7 @@ impl Stored {
         }
     }
 
-    /// The type in which such samples are held.
+    /// Returns the type of the samples in memory.
     pub(super) const fn held(self) -> SampleType {
         match self {
             Self::Held(sample) => sample,
@@ -37,7 +37,8 @@ impl Stored {
         }
     }
 
-    /// Room for `count` samples; the caller has checked that the file holds them.
+    /// Returns an empty vector with capacity for `count` samples; the caller has checked that the
+    /// file holds them.
     pub(super) fn room(self, count: u64) -> Result<Samples, RasterError> {
         let mut samples = self.held().none();
         let reserved = usize::try_from(count).ok().and_then(
@@ -49,8 +50,8 @@ impl Stored {
         Ok(samples)
     }
 
-    /// Appends the samples in `bytes`, each of which begins `apart` bytes after the one
-    /// before, to `samples`, which [`Stored::room`] made.
+    /// Appends the samples in `bytes`, which are `apart` bytes apart, to `samples` from
+    /// [`Stored::room`].
     pub(super) fn append(self, samples: &mut Samples, bytes: &[u8], apart: usize, endian: Endian) {
         let each = || bytes.chunks(apart);
         match (self, samples) {
@@ -79,7 +80,7 @@ fn extend<'b, T: SampleValue>(
     values.extend(stored.map(|bytes| T::from_bytes(&bytes[..size_of::<T>()], endian)));
 }
 
-/// The first eight bytes, least significant first.
+/// Returns the first eight bytes, least significant first.
 fn little(bytes: &[u8], endian: Endian) -> [u8; 8] {
     let mut eight: [u8; 8] = bytes[..8].try_into().unwrap_or_default();
     if endian == Endian::Big {

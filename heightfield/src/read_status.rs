@@ -1,24 +1,24 @@
-//! The choice to wait for heights that are not in memory, and the completeness of a read.
+//! Whether a read waits for heights that are not in memory, and whether it was complete.
 
 use std::cell::Cell;
 
-/// Behaviour of a read where a height is not in memory.
+/// Behaviour of a read if a height is not in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
-    /// Waits until it has been read, or cannot be read at present.
+    /// Waits until the height is read, or cannot be read at present.
     UntilRead,
     /// Does not wait: the height is read in the background, for a later read.
     Never,
 }
 
-/// Completeness of a read. A pending height is NaN as no-data is, and is not no-data.
+/// Completeness of a read. A pending height is NaN, but it is not no-data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[must_use = "pending heights look like no-data"]
 pub enum ReadStatus {
     /// All heights were returned.
     #[default]
     Complete,
-    /// Some heights are not here yet: read again later.
+    /// Some heights are pending: read again later.
     Pending,
 }
 
@@ -38,7 +38,7 @@ impl ReadStatus {
     }
 }
 
-/// Status of several reads together.
+/// Combined status of several reads.
 #[derive(Debug, Default)]
 pub struct ReadTracker(Cell<ReadStatus>);
 
@@ -48,7 +48,7 @@ impl ReadTracker {
         self.0.set(self.0.get().and(status));
     }
 
-    /// Adds the status of a read, and returns what was read.
+    /// Adds the status of a read, and returns the value.
     pub fn record<T>(&self, (read, status): (T, ReadStatus)) -> T {
         self.add(status);
         read

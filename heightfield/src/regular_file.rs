@@ -1,5 +1,5 @@
-//! Files that are read: regular ones only. Opening a pipe waits for a writer, and opening a
-//! device may start it, so the kind is checked before the file is opened.
+//! Opens and reads regular files only. Opening a pipe waits for a writer, and opening a device may
+//! start it, so the kind is checked before the file is opened.
 
 use std::fs::{File, FileType, Metadata};
 use std::io::{Error, ErrorKind, Read, Result};
@@ -8,11 +8,11 @@ use std::path::Path;
 /// Opens a regular file.
 ///
 /// # Errors
-/// There is none, it may not be read, or it is of another kind, which the error names.
+/// The file is missing, reading is denied, or it is of another kind, which the error names.
 pub fn open(path: &Path) -> Result<File> {
     check(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
-    // It may have been replaced meanwhile.
+    // The file may have been replaced in between.
     check(&file.metadata()?)?;
     Ok(file)
 }
@@ -42,7 +42,7 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String> {
     String::from_utf8(bytes).map_err(|_| Error::new(ErrorKind::InvalidData, "it is not UTF-8 text"))
 }
 
-/// Checks that the metadata is that of a regular file.
+/// Checks that the metadata describes a regular file.
 fn check(metadata: &Metadata) -> Result<()> {
     if metadata.is_file() {
         return Ok(());
@@ -97,7 +97,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let pipe = folder.path().join("pipe");
         mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR, 0).expect("a pipe");
-        // Were it opened, this would wait for ever.
+        // If it were opened, this test would wait for ever.
         for (path, what) in [
             (&*pipe, "a pipe (FIFO)"),
             (Path::new("/dev/zero"), "a character device"),

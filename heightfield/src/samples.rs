@@ -1,11 +1,11 @@
-//! The samples of a file, held once, in the file's own compact type.
+//! The samples of a file, stored once, in the file's own compact type.
 
-/// Declares the types a sample may have, one line a type.
+/// Declares the sample types, one line each.
 macro_rules! sample_types {
     ($($(#[$about:meta])* $variant:ident($type:ty) = $name:literal, $short:literal;)*) => {
         /// Samples in file order (row after row), in the file's own type.
         ///
-        /// Half floats are held as `f32` and 64-bit integers as `f64` (exact to 2^53).
+        /// Half floats are stored as `f32` and 64-bit integers as `f64` (exact to 2^53).
         #[derive(Clone, Debug, PartialEq)]
         #[non_exhaustive]
         pub enum Samples {
@@ -19,10 +19,10 @@ macro_rules! sample_types {
         }
 
         impl SampleType {
-            /// All of them.
+            /// All types.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// Its short name, as `i16`.
+            /// Returns the short name, as `i16`.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -30,14 +30,14 @@ macro_rules! sample_types {
                 }
             }
 
-            /// Bytes that a sample of this type takes.
+            /// Returns the bytes of a sample.
             pub const fn bytes(self) -> u64 {
                 match self {
                     $(Self::$variant => size_of::<$type>() as u64,)*
                 }
             }
 
-            /// No samples of this type, to be filled.
+            /// Returns an empty vector of this type.
             pub(super) const fn none(self) -> Samples {
                 match self {
                     $(Self::$variant => Samples::$variant(Vec::new()),)*
@@ -46,14 +46,14 @@ macro_rules! sample_types {
         }
 
         impl Samples {
-            /// Type of the samples.
+            /// Returns the type of the samples.
             pub const fn sample_type(&self) -> SampleType {
                 match self {
                     $(Self::$variant(_) => SampleType::$variant,)*
                 }
             }
 
-            /// Name of the sample type, as `int16`.
+            /// Returns the name of the sample type, as `int16`.
             pub const fn type_name(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => $name,)*
@@ -106,7 +106,7 @@ sample_types! {
     F64(f64) = "float64", "f64";
 }
 
-/// Runs `$body` with `$values` bound to the vector inside, whatever its type.
+/// Runs `$body` with `$values` bound to the inner vector, for any type.
 macro_rules! with_samples {
     ($samples:expr, $values:ident => $body:expr) => {
         match $samples {
@@ -134,10 +134,10 @@ pub enum Endian {
 }
 
 impl Endian {
-    /// Both.
+    /// Both orders.
     pub const ALL: &[Self] = &[Self::Little, Self::Big];
 
-    /// Its name, as `little`.
+    /// Returns its name, as `little`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -149,49 +149,49 @@ impl Endian {
 
 /// One sample of a type that [`Samples`] can hold.
 pub(super) trait SampleValue: Copy {
-    /// The same number.
+    /// Converts to `f64`, exactly.
     fn widen(self) -> f64;
 
-    /// The number of this type that is nearest to `value`.
+    /// Returns the number of this type nearest to `value`.
     fn nearest(value: f64) -> Self;
 
-    /// The sample stored in as many bytes as the type has.
+    /// Reads a sample from as many bytes as the type has.
     fn from_bytes(bytes: &[u8], endian: Endian) -> Self;
 }
 
 impl Samples {
-    /// Number of samples.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         with_samples!(self, values => values.len())
     }
 
-    /// Returns true if there are none.
+    /// Returns true if there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes that the samples take in memory.
+    /// Returns the memory of the samples, bytes.
     pub fn bytes(&self) -> usize {
         with_samples!(self, values => size_of_val(values.as_slice()))
     }
 
-    /// The no-data value as this type would hold it, so that comparing samples
-    /// widened to `f64` with it is exact; `None` when no sample can equal it.
+    /// Returns the no-data value as this type stores it, so that comparing it with samples widened
+    /// to `f64` is exact; `None` if no sample can equal it.
     ///
-    /// A float32 file's no-data is often written with the digits of a double
+    /// The no-data value of a float32 file is often written with the digits of a double
     /// (-3.4028234663852886e+38): it is rounded to `f32` first.
     pub(super) fn comparable_no_data(&self, value: f64) -> Option<f64> {
         fn held<T: SampleValue>(_: &[T], value: f64) -> f64 {
             T::nearest(value).widen()
         }
         let held = with_samples!(self, values => held(values, value));
-        // NaN needs no rule: it is a hole in every float file. An integer type
-        // that had to change the value cannot hold it.
+        // NaN is no-data in every float file, so it needs no rule. An integer type that had to
+        // change the value cannot store it.
         let same = matches!(self, Self::F32(_)) || held == value;
         (same && !held.is_nan()).then_some(held)
     }
 }
 
-/// One bit a sample: the holes that no sample value marks (alpha 0 in a grey
-/// picture, a tile that a sparse file leaves out).
+/// One bit per sample: no-data that no sample value marks (alpha 0 in a grey picture, a missing
+/// tile of a sparse file).
 pub(super) type HoleMask = fixedbitset::FixedBitSet;

@@ -1,4 +1,4 @@
-//! Storage of a raster's samples: in memory, or in its file until they are touched.
+//! Storage of a raster's samples: in memory, or in its file until they are accessed.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,11 +10,11 @@ use crate::disk_cache::DiskCache;
 /// The samples of a raster, in the file's order and type.
 #[derive(Clone, Debug)]
 pub(super) enum Storage {
-    /// All of them in memory.
+    /// All samples in memory.
     Held {
         /// `columns × rows` samples, the file's first row first.
         samples: Samples,
-        /// Holes that no value marks.
+        /// No-data that no value marks.
         mask: Option<HoleMask>,
     },
     /// In the file.
@@ -37,7 +37,7 @@ impl<R: BlockReader + 'static> From<R> for Storage {
 }
 
 impl Storage {
-    /// The samples, where all are in memory.
+    /// Returns the samples, if all are in memory.
     pub(super) fn held(&self) -> Option<&Samples> {
         match self {
             Self::Held { samples, .. } => Some(samples),
@@ -45,7 +45,7 @@ impl Storage {
         }
     }
 
-    /// The type of a sample.
+    /// Returns the type of a sample.
     pub(super) fn sample_type(&self) -> SampleType {
         match self {
             Self::Held { samples, .. } => samples.sample_type(),
@@ -53,7 +53,7 @@ impl Storage {
         }
     }
 
-    /// The file's order, before anything is read.
+    /// Sets the file's order; call it before anything is read.
     pub(super) fn set_order(&mut self, south_up: bool, east_first: bool) {
         if let Self::Blocks(blocks) = self
             && let Some(blocks) = Arc::get_mut(blocks)
@@ -62,7 +62,7 @@ impl Storage {
         }
     }
 
-    /// Sets the folder of coarse samples, before anything is read.
+    /// Sets the folder of coarse samples; call it before anything is read.
     pub(super) fn set_disk_cache(&mut self, disk: &DiskCache) {
         if let Self::Blocks(blocks) = self
             && let Some(blocks) = Arc::get_mut(blocks)
@@ -71,14 +71,14 @@ impl Storage {
         }
     }
 
-    /// Names the file in warnings about what is touched later.
+    /// Sets the file's name for warnings of later reads.
     pub(super) fn set_path(&self, path: &Path) {
         if let Self::Blocks(blocks) = self {
             blocks.set_path(path);
         }
     }
 
-    /// Marks holes in samples that are in memory.
+    /// Marks no-data in samples that are in memory.
     pub(super) fn set_holes(&mut self, holes: Option<HoleMask>) {
         if let Self::Held { mask, .. } = self {
             *mask = holes.filter(|holes| !holes.is_clear());

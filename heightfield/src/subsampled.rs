@@ -1,13 +1,12 @@
-//! Images that have every 2ᵏ-th sample of a field, for files without overviews.
+//! Images with every 2ᵏ-th sample of a field, for files without overviews.
 
 use super::blocks::{BlockImage, Looks, Part};
 
-/// When a file that is not read as a whole is opened, places of so many samples each way
-/// are looked at.
+/// Side, in samples, of the parts that are read at opening, if a file is not read whole.
 const PLACE: u32 = 64;
 
-/// The full image and coarser ones while these have cells; `block` has the columns and rows of
-/// a block of the image with every 2ᵏ-th sample.
+/// Returns the full image and coarser ones while these have cells; `block` returns the columns and
+/// rows of a block of the image with every 2ᵏ-th sample.
 pub(super) fn images(size: [u32; 2], block: impl Fn(u32) -> [u32; 2]) -> Vec<BlockImage> {
     let image = |k: u32| {
         let [columns, rows] = size.map(|count| ((count.max(1) - 1) >> k) + 1);
@@ -24,7 +23,7 @@ pub(super) fn images(size: [u32; 2], block: impl Fn(u32) -> [u32; 2]) -> Vec<Blo
     std::iter::once(image(0)).chain(coarser).collect()
 }
 
-/// Has coarse images count their samples from the south and west of a file in that order.
+/// Aligns the samples of coarse images to the south-west of a file in that order.
 pub(super) fn set_order(images: &mut [BlockImage], south_up: bool, east_first: bool) {
     let Some(full) = images.first() else {
         return;
@@ -39,7 +38,7 @@ pub(super) fn set_order(images: &mut [BlockImage], south_up: bool, east_first: b
     }
 }
 
-/// Places all over a full image, so many each way.
+/// Returns parts spread over a full image, `each` per direction.
 pub(super) fn places(full: &BlockImage, each: u32) -> Looks {
     let along = |count: u32, number: u32| {
         let size = PLACE.min(count);

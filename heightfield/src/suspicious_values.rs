@@ -1,18 +1,19 @@
-//! Stored values that are probably no-data, though the file does not declare them so.
+//! Stored values that are probably no-data, though the file does not declare them.
 
-/// No height is larger than this (in the file's vertical unit), whatever the
-/// planet: such a sample is a no-data value that the file forgot to declare.
+/// Max magnitude of a height (in the file's vertical unit), on any planet: a larger sample is a
+/// no-data value that the file does not declare.
 pub const MAX_HEIGHT: f64 = 1e30;
 
-/// Values that programs write where there is no data.
+/// Values that programs often write for no-data.
 const LOW: [f64; 5] = [-32_768.0, -32_767.0, -9999.0, -99_999.0, -999.0];
 const HIGH: [f64; 3] = [9999.0, 32_767.0, 99_999.0];
-/// Zero is suspected where the gap to the next value is this share of the range of the others ...
+/// Zero is suspect if the gap to the next value is at least this share of the other values' range
+/// ...
 const GAP: f64 = 0.25;
-/// ... and no fewer of all values than one in so many are zero.
+/// ... and at least one value in `ONE_IN` is zero.
 const ONE_IN: u64 = 200;
 
-/// The outermost of the stored values that were looked at.
+/// The extremes of the stored values that were read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outermost {
     lowest: f64,
@@ -20,12 +21,12 @@ pub(super) struct Outermost {
     highest: f64,
     lowest_count: u64,
     count: u64,
-    /// Values that are no heights.
+    /// Values too large for heights.
     beyond: u64,
 }
 
 impl Outermost {
-    /// Of no values.
+    /// Extremes of no values.
     pub(super) const NONE: Self = Self {
         lowest: f64::INFINITY,
         next: f64::INFINITY,
@@ -35,7 +36,7 @@ impl Outermost {
         beyond: 0,
     };
 
-    /// Counts a stored value that is not declared as no data.
+    /// Counts a stored value that is not declared no-data.
     pub(super) fn add(&mut self, stored: f64) {
         if stored.is_nan() {
             return;
@@ -56,7 +57,7 @@ impl Outermost {
         }
     }
 
-    /// Returns remarks for the user; `is_declared` where a no-data value is.
+    /// Returns remarks for the user; `is_declared` is true if the file has a no-data value.
     pub(super) fn remarks(&self, is_declared: bool) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.beyond > 0 {
@@ -81,7 +82,7 @@ impl Outermost {
         remarks
     }
 
-    /// Returns true if zeros lie far below all other values, as in the collar of a warped image.
+    /// Returns true if zeros lie far below all other values, as in the border of a warped image.
     fn may_be_zero_for_none(&self) -> bool {
         let others = self.highest - self.next;
         self.lowest == 0.0

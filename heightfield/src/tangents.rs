@@ -3,17 +3,17 @@
 use super::geometry::CellSize;
 use super::globe::Globe;
 
-/// Cosines of angles below this are rounding of a projection's formulas: no shear of a
-/// millionth is noticeable.
+/// Smaller cosines are rounding in the projection's formulas: a shear of a millionth is not
+/// noticeable.
 const STRAIGHT: f64 = 1e-6;
-/// Cells whose columns lean farther than this over their rows are no cells.
+/// Cells whose columns lean more than this towards their rows are invalid.
 const FLATTENED: f64 = 0.999;
 
-/// Vectors on the ground of a unit of x and of y at a place, metres: tangents of
-/// the globe, both in the same frame.
+/// Vectors on the ground of a unit of x and of y at a position, metres: tangents of the globe, both
+/// in the same frame.
 ///
-/// They need be neither as long as each other nor perpendicular: most maps that are not
-/// conformal shear the ground, the more the farther from their middle.
+/// They may differ in length and need not be perpendicular: most projections that are not conformal
+/// shear the ground, more so far from their centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tangents {
     pub(super) x: [f64; 3],
@@ -21,7 +21,7 @@ pub(super) struct Tangents {
 }
 
 impl Tangents {
-    /// Of longitude and latitude in units of so many degrees.
+    /// Returns the tangents of longitude and latitude in units of `degrees`.
     pub(super) fn of_angles(globe: &Globe, latitude: f64, degrees: f64) -> Self {
         let [east, north] = globe.metres_per_degree(latitude);
         Self {
@@ -30,8 +30,8 @@ impl Tangents {
         }
     }
 
-    /// The size of a cell at the place, whose columns and rows are so far apart in
-    /// coordinates; `None` where it has no area there.
+    /// Returns the size of a cell at the position, from the steps of its columns and rows in
+    /// coordinates; `None` if it has no area there.
     pub(super) fn cell(
         &self,
         cell: CellSize,

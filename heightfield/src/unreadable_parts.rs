@@ -1,5 +1,5 @@
-//! Tiles, strips, chunks and rows of a file that could not be read: each is warned of once, and is
-//! a hole.
+//! Tiles, strips, chunks and rows of a file that cannot be read: each causes one warning, and is
+//! no-data.
 
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
@@ -7,21 +7,21 @@ use std::sync::{Mutex, PoisonError};
 use super::RasterError;
 use super::blocks::Part;
 
-/// Parts that are remembered, at most: further ones are tried, and reported, again.
+/// Max stored parts: further ones are read, and reported, again.
 const MOST: usize = 1 << 16;
-/// After so many warnings one says that there are more.
+/// After this many warnings, one reports that there are more.
 const WARNINGS: usize = 8;
 
 /// Parts of a file that could not be read.
 #[derive(Debug)]
 pub(super) struct UnreadableParts {
-    /// The file's name, for warnings.
+    /// The file's name for warnings.
     name: String,
     known: Mutex<HashSet<(usize, [u32; 2])>>,
 }
 
 impl UnreadableParts {
-    /// Nothing yet of a file of a name.
+    /// Returns an empty set for a file.
     pub(super) fn of(name: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -29,13 +29,13 @@ impl UnreadableParts {
         }
     }
 
-    /// Returns true if what begins at a column and row of an image could not be read before.
+    /// Returns true if reading the part at a column and row of an image failed before.
     pub(super) fn has(&self, image: usize, first: [u32; 2]) -> bool {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.contains(&(image, first))
     }
 
-    /// Says once of a part of an image that it cannot be read.
+    /// Warns once per part of an image that cannot be read.
     pub(super) fn warn(&self, image: usize, part: &Part, fault: &RasterError) {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if known.len() < MOST && !known.insert((image, [part.column, part.row])) {

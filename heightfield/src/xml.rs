@@ -1,35 +1,35 @@
-//! XML read piece by piece, of bounded depth: notes of GDAL's beside or in a file.
+//! A streaming reader for XML of bounded depth: GDAL's notes beside or in a file.
 
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
-/// No note is deeper, and none has more attributes.
+/// Max depth of elements, and max number of attributes.
 const DEEPEST: usize = 16;
 const MAX_ATTRIBUTES: usize = 64;
 
-/// An element whose end was read, and those around it.
+/// A closed element.
 #[derive(Debug, Default)]
 pub(super) struct Element {
     /// Its name.
     pub(super) name: String,
     attributes: Vec<(String, String)>,
-    /// All text in it, but that of its children.
+    /// The text in it, without its children's.
     pub(super) text: String,
 }
 
 impl Element {
-    /// An attribute's value.
+    /// Returns an attribute's value.
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
         let own = self.attributes.iter().find(|(own, _)| own == name);
         own.map(|(_, value)| value.as_str())
     }
 }
 
-/// Calls `visit` at the end of each element, with the elements around it, the outermost first and
-/// itself last.
+/// Calls `visit` at the end of each element, with the stack of open elements, the outermost first
+/// and itself last.
 ///
 /// # Errors
-/// The part that is no XML or not supported here.
+/// Names the part that is not XML or not supported.
 pub(super) fn for_each(text: &str, mut visit: impl FnMut(&[Element])) -> Result<(), String> {
     let mut reader = Reader::from_str(text);
     let mut open: Vec<Element> = Vec::new();
@@ -87,7 +87,7 @@ fn element(start: &BytesStart<'_>) -> Result<Element, String> {
     })
 }
 
-/// The text that a reference as `&amp;` or `&#233;` stands for.
+/// Returns the text of a reference such as `&amp;` or `&#233;`.
 fn resolved(reference: &quick_xml::events::BytesRef<'_>) -> Result<String, String> {
     let unknown = || format!("it uses the unknown entity &{};", &**reference);
     if let Some(character) = reference.resolve_char_ref().map_err(|_| unknown())? {

@@ -1,6 +1,6 @@
-//! Files beside a file under the same name: a header (`.hdr`), a reference system
-//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`), GDAL's notes (`.aux.xml`). A file on
-//! disk or at a URL has neighbours.
+//! Files beside a file under the same name: a header (`.hdr`), a reference system (`.prj`), a world
+//! file, a mask (`.msk`), overviews (`.ovr`), GDAL's notes (`.aux.xml`). Files on disk and at URLs
+//! can have such neighbours.
 
 mod pam;
 mod prj;
@@ -19,20 +19,20 @@ pub(super) use prj::reference_system;
 pub(super) use unused_files::remark_unread;
 pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 
-/// No neighbour that is text is longer; what is longer is something else.
+/// Max size of a neighbour that is text; a longer file is something else.
 const MAX_TEXT: u64 = 1 << 20;
 
 /// First bytes of GDAL's metadata files.
 const NOTES: &[u8] = b"<PAMDataset";
 
-/// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
-/// that no output comes to lie over one that [`files_read_with`] does not know.
+/// Extensions of all neighbours that a format reads: [`find`] accepts no others, so an output
+/// cannot replace a file that [`files_read_with`] does not list.
 const NEIGHBOURS: [&str; 13] = [
     "hdr", "prj", "msk", "ovr", "aux.xml", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw",
     "pgwx",
 ];
 
-/// A terrain file and the files beside it that are read with it.
+/// Returns a terrain file and the files beside it that are read with it.
 #[must_use]
 pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     let beside = NEIGHBOURS
@@ -42,8 +42,8 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_owned()).chain(there).collect()
 }
 
-/// Names of the files beside the one at a URL that belong to it. A TIFF of many that a VRT names is
-/// asked for three of them only.
+/// Returns the names of the files beside a URL that belong to it. For a TIFF, only three are tried,
+/// because a VRT may reference many TIFFs.
 pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, RasterError> {
     let ends = match input.extension() {
         "tif" | "tiff" => &["msk", "ovr", "aux.xml"][..],
@@ -58,7 +58,7 @@ pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, 
     Ok(names)
 }
 
-/// Files with these extensions are about to be asked for: at a server, all at once.
+/// Prefetches files with these extensions: on a server, all at once.
 fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
     if let Data::Remote(_, url) = input.data() {
         let urls: Vec<String> = extensions.flat_map(|end| neighbour(url, end)).collect();
@@ -66,8 +66,8 @@ fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
     }
 }
 
-/// The file beside `input` whose extension is `extension`, in lower or upper case:
-/// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
+/// Finds the file beside `input` with an extension, in lower or upper case: `hills.hdr` beside
+/// `hills.flt`, or `hills.flt.hdr`.
 fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, RasterError> {
     match (input.data(), known(extension)) {
         (Data::File(_, path), Some(known)) => on_disk(path, &candidates(path, known), input),
@@ -76,8 +76,8 @@ fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, RasterE
     }
 }
 
-/// The file beside `input` whose name is that of `input` with `extension` behind it, as
-/// `hills.tif.msk`: what GDAL writes for one file alone.
+/// Finds the file beside `input` whose name is `input`'s with `extension` appended, as
+/// `hills.tif.msk`: GDAL writes these for one file only.
 pub(super) fn find_appended(
     input: &FileBytes,
     extension: &str,
@@ -89,13 +89,13 @@ pub(super) fn find_appended(
     }
 }
 
-/// An extension that no output may have.
+/// Returns the extension if it is in `NEIGHBOURS`.
 fn known(extension: &str) -> Option<&'static str> {
     let known = NEIGHBOURS.iter().find(|known| **known == extension);
     known.copied()
 }
 
-/// The first of some paths that is a file, and not `path` itself.
+/// Returns the first path that is a file other than `path`.
 fn on_disk(
     path: &Path,
     others: &[PathBuf],
@@ -107,8 +107,8 @@ fn on_disk(
     found.map(open).transpose()
 }
 
-/// The first of some URLs at which there is a file. If that cannot be determined, the file that
-/// has them as neighbours cannot be read: an unknown mask would be read as heights.
+/// Returns the first URL with a file. If that cannot be determined, the whole file cannot be read:
+/// masked samples would be read as heights.
 fn elsewhere(
     own: &str,
     urls: &[String],
@@ -124,8 +124,8 @@ fn elsewhere(
     Ok(None)
 }
 
-/// Checks that a file is a page of a web site, or empty: some servers have one for every name.
-/// Of the neighbours, GDAL's notes alone begin like one.
+/// Returns true if a file is a web page, or empty: some servers return one for every name. Of the
+/// neighbours, only GDAL's notes begin like one.
 fn is_page(found: &FileBytes) -> Result<bool, RasterError> {
     let head = found.head(256)?;
     let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
@@ -133,7 +133,7 @@ fn is_page(found: &FileBytes) -> Result<bool, RasterError> {
     Ok(first.is_none_or(|first| *first == b'<' && !is_note()))
 }
 
-/// The names that a file beside `path` may have.
+/// Returns the possible names of a file beside `path`.
 fn candidates(path: &Path, extension: &str) -> [PathBuf; 4] {
     let upper = extension.to_uppercase();
     [
@@ -144,7 +144,7 @@ fn candidates(path: &Path, extension: &str) -> [PathBuf; 4] {
     ]
 }
 
-/// A path with an extension behind its own.
+/// Returns a path with an extension appended to its own.
 pub(super) fn appended(path: &Path, extension: &str) -> PathBuf {
     let mut name: OsString = path.as_os_str().to_owned();
     name.push(".");
@@ -152,7 +152,7 @@ pub(super) fn appended(path: &Path, extension: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// The text of the file beside `input` with an extension, and that file's name.
+/// Returns the text and the name of the file beside `input` with an extension.
 pub(super) fn text(
     input: &FileBytes,
     extension: &str,
@@ -160,7 +160,7 @@ pub(super) fn text(
     find(input, extension)?.map(whole_text).transpose()
 }
 
-/// The same of the file whose name is that of `input` with the extension behind it.
+/// As `text`, for the file whose name is `input`'s with the extension appended.
 fn text_appended(
     input: &FileBytes,
     extension: &str,

@@ -1,8 +1,8 @@
 //! GDAL's notes beside a file (`hills.tif.aux.xml`, PAM): no-data, scale, offset, unit, reference
-//! system and place, as GDAL, QGIS and ArcGIS keep them where the format has no place for them.
+//! system and place, as GDAL, QGIS and ArcGIS store them if the format has no field for them.
 //!
-//! Which of two sources counts is as in GDAL: the notes for no-data, reference system and place,
-//! the file for scale, offset and unit. Where both differ, a remark reports it.
+//! As in GDAL, the notes override the file for no-data, reference system and place, and the file
+//! overrides the notes for scale, offset and unit. A remark reports each difference.
 
 use crate::RasterError;
 use crate::crs::ReferenceSystem;
@@ -16,7 +16,7 @@ use crate::xml;
 /// Notes on one band of a file.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Notes {
-    /// The name of the file that they are in.
+    /// The notes' file name.
     name: String,
     /// Stored value that means no data.
     pub(crate) no_data: Option<f64>,
@@ -33,7 +33,7 @@ impl Notes {
     /// Reads the notes on a band, the first being 1, beside a file on disk or at a URL.
     ///
     /// # Errors
-    /// If they are remote and cannot be read at present: no-data would be taken for heights.
+    /// If they are remote and cannot be read at present: no-data would be read as heights.
     pub(crate) fn read(input: &FileBytes, band: u32) -> Result<Self, RasterError> {
         let (text, name) = match super::text_appended(input, "aux.xml") {
             Ok(Some(found)) => found,
@@ -87,7 +87,7 @@ impl Notes {
         }
     }
 
-    /// Adds them to the file's own description.
+    /// Adds the notes to the file's own metadata.
     pub(crate) fn apply(self, decoded: &mut Decoded) {
         let name = self.name.as_str();
         let mut remarks = self.remarks;
@@ -139,7 +139,7 @@ impl Notes {
 }
 
 impl Decoded {
-    /// Takes reference system and place from notes in a file of a name.
+    /// Sets reference system and place from the notes in file `name`.
     fn place_by_notes(&mut self, name: &str, system: Option<&str>, place: Option<&str>) {
         let unit = self.ground_unit();
         let mut has_system = false;
@@ -211,7 +211,7 @@ fn is_same(own: &ReferenceSystem, other: &ReferenceSystem) -> bool {
     is_same && own.has_unit_of(other)
 }
 
-/// Reads six numbers: x of the corner, x per column, x per row, and the same of y.
+/// Reads six numbers: x of the corner, x per column, x per row, then the same for y.
 fn ground_map(text: &str) -> Option<GroundMap> {
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     match numbers?[..] {

@@ -19,7 +19,7 @@ fn notes_of_the_asked_band_are_read() {
     assert_eq!(second.no_data, None);
 }
 
-/// A grid of the heights 1 to 6, with notes beside it.
+/// Opens a grid of the heights 1 to 6 with notes beside it.
 fn noted(notes: &str, options: &OpenOptions) -> Raster {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("x.asc");
@@ -53,7 +53,7 @@ fn notes_beside_a_file_are_used() {
         raster.cell().expect("a cell").certainty,
         Certainty::FromCode
     );
-    // What the user states wins.
+    // The user's value has priority.
     let options = OpenOptions {
         no_data: Some(1.0),
         ..OpenOptions::default()

@@ -6,8 +6,8 @@ use crate::crs::ReferenceSystem;
 use crate::decoded::Decoded;
 use crate::input::FileBytes;
 
-/// Sets the reference system from a `.prj` beside the file, where there is one; it is
-/// to be called before the samples are laid out.
+/// Sets the reference system from a `.prj` beside the file, if there is one; call it before
+/// `lay_out`.
 ///
 /// # Errors
 /// If it is remote and cannot be read at present.
@@ -18,7 +18,7 @@ pub(crate) fn reference_system(
     let (wkt, name) = match text(input, "prj") {
         Ok(Some(found)) => found,
         Err(error) if error.is_of_the_line() => return Err(error),
-        // A neighbour that cannot be read costs the place, not the heights.
+        // If the neighbour cannot be read, only the place is lost, not the heights.
         Ok(None) | Err(_) => return Ok(()),
     };
     let (system, vertical) = ReferenceSystem::from_wkt(&wkt);

@@ -1,10 +1,10 @@
-//! Files beside a terrain that say something about it and are not read.
+//! Files beside a terrain that describe it but are not read.
 
 use super::candidates;
 use crate::decoded::Decoded;
 use crate::input::{Data, FileBytes};
 
-/// Extensions of such files, and what is in them.
+/// Extensions of such files, and their content.
 const UNREAD: [(&str, &str); 6] = [
     ("aux", "no-data value, reference system and statistics"),
     ("rrd", "overviews"),
@@ -14,7 +14,7 @@ const UNREAD: [(&str, &str); 6] = [
     ("rpb", "a camera model"),
 ];
 
-/// Remarks on what lies beside a file on disk, says something about it, and is not read.
+/// Adds remarks on files beside a file on disk that describe it but are not read.
 pub(crate) fn remark_unread(input: &FileBytes, decoded: &mut Decoded) {
     let Data::File(_, path) = input.data() else {
         return;
@@ -29,7 +29,7 @@ pub(crate) fn remark_unread(input: &FileBytes, decoded: &mut Decoded) {
             continue;
         };
         let name = found.file_name().unwrap_or_default().to_string_lossy();
-        // One that was looked into has its own remark.
+        // A file that was opened has its own remark.
         if !decoded.remarks.iter().any(|remark| remark.contains(&*name)) {
             decoded
                 .remarks

@@ -1,4 +1,4 @@
-//! World files: six numbers in a text beside a picture, which say where its samples lie.
+//! World files: six numbers in a text beside a picture, which define the place of its samples.
 
 use super::text;
 use crate::RasterError;
@@ -6,11 +6,11 @@ use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
 use crate::input::{Data, FileBytes};
 
-/// Lays the samples out by the world file beside a file, and the `.prj` that may lie
-/// there too. `own` are the extensions of the format's world files; `.wld` serves all.
+/// Sets the place from the world file beside a file, and from its `.prj`, if any. `own` are the
+/// extensions of the format's world files; `.wld` is for all formats.
 ///
-/// The numbers are, a line each: x per column, y per column, x per row, y per row, x
-/// and y of the centre of the first sample.
+/// The numbers, one per line, are: x per column, y per column, x per row, y per row, x and y of the
+/// centre of the first sample.
 pub(crate) fn lay_out_by_world_file(
     input: &FileBytes,
     own: &[&'static str],
@@ -24,7 +24,7 @@ pub(crate) fn lay_out_by_world_file(
     Ok(())
 }
 
-/// Remarks on a world file beside a file on disk that states another place itself.
+/// Adds a remark if a world file beside a file on disk contradicts the file's own place.
 pub(crate) fn remark_other_place(input: &FileBytes, own: &[&'static str], decoded: &mut Decoded) {
     if let (Data::File(..), Some(place)) = (input.data(), decoded.place)
         && let Ok(Some((map, name))) = find(input, own)
@@ -36,7 +36,7 @@ pub(crate) fn remark_other_place(input: &FileBytes, own: &[&'static str], decode
     }
 }
 
-/// The map of the world file beside a file, and that file's name.
+/// Returns the map of the world file beside a file, and the world file's name.
 fn find(
     input: &FileBytes,
     own: &[&'static str],

@@ -1,5 +1,4 @@
-//! Work in the background for readers that must not wait: a queue of requests,
-//! for one thread.
+//! Background work for readers that must not wait: a queue of requests, for one thread.
 
 use std::collections::{HashSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -7,22 +6,22 @@ use std::time::Duration;
 
 use super::cache::Key;
 
-/// Jobs that wait, at most: more than the blocks that a coarse tile touches (33 × 33). The
-/// one that waits longest goes, and is requested again if it is still needed.
+/// Max queued jobs: more than the blocks under a coarse tile (33 × 33). The oldest job is dropped,
+/// and is requested again if it is still needed.
 const MOST: usize = 2048;
 
-/// Something to be done in the background.
+/// A job for a background thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Job {
-    /// Look for a piece of a made image on disk.
+    /// Search the disk for a piece of a computed image.
     Seek(Key),
     /// Decode a block of the full image for its coarse samples.
     Pass([u32; 2]),
-    /// Read a block, which is kept.
+    /// Read a block into the cache.
     Fetch(Key),
 }
 
-/// Jobs, each once.
+/// A queue of jobs without duplicates.
 #[derive(Default)]
 pub(super) struct Queue {
     state: Mutex<State>,
@@ -32,18 +31,18 @@ pub(super) struct Queue {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Job>,
-    /// Those that wait, and the one that is being done.
+    /// The queued jobs, and the running one.
     known: HashSet<Job>,
     is_over: bool,
 }
 
 impl Queue {
     fn state(&self) -> MutexGuard<'_, State> {
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has something done before what was wanted already. Returns true if it is new.
+    /// Adds a job at the front of the queue. Returns true if it is new.
     pub(super) fn want_first(&self, job: Job) -> bool {
         let mut state = self.state();
         let is_new = !state.is_over && state.waiting.len() < MOST && state.known.insert(job);
@@ -55,7 +54,7 @@ impl Queue {
         is_new
     }
 
-    /// Has something done, after what was wanted before. Returns true if it is new.
+    /// Adds a job at the end of the queue. Returns true if it is new.
     pub(super) fn want(&self, job: Job) -> bool {
         let mut state = self.state();
         if state.is_over || !state.known.insert(job) {
@@ -72,7 +71,7 @@ impl Queue {
         true
     }
 
-    /// The next job; `None` where none waits.
+    /// Returns the next job; `None` if the queue is empty or closed.
     pub(super) fn next(&self) -> Option<Job> {
         let mut state = self.state();
         match state.is_over {
@@ -81,7 +80,7 @@ impl Queue {
         }
     }
 
-    /// Blocks of the full image that are going to be decoded, some of them.
+    /// Returns up to `most` blocks of the full image that will be decoded next.
     pub(super) fn coming(&self, most: usize) -> Vec<[u32; 2]> {
         let state = self.state();
         let blocks = state.waiting.iter().filter_map(|job| match job {
@@ -91,18 +90,18 @@ impl Queue {
         blocks.take(most).collect()
     }
 
-    /// A job is done.
+    /// Marks a job as done.
     pub(super) fn done(&self, job: &Job) {
         self.state().known.remove(job);
         self.wake.notify_all();
     }
 
-    /// Returns true if no job waits or is being done.
+    /// Returns true if no job is queued or running.
     pub(super) fn is_idle(&self) -> bool {
         self.state().known.is_empty()
     }
 
-    /// Waits for a job; `false` where none will come any more.
+    /// Waits for a job; returns false if the queue is closed.
     pub(super) fn wait(&self) -> bool {
         let state = self.state();
         let is_idle = |state: &mut State| state.waiting.is_empty() && !state.is_over;
@@ -110,7 +109,7 @@ impl Queue {
         !state.unwrap_or_else(PoisonError::into_inner).is_over
     }
 
-    /// Ends it: no job is begun any more. Returns true if the present one is done within a time.
+    /// Closes the queue: no further job starts. Returns true if the running job ends within a time.
     pub(super) fn end(&self, within: Duration) -> bool {
         let mut state = self.state();
         state.is_over = true;
@@ -144,7 +143,7 @@ mod tests {
             queue.want(Job::Pass([number, 0]));
         }
         assert_eq!(queue.next(), Some(Job::Pass([1, 0])));
-        // What was left out may be wanted again.
+        // A dropped job may be requested again.
         queue.want(Job::Pass([0, 0]));
         assert_eq!(queue.coming(2), [[2, 0], [3, 0]]);
         assert!(queue.next().is_some());

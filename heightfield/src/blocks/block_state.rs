@@ -1,4 +1,4 @@
-//! State of blocks without reading: those in memory, those that are not here yet, and errors.
+//! State of blocks, without reading: those in memory, pending ones, and errors.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -8,9 +8,9 @@ use super::super::RasterError;
 use super::cache::{Cache, Key};
 use super::{Block, NotHere};
 
-/// A block that was not here yet is looked for again after so long.
+/// Time after which a pending block is tried again.
 const AGAIN: Duration = Duration::from_millis(20);
-/// Blocks that are known to be on their way, at most.
+/// Max pending blocks that are stored.
 const MAX_AWAITED: usize = 1024;
 
 /// State of the blocks of a file.
@@ -18,14 +18,14 @@ pub(super) struct BlockState {
     pub(super) cache: Cache,
     /// Blocks that could not be read.
     pub(super) unread: u32,
-    /// Blocks that are not here yet, and when they were looked for.
+    /// Pending blocks, and when they were last tried.
     awaited: HashMap<Key, Instant>,
     /// Last error of the connection.
     pub(super) outage: Option<RasterError>,
 }
 
 impl BlockState {
-    /// Nothing yet, and blocks of so many bytes at most.
+    /// Returns an empty state with a max size of the cache, bytes.
     pub(super) fn new(most_bytes: usize) -> Self {
         Self {
             cache: Cache::new(most_bytes),
@@ -35,13 +35,12 @@ impl BlockState {
         }
     }
 
-    /// The same of a file of which so many blocks were warned of before.
+    /// Sets the number of unreadable blocks that were reported before.
     pub(super) fn after(self, unread: u32) -> Self {
         Self { unread, ..self }
     }
 
-    /// Returns the state of a block: it is in memory, or it is not here yet, and was looked for a
-    /// moment ago.
+    /// Returns the state of a block without reading: in memory, or pending and tried a moment ago.
     pub(super) fn known(&mut self, key: &Key) -> Option<Result<Option<Arc<Block>>, NotHere>> {
         if let Some(block) = self.cache.get(key) {
             return Some(Ok(block));
@@ -51,13 +50,13 @@ impl BlockState {
         Some(Err(NotHere))
     }
 
-    /// Keeps a block that was read; `None` where there is no sample.
+    /// Stores a block that was read; `None` if the file has no samples there.
     pub(super) fn put(&mut self, key: Key, block: Option<Arc<Block>>) {
         self.awaited.remove(&key);
         self.cache.put(key, block);
     }
 
-    /// Remembers a block that is not here yet.
+    /// Marks a block as pending.
     pub(super) fn wait_for(&mut self, key: Key) {
         if self.awaited.len() >= MAX_AWAITED {
             self.awaited.clear();
@@ -65,7 +64,7 @@ impl BlockState {
         self.awaited.insert(key, Instant::now());
     }
 
-    /// Counts a block that could not be read, and says how many there are.
+    /// Counts an unreadable block, and returns the count.
     pub(super) fn count_unread(&mut self) -> u32 {
         self.unread = self.unread.saturating_add(1);
         self.unread

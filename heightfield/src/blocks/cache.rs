@@ -1,4 +1,4 @@
-//! The blocks that were touched last.
+//! Cache of the blocks that were used last.
 
 use std::sync::Arc;
 
@@ -6,30 +6,30 @@ use lru::LruCache;
 
 use super::Block;
 
-/// Blocks of a terrain are kept until they take more than this, bytes.
+/// Max size of the cache, bytes.
 pub(super) const MAX_BYTES: usize = 64 << 20;
-/// Memory of a hole, and of a block besides its samples, bytes: about.
+/// Memory of an entry without its samples, bytes, roughly.
 const ENTRY_BYTES: usize = 128;
 
-/// Names a block of a file.
+/// Identifies a block of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Key {
-    /// The full image, 0, or an overview.
+    /// 0 for the full image, or the number of an overview.
     pub(super) image: usize,
-    /// Blocks to the west of it and above it.
+    /// Number of blocks to the west of it and above it.
     pub(super) at: [u32; 2],
 }
 
-/// Blocks by their place, the one touched longest ago the first to go.
+/// Blocks by key; the least recently used is dropped first.
 pub(super) struct Cache {
-    /// `None` where there is no sample.
+    /// `None` if the file has no samples there.
     blocks: LruCache<Key, Option<Arc<Block>>>,
     bytes: usize,
     most_bytes: usize,
 }
 
 impl Cache {
-    /// Nothing yet, and blocks of so many bytes at most.
+    /// Returns an empty cache with a max size, bytes.
     pub(super) fn new(most_bytes: usize) -> Self {
         Self {
             blocks: LruCache::unbounded(),
@@ -38,22 +38,22 @@ impl Cache {
         }
     }
 
-    /// A block that is kept.
+    /// Returns a cached block.
     pub(super) fn get(&mut self, key: &Key) -> Option<Option<Arc<Block>>> {
         self.blocks.get(key).cloned()
     }
 
-    /// Returns true if a block is kept.
+    /// Returns true if a block is cached.
     pub(super) fn has(&self, key: &Key) -> bool {
         self.blocks.contains(key)
     }
 
-    /// Bytes that all kept blocks take.
+    /// Returns the size of all cached blocks, bytes.
     pub(super) const fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Keeps a block, and lets others go until there is room.
+    /// Stores a block, and drops others until there is room.
     pub(super) fn put(&mut self, key: Key, block: Option<Arc<Block>>) {
         self.bytes += bytes(block.as_deref());
         if let Some((_, replaced)) = self.blocks.push(key, block) {

@@ -1,9 +1,9 @@
-//! Coarse images of a file that has none: every 8th, 64th and 512th sample of its full
-//! image, as far as they are known.
+//! Coarse images of a file without overviews: every 8th, 64th and 512th sample of its full image,
+//! as far as they are known.
 //!
-//! A block that is decoded, whatever for, leaves its coarse samples behind. Each step is
-//! eight times the one before: so a tile of any level lies in 25 pieces at most, and all
-//! three images together hold a sixtieth of the samples.
+//! Every decoded block contributes its coarse samples. Each step is eight times the previous one,
+//! so a tile of any level lies in 25 pieces at most, and all three images together have a sixtieth
+//! of the samples.
 
 use std::time::{Duration, Instant};
 
@@ -13,30 +13,30 @@ use lru::LruCache;
 use super::cache::Key;
 use super::{Block, BlockImage, Part};
 
-/// Samples of the full image from one to the next, of each image. They are whole powers of
-/// two, so that levels have samples of their own in them.
+/// Distance of each image's samples, in samples of the full image. They are powers of two, so that
+/// levels use samples of these images directly.
 pub(super) const STEPS: [u32; 3] = [8, 64, 512];
-/// Samples of a piece each way.
+/// Side of a piece, samples.
 const PIECE: u32 = 64;
 const SAMPLES: usize = (PIECE * PIECE) as usize;
-/// Pieces in memory, at most: 17 MB.
+/// Max pieces in memory: 17 MB.
 const MAX_PIECES: usize = 512;
-/// Between two times at which all that is known is kept: pieces grow block by block.
+/// Time between two saves of all new samples: pieces grow block by block.
 const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
-/// Bytes that they take at most.
+/// Max memory of the pieces, bytes.
 pub(super) const MAX_BYTES: usize = MAX_PIECES * SAMPLES * (size_of::<f64>() + 1);
 
-/// Some samples of a coarse image, row after row; those beyond its edges are not known.
+/// A square of samples of a coarse image, row after row; those beyond its edges are unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Piece {
-    /// Stored values; NaN in holes.
+    /// Stored values; NaN for no-data.
     pub(super) values: Vec<f64>,
-    /// Which of them are known.
+    /// Marks the known samples.
     pub(super) known: FixedBitSet,
 }
 
 impl Piece {
-    /// Nothing is known of so many samples.
+    /// Returns a piece of unknown samples.
     pub(super) fn unknown(samples: usize) -> Self {
         Self {
             values: vec![f64::NAN; samples],
@@ -44,7 +44,7 @@ impl Piece {
         }
     }
 
-    /// Takes the samples that another piece has and this one lacks.
+    /// Copies samples from another piece that are unknown in this one.
     pub(super) fn join(&mut self, other: &Self) {
         for index in other.known.difference(&self.known) {
             self.values[index] = other.values[index];
@@ -61,11 +61,11 @@ impl Piece {
 /// A piece in memory.
 struct Held {
     piece: Piece,
-    /// Samples that count as holes for now, because their block cannot be read.
+    /// Samples that count as no-data for now, because their block cannot be read.
     lacking: FixedBitSet,
-    /// True if it was looked for on disk.
+    /// True if the disk was searched for it.
     was_sought: bool,
-    /// True if it has samples that the disk lacks.
+    /// True if it has samples that are not on disk.
     is_new: bool,
 }
 
@@ -83,26 +83,26 @@ impl Held {
 /// State of a coarse sample.
 #[derive(Debug, PartialEq)]
 pub(super) enum Found {
-    /// Its stored value; NaN in a hole.
+    /// Its stored value; NaN for no-data.
     Value(f64),
-    /// Nothing yet; whether its piece was looked for on disk.
+    /// Unknown; `was_sought` is true if the disk was searched for its piece.
     Nothing { was_sought: bool },
 }
 
-/// The coarse images that are made of one full image.
+/// The coarse images that are computed from one full image.
 pub(super) struct Coarse {
-    /// The number of the first among the file's images.
+    /// Number of the first coarse image among the file's images.
     first: usize,
     images: Vec<BlockImage>,
     pieces: LruCache<Key, Held>,
-    /// Pieces that gave way to others, and know more than the disk.
+    /// Evicted pieces with samples that are not on disk.
     outgoing: Vec<(Key, Piece)>,
-    /// When all that is known was kept.
+    /// Time of the last save of all new samples.
     kept: Instant,
 }
 
 impl Coarse {
-    /// None.
+    /// Returns no coarse images.
     pub(super) fn none() -> Self {
         Self {
             first: 0,
@@ -113,8 +113,8 @@ impl Coarse {
         }
     }
 
-    /// Those of an image that is the file's only one, which begins in the south or the east
-    /// or not: levels count their samples from the south and west.
+    /// Returns the coarse images of a file's only image, which may begin in the south or the east:
+    /// levels count their samples from the south-west.
     pub(super) fn of(full: &BlockImage, south_up: bool, east_first: bool) -> Self {
         let image = |every: u32| {
             let last = [full.columns, full.rows].map(|count| count.max(1) - 1);
@@ -138,7 +138,7 @@ impl Coarse {
         }
     }
 
-    /// The images, each coarser than the one before.
+    /// Returns the images, each coarser than the previous one.
     pub(super) fn images(&self) -> &[BlockImage] {
         &self.images
     }
@@ -158,14 +158,14 @@ impl Coarse {
         }
     }
 
-    /// Takes the coarse samples of a block of the full image; `None` where the file stores
-    /// none.
+    /// Stores the coarse samples of a block of the full image; `None` if the file has no samples
+    /// there.
     pub(super) fn leave(&mut self, part: &Part, block: Option<&Block>, is_lacking: bool) {
         let last = [part.column + (part.columns - 1), part.row + (part.rows - 1)];
         for number in 0..self.images.len() {
             let image = self.images[number];
             let every = image.every.unwrap_or(1);
-            // Columns and rows of the image in the part.
+            // Columns and rows of the coarse image in the part.
             let along = |axis: usize, from: u32, to: u32| {
                 let first = image.first[axis];
                 let begin = from.saturating_sub(first).div_ceil(every);
@@ -191,7 +191,7 @@ impl Coarse {
         }
     }
 
-    /// Takes what the disk has of a piece, or that it has nothing.
+    /// Stores the result of the disk search for a piece.
     pub(super) fn sought(&mut self, key: Key, found: Option<&Piece>) {
         let held = self.held(key);
         held.was_sought = true;
@@ -200,8 +200,8 @@ impl Coarse {
         }
     }
 
-    /// The pieces to keep now: those that gave way to others, and from time to time copies of all
-    /// that know more than the disk, so that little is lost with a program that is killed.
+    /// Returns the pieces to save now: evicted ones, and periodically copies of all with new
+    /// samples, so that little is lost if the program is killed.
     pub(super) fn take_due(&mut self) -> Vec<(Key, Piece)> {
         match self.kept.elapsed() >= BETWEEN_KEEPING {
             true => self.take_new(),
@@ -209,7 +209,7 @@ impl Coarse {
         }
     }
 
-    /// All pieces that know more than the disk.
+    /// Returns all pieces with samples that are not on disk.
     pub(super) fn take_new(&mut self) -> Vec<(Key, Piece)> {
         self.kept = Instant::now();
         let mut taken = std::mem::take(&mut self.outgoing);
@@ -221,7 +221,7 @@ impl Coarse {
         taken
     }
 
-    /// Number of pieces in memory.
+    /// Returns the number of pieces in memory.
     #[cfg(test)]
     pub(super) fn pieces(&self) -> usize {
         self.pieces.len()
@@ -231,7 +231,7 @@ impl Coarse {
         if !self.pieces.contains(&key) && self.pieces.len() >= MAX_PIECES {
             let gone = self.pieces.pop_lru();
             if let Some((key, held)) = gone.filter(|(_, held)| held.is_new) {
-                // A disk that is too slow for them gets those that come.
+                // If the disk is too slow, older pieces are dropped in favour of new ones.
                 if self.outgoing.len() >= MAX_PIECES / 2 {
                     self.outgoing.clear();
                 }
@@ -242,7 +242,7 @@ impl Coarse {
     }
 }
 
-/// The piece that has a sample of an image, and its place there.
+/// Returns the piece that contains a sample of an image, and the sample's index there.
 pub(super) fn place(image: usize, [column, row]: [u32; 2]) -> (Key, usize) {
     let key = Key {
         image,

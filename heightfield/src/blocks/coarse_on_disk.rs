@@ -1,7 +1,7 @@
 //! Names and bytes of coarse samples in the disk cache.
 //!
-//! A piece is a bit a sample that tells whether it is known, from the lowest bit of the
-//! first byte on, and the values: as `f32` where that holds all of them, else as `f64`,
+//! A piece is stored as one bit per sample, set if the sample is known, from the lowest bit of the
+//! first byte on, and the values: as `f32` if that is exact for all of them, else as `f64`,
 //! little-endian.
 
 use super::cache::Key;
@@ -9,31 +9,31 @@ use super::coarse::Piece;
 use super::{Block, BlockImage, BlockReader};
 use crate::disk_cache::{DiskCache, Name};
 
-/// Native images at least so coarse are kept: what is finer lies together in the file.
+/// Min step of native images that are saved: the samples of finer ones are adjacent in the file.
 const COARSE: u32 = 8;
 
-/// Returns true if blocks of an image are kept on disk, and made in the background.
+/// Returns true if blocks of an image are saved on disk, and read in the background.
 pub(super) fn is_coarse(image: &BlockImage) -> bool {
     image.every.is_some_and(|every| every >= COARSE)
 }
 
-/// The name of a piece of a coarse image in the present state of the file; `None` where
-/// nothing may be kept.
+/// Returns the name of a piece of a coarse image in the present state of the file; `None` if
+/// nothing may be saved.
 pub(super) fn name(reader: &dyn BlockReader, image: &BlockImage, key: &Key) -> Option<Name> {
     let part = image.part(key.at);
-    // What is made comes from the full image, as far as the part reaches there.
+    // Computed samples depend on the part of the full image that they cover.
     let native = key.image.min(reader.images().len() - 1);
     let stamp = reader.stamp(native, &part)?;
     let place = format!("{:?} {:?} {:?}", image.every, image.first, part);
     Some(Name::of(&["coarse", reader.format(), &stamp, &place]))
 }
 
-/// A piece that was kept, of so many samples.
+/// Loads a saved piece of `samples` samples.
 pub(super) fn load(cache: &DiskCache, name: &Name, samples: usize) -> Option<Piece> {
     decoded(&cache.get(name)?, samples)
 }
 
-/// Keeps a piece, and what was known of it before.
+/// Saves a piece, merged with the one on disk.
 pub(super) fn keep(cache: &DiskCache, name: &Name, mut piece: Piece) {
     let samples = piece.values.len();
     if let Some(before) = load(cache, name, samples) {
@@ -45,7 +45,7 @@ pub(super) fn keep(cache: &DiskCache, name: &Name, mut piece: Piece) {
     cache.put(name, &encoded(&piece));
 }
 
-/// A block of which all is known.
+/// Returns a block as a piece with all samples known.
 pub(super) fn piece_of(block: Option<&Block>, samples: usize) -> Piece {
     let mut piece = Piece::unknown(samples);
     let value = |index: usize| block.and_then(|block| block.stored(index));
@@ -56,7 +56,7 @@ pub(super) fn piece_of(block: Option<&Block>, samples: usize) -> Piece {
     piece
 }
 
-/// The block of a piece of which all is known.
+/// Returns the block of a piece if all samples are known.
 pub(super) fn block_of(piece: Piece) -> Option<Block> {
     piece.known.is_full().then(|| Block {
         samples: piece.values.into(),

@@ -1,4 +1,4 @@
-//! A field without overviews: its coarse levels, made on the way and kept on disk.
+//! Coarse levels of a field without overviews, computed from blocks and saved on disk.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -14,7 +14,7 @@ use crate::{Raster, Window};
 
 const SIZE: [u32; 2] = [2101, 1250];
 const BLOCK: [u32; 2] = [64, 48];
-/// Blocks that the file does not store, that cannot be read, and that have not come yet.
+/// Blocks that the file does not store, that cannot be read, and that are pending.
 const SPARSE: [u32; 2] = [3, 2];
 const BAD: [u32; 2] = [5, 4];
 const LATE: [u32; 2] = [7, 6];
@@ -28,7 +28,7 @@ fn value(column: u32, row: u32) -> f64 {
     }
 }
 
-/// State of the reader, visible from outside.
+/// State of the reader that a test can inspect.
 #[derive(Clone)]
 struct Seen {
     reads: Arc<AtomicU64>,
@@ -106,7 +106,7 @@ impl BlockReader for Full {
     }
 
     fn looks(&self) -> Option<Looks> {
-        // One place is enough to know that there is a height.
+        // One part is enough to find a height.
         let parts = vec![Part::whole(2, 2)];
         Some(Looks { image: 0, parts })
     }
@@ -138,7 +138,7 @@ fn raster(seen: &Seen, disk: &DiskCache, [south_up, east_first]: [bool; 2]) -> R
 
 const USUAL: [bool; 2] = [false, false];
 
-/// The height that a sample of the full image has, by the field's own formula.
+/// Returns the height at a sample of the full image, by the field's formula.
 fn height(column: u32, row: u32, [south_up, east_first]: [bool; 2]) -> f64 {
     let column = if east_first {
         SIZE[0] - 1 - column
@@ -154,7 +154,7 @@ fn height(column: u32, row: u32, [south_up, east_first]: [bool; 2]) -> f64 {
     }
 }
 
-/// Holds all samples of a level against the field.
+/// Compares all samples of a level with the field.
 fn check(raster: &Raster, level: u8, order: [bool; 2]) {
     let count = SIZE.map(|count| ((count - 1) >> level) + 1);
     let mut heights = vec![0.0; count[0] as usize];
@@ -180,7 +180,7 @@ fn coarse_levels_have_the_files_own_samples_whatever_its_order() {
     for order in [[true, false], [false, false], [true, true], [false, true]] {
         let seen = Seen::new("");
         for level in [2, 3, 5, 6, 8, 9, 10] {
-            // Of each level anew, and then all after each other.
+            // Each level in a new raster, then all in the same one.
             check(&raster(&seen, &DiskCache::off(), order), level, order);
         }
         let all = raster(&seen, &DiskCache::off(), order);
@@ -200,7 +200,7 @@ fn a_second_look_reads_no_block_and_a_finer_one_serves_the_coarser() {
     assert!((1..=9 * 5).contains(&first), "{first}");
     check(&raster, 8, USUAL);
     assert_eq!(seen.reads(), 0);
-    // Touched blocks leave their coarse samples behind, too.
+    // Blocks that are read contribute their coarse samples, too.
     check(&raster, 0, USUAL);
     assert_eq!(
         seen.reads(),
@@ -218,13 +218,13 @@ fn a_second_look_reads_no_block_and_a_finer_one_serves_the_coarser() {
 fn between_coarse_samples_a_surface_is_linear() {
     let seen = Seen::new("");
     let raster = raster(&seen, &DiskCache::off(), [true, false]);
-    // No holes among them.
+    // None of them is no-data.
     let [a, b] = [560, 568].map(|column| height(column, 808, [true, false]));
     assert!(a > 0.0 && b > 0.0);
     assert_eq!(raster.surface(3, [562.0, 808.0]), 0.75 * a + 0.25 * b);
 }
 
-/// The level's row at which a tile would look, with what comes of it.
+/// Reads the level's rows as a tile does; `None` while they are pending.
 fn look(raster: &Raster, level: u8, wait: Wait) -> Option<Vec<f64>> {
     let reads = ReadTracker::default();
     let mut heights = vec![0.0; 9 * 7];
@@ -291,7 +291,7 @@ fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
     seen.is_damaged.store(true, Ordering::Relaxed);
     {
         let raster = raster(&seen, &disk, [true, false]);
-        // Level 3 there: the late block has columns 448 to 511, rows 288 to 335.
+        // Level 3: the late block covers columns 448 to 511, rows 288 to 335.
         let late = |raster: &Raster| {
             let mut heights = [0.0; 8];
             let status = raster.read_row(3, 37, 56, &mut heights, Wait::Never);
@@ -307,7 +307,7 @@ fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
             .map(|c| height(c * 8, 37 * 8, [true, false]))
             .collect();
         same(&heights, &expected);
-        // The damaged one has columns 320 to 383, rows 192 to 239.
+        // The damaged block covers columns 320 to 383, rows 192 to 239.
         let mut bad = [0.0; 8];
         wait_until("the damaged block", || {
             raster
@@ -343,7 +343,7 @@ fn another_run_on_the_same_file_reads_nothing_and_on_another_all() {
         }
         assert_eq!(seen.reads() == 0, again, "{stamp:?}");
     }
-    // In another order other samples are coarse ones.
+    // In another order, other samples are coarse ones.
     *seen.stamp.lock().expect("alone") = Some("one".into());
     check(&raster(&seen, &disk, [true, true]), 8, [true, true]);
 }
@@ -355,7 +355,7 @@ fn what_was_read_of_a_file_that_changed_meanwhile_is_not_kept() {
     let seen = Seen::new("one");
     let before = raster(&seen, &disk, USUAL);
     check(&before, 8, USUAL);
-    // Its reader finds that it is not what it was.
+    // The reader detects that the file has changed.
     *seen.stamp.lock().expect("alone") = None;
     drop(before);
     *seen.stamp.lock().expect("alone") = Some("one".into());

@@ -1,22 +1,20 @@
-//! A raster that stays in its file: blocks of samples are read when they are touched.
+//! A raster that stays in its file: blocks of samples are read on access.
 //!
-//! A format that can read a part of an image without the rest hands over a
-//! [`BlockReader`]. [`Blocks`] asks it for what is touched, keeps the blocks touched last
-//! (`cache`), and looks at a few of them when the file is opened (`survey`). Coarser
-//! images of the same field, overviews, serve the coarse levels of detail. Of a file that
-//! has none they are made on the way (`coarse`), and what is coarse is kept on disk
-//! (`coarse_on_disk`). `block_state` tracks the blocks in memory and those on their way.
+//! A format that can read a part of an image without the rest returns a [`BlockReader`]. [`Blocks`]
+//! reads blocks with it on access, caches the last ones (`cache`), and reads a few at opening
+//! (`survey`). Coarser images of the same field, overviews, serve the coarse levels. For a file
+//! without overviews they are computed during reading (`coarse`), and coarse samples are saved on
+//! disk (`coarse_on_disk`). `block_state` tracks the blocks in memory and the pending ones.
 //!
-//! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
-//! file that is larger than memory is no reason to feel nothing of it. What has not come yet
-//! from elsewhere is not known ([`NotHere`]), and asked for again. So is everything that is not in
-//! memory, for a reader who must not wait ([`Wait::Never`]): one thread makes what is coarse, another
-//! reads what is fine (`background`), and both wait for what they read.
+//! A block that cannot be read is no-data, with a warning: one damaged part must not make the rest
+//! of a large file unusable. Remote data that has not arrived is pending ([`NotHere`]), and is
+//! requested again. With [`Wait::Never`], so is everything that is not in memory: one thread makes
+//! coarse samples, another reads fine ones (`background`), and only they wait for data.
 //!
-//! Several threads may share the blocks, as those of several devices on one terrain do. Of them one
-//! reads at a time, besides the threads in the background, so the bound of the memory does not grow with
-//! them, and a block that one thread has read is not read again for another. A read of blocks in
-//! memory does not wait for one that is being read.
+//! Several threads may share the blocks, for several devices on one terrain. Only one of them reads
+//! at a time, beside the background threads, so the memory bound does not grow with their number,
+//! and a block is not read twice. Reading a block in memory does not wait for one that is being
+//! read.
 
 mod background;
 mod block_state;
@@ -46,39 +44,39 @@ use coarse::{Coarse, Found};
 pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
 pub(super) use survey::{Looks, Survey, stored_parts};
 
-/// Blocks of a larger size than this are not read one by one, bytes.
+/// Max size of a block that can be read alone, bytes.
 pub(super) const MAX_BLOCK_BYTES: u64 = 32 << 20;
-/// Time in which a block that is being read may end when the file is closed.
+/// Max wait for the running read when the file is closed.
 const END_WITHIN: Duration = Duration::from_secs(1);
-/// An image serves a level that is coarser than it, or as coarse to this share: overviews
-/// of a field whose size is odd are coarser than a power of two by up to a sample.
+/// An image serves a level that is coarser than it, or equal within this ratio: overviews of a
+/// field of odd size are coarser than a power of two by up to a sample.
 const AS_COARSE: f64 = 1.01;
 
-/// The blocks of a file, those touched last in memory.
+/// The blocks of a file; the last used are in memory.
 pub(super) struct Blocks {
     shared: Arc<Shared>,
-    /// Read for those who do not wait; none if the system starts no thread.
+    /// Read for callers that do not wait; `None` if the system starts no thread.
     threads: OnceLock<Option<[JoinHandle<()>; 2]>>,
 }
 
-/// State that the reader and the threads in the background share.
+/// State shared by the reader and the background threads.
 pub(super) struct Shared {
     reader: Box<dyn BlockReader>,
-    /// The reader's images, and coarse ones that are made of them.
+    /// The reader's images, and the coarse images computed from them.
     images: Vec<BlockImage>,
-    /// Is not held while a block is read.
+    /// Never locked while a block is read.
     kept: Mutex<BlockState>,
-    /// Held by a thread that reads a block for a waiting reader.
+    /// Locked by a thread that reads a block for a waiting reader.
     turn: Mutex<()>,
     coarse: Mutex<Coarse>,
     disk: DiskCache,
     /// Queue for coarse samples.
     queue: Queue,
-    /// Queue for fine samples, which are needed at once.
+    /// Queue for fine samples, which are urgent.
     fine: Queue,
     /// Blocks that were read from the file.
     read: AtomicU64,
-    /// The file, for warnings.
+    /// The file's path, for warnings.
     path: OnceLock<PathBuf>,
 }
 
@@ -86,11 +84,11 @@ pub(super) struct Shared {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NotHere;
 
-/// A stored sample; `None` in a hole that no value marks.
+/// A stored sample; `None` for no-data that no value marks.
 pub(super) type Stored = Result<Option<f64>, NotHere>;
 
 impl Blocks {
-    /// Nothing is read yet.
+    /// Returns the blocks of a reader, without reading any.
     pub(super) fn new(reader: Box<dyn BlockReader>) -> Self {
         let shared = Shared {
             images: reader.images().to_vec(),
@@ -110,7 +108,7 @@ impl Blocks {
         }
     }
 
-    /// The file's order, before anything is read. From now on it has coarse images.
+    /// Sets the file's order, and adds coarse images; call it before anything is read.
     pub(super) fn set_order(&mut self, south_up: bool, east_first: bool) {
         let Some(shared) = Arc::get_mut(&mut self.shared) else {
             return;
@@ -126,14 +124,14 @@ impl Blocks {
         }
     }
 
-    /// Sets the folder of coarse samples, before anything is read.
+    /// Sets the folder of coarse samples; call it before anything is read.
     pub(super) fn set_disk_cache(&mut self, disk: &DiskCache) {
         if let Some(shared) = Arc::get_mut(&mut self.shared) {
             shared.disk = disk.clone();
         }
     }
 
-    /// Starts the threads for reads that do not wait. Without threads such a read has to wait.
+    /// Starts the threads for reads that do not wait. If that fails, such a read waits.
     fn possible(&self, wait: Wait) -> Wait {
         let start = |name: &str, queue: fn(&Shared) -> &Queue| {
             let shared = self.shared.clone();
@@ -159,14 +157,14 @@ impl Blocks {
         }
     }
 
-    /// A stored sample at a column and row of an image, in the file's order.
+    /// Returns a stored sample at a column and row of an image, in the file's order.
     pub(super) fn stored(&self, image: usize, column: u32, row: u32, wait: Wait) -> Stored {
         self.shared
             .sample(image, [column, row], self.possible(wait))
     }
 
-    /// The height at a column and row of an image, in the file's order; `height` makes one of a stored
-    /// value.
+    /// Returns the height at a column and row of an image, in the file's order; `height` converts a
+    /// stored value.
     pub(super) fn height(
         &self,
         image: usize,
@@ -180,8 +178,8 @@ impl Blocks {
         }
     }
 
-    /// Has blocks read in the background: those of the image that serves a level, between two
-    /// columns and two rows of the full one.
+    /// Prefetches blocks of the image that serves a level, in a range of columns and of rows of the
+    /// full image.
     pub(super) fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
         if self.possible(Wait::Never) == Wait::Never {
             self.shared.prefetch_full(level, columns, rows);
@@ -217,35 +215,36 @@ impl Drop for Blocks {
 }
 
 impl Shared {
-    /// Names the file in warnings.
+    /// Sets the file's name for warnings.
     pub(super) fn set_path(&self, path: &Path) {
-        // A second name of the same file is no better.
+        // The first name is kept: a second one is for the same file.
         let _ = self.path.set(path.to_owned());
     }
 
-    /// Keeps no more than so many bytes of blocks, and counts `unread` blocks as warned of.
+    /// Sets the max size of the cache, and the number of unreadable blocks that were reported
+    /// before.
     pub(super) fn set_share(&self, most_bytes: usize, unread: u32) {
         *self.kept() = BlockState::new(most_bytes).after(unread);
     }
 
-    /// Bytes that the blocks in memory take, and how many blocks could not be read.
+    /// Returns the memory of the cached blocks, bytes, and the number of unreadable blocks.
     pub(super) fn share(&self) -> (usize, u32) {
         let kept = self.kept();
         (kept.cache.bytes(), kept.unread)
     }
 
-    /// Number of blocks that were read from the file.
+    /// Returns the number of blocks that were read from the file.
     pub(super) fn blocks_read(&self) -> u64 {
         self.read.load(Ordering::Relaxed)
     }
 
-    /// Blocks of the full image.
+    /// Returns the number of blocks of the full image.
     pub(super) fn count(&self) -> u64 {
         let counts = self.images.first().map_or([0; 2], BlockImage::counts);
         counts.map(u64::from).iter().product()
     }
 
-    /// Returns true if a block of the file is being read in the background, or is going to be.
+    /// Returns true if a block of the file is being read in the background, or is queued.
     pub(super) fn is_reading(&self) -> bool {
         !self.fine.is_idle()
     }
@@ -256,22 +255,22 @@ impl Shared {
     }
 
     fn kept(&self) -> MutexGuard<'_, BlockState> {
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn coarse(&self) -> MutexGuard<'_, Coarse> {
-        // The same.
+        // See `kept`.
         self.coarse.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Type in which samples are held.
+    /// Returns the type of the samples in memory.
     pub(super) fn sample_type(&self) -> SampleType {
         self.reader.sample_type()
     }
 
-    /// Bytes that samples in memory take at most, and what their reader keeps: beside the
-    /// kept blocks there is one that is touched and one that is read in the background.
+    /// Returns the max memory, bytes: the cached blocks, the one in use, the one read in the
+    /// background, and the reader's own memory.
     pub(super) fn most_bytes(&self) -> usize {
         let samples = |image: &BlockImage| image.block.map(u64::from).iter().product::<u64>();
         let largest = self.reader.images().iter().map(samples).max();
@@ -284,22 +283,22 @@ impl Shared {
         cache::MAX_BYTES + blocks + pieces + self.reader.kept_bytes()
     }
 
-    /// The image that serves a level of detail: the coarsest that is no coarser than it.
+    /// Returns the image that serves a level: the coarsest that is no coarser than the level.
     pub(super) fn image_of(&self, level: u8) -> usize {
         let step = f64::from(level).exp2() * AS_COARSE;
         let serves = |image: &BlockImage| self.coarseness(image).iter().all(|times| *times <= step);
         self.images.iter().rposition(serves).unwrap_or(0)
     }
 
-    /// The same among the full image and those with samples of their own: the samples of
-    /// one that has every so many-th sample lie elsewhere than those of a field around it.
+    /// As `image_of`, for the full image and those whose samples are areas: a subsampled image has
+    /// its samples at other positions.
     pub(super) fn overview_of(&self, level: u8) -> usize {
         let image = self.image_of(level);
         let every = self.images.get(image).and_then(|image| image.every);
         if every.is_some() { 0 } else { image }
     }
 
-    /// A stored sample at a column and row of an image, in the file's order.
+    /// Returns a stored sample at a column and row of an image, in the file's order.
     fn sample(&self, image: usize, [column, row]: [u32; 2], wait: Wait) -> Stored {
         if image >= self.reader.images().len() {
             return self.coarse_sample(image, [column, row], wait);
@@ -316,7 +315,7 @@ impl Shared {
         Ok(block.stored(index))
     }
 
-    /// A stored sample of an image that is made.
+    /// Returns a stored sample of a computed image.
     fn coarse_sample(&self, image: usize, at: [u32; 2], wait: Wait) -> Stored {
         let Some(of) = self.images.get(image) else {
             return Ok(None);
@@ -354,15 +353,15 @@ impl Shared {
         Err(NotHere)
     }
 
-    /// Columns and rows of an image.
+    /// Returns the columns and rows of an image.
     pub(super) fn size(&self, image: usize) -> [u32; 2] {
         let of = self.images.get(image);
         of.map_or([0; 2], |of| [of.columns, of.rows])
     }
 
-    /// A height between the samples of an image, linear along rows and columns, at a place in columns
-    /// and rows of the full one; every corner that counts must have a height. `read` returns the height
-    /// at a column and row of the image, in the file's order.
+    /// Returns the bilinear height between the samples of an image at a position in columns and
+    /// rows of the full image; every corner with a weight must have a height. `read` returns the
+    /// height at a column and row of the image, in the file's order.
     pub(super) fn between(
         &self,
         image: usize,
@@ -372,7 +371,7 @@ impl Shared {
         let Some(of) = self.images.get(image) else {
             return (f64::NAN, ReadStatus::Complete);
         };
-        // A sample is the middle of its cell, and the edges of the images are the same.
+        // A sample is the middle of its cell, and all images have the same edges.
         let times = self.coarseness(of);
         let middle = if of.every.is_some() { 0.0 } else { 0.5 };
         let place = |at: f64, times: f64, count: u32| {
@@ -387,14 +386,14 @@ impl Shared {
         (height, reads.status())
     }
 
-    /// [`Blocks::prefetch_full`].
+    /// As [`Blocks::prefetch_full`].
     fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
         let image = self.image_of(level);
         let Some(of) = self.images.get(image) else {
             return;
         };
         let times = self.coarseness(of);
-        // What lies between two samples follows from both.
+        // A height between two samples needs both.
         let along = |[first, last]: [u32; 2], axis: usize, count: u32| {
             let at = |full: u32| (f64::from(full) - f64::from(of.first[axis])) / times[axis];
             let begin = (at(first).floor() - 1.0).clamp(0.0, f64::from(count) - 1.0);
@@ -415,7 +414,7 @@ impl Shared {
         self.prefetch(image, &part);
     }
 
-    /// Samples of the full image in one of another, along rows and columns.
+    /// Returns the samples of the full image per sample of another, along rows and columns.
     fn coarseness(&self, image: &BlockImage) -> [f64; 2] {
         if let Some(every) = image.every {
             return [f64::from(every); 2];

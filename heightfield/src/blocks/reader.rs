@@ -4,59 +4,58 @@ use super::super::RasterError;
 use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
 use super::survey::Looks;
 
-/// Side of a usual block: where blocks of a file are smaller, several are read at once.
+/// Side of a usual block: smaller blocks of a file are read several at once.
 const USUAL_BLOCK: u32 = 256;
 
-/// Reads parts of a file's images.
+/// A source of parts of a file's images.
 pub(crate) trait BlockReader: Send + Sync {
-    /// Name of the format, in messages.
+    /// Returns the name of the format, for messages.
     fn format(&self) -> &'static str;
 
-    /// The full image, and after it others of the same field, each coarser than the one
-    /// before.
+    /// Returns the full image, followed by overviews of the same field, each coarser than the
+    /// previous one.
     fn images(&self) -> &[BlockImage];
 
-    /// Type in which samples are held.
+    /// Returns the type of the samples in memory.
     fn sample_type(&self) -> SampleType;
 
-    /// Returns true if the file stores samples there; where it does not, there is a hole.
+    /// Returns true if the file stores samples there; otherwise they are no-data.
     fn is_stored(&self, image: usize, part: &Part) -> bool;
 
-    /// The samples of a part of an image, row after row.
+    /// Reads the samples of a part of an image, row after row.
     ///
     /// # Errors
     /// A fault of that part of the file.
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError>;
 
-    /// Sets the file's order before anything is read: coarse levels count their samples
-    /// from the south and west.
+    /// Sets the file's order; call it before anything is read. Coarse levels count their samples
+    /// from the south-west.
     fn set_order(&mut self, south_up: bool, east_first: bool) {
         let _ = (south_up, east_first);
     }
 
-    /// Announces the parts that are going to be read, one after the other: a remote part is
-    /// fetched meanwhile.
+    /// Announces parts that will be read one after another, so that remote parts are prefetched.
     fn want(&self, image: usize, parts: &[Part]) {
         let _ = (image, parts);
     }
 
-    /// A hash of the file's index: where each block is stored and in how many bytes.
+    /// Returns a hash of the file's index: the offset and size of each block.
     fn index(&self) -> u64;
 
-    /// Returns the places that are read when the raster is opened; `None` for its coarsest image.
+    /// Returns the parts that are read at opening; `None` for the coarsest image.
     fn looks(&self) -> Option<Looks> {
         None
     }
 
-    /// Returns the stamp of the samples of a part, which names them in the disk cache: it differs
-    /// for every other file, and for another state of the same file. `None` if that is unknown, or
-    /// the file was written a moment ago; nothing is cached then.
+    /// Returns the stamp of the samples of a part, which names them in the disk cache. It differs
+    /// between files, and between states of a file. `None`, and no caching, if the state is unknown
+    /// or the file was written a moment ago.
     fn stamp(&self, image: usize, part: &Part) -> Option<String> {
         let _ = (image, part);
         None
     }
 
-    /// Bytes that the reader itself keeps at most, besides the blocks that it hands over.
+    /// Returns the reader's own max memory, bytes, without the blocks that it returns.
     fn kept_bytes(&self) -> usize {
         0
     }
@@ -65,17 +64,16 @@ pub(crate) trait BlockReader: Send + Sync {
 /// An image that is read in blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BlockImage {
-    /// Samples a row.
+    /// Samples per row.
     pub(crate) columns: u32,
     /// Rows.
     pub(crate) rows: u32,
-    /// Columns and rows of a block; those at the east and south end are cut.
+    /// Columns and rows of a block; those at the east and south end are smaller.
     pub(crate) block: [u32; 2],
-    /// It has every so many-th sample of the full image, the first one first. Else its
-    /// samples are the middles of its own cells, and its edges those of the full image.
+    /// Step, if the image is every `every`-th sample of the full image. Otherwise its samples are
+    /// the middles of its own cells, and its edges are those of the full image.
     pub(crate) every: Option<u32>,
-    /// Column and row of the full image where its first sample lies, where it has every so
-    /// many-th.
+    /// Column and row of its first sample in the full image, if `every` is set.
     pub(crate) first: [u32; 2],
 }
 
@@ -86,7 +84,7 @@ pub(crate) struct Part {
     pub(crate) column: u32,
     /// Its first row.
     pub(crate) row: u32,
-    /// Samples a row.
+    /// Samples per row.
     pub(crate) columns: u32,
     /// Rows.
     pub(crate) rows: u32,
@@ -97,14 +95,14 @@ pub(crate) struct Part {
 pub(crate) struct Block {
     /// Row after row.
     pub(crate) samples: Samples,
-    /// Holes that no value marks.
+    /// No-data that no value marks.
     pub(crate) holes: Option<HoleMask>,
-    /// True if some of its holes are there only because a part of the file could not be read.
+    /// True if some samples are no-data only because a part of the file could not be read.
     pub(crate) is_lacking: bool,
 }
 
 impl Block {
-    /// A sample by its place in the block; `None` in a hole that no value marks.
+    /// Returns a sample by its index in the block; `None` for no-data that no value marks.
     pub(crate) fn stored(&self, index: usize) -> Option<f64> {
         let hole = (self.holes.as_ref()).is_some_and(|mask| mask.contains(index));
         (!hole).then(|| with_samples!(&self.samples, values => values[index].widen()))
@@ -112,7 +110,7 @@ impl Block {
 }
 
 impl Part {
-    /// All of an image.
+    /// Returns a whole image.
     pub(crate) const fn whole(columns: u32, rows: u32) -> Self {
         Self {
             column: 0,
@@ -140,7 +138,7 @@ impl Part {
 }
 
 impl BlockImage {
-    /// Blocks from west to east and down.
+    /// Returns the number of blocks across and down.
     pub(crate) fn counts(&self) -> [u32; 2] {
         let [across, down] = self.block;
         [self.columns.div_ceil(across), self.rows.div_ceil(down)]
@@ -158,10 +156,10 @@ impl BlockImage {
     }
 }
 
-/// Columns and rows of a block: as few whole chunks as make a usual one.
+/// Returns the columns and rows of a block: the fewest whole chunks that make a usual block.
 pub(crate) fn usual_block([columns, rows]: [u32; 2]) -> [u32; 2] {
     let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
-    // Of wide chunks fewer rows make a usual block, and of high ones fewer columns.
+    // Wide chunks need fewer rows, high ones fewer columns.
     let filled = |chunk: u32, other: u32| {
         let usual = (USUAL_BLOCK * USUAL_BLOCK / other.clamp(1, USUAL_BLOCK * USUAL_BLOCK)).max(1);
         chunk.saturating_mul(usual.div_ceil(chunk))

@@ -1,5 +1,4 @@
-//! Reads blocks from the file or from what was kept of it on disk, and what the thread in
-//! the background does.
+//! Reading of blocks from the file or from the disk cache, and the background threads' work.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
@@ -11,24 +10,24 @@ use super::coarse::Piece;
 use super::{Block, NotHere, Part, Shared, Wait, coarse_on_disk};
 use crate::remote::without_key;
 
-/// After so many warnings of blocks that cannot be read one says that there are more.
+/// After this many warnings of unreadable blocks, one reports that there are more.
 const WARNINGS: u32 = 8;
-/// Blocks that are fetched from elsewhere while one is decoded in the background.
+/// Remote blocks that are fetched while one is decoded in the background.
 const AHEAD: usize = 16;
 
-/// Blocks that are read ahead of the hand at once, at most.
+/// Max blocks of one prefetch.
 const MAX_PREFETCHED: usize = 16;
 
 /// Result of reading a part of an image.
 pub(super) struct Read {
-    /// `None` where there is no sample.
+    /// `None` if the file has no samples there.
     pub(super) block: Option<Arc<Block>>,
-    /// True if some of its holes are there only because something could not be read.
+    /// True if some samples are no-data only because something could not be read.
     is_lacking: bool,
 }
 
 impl Shared {
-    /// A block, read if it is not in memory; `None` where there is no sample.
+    /// Returns a block, read if it is not in memory; `None` if the file has no samples there.
     ///
     /// # Errors
     /// [`NotHere`] if it is not in memory and `wait` is [`Wait::Never`], or if it cannot be read at
@@ -52,15 +51,15 @@ impl Shared {
                 false => self.fine.want_first(Job::Fetch(key)),
             };
             if is_new {
-                // Blocks are decoded one after the other, and fetched together.
+                // Blocks are decoded one after another, but fetched together.
                 self.reader.want(image, &[of.part(at)]);
             }
             return Err(NotHere);
         }
-        // Nothing that panics runs while this is held but decoders, whose panics are caught.
+        // Only decoders can panic while the lock is held, and their panics are caught.
         let turn = self.turn.lock();
         let _turn = turn.unwrap_or_else(PoisonError::into_inner);
-        // It may have been read by the one who had the turn before.
+        // The previous owner of the lock may have read it.
         if let Some(known) = self.kept().known(&key) {
             return known;
         }
@@ -72,7 +71,7 @@ impl Shared {
         fetched
     }
 
-    /// Reads a block and keeps it.
+    /// Reads a block into the cache.
     fn fetch(&self, key: Key) -> Result<Option<Arc<Block>>, NotHere> {
         let Some(image) = self.images.get(key.image) else {
             return Ok(None);
@@ -90,7 +89,7 @@ impl Shared {
             Some(Arc::new(block))
         } else {
             let read = self.read(key.image, &part)?;
-            // A file that changed meanwhile may have given either.
+            // If the file changed during the read, either state may have been read.
             if let Some(kept_as) = before.filter(|_| !read.is_lacking)
                 && name() == Some(kept_as)
             {
@@ -106,8 +105,8 @@ impl Shared {
         Ok(block)
     }
 
-    /// Has the blocks of a part of an image read that are not in memory. Waits for
-    /// nothing, and does nothing for a part of more than [`MAX_PREFETCHED`] blocks.
+    /// Queues reads of a part's blocks that are not in memory. Does not wait, and ignores a part of
+    /// more than [`MAX_PREFETCHED`] blocks.
     pub(super) fn prefetch(&self, image: usize, part: &Part) {
         let Some(of) = self.images.get(image) else {
             return;
@@ -118,7 +117,7 @@ impl Shared {
         let [across, down] = of.block;
         let columns = part.column / across..(part.column + (part.columns - 1)) / across + 1;
         let rows = part.row / down..(part.row + (part.rows - 1)) / down + 1;
-        // Of a part that is too large nothing comes in time.
+        // A part that is too large would be too late anyway.
         if columns.len() * rows.len() > MAX_PREFETCHED {
             return;
         }
@@ -139,22 +138,22 @@ impl Shared {
         }
     }
 
-    /// Takes the coarse samples of a block of the full image.
+    /// Stores the coarse samples of a block of the full image.
     fn leave(&self, part: &Part, read: &Read) {
         let mut coarse = self.coarse();
         coarse.leave(part, read.block.as_deref(), read.is_lacking);
     }
 
-    /// Keeps coarse samples on disk, from time to time.
+    /// Saves coarse samples on disk, periodically.
     fn keep_due(&self) {
         let due = self.coarse().take_due();
         self.keep(due);
     }
 
-    /// A part of an image; `None` where there is no sample.
+    /// Reads a part of an image; the block is `None` if the file has no samples there.
     ///
     /// # Errors
-    /// [`NotHere`], of which the line's word is kept.
+    /// [`NotHere`] after an error of the connection, which is stored.
     pub(super) fn read(&self, image: usize, part: &Part) -> Result<Read, NotHere> {
         if !self.reader.is_stored(image, part) {
             return Ok(Read {
@@ -195,14 +194,14 @@ impl Shared {
         }
     }
 
-    /// Does what a queue holds until that ends.
+    /// Runs the jobs of a queue until it is closed.
     pub(super) fn work(&self, queue: &Queue) {
         loop {
             while let Some(job) = queue.next() {
                 match job {
                     Job::Seek(key) => self.seek(key),
                     Job::Pass(at) => self.pass(at),
-                    // What is not here yet is wanted again.
+                    // A block that is still pending is requested again.
                     Job::Fetch(key) => {
                         if self.fetch(key).is_err() {
                             self.kept().wait_for(key);
@@ -218,7 +217,7 @@ impl Shared {
         }
     }
 
-    /// Looks for a piece of a made image on disk.
+    /// Searches the disk for a piece of a computed image.
     pub(super) fn seek(&self, key: Key) {
         let name = coarse_on_disk::name(&*self.reader, &self.images[key.image], &key);
         let block = self.images[key.image].block;
@@ -227,8 +226,8 @@ impl Shared {
         self.coarse().sought(key, found.as_ref());
     }
 
-    /// Decodes a block of the full image for its coarse samples, and lets it go: a coarse
-    /// tile touches more blocks than memory keeps.
+    /// Decodes a block of the full image for its coarse samples, without caching it: a coarse tile
+    /// needs more blocks than fit in memory.
     fn pass(&self, at: [u32; 2]) {
         let full = &self.images[0];
         let coming = self.queue.coming(AHEAD);
@@ -240,7 +239,7 @@ impl Shared {
         }
     }
 
-    /// Keeps pieces on disk, if the file is what it was.
+    /// Saves pieces on disk, if the file is unchanged.
     pub(super) fn keep(&self, pieces: Vec<(Key, Piece)>) {
         for (key, piece) in pieces.into_iter().filter(|_| self.disk.is_on()) {
             if let Some(name) = coarse_on_disk::name(&*self.reader, &self.images[key.image], &key) {

@@ -1,4 +1,4 @@
-//! Knowledge of a file without reading all of it.
+//! Summary of a file without reading all of it.
 
 use std::hash::Hasher;
 
@@ -9,27 +9,26 @@ use super::{BlockImage, Part, Shared};
 use crate::Wait;
 use crate::remote::without_key;
 
-/// Of an image with at most so many samples all are looked at.
+/// An image of at most this many samples is read whole.
 const FEW_SAMPLES: u64 = 1 << 20;
-/// Of a larger one so many blocks that hold samples, spread evenly.
+/// Number of stored blocks, evenly spread, that are read of a larger image.
 const LOOKS: usize = 32;
-/// Of more blocks that hold samples not all are listed, but so many, spread evenly: a list of
-/// them all would take more memory than a terrain.
+/// Max listed blocks, evenly spread over those that are stored: a full list could need more memory
+/// than the terrain.
 const MAX_LISTED: usize = 1 << 20;
 
-/// Heights looked at when the file was opened.
+/// Summary of the heights that are read at opening.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Survey {
-    /// Of the heights that were looked at.
+    /// Range and count of these heights.
     pub(crate) summary: HeightSummary,
-    /// Hash of the file's index and of the heights that were looked at: the same file has
-    /// the same, and one that was changed most likely another. `None` where all samples
-    /// are in memory.
+    /// Hash of the file's index and of these heights. It is the same for the same file, and almost
+    /// certainly differs after a change. `None` if all samples are in memory.
     pub(crate) print: Option<u64>,
 }
 
 impl Survey {
-    /// Of a raster that is in memory: nothing but its samples is needed to know it again.
+    /// Returns the survey of a raster in memory: its samples identify it.
     pub(crate) const fn of_all(summary: HeightSummary) -> Self {
         Self {
             summary,
@@ -38,23 +37,23 @@ impl Survey {
     }
 }
 
-/// Places of a raster that are read when it is opened.
+/// Parts of a raster that are read at opening.
 #[derive(Debug)]
 pub(crate) struct Looks {
-    /// The image to look at.
+    /// The image to read.
     pub(crate) image: usize,
-    /// Parts of it, of which a few are looked at.
+    /// Parts of it, of which a few are read.
     pub(crate) parts: Vec<Part>,
 }
 
-/// Places that have been read.
+/// The heights that have been read.
 struct Seen {
     hasher: XxHash64,
     summary: HeightSummary,
 }
 
 impl Seen {
-    /// Counts a height; NaN is a hole.
+    /// Counts a height; NaN is no-data.
     fn add(&mut self, height: f64) {
         let bits = if height.is_nan() { f64::NAN } else { height };
         self.hasher.write(&bits.to_le_bytes());
@@ -63,9 +62,9 @@ impl Seen {
 }
 
 impl Shared {
-    /// Looks at what the reader chooses, or at the coarsest image, all of it where it is
-    /// small. `height` makes a height of a stored sample. The summary's range is empty where
-    /// there is no height in the whole file.
+    /// Reads the parts that the reader chooses, or the coarsest image, all of it if it is small.
+    /// `height` converts a stored sample. The summary's range is empty if the whole file has no
+    /// height.
     pub(crate) fn survey(&self, height: impl Fn(Option<f64>) -> f64) -> Survey {
         let mut seen = Seen {
             hasher: XxHash64::with_seed(0),
@@ -97,7 +96,7 @@ impl Shared {
         }
         if looks < parts.len() && seen.summary.has_none() {
             self.tell_of_search(looks, parts.len());
-            // Most of it may hold nothing: then the first height anywhere will do.
+            // Most of the file may be no-data: then the first height anywhere is enough.
             for part in &parts {
                 look_once(part, &mut seen);
                 if !seen.summary.has_none() {
@@ -111,7 +110,7 @@ impl Shared {
         }
     }
 
-    /// Says why it may take long to open the file.
+    /// Warns that opening the file may take long, and why.
     fn tell_of_search(&self, looks: usize, parts: usize) {
         let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
         tracing::warn!(
@@ -119,7 +118,7 @@ impl Shared {
         );
     }
 
-    /// The samples of a block, which is kept.
+    /// Reads the samples of a block, which is cached.
     fn look_at_block(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
         for row in part.row..part.row + part.rows {
             for column in part.column..part.column + part.columns {
@@ -129,8 +128,8 @@ impl Shared {
         }
     }
 
-    /// The samples of a part that is no block: neither is it kept, nor is read what lies
-    /// around it.
+    /// Reads the samples of a part that is not a block: it is not cached, and nothing around it is
+    /// read.
     fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
         let block = self.read(image, part).ok().and_then(|read| read.block);
         for index in 0..part.columns as usize * part.rows as usize {
@@ -157,7 +156,7 @@ impl Shared {
     }
 }
 
-/// The blocks of an image that hold samples, or some of them where there are very many.
+/// Returns the blocks of an image that hold samples, or evenly spread ones if there are too many.
 pub(crate) fn stored_parts(of: &BlockImage, is_stored: impl Fn(&Part) -> bool) -> Vec<Part> {
     let [across, down] = of.counts();
     let every = || (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));

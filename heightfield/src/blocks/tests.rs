@@ -1,4 +1,4 @@
-//! A field that is known everywhere, read in blocks.
+//! A field with a known formula, read in blocks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,13 +12,13 @@ use crate::{OpenOptions, Raster};
 const SIZE: [u32; 2] = [1000, 700];
 const BLOCK: [u32; 2] = [64, 48];
 
-/// Full image, and an overview of every fourth sample each way; a block of the full one is
-/// not stored and one cannot be read.
+/// A full image, and an overview of every fourth sample in both directions. One block of the full
+/// image is not stored, and one cannot be read.
 struct Field {
     images: Vec<BlockImage>,
-    /// Samples that were read.
+    /// Number of samples that were read.
     read: Arc<AtomicU64>,
-    /// A plane, so that samples between samples are known.
+    /// True if one block cannot be read.
     fault: bool,
 }
 
@@ -113,7 +113,7 @@ fn a_touched_place_reads_its_block_once_and_nothing_else() {
         assert_eq!(raster.height(301, 210), plane(301.0, 210.0));
     }
     assert_eq!(read.load(Ordering::Relaxed), 64 * 48);
-    // The last blocks are cut.
+    // The last blocks are smaller.
     assert_eq!(raster.height(999, 699), plane(999.0, 699.0));
     assert!(raster.height(1000, 699).is_nan());
     assert!(raster.height(999, 700).is_nan());
@@ -174,11 +174,11 @@ fn coarse_levels_come_from_the_overview_in_their_place_whatever_the_files_order(
             read.load(Ordering::Relaxed) < 250 * 175,
             "no full image was read"
         );
-        // One step is finer than the overview.
+        // Level 1 is finer than the overview.
         assert_eq!(raster.surface(1, [400.0, 200.0]), height(400, 200));
         let before = read.load(Ordering::Relaxed);
         assert!(before >= 64 * 48);
-        // Where the overview's outermost samples end its surface is level.
+        // Beyond the outermost samples of the overview, its surface is level.
         let corner = raster.surface(2, [0.0, 0.0]);
         assert!((corner - height(0, 0)).abs() <= 3.0 * 1.5 + 2.0 * 1.5);
     }
@@ -205,14 +205,14 @@ fn the_memory_that_blocks_take_is_bounded() {
     assert!(kept.cache.bytes() <= MAX_BYTES, "{}", kept.cache.bytes());
     assert!(kept.cache.bytes() > MAX_BYTES / 2);
     drop(kept);
-    // The one touched last is still there.
+    // The block used last is still cached.
     let before = read.load(Ordering::Relaxed);
     let _ = blocks.stored(0, (20_000 / 64 - 1) * 64, 4800 + 19 * 480, Wait::UntilRead);
     assert_eq!(read.load(Ordering::Relaxed), before);
 }
 
-/// Reads of the same field by several threads at once, each over its own terrain, as several
-/// devices do.
+/// Concurrent reads of the same field by several threads, as for several devices, each with its own
+/// terrain.
 #[test]
 fn a_block_that_one_thread_read_is_not_read_again_for_another() {
     let (mut field, read) = Field::new();
@@ -237,15 +237,14 @@ fn a_block_that_one_thread_read_is_not_read_again_for_another() {
     let Storage::Blocks(blocks) = &raster.source.storage else {
         panic!("it is read in blocks");
     };
-    // The overview was read when the raster was opened.
+    // The overview was read at opening.
     let overview = samples / 16;
     let held = blocks.share().0 as u64;
     assert!(held >= 8 * (samples + overview), "{held}");
     assert!(held < 9 * (samples + overview), "{held}: kept once");
 }
 
-/// A field of one block a row of them, of which the second is read as slowly as the test
-/// wants.
+/// A field of blocks of one row each; reading the second one waits for the test.
 struct Slow {
     images: Vec<BlockImage>,
     begun: Arc<std::sync::Barrier>,
@@ -315,7 +314,7 @@ fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_rea
             );
         });
         begun.wait();
-        // The other thread reads until it gets the signal.
+        // The other thread is reading until it gets the signal.
         let is_free = blocks.kept.try_lock().is_ok();
         let sample = is_free.then(|| blocks.stored(0, 1, 1, Wait::UntilRead));
         go_on.wait();
@@ -327,7 +326,7 @@ fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_rea
 fn a_missing_block_is_reported_at_each_read() {
     let blocks = Blocks::new(Box::new(slow(true)));
     let missing = || blocks.stored(0, BLOCK[0], 0, Wait::UntilRead);
-    // The second time it is known without a look.
+    // The second time, its state is known without a read.
     assert_eq!((missing(), missing()), (Err(NotHere), Err(NotHere)));
     assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
 }
@@ -339,7 +338,7 @@ fn a_field_without_a_height_anywhere_is_refused() {
     let size = (SIZE[0], SIZE[1]);
     let mut decoded = Decoded::new("test".into(), size, Storage::from(field));
     decoded.scale = f64::MAX;
-    // Every height but zero is larger than any height.
+    // All heights but zero are too large.
     let fault = Raster::checked(decoded, Some(0.0)).expect_err("no height");
     assert!(matches!(fault, RasterError::AllNoData { .. }), "{fault}");
     assert_eq!(OpenOptions::default().most_in_memory_bytes, 128 << 20);

@@ -1,4 +1,4 @@
-//! Reference systems without code here, through libgdal's PROJ, where there is one.
+//! Reference systems that this crate does not have, from libgdal's PROJ, if it is installed.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -11,18 +11,18 @@ use super::unit::Unit;
 use crate::gdal;
 use crate::globe::Globe;
 
-/// The system with a code of EPSG's.
+/// Returns the system with an EPSG code.
 pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
     let found = gdal().ok()?.reference_of_epsg(code).ok()?;
     described(&found).map(|system| system.with_code(code))
 }
 
-/// Texts that are remembered: tiles of one terrain have the same, and PROJ takes half a second to
-/// compare one with all of EPSG's systems.
+/// Max cached texts: tiles of one terrain have the same text, and PROJ takes half a second to
+/// compare one with all EPSG systems.
 const MAX_REMEMBERED: usize = 16;
 static REMEMBERED: Mutex<Vec<(String, Option<ReferenceSystem>)>> = Mutex::new(Vec::new());
 
-/// The system of a text.
+/// Returns the system of a text.
 pub(super) fn of_text(text: &str) -> Option<ReferenceSystem> {
     let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, system)) = remembered().iter().find(|(known, _)| known == text) {
@@ -63,7 +63,7 @@ fn described(found: &SpatialReference) -> Option<ReferenceSystem> {
         Some(projection) => named(&found.name).with_projection(projection),
         None => named(&found.name),
     };
-    // "unknown" does not explain why it cannot be placed; the method does.
+    // "unknown" does not explain why it cannot be placed, but the method does.
     match &found.method {
         Some(method) if !system.has_lonlat() && found.name == "unknown" => {
             Some(named(&method.replace('_', " ")))

@@ -1,11 +1,10 @@
-//! Datums of reference systems, and how their longitudes and latitudes become
-//! those of WGS 84.
+//! Datums of reference systems, and the conversion of their longitudes and latitudes to WGS 84.
 //!
-//! The way is a shift of three or seven parameters, by the text's own numbers or by
-//! `crs-definitions`; no grids of shifts are read. How far such a way may be off was found by
-//! comparing every geographic system of `crs-definitions` with the best transformation of
-//! PROJ 9 in the middle of its area, its stated accuracy added: nine of ten systems are
-//! within 4 m where there is no shift, 10 m by seven and 45 m by three parameters.
+//! The conversion is a shift of three or seven parameters, from the text or from `crs-definitions`;
+//! shift grids are not used. Its error was found by comparing every geographic system of
+//! `crs-definitions` with PROJ 9's best transformation in the middle of its area, plus that one's
+//! stated accuracy: nine of ten systems are within 4 m without a shift, 10 m with seven and 45 m
+//! with three parameters.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,35 +12,35 @@ use super::shift::Shift;
 use super::wkt::Node;
 use crate::globe::Globe;
 
-/// A geodetic datum, as far as a file tells it.
+/// A geodetic datum, as far as the file defines it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Datum {
     name: String,
     globe: Globe,
-    /// Degrees east of Greenwich (of another body: of its own zero) at which longitudes begin.
+    /// Prime meridian, degrees east of Greenwich, or of the zero of another body.
     meridian: f64,
     shift: Option<Shift>,
 }
 
-/// Meaning of a file's longitudes and latitudes in input and output. They
-/// always count from Greenwich, whatever the file's own prime meridian.
+/// Meaning of a file's longitudes and latitudes in input and output. They count from Greenwich,
+/// whatever the file's own prime meridian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LonLat<'r> {
-    /// The file states degrees, and no more: they count as WGS 84's.
+    /// The file states only degrees: they are treated as WGS 84.
     Unstated,
-    /// Those of WGS 84 itself.
+    /// WGS 84 itself.
     Wgs84,
-    /// Those of WGS 84, from another datum.
+    /// WGS 84, shifted from another datum.
     ShiftedToWgs84 {
-        /// Usually not farther off than this, m.
+        /// Usual max error, m.
         within_m: f64,
     },
-    /// Those of a datum whose way to WGS 84 is not known here.
+    /// A datum whose shift to WGS 84 is unknown.
     OfOwnDatum {
         /// The datum's name.
         name: &'r str,
     },
-    /// Those of another body than the Earth.
+    /// A body other than the Earth.
     OfBody {
         /// The datum's name.
         name: &'r str,
@@ -51,7 +50,7 @@ pub enum LonLat<'r> {
 }
 
 impl Datum {
-    /// Of a globe, with longitudes that begin at a meridian in degrees.
+    /// Returns the datum of a globe, with a prime meridian in degrees.
     pub(super) fn new(name: String, globe: Globe, meridian: f64, shift: Option<Shift>) -> Self {
         let like_wgs84 = || globe.is_wgs84().then_some(Shift::None);
         Self {
@@ -62,12 +61,13 @@ impl Datum {
         }
     }
 
-    /// Of a globe whose way to WGS 84 is not known, with longitudes from its own zero.
+    /// Returns the datum of a globe without a known shift to WGS 84, with longitudes from its own
+    /// zero.
     pub(crate) fn unplaced(name: &str, globe: Globe) -> Self {
         Self::new(name.to_owned(), globe, 0.0, None)
     }
 
-    /// Of a node of a geographic system, and its shift.
+    /// Reads the datum of a geographic system's node, with its shift.
     pub(super) fn of(base: &Node, shift: Option<Shift>) -> Option<Self> {
         let node = base.child(&["DATUM", "ENSEMBLE", "GEODETICDATUM", "TRF"])?;
         let ellipsoid = node.child(&["ELLIPSOID", "SPHEROID"])?;
@@ -78,7 +78,7 @@ impl Datum {
         Some(Self::new(name, globe, meridian.unwrap_or(0.0), shift))
     }
 
-    /// The body that it is a datum of.
+    /// Returns the body of the datum.
     pub(crate) const fn globe(&self) -> Globe {
         self.globe
     }
@@ -104,14 +104,14 @@ impl Datum {
         }
     }
 
-    /// Returns true if its own degrees are the reported ones, to 4 m.
+    /// Returns true if its degrees equal the reported ones, to 4 m.
     pub(super) fn counts_lonlat(&self) -> bool {
         let is_shifted = matches!(self.shift, Some(Shift::Parameters { .. }));
         self.meridian == 0.0 && !is_shifted
     }
 
-    /// Reported degrees, of degrees of this datum from Greenwich. Longitudes beyond
-    /// ±180° stay in their turn.
+    /// Returns the reported degrees for this datum's degrees from Greenwich. Longitudes beyond
+    /// ±180° stay beyond.
     pub(super) fn to_lonlat(&self, own: (f64, f64)) -> Option<(f64, f64)> {
         match &self.shift {
             None | Some(Shift::None) => Some(own),
@@ -119,7 +119,7 @@ impl Datum {
         }
     }
 
-    /// The inverse of [`Datum::to_lonlat`].
+    /// Inverts [`Datum::to_lonlat`].
     pub(super) fn of_lonlat(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
         match &self.shift {
             None | Some(Shift::None) => Some(lonlat),
@@ -134,19 +134,19 @@ fn is_wgs84(name: &str) -> bool {
     plain.contains("wgs1984") || plain.contains("wgs84") || plain.contains("geodeticsystem1984")
 }
 
-/// A place on the globe: fields of cells reach half a cell beyond the poles.
+/// Limits degrees to the globe: fields of cells extend half a cell beyond the poles.
 fn sensible((longitude, latitude): (f64, f64)) -> (f64, f64) {
     (wrapped(longitude), latitude.clamp(-90.0, 90.0))
 }
 
-/// A place moved as far as a place on the globe was.
+/// Applies the shift of the limited degrees to the original ones.
 fn moved(place: (f64, f64), to: (f64, f64)) -> (f64, f64) {
     let from = sensible(place);
     let east = wrapped(to.0 - from.0);
     (place.0 + east, place.1 + to.1 - from.1)
 }
 
-/// A longitude from −180 to 180.
+/// Wraps a longitude to −180° to 180°.
 fn wrapped(longitude: f64) -> f64 {
     (longitude.to_radians() + PI).rem_euclid(TAU).to_degrees() - 180.0
 }

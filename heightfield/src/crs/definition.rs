@@ -1,5 +1,5 @@
-//! Reference systems by EPSG's code: `crs-definitions` has most, the two tables beside this file
-//! the newer projected ones and the vertical ones, and libgdal, where there is one, the rest.
+//! Reference systems by EPSG code: most are in `crs-definitions`, newer projected ones and vertical
+//! ones in the two tables beside this file, and the rest in libgdal, if it is installed.
 
 use super::datum::Datum;
 use super::shift::Shift;
@@ -9,21 +9,21 @@ use super::wkt::Node;
 use super::{Vertical, by_gdal};
 use crate::globe::Globe;
 
-/// Vertical systems: code, metres in the unit, 1 where numbers grow downwards, name.
+/// Vertical systems: code, metres in the unit, 1 for depths, name.
 const VERTICAL: &str = include_str!("vertical.txt");
-/// Projected systems that `crs-definitions` does not have: code, metres in the unit, code of the
-/// geographic system, its ellipsoid and datum, the projection as PROJ writes it, name.
+/// Projected systems missing in `crs-definitions`: code, metres in the unit, code of the geographic
+/// system, its ellipsoid and datum, the projection in PROJ's syntax, name.
 const PROJECTED: &str = include_str!("projected.txt");
 
-/// Systems that `crs-definitions` does not define as EPSG does: other axes, another unit, another
-/// meridian. libgdal is asked for them.
+/// Systems whose definition in `crs-definitions` differs from EPSG's: other axes, another unit,
+/// another meridian. libgdal provides them.
 const DEFINED_OTHERWISE: [u16; 5] = [2065, 3167, 5513, 26591, 26592];
-/// Systems whose projection `proj4rs` computes to another place than PROJ, by more than 50 m: theirs is
-/// not known here. Of 5,608 projected codes all others are within 1 m, but 2062, with 48 m
+/// Systems whose projection differs between `proj4rs` and PROJ by more than 50 m; it is treated as
+/// unknown. All other projected codes, of 5,608, agree within 1 m, except 2062, with 48 m
 /// (`tests/data/epsg_places.py`).
 const COMPUTED_OTHERWISE: [u16; 8] = [3973, 3974, 3975, 6200, 6996, 6997, 8044, 8045];
 
-/// The system with a code; `None` if it is unknown here, or it is not one of places.
+/// Returns the system with a code; `None` if it is unknown, or not horizontal.
 pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
     let here = || defined(code).or_else(|| newer(code));
     let of_gdal = || by_gdal::of_code(code);
@@ -37,7 +37,7 @@ pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
     })
 }
 
-/// The vertical system with a code.
+/// Returns the vertical system with a code.
 pub(crate) fn vertical(code: u16) -> Option<Vertical> {
     let [metres, down, name] = row(VERTICAL, code)?;
     Some(Vertical {
@@ -48,7 +48,7 @@ pub(crate) fn vertical(code: u16) -> Option<Vertical> {
     })
 }
 
-/// The vertical system beside a horizontal one, where the code is that of both.
+/// Returns the vertical part of a compound system with a code.
 pub(crate) fn vertical_beside(code: u16) -> Option<Vertical> {
     let root = Node::parse(crs_definitions::from_code(code)?.wkt)?;
     Vertical::beside(&root)

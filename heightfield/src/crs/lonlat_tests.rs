@@ -1,10 +1,11 @@
-//! Longitudes and latitudes under systems of every kind.
+//! Longitudes and latitudes for systems of every kind.
 
 use super::*;
 
 const DEGREE_M: f64 = 111_000.0;
 
-/// Returns true if there is a libgdal, which describes texts without a code; reports it where there is none.
+/// Returns true if there is a libgdal, which describes texts without a code; reports it if there is
+/// none.
 pub(super) fn has_libgdal() -> bool {
     let library = heightfield_gdal::Library::load(heightfield_gdal::Settings::default());
     if let Err(why) = &library {
@@ -53,7 +54,7 @@ fn longitudes_and_latitudes_are_those_of_wgs_84() {
     }
 }
 
-/// Esri's texts have no codes: the datum goes by its name.
+/// Esri's texts have no codes: the datum is found by its name.
 #[test]
 fn a_text_without_a_code_is_shifted_by_its_datum() {
     if !has_libgdal() {
@@ -130,7 +131,7 @@ fn the_moon_has_its_own_longitudes() {
     }
 }
 
-/// At a pole all longitudes are one place.
+/// At a pole, all longitudes are the same position.
 #[test]
 fn the_poles_of_polar_maps_are_places() {
     for (code, latitude, wanted) in [

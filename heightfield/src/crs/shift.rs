@@ -1,40 +1,39 @@
-//! The way from one datum's longitudes and latitudes to those of WGS 84.
+//! Shifts from a datum's longitudes and latitudes to those of WGS 84.
 
 use super::transform::Transform;
 
 use crate::globe::Globe;
 
-/// A way to WGS 84.
+/// A shift to WGS 84.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shift {
-    /// No way at all: the datum counts as WGS 84.
+    /// No shift: the datum is treated as WGS 84.
     None,
-    /// A shift, as PROJ writes it, with the ellipsoid that it is for.
+    /// A shift with its ellipsoid, in PROJ's syntax.
     Parameters {
-        /// From longitude and latitude of the datum to those of WGS 84.
+        /// From longitude and latitude of the datum to WGS 84.
         way: Transform,
-        /// Usually not farther off than this, m.
+        /// Usual max error, m.
         within_m: f64,
     },
 }
 
-/// Largest error of the datum of a modern system that counts as WGS 84, m: as far as
-/// plates have moved since.
+/// Max error of a modern datum that is treated as WGS 84, m: plate motion since its epoch.
 const SAME_WITHIN_M: f64 = 4.0;
-/// Largest error of nine of ten shifts by three and by seven parameters, m, by
+/// Max error of nine of ten shifts by three and by seven parameters, m, by
 /// `tests/data/shift_errors.py`.
 const THREE_WITHIN_M: f64 = 45.0;
 const SEVEN_WITHIN_M: f64 = 10.0;
 
-/// NAD27's shift is a grid; these three parameters are EPSG's for the contiguous states.
+/// NAD27's true shift is a grid; these are EPSG's three parameters for the contiguous states.
 const NAD27: [f64; 3] = [-8.0, 160.0, 176.0];
 
-/// Geographic systems whose shift in `crs-definitions` is more than 100 m from PROJ's.
+/// Geographic systems whose shift in `crs-definitions` differs from PROJ's by more than 100 m.
 const NOT_TRUSTED: [u16; 5] = [4161, 4240, 4688, 4805, 4751];
 
 impl Shift {
-    /// Three or seven parameters for an ellipsoid: metres, seconds of arc, and parts in a
-    /// million, as PROJ has them.
+    /// Creates a shift from three or seven parameters for an ellipsoid: metres, seconds of arc, and
+    /// parts per million, as in PROJ.
     pub(super) fn of_numbers(globe: &Globe, numbers: &[f64]) -> Option<Self> {
         if !matches!(numbers.len(), 3 | 7) || !numbers.iter().all(|number| number.is_finite()) {
             return None;
@@ -59,7 +58,7 @@ impl Shift {
         Some(Self::Parameters { way, within_m })
     }
 
-    /// Of the system with a code of EPSG's.
+    /// Returns the shift of the system with an EPSG code.
     pub(super) fn of_code(code: u16) -> Option<Self> {
         if NOT_TRUSTED.contains(&code) {
             return None;
@@ -89,7 +88,7 @@ impl Shift {
         }
     }
 
-    /// Of a datum that `proj4rs` has a name for.
+    /// Returns the shift of a datum that `proj4rs` supports by name.
     fn by_datum(datum: &str) -> Option<Self> {
         match datum {
             "WGS84" | "NAD83" => Some(Self::None),
@@ -105,7 +104,7 @@ impl Shift {
         }
     }
 
-    /// Usually not farther off than this, m.
+    /// Returns the usual max error, m.
     pub(super) const fn within_m(&self) -> f64 {
         match self {
             Self::None => SAME_WITHIN_M,
@@ -113,7 +112,7 @@ impl Shift {
         }
     }
 
-    /// Longitude and latitude of WGS 84 of those of the datum, degrees.
+    /// Converts longitude and latitude of the datum to WGS 84, degrees.
     pub(super) fn to_wgs84(&self, own: (f64, f64)) -> Option<(f64, f64)> {
         match self {
             Self::None => Some(own),
@@ -121,7 +120,7 @@ impl Shift {
         }
     }
 
-    /// The inverse of [`Shift::to_wgs84`].
+    /// Inverts [`Shift::to_wgs84`].
     pub(super) fn of_wgs84(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
         match self {
             Self::None => Some(lonlat),

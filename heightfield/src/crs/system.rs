@@ -1,5 +1,5 @@
-//! A horizontal reference system: its name, its code, and where its coordinates are
-//! in longitude and latitude.
+//! A horizontal reference system: its name, its code, and the longitude and latitude of its
+//! coordinates.
 
 use super::datum::{Datum, LonLat};
 use super::projection::Projection;
@@ -8,17 +8,17 @@ use super::wkt::Node;
 use super::{Globe, Vertical, by_gdal, definition};
 use crate::tangents::Tangents;
 
-/// Lengths of a map's unit on the ground within the area of the projection.
+/// Valid lengths of a map's unit on the ground within the projection's area.
 const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
 
-/// Units that differ by less than this are one.
+/// Units with a smaller relative difference are the same.
 const SAME_UNIT: f64 = 1e-9;
 
-/// Distance from a place at which its scale is computed, m: a projection's formulas end their
-/// rounds at 1e-10 rad, and its scale changes over kilometres.
+/// Distance at which the scale at a position is computed, m: a projection's iterations stop at
+/// 1e-10 rad, and its scale changes over kilometres.
 const STEP_M: f64 = 100.0;
 
-/// A horizontal reference system, as far as a file tells it.
+/// A horizontal reference system, as far as the file defines it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceSystem {
     code: Option<u16>,
@@ -26,22 +26,22 @@ pub struct ReferenceSystem {
     unit: Unit,
     /// The projection's units in a unit of coordinates.
     scale: f64,
-    /// `None` where it is not known.
+    /// `None` if it is unknown.
     projection: Option<Projection>,
-    /// `None` where the file does not tell it.
+    /// `None` if the file does not define it.
     datum: Option<Datum>,
 }
 
 impl ReferenceSystem {
-    /// The system with a code of EPSG's; `None` where the code is not known.
+    /// Returns the system with an EPSG code; `None` if the code is unknown.
     #[must_use]
     pub fn from_code(code: u16) -> Option<Self> {
         definition::of_code(code)
     }
 
-    /// The system that a text describes, and the vertical one that may stand beside
-    /// it; the code in the text wins over its parameters, which other programs round. Without a
-    /// code its projection is known through libgdal, where there is one.
+    /// Reads the system that a text describes, and the vertical system that may follow it. A code
+    /// in the text overrides its parameters, which other programs round. Without a code, the
+    /// projection comes from libgdal, if it is installed.
     pub(crate) fn from_wkt(text: &str) -> (Option<Self>, Option<Vertical>) {
         let text = text.trim().trim_end_matches('\0');
         let Some((root, beside)) = Node::parse_both(text) else {
@@ -56,7 +56,7 @@ impl ReferenceSystem {
 
     fn of_node(node: &Node, text: &str) -> Option<Self> {
         let by_code = node.epsg().and_then(Self::from_code);
-        // A unit that stands beside a code counts, as for GDAL.
+        // A unit beside a code overrides the code's, as in GDAL.
         let by_code = by_code.map(|system| match (node.is_projected(), node.unit()) {
             (true, Some(metres)) => system.in_units_of(metres),
             _ => system,
@@ -67,7 +67,7 @@ impl ReferenceSystem {
         })
     }
 
-    /// A system of which only the name, the unit and perhaps the datum are known.
+    /// Returns a system with only a name, a unit and perhaps a datum.
     pub(crate) fn new(name: &str, unit: Unit, datum: Option<Datum>) -> Self {
         Self {
             code: None,
@@ -79,25 +79,25 @@ impl ReferenceSystem {
         }
     }
 
-    /// The same system with a code of EPSG's.
+    /// Sets the EPSG code.
     pub(super) const fn with_code(mut self, code: u16) -> Self {
         self.code = Some(code);
         self
     }
 
-    /// The same system with a projection, as PROJ writes it, where that is known here.
+    /// Sets a projection in PROJ's syntax, if it is supported.
     pub(super) fn with_projection(mut self, projection: &str) -> Self {
         self.projection = Projection::new(projection, self.globe());
         self
     }
 
-    /// The same system, whose projection is not known.
+    /// Removes the projection.
     pub(super) fn without_projection(mut self) -> Self {
         self.projection = None;
         self
     }
 
-    /// The same system, whose coordinates are in units of so many metres, whatever its own unit is.
+    /// Sets the unit of the coordinates to `metres`, whatever the system's own unit.
     pub(crate) fn in_units_of(mut self, metres: f64) -> Self {
         if let Unit::Length(Some(own)) = self.unit
             && (metres / own - 1.0).abs() > SAME_UNIT
@@ -108,7 +108,7 @@ impl ReferenceSystem {
         self
     }
 
-    /// The same system, whose coordinates are in units of so many degrees.
+    /// Sets the unit of the coordinates to `degrees`.
     pub(crate) const fn in_degrees_of(mut self, degrees: f64) -> Self {
         if let Unit::Angle(_) = self.unit {
             self.unit = Unit::Angle(degrees);
@@ -116,7 +116,7 @@ impl ReferenceSystem {
         self
     }
 
-    /// Returns a remark where coordinates are in another unit than the system's own.
+    /// Returns a remark if coordinates are in another unit than the system's own.
     pub(crate) fn other_unit(&self) -> Option<String> {
         let Unit::Length(Some(metres)) = self.unit else {
             return None;
@@ -130,40 +130,40 @@ impl ReferenceSystem {
         })
     }
 
-    /// Its datum, where it is known.
+    /// Returns its datum, if known.
     pub(crate) const fn datum(&self) -> Option<&Datum> {
         self.datum.as_ref()
     }
 
-    /// The body that it belongs to; the Earth where nothing says otherwise.
+    /// Returns its body; the Earth by default.
     pub(crate) fn globe(&self) -> Globe {
         self.datum.as_ref().map_or(Globe::EARTH, Datum::globe)
     }
 
-    /// EPSG's code, where the file states one or names the system so that it follows.
+    /// Returns EPSG's code, if the file states it or it follows from the name.
     #[must_use]
     pub const fn code(&self) -> Option<u16> {
         self.code
     }
 
-    /// Its name, as `NAD83 / UTM zone 11N`.
+    /// Returns its name, as `NAD83 / UTM zone 11N`.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Returns true if its places on the globe are known.
+    /// Returns true if its coordinates can be converted to longitude and latitude.
     #[must_use]
     pub const fn has_lonlat(&self) -> bool {
         matches!(self.unit, Unit::Angle(_)) || self.projection.is_some()
     }
 
-    /// The unit of its coordinates.
+    /// Returns the unit of its coordinates.
     pub(crate) const fn unit(&self) -> Unit {
         self.unit
     }
 
-    /// Returns true if the coordinates of another system are in the same unit.
+    /// Returns true if both systems have the same unit.
     pub(crate) fn has_unit_of(&self, other: &Self) -> bool {
         match (self.unit, other.unit) {
             (Unit::Length(Some(own)), Unit::Length(Some(other)))
@@ -172,7 +172,7 @@ impl ReferenceSystem {
         }
     }
 
-    /// Returns the meaning of its longitudes and latitudes.
+    /// Returns the meaning of the longitudes and latitudes.
     #[must_use]
     pub fn lonlat(&self) -> LonLat<'_> {
         self.datum
@@ -180,16 +180,16 @@ impl ReferenceSystem {
             .map_or(LonLat::Unstated, |datum| datum.lonlat())
     }
 
-    /// Returns true if its own coordinates are these longitudes and latitudes, to 4 m.
+    /// Returns true if its coordinates are the reported longitudes and latitudes, to 4 m.
     #[must_use]
     pub fn counts_lonlat(&self) -> bool {
         let datum = self.datum.as_ref();
         self.unit == Unit::Angle(1.0) && datum.is_none_or(Datum::counts_lonlat)
     }
 
-    /// Longitude and latitude in degrees, as [`ReferenceSystem::lonlat`] says, of a place
-    /// in the system's units. Longitudes count from Greenwich. `None` where the projection is
-    /// not known or does not reach.
+    /// Converts a position in the system's units to longitude and latitude in degrees, see
+    /// [`ReferenceSystem::lonlat`]. Longitudes count from Greenwich. `None` if the projection is
+    /// unknown, or the position is outside it.
     #[must_use]
     pub fn to_lonlat(&self, place: (f64, f64)) -> Option<(f64, f64)> {
         let own = self.own_degrees(place)?;
@@ -199,7 +199,7 @@ impl ReferenceSystem {
         }
     }
 
-    /// Degrees of the system's own datum, from Greenwich.
+    /// Returns the degrees in the system's own datum, from Greenwich.
     pub(super) fn own_degrees(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         match self.unit {
             Unit::Angle(degrees) => Some((x * degrees + self.meridian(), y * degrees)),
@@ -207,7 +207,7 @@ impl ReferenceSystem {
         }
     }
 
-    /// Place in the system's units of a longitude and latitude in degrees: the inverse of
+    /// Converts longitude and latitude in degrees to the system's units: inverts
     /// [`ReferenceSystem::to_lonlat`].
     #[must_use]
     pub fn from_lonlat(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
@@ -225,21 +225,21 @@ impl ReferenceSystem {
         }
     }
 
-    /// Degrees of the system's own datum, from Greenwich, of a place on its map.
+    /// Returns the degrees in the system's own datum, from Greenwich, of a position on its map.
     fn projected(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         let place = (x * self.scale, y * self.scale);
         let (longitude, latitude) = self.projection.as_ref()?.degrees(place)?;
         Some((longitude + self.meridian(), latitude))
     }
 
-    /// Degrees east of Greenwich at which its longitudes begin.
+    /// Returns the prime meridian, degrees east of Greenwich.
     pub(crate) fn meridian(&self) -> f64 {
         self.datum.as_ref().map_or(0.0, Datum::meridian)
     }
 
-    /// Returns the vectors on the ground of a unit of a projected system's x and y at a place in
-    /// its units: a map's scale and its angles are true in few places. Its formulas are asked
-    /// [`STEP_M`] to both sides.
+    /// Returns the vectors on the ground of a unit of a projected system's x and y at a position in
+    /// its units: a map's scale and angles vary. They are differences over [`STEP_M`] to both
+    /// sides.
     pub(crate) fn tangents(&self, (x, y): (f64, f64)) -> Option<Tangents> {
         let Unit::Length(metres) = self.unit else {
             return None;

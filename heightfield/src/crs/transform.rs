@@ -1,4 +1,4 @@
-//! The way between two systems as PROJ writes them, made once for all points.
+//! Conversions between two systems in PROJ's syntax, parsed once for all points.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
-/// From one system to another and back. Angles are radians.
+/// A conversion between two systems. Angles are in radians.
 #[derive(Clone)]
 pub(super) struct Transform {
     words: [String; 2],
@@ -14,7 +14,8 @@ pub(super) struct Transform {
 }
 
 impl Transform {
-    /// Between two systems; `None` where `proj4rs` does not know one of them.
+    /// Creates the conversion between two systems; `None` if `proj4rs` does not support one of
+    /// them.
     pub(super) fn new(from: String, to: String) -> Option<Self> {
         let system = |words: &str| Proj::from_proj_string(words).ok();
         let systems = Arc::new([system(&from)?, system(&to)?]);
@@ -22,13 +23,13 @@ impl Transform {
         Some(Self { words, systems })
     }
 
-    /// A place of the first system in the second one.
+    /// Converts a position of the first system to the second.
     pub(super) fn forward(&self, place: (f64, f64)) -> Option<(f64, f64)> {
         let [from, to] = &*self.systems;
         moved(from, to, place)
     }
 
-    /// A place of the second system in the first one.
+    /// Converts a position of the second system to the first.
     pub(super) fn back(&self, place: (f64, f64)) -> Option<(f64, f64)> {
         let [from, to] = &*self.systems;
         moved(to, from, place)

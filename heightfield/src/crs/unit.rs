@@ -5,12 +5,12 @@
 pub(crate) enum Unit {
     /// Degrees in a unit.
     Angle(f64),
-    /// Metres in a unit, where known.
+    /// Metres in a unit, if known.
     Length(Option<f64>),
 }
 
 impl Unit {
-    /// An angle of radians; of a degree or a grad, where rounding is all that is between.
+    /// Returns an angle in radians, rounded to a degree or a grad if only rounding separates them.
     pub(super) fn of_radians(radians: f64) -> Self {
         let degrees = radians.to_degrees();
         let whole = |part: &f64| (degrees / part - 1.0).abs() < 1e-9;

@@ -2,11 +2,11 @@
 
 use super::unit::Unit;
 
-/// Longer texts describe no reference system, bytes.
+/// Max size of a text that may describe a reference system, bytes.
 const MAX_BYTES: usize = 1 << 16;
-/// Real systems nest to about 8 brackets.
+/// Max depth of brackets; real systems nest to about 8.
 const MAX_LEVELS: usize = 32;
-/// Real systems have some hundred nodes.
+/// Max number of nodes; real systems have some hundred.
 const MAX_NODES: usize = 512;
 
 const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
@@ -17,7 +17,7 @@ const GEOGRAPHIC: [&str; 5] = [
     "GEODCRS",
     "GEODETICCRS",
 ];
-/// The geographic system under a projected one.
+/// Keywords of the geographic system in a projected one.
 const BASES: [&str; 6] = [
     "GEOGCS",
     "BASEGEOGCRS",
@@ -36,15 +36,15 @@ pub(super) struct Node {
     children: Vec<Node>,
 }
 
-/// Reads a text from its beginning.
+/// A parser that consumes a text.
 struct Reader<'t> {
     left: &'t str,
-    /// Nodes that may still be opened.
+    /// Number of nodes that may still be read.
     nodes: usize,
 }
 
 impl<'t> Reader<'t> {
-    /// A node that begins here, of which so many more levels may nest.
+    /// Reads a node, with at most `levels` nested in it.
     fn node(&mut self, levels: usize) -> Option<Node> {
         let keyword = self.word();
         self.nodes = self.nodes.checked_sub(1)?;
@@ -79,7 +79,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    /// Takes one of some characters, behind spaces.
+    /// Consumes one of some characters, after spaces.
     fn takes(&mut self, characters: &[char]) -> bool {
         let left = self.left.trim_start();
         let rest = left.strip_prefix(characters);
@@ -87,7 +87,7 @@ impl<'t> Reader<'t> {
         rest.is_some()
     }
 
-    /// Takes a keyword or a number.
+    /// Consumes a keyword or a number.
     fn word(&mut self) -> &'t str {
         let left = self.left.trim_start();
         let end = left.find(['[', ']', '(', ')', ',', '"']);
@@ -96,7 +96,7 @@ impl<'t> Reader<'t> {
         word.trim_end()
     }
 
-    /// Takes what is in quotes, of which the first was taken; two in a row are one of the text.
+    /// Consumes a quoted text after its opening quote; two quotes in a row mean one.
     fn quoted(&mut self) -> Option<String> {
         let mut text = String::new();
         loop {
@@ -113,13 +113,13 @@ impl<'t> Reader<'t> {
 }
 
 impl Node {
-    /// The tree of a text; `None` where it is no such text.
+    /// Returns the tree of a text; `None` if it is not WKT.
     pub(super) fn parse(text: &str) -> Option<Self> {
         Self::parse_both(text).map(|(first, _)| first)
     }
 
-    /// The two trees of a text: of a vertical system that Esri's programs write behind the other,
-    /// after a comma.
+    /// Returns the trees of a text: Esri's programs write a vertical system after the horizontal
+    /// one, after a comma.
     pub(super) fn parse_both(text: &str) -> Option<(Self, Option<Self>)> {
         let mut reader = Reader {
             left: text,
@@ -133,7 +133,7 @@ impl Node {
         Some((first, second.flatten()))
     }
 
-    /// The geographic or projected system in it: itself, or a part of a compound or bound one.
+    /// Returns the geographic or projected system: itself, or a part of a compound or bound one.
     pub(super) fn horizontal(&self) -> Option<&Self> {
         match self.keyword.as_str() {
             "BOUNDCRS" => self.child(&["SOURCECRS"])?.children.first()?.horizontal(),
@@ -145,17 +145,17 @@ impl Node {
         }
     }
 
-    /// Returns true if it is a system of a map.
+    /// Returns true for a projected system.
     pub(super) fn is_projected(&self) -> bool {
         self.is(&PROJECTED)
     }
 
-    /// The geographic system that a projected one stands on; itself where it is one.
+    /// Returns the geographic system of a projected one, or itself.
     pub(super) fn base(&self) -> &Self {
         self.child(&BASES).unwrap_or(self)
     }
 
-    /// The unit of coordinates; `None` of an angle that is not stated.
+    /// Returns the unit of coordinates; `None` for an angle without a stated unit.
     pub(super) fn unit_of_places(&self) -> Option<Unit> {
         match self.is_projected() {
             true => Some(Unit::Length(self.unit())),
@@ -163,36 +163,36 @@ impl Node {
         }
     }
 
-    /// Returns true if its keyword is one of some.
+    /// Returns true if its keyword is in a list.
     pub(super) fn is(&self, keywords: &[&str]) -> bool {
         keywords.contains(&self.keyword.as_str())
     }
 
-    /// The first node directly below it with one of some keywords.
+    /// Returns its first child with one of some keywords.
     pub(super) fn child(&self, keywords: &[&str]) -> Option<&Self> {
         self.children.iter().find(|child| child.is(keywords))
     }
 
-    /// Its name: the first of its values.
+    /// Returns its name: the first of its values.
     pub(super) fn name(&self) -> Option<&str> {
         let name = self.values.first()?.trim();
         (!name.is_empty()).then_some(name)
     }
 
-    /// EPSG's code for it, where it names one.
+    /// Returns its EPSG code, if stated.
     pub(super) fn epsg(&self) -> Option<u16> {
         let authority = self.child(&["AUTHORITY", "ID"])?;
         let is_epsg = authority.name()?.eq_ignore_ascii_case("EPSG");
         authority.values.get(1)?.parse().ok().filter(|_| is_epsg)
     }
 
-    /// One of its values, as a number.
+    /// Returns one of its values as a number.
     pub(super) fn number(&self, index: usize) -> Option<f64> {
         let number: f64 = self.values.get(index)?.parse().ok()?;
         number.is_finite().then_some(number)
     }
 
-    /// Size of its unit in metres or radians, by a node of its own or of an axis.
+    /// Returns its unit in metres or radians, from its own node or an axis.
     pub(super) fn unit(&self) -> Option<f64> {
         const UNITS: [&str; 4] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT", "SCALEUNIT"];
         let of_axis = || self.child(&["AXIS"])?.child(&UNITS);
@@ -201,7 +201,7 @@ impl Node {
         (size.is_finite() && size > 0.0).then_some(size)
     }
 
-    /// Returns true if one of its axes points that way.
+    /// Returns true if one of its axes has this direction.
     pub(super) fn has_axis(&self, direction: &str) -> bool {
         let axes = self.children.iter().filter(|child| child.is(&["AXIS"]));
         let mut ends = axes.filter_map(|axis| axis.values.get(1));
@@ -228,7 +228,7 @@ mod tests {
         assert!(Node::parse(&format!("{}\"x\"{}", "A[".repeat(20), "]".repeat(20))).is_some());
         let deep = format!("{}\"x\"{}", "A[".repeat(40), "]".repeat(40));
         assert!(Node::parse(&deep).is_none(), "too deep");
-        // Brackets in quotes close nothing.
+        // Brackets in quotes do not close a node.
         let hidden = "A[\"]\",".repeat(40) + "\"x\"" + &"]".repeat(40);
         assert!(Node::parse(&hidden).is_none(), "deep");
         let wide = format!("A[\"x\"{}]", ",B[1]".repeat(MAX_NODES));

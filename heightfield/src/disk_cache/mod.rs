@@ -1,17 +1,15 @@
-//! The disk cache: results and downloads in a folder that has a bound and may
-//! be deleted at any time.
+//! The disk cache: results and downloads in a folder of bounded size, which may be deleted at any
+//! time.
 //!
-//! A record is one file. Its name is a hash of what it is about (`Name`): the file it was
-//! made of and the state of that file, so what belongs to a file that was changed since is
-//! never found. `record` says what is in it and checks it; `size_limit` deletes the records used
-//! longest ago when all take more than the bound.
+//! A record is one file. Its name (`Name`) is a hash of the source file and its state, so records
+//! of an older state are never found. `record` defines and checks a record's content; `size_limit`
+//! deletes the least recently used records when their total size exceeds the bound.
 //!
-//! A record appears when it is complete (it is renamed to its name), so that programs that
-//! use the folder at once only ever see whole ones. Whatever is wrong with the folder is a
-//! line in the log and no error: without it everything is worked out again. A folder in which
-//! others may write is not used (`private`).
+//! A record is written under another name and then renamed, so that programs that share the folder
+//! see only complete records. Errors of the folder are logged, not returned: without the cache,
+//! results are computed again. A folder in which other users may write is not used (`private`).
 //!
-//! `temporary_files` has files for one program's own use, which are no records.
+//! `temporary_files` has files for one program's own use, which are not records.
 
 mod name;
 mod private;
@@ -38,41 +36,41 @@ pub(crate) use temporary_files::TemporaryFile;
 
 use crate::regular_file;
 
-/// Records of another form are in another folder.
+/// Version of the record format, and the name of its folder.
 const FORM: &str = "v1";
-/// No record is larger than this, bytes.
+/// Max size of a record, bytes.
 const MAX_RECORD: usize = 1 << 20;
-/// A record that is read is marked as used where that was done longer ago than this.
+/// Time after which a read marks a record as used again.
 const USED_AGAIN: Duration = Duration::from_secs(3600);
 
-/// A folder of records; clones are of the same. The default keeps nothing.
+/// A folder of records; clones share it. The default stores nothing.
 #[derive(Clone, Default)]
 pub struct DiskCache(Option<Arc<Folder>>);
 
 struct Folder {
-    /// Of the records, in the folder that the user names.
+    /// Folder of the records, inside the user's folder.
     path: PathBuf,
     most_bytes: u64,
-    /// Bytes that files without a name may take.
+    /// Size reserved for unnamed files, bytes.
     unnamed: AtomicU64,
-    /// Size of its content; `None` once it could not be written.
+    /// Size of its content; `None` after a failed write.
     room: Mutex<Option<SizeLimit>>,
-    /// Set once a message has reported that it is not used.
+    /// Set after the warning that the folder is not used.
     warned: OnceLock<()>,
 }
 
 impl DiskCache {
-    /// Bytes that all records take at most unless the user states it, in units of 2²⁰.
+    /// Default of the max size of all records, in units of 2²⁰ bytes.
     pub const MAX_MB: u32 = 1024;
 
-    /// Keeps nothing.
+    /// Returns a cache that stores nothing.
     #[must_use]
     pub const fn off() -> Self {
         Self(None)
     }
 
-    /// Keeps records of so many bytes at most in a folder, which need not exist; its other
-    /// contents are left alone. No bytes: keeps nothing.
+    /// Returns a cache of at most `most_bytes` in a folder, which is created if needed; other
+    /// contents of the folder are not touched. With zero bytes, nothing is stored.
     #[must_use]
     pub fn at(folder: &Path, most_bytes: u64) -> Self {
         if most_bytes == 0 {
@@ -89,20 +87,20 @@ impl DiskCache {
         })))
     }
 
-    /// The folder where programs of this user keep what may be deleted, as
-    /// `~/.cache/hapterra`; `None` where there is no such place.
+    /// Returns the folder for this user's caches, as `~/.cache/hapterra`; `None` if the system has
+    /// none.
     #[must_use]
     pub fn usual_folder() -> Option<PathBuf> {
         let strategy = choose_base_strategy().ok()?;
         Some(strategy.cache_dir().join("hapterra"))
     }
 
-    /// Returns true if it keeps anything.
+    /// Returns true if it stores records.
     pub(crate) const fn is_on(&self) -> bool {
         self.0.is_some()
     }
 
-    /// Returns the content of a record; `None` where there is none, or none that is complete.
+    /// Returns the content of a record; `None` if it is missing or incomplete.
     pub(crate) fn get(&self, name: &Name) -> Option<Vec<u8>> {
         let folder = self.0.as_ref()?;
         let path = folder.path.join(name.path());
@@ -116,12 +114,12 @@ impl DiskCache {
         }
     }
 
-    /// Keeps a record, in place of one of the same name, if it can.
+    /// Stores a record, and replaces one of the same name. Errors are logged.
     pub(crate) fn put(&self, name: &Name, bytes: &[u8]) {
         let Some(folder) = self.0.as_ref().filter(|_| bytes.len() <= MAX_RECORD) else {
             return;
         };
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         let mut room = folder.room.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(open) = room.as_mut() else {
             return;
@@ -135,10 +133,10 @@ impl DiskCache {
 }
 
 impl Folder {
-    /// Checks that it is the user's own, and warns once where it is not.
+    /// Checks that the folder is the user's own, and warns once if it is not.
     ///
     /// # Errors
-    /// There is none yet, or it is not used.
+    /// It does not exist yet, or must not be used.
     fn check(&self) -> io::Result<()> {
         let above = self.path.parent().map_or(Ok(()), private::check);
         let checked = above.and_then(|()| private::check(&self.path));
@@ -151,10 +149,10 @@ impl Folder {
         checked
     }
 
-    /// Makes it, and checks that it is the user's own.
+    /// Creates the folder, and checks that it is the user's own.
     ///
     /// # Errors
-    /// It cannot be made, or is not used.
+    /// It cannot be created, or must not be used.
     fn make(&self) -> io::Result<()> {
         match self.check() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -194,7 +192,7 @@ fn read(path: &Path, name: &Name) -> io::Result<Vec<u8>> {
     let used = metadata.modified().ok();
     let is_old = used.and_then(|used| used.elapsed().ok());
     if is_old.is_some_and(|since| since >= USED_AGAIN) {
-        // Where that may not be written, it goes as if it had not been used.
+        // If the time cannot be written, the record counts as unused.
         let _ = file.set_modified(SystemTime::now());
     }
     Ok(held)

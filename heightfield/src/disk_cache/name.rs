@@ -5,15 +5,14 @@ use std::path::PathBuf;
 
 use twox_hash::XxHash64;
 
-/// Name of a record, as a hash of 128 bits: nothing of a URL or path is to be seen in
-/// the folder.
+/// Name of a record, as a hash of 128 bits: no URL or path is visible in the folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Name([u64; 2]);
 
 impl Name {
-    /// Of some texts, in this order.
+    /// Hashes some texts, in this order.
     pub(crate) fn of(parts: &[&str]) -> Self {
-        // Two seeds, for 64 bits each.
+        // Two seeds for two halves of 64 bits.
         let hash = |seed: u64| {
             let mut hasher = XxHash64::with_seed(seed);
             for part in parts {
@@ -25,14 +24,14 @@ impl Name {
         Self([hash(0), hash(0x6861_7074_6572_7261)])
     }
 
-    /// Returns the place where it is in the folder.
+    /// Returns the record's path in the folder.
     pub(super) fn path(&self) -> PathBuf {
         let text = format!("{:016x}{:016x}", self.0[0], self.0[1]);
         let (folder, rest) = text.split_at(2);
         [folder, rest].iter().collect()
     }
 
-    /// As it stands in the record.
+    /// Returns the bytes stored in the record.
     pub(super) fn bytes(&self) -> [u8; 16] {
         let mut bytes = [0; 16];
         bytes[..8].copy_from_slice(&self.0[0].to_le_bytes());

@@ -1,12 +1,12 @@
-//! Check that a folder is the user's own: anyone else with write access could put records there that
-//! would be rendered, or a link by which other files would be deleted.
+//! Check that a folder is the user's own: another user with write access could place records there,
+//! which would be rendered, or a link that causes other files to be deleted.
 
 use std::fs;
 use std::io::{Error, Result};
 use std::path::Path;
 
-/// Makes a folder, and those above it, in which other users may not look: a file of a server may have
-/// been opened with a key.
+/// Creates a folder and its parents, unreadable for other users: a server's file may have needed a
+/// key.
 pub(super) fn make(folder: &Path) -> Result<()> {
     let mut builder = fs::DirBuilder::new();
     builder.recursive(true);
@@ -15,10 +15,10 @@ pub(super) fn make(folder: &Path) -> Result<()> {
     builder.create(folder)
 }
 
-/// Checks that a folder is the user's own, is no link, and that other users may not write in it.
+/// Checks that a folder is the user's own and not a link, and that other users may not write in it.
 ///
 /// # Errors
-/// There is none ([`std::io::ErrorKind::NotFound`]), or what is wrong with it and what to do.
+/// It does not exist ([`std::io::ErrorKind::NotFound`]), or the fault and its remedy.
 pub(super) fn check(folder: &Path) -> Result<()> {
     let metadata = fs::symlink_metadata(folder)?;
     let wrong = |why: &str| {

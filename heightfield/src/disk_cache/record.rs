@@ -1,5 +1,5 @@
-//! A record, byte by byte: 8 bytes that say what it is, its name (16), the number of bytes
-//! that it holds (8), their XXH64 (8), all numbers little-endian, and the bytes.
+//! The format of a record: 8 bytes of signature, its name (16), the number of content bytes (8),
+//! their XXH64 (8), all numbers little-endian, and the content.
 
 use std::hash::Hasher;
 
@@ -8,7 +8,7 @@ use twox_hash::XxHash64;
 use super::Name;
 
 const BEGINS: &[u8; 8] = b"hapterr1";
-/// Bytes before what a record holds.
+/// Size of the header, bytes.
 pub(super) const HEAD: usize = 8 + 16 + 8 + 8;
 
 fn sum(bytes: &[u8]) -> u64 {
@@ -17,14 +17,14 @@ fn sum(bytes: &[u8]) -> u64 {
     hasher.finish()
 }
 
-/// A record that holds some bytes.
+/// Returns a record with some content.
 pub(super) fn made(name: &Name, bytes: &[u8]) -> Vec<u8> {
     let length = (bytes.len() as u64).to_le_bytes();
     let sum = sum(bytes).to_le_bytes();
     [BEGINS, &name.bytes()[..], &length, &sum, bytes].concat()
 }
 
-/// Returns the content of a record of that name; `None` where it is another or is not complete.
+/// Returns the content of a record; `None` if the name differs or it is incomplete.
 pub(super) fn held(name: &Name, mut record: Vec<u8>) -> Option<Vec<u8>> {
     let head = record.get(..HEAD)?;
     let length = (record.len() - HEAD) as u64;

@@ -4,18 +4,17 @@ use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// A disk gives room in pieces of this size, bytes.
+/// Unit of disk space, bytes.
 const PIECE: u64 = 4096;
 /// Beginning of the name of an incomplete record.
 pub(super) const UNFINISHED: &str = ".new-";
-/// No program takes longer to write one: then it was killed.
+/// Age at which an incomplete record counts as abandoned: writing never takes that long.
 const LEFT_BEHIND: Duration = Duration::from_secs(3600);
 
-/// Knowledge of a folder's size.
+/// Tracks the size of a folder.
 pub(super) struct SizeLimit {
     most_bytes: u64,
-    /// Size of all records at the last look, and of the writes since; `None`
-    /// before the first look.
+    /// Size of all records at the last scan plus the writes since; `None` before the first scan.
     used: Option<u64>,
     written: u64,
 }
@@ -35,15 +34,15 @@ impl SizeLimit {
         }
     }
 
-    /// Looks at the folder, where that was not done yet.
+    /// Scans the folder, if that has not been done.
     pub(super) fn look(&mut self, folder: &Path) {
         if self.used.is_none() {
             self.make(folder);
         }
     }
 
-    /// Counts a record that was written, and makes room where all are too many. What other
-    /// programs write is seen when an eighth of the bound was written here.
+    /// Counts a written record, and frees space if needed. The folder is scanned for other
+    /// programs' records after writes of an eighth of the bound.
     pub(super) fn add(&mut self, folder: &Path, bytes: u64) {
         let bytes = bytes.next_multiple_of(PIECE);
         self.written += bytes;
@@ -54,8 +53,8 @@ impl SizeLimit {
         }
     }
 
-    /// Deletes the records used longest ago until the rest takes seven eighths of the bound,
-    /// where all take more than it.
+    /// Deletes the least recently used records until they fit in seven eighths of the bound, if
+    /// they exceed the bound.
     fn make(&mut self, folder: &Path) {
         let mut records = records(folder);
         let mut used: u64 = records.iter().map(|record| record.bytes).sum();
@@ -65,7 +64,7 @@ impl SizeLimit {
                 if used <= self.most_bytes - self.most_bytes / 8 {
                     break;
                 }
-                // Where another program was faster, it is gone as well.
+                // If this fails, another program has already deleted it.
                 let _ = fs::remove_file(&record.path);
                 used -= record.bytes;
             }
@@ -74,7 +73,7 @@ impl SizeLimit {
     }
 }
 
-/// The records of a folder: what else lies there is not looked at.
+/// Returns the records of a folder, and ignores its other files.
 fn records(folder: &Path) -> Vec<Record> {
     let entries = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten();
     let is_hex = |entry: &DirEntry, digits: usize| {

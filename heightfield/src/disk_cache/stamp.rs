@@ -1,15 +1,14 @@
-//! Stamp of a file: distinguishes it from others, and from itself in another state.
+//! Stamp of a file: differs between files, and between states of a file.
 
 use std::fs::Metadata;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-/// A file that was written so short a time ago may be written again without its times
-/// telling: systems count them in steps.
+/// Age below which a file may be written again without a change of its times, because file systems
+/// round them.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// A file on disk in one state: its path, size, times and, where the system has them, its
-/// numbers.
+/// A file on disk in one state: its path, size, times and, if the system has them, its numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FileStamp {
     text: String,
@@ -17,7 +16,7 @@ pub(crate) struct FileStamp {
 }
 
 impl FileStamp {
-    /// Of a file with such metadata.
+    /// Returns the stamp of a file with some metadata.
     pub(crate) fn of(path: &Path, metadata: &Metadata) -> Self {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let modified = metadata.modified().ok();
@@ -26,13 +25,13 @@ impl FileStamp {
         Self { text, modified }
     }
 
-    /// Of what is at a path at present, where there is a file.
+    /// Returns the stamp of the file at a path, if there is one.
     pub(crate) fn at(path: &Path) -> Option<Self> {
         let metadata = std::fs::metadata(path).ok()?;
         Some(Self::of(path, &metadata))
     }
 
-    /// Of a file that is known by some text in its state.
+    /// Returns the stamp of a file whose state a text identifies.
     #[cfg(feature = "remote")]
     pub(crate) const fn of_text(text: String) -> Self {
         Self {
@@ -41,14 +40,14 @@ impl FileStamp {
         }
     }
 
-    /// In words, where the file was not written a moment ago.
+    /// Returns the stamp as text, unless the file was written a moment ago.
     pub(crate) fn settled(&self) -> Option<&str> {
         let since = self.modified?.elapsed().ok()?;
         (since >= SETTLED).then_some(&*self.text)
     }
 }
 
-/// When the file's entry was changed, which no program sets, and where it is on which disk.
+/// Returns the change time, which programs cannot set, and the device and inode.
 #[cfg(unix)]
 fn numbers(metadata: &Metadata) -> String {
     use std::os::unix::fs::MetadataExt;
@@ -57,7 +56,7 @@ fn numbers(metadata: &Metadata) -> String {
     format!("{seconds}.{nanoseconds} {device} {number}")
 }
 
-/// When it was made.
+/// Returns the creation time.
 #[cfg(not(unix))]
 fn numbers(metadata: &Metadata) -> String {
     format!("{:?}", metadata.created().ok())

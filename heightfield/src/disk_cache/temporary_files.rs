@@ -1,4 +1,4 @@
-//! Files in the folder that belong to one program, have no name, and go with it.
+//! Unnamed files in the folder, which are deleted when their program ends.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Result};
@@ -7,10 +7,10 @@ use std::sync::atomic::Ordering;
 
 use super::{DiskCache, Folder};
 
-/// All of them take no more than one of so many parts of what is free.
+/// Their total size is at most 1/`PARTS` of the free space.
 const PARTS: u64 = 2;
 
-/// A file without a name, which may grow to so many bytes.
+/// A file without a name, with a max size.
 pub(crate) struct TemporaryFile {
     pub(crate) file: File,
     bytes: u64,
@@ -24,8 +24,8 @@ impl Drop for TemporaryFile {
 }
 
 impl DiskCache {
-    /// A file for so many bytes. It has no name, so that nothing is left of it however the
-    /// program ends. The bound of the records does not count it.
+    /// Creates a file for `bytes`. It has no name, so it disappears however the program ends. It
+    /// does not count towards the bound of the records.
     ///
     /// # Errors
     /// The cache is off, too little space is free, or the folder cannot be written.
@@ -34,10 +34,10 @@ impl DiskCache {
             return Err(Error::other("nothing may be kept on disk (--cache off)"));
         };
         folder.make()?;
-        // Where the system does not tell, the writing decides.
+        // If the free space is unknown, the writes decide.
         let free = fs4::available_space(&folder.path).unwrap_or(u64::MAX);
         let file = tempfile::tempfile_in(&folder.path)?;
-        // What others have not filled yet is not free for long.
+        // Space that is reserved but not yet filled is not free.
         let before = folder.unnamed.fetch_add(bytes, Ordering::Relaxed);
         let folder = folder.clone();
         let unnamed = TemporaryFile {
@@ -57,7 +57,7 @@ impl DiskCache {
         Ok(unnamed)
     }
 
-    /// Bytes that all records take at most; none where nothing is kept.
+    /// Returns the max size of all records, bytes; zero if the cache is off.
     pub(crate) fn most_bytes(&self) -> u64 {
         self.0.as_ref().map_or(0, |folder| folder.most_bytes)
     }

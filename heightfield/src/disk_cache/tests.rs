@@ -1,4 +1,4 @@
-//! A folder of records: whole or absent, within its bound, and never in the way.
+//! Records: complete or absent, within the bound, and never a cause of failure.
 
 use std::fs;
 use std::path::PathBuf;
@@ -23,12 +23,12 @@ fn cache(most_bytes: u64) -> (tempfile::TempDir, DiskCache) {
     (folder, cache)
 }
 
-/// The file of a record.
+/// Returns the path of a record.
 fn path(folder: &tempfile::TempDir, number: usize) -> PathBuf {
     folder.path().join(FORM).join(name(number).path())
 }
 
-/// Bytes of all files.
+/// Returns the size of all files, bytes.
 fn used(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let each = entries.map(|entry| match entry.path().is_dir() {
@@ -50,7 +50,7 @@ fn a_record_is_found_again_by_its_name_alone() {
     assert_eq!(other.get(&name(3)), None);
     other.put(&name(1), &bytes(9));
     assert_eq!(cache.get(&name(1)), Some(bytes(9)));
-    // Texts that are one when they are joined have two names.
+    // Texts that are equal when joined have different names.
     assert_ne!(Name::of(&["ab", "c"]), Name::of(&["a", "bc"]));
 }
 
@@ -98,7 +98,7 @@ fn the_records_used_longest_ago_go_first_and_nothing_else() {
         // Each is some hours older than the next.
         let age = Duration::from_secs(3600 * (1000 - number as u64));
         set_age(&path(&folder, number), age);
-        // This one is used again and again.
+        // This record is used again and again.
         assert_eq!(cache.get(&name(0)), Some(bytes(0)), "{number}");
         assert!(used(folder.path()) <= MOST + 200, "{}", used(folder.path()));
     }
@@ -125,7 +125,7 @@ fn two_that_write_and_read_the_same_records_at_once_see_whole_ones() {
     std::thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
-                // As programs of their own.
+                // Caches as in separate programs.
                 let cache = DiskCache::at(folder.path(), 100 << 10);
                 for round in 0..300 {
                     let number = round % 40;
@@ -134,7 +134,7 @@ fn two_that_write_and_read_the_same_records_at_once_see_whole_ones() {
                         assert_eq!(found, bytes((round + 20) % 40));
                     }
                     if round % 100 == 99 {
-                        // Another program deletes it meanwhile.
+                        // Another program deletes the folder in between.
                         let _ = fs::remove_dir_all(folder.path().join(FORM));
                     }
                 }
@@ -158,7 +158,7 @@ fn a_folder_that_is_off_or_cannot_be_made_keeps_nothing_and_says_nothing() {
     }
     assert_eq!(fs::read(&file).expect("there"), b"mine");
     assert!(!folder.path().join("off").exists());
-    // More than the largest record.
+    // Larger than the largest record.
     let cache = DiskCache::at(folder.path(), 1 << 30);
     cache.put(&name(1), &vec![0; MAX_RECORD + 1]);
     assert_eq!(cache.get(&name(1)), None);
@@ -174,7 +174,7 @@ fn folder_that_others_may_write_is_neither_read_nor_written() {
     for open in [folder.path(), &own] {
         for (mode, is_used) in [(0o757, false), (0o770, false), (0o755, true)] {
             fs::set_permissions(open, fs::Permissions::from_mode(mode)).expect("set");
-            // Another program: one that could not write tries it no more.
+            // A separate program: after a failed write, a cache does not retry.
             let cache = DiskCache::at(folder.path(), 1 << 20);
             assert_eq!(cache.get(&name(1)).is_some(), is_used, "{mode:o}");
             cache.put(&name(2), &bytes(2));
@@ -183,7 +183,7 @@ fn folder_that_others_may_write_is_neither_read_nor_written() {
             let _ = fs::remove_file(path(&folder, 2));
         }
     }
-    // Only root may give a folder away.
+    // Only root can give a folder away.
     if std::os::unix::fs::chown(&own, Some(65_534), None).is_ok() {
         assert_eq!(cache.get(&name(1)), None, "it is another user's");
     }
@@ -237,7 +237,7 @@ fn a_stamp_tells_a_file_from_others_and_from_itself_after_a_change() {
     assert_eq!(FileStamp::at(&a).as_ref(), Some(&aged));
     fs::copy(&a, &b).expect("copied");
     assert_ne!(FileStamp::at(&b).as_ref(), Some(&aged));
-    // Other bytes of the same number and time.
+    // Other bytes, with the same size and time.
     let modified = fs::metadata(&a).and_then(|metadata| metadata.modified());
     fs::write(&a, [2; 9]).expect("written");
     let file = fs::File::options().append(true).open(&a).expect("opens");

@@ -1,13 +1,12 @@
-//! Which of several variables or arrays in a file holds the heights.
+//! Choice of the variable or array in a file that holds the heights.
 
 use crate::RasterError;
 
-/// The place in `names` of the `asked` one; without that of the first of the names that
-/// heights `usual`ly have (words, the likeliest first), or of the only name. `kind` is
-/// what the file calls its parts, for messages.
+/// Returns the index in `names` of `asked`; by default, of the first name in `usual` (words, the
+/// likeliest first), or of the only name. `kind` is the file's word for its parts, for messages.
 ///
 /// # Errors
-/// When there are none, several with other names, or not the one that is asked for.
+/// If there are no names, several unusual ones, or not the requested one.
 pub(super) fn choose(
     kind: &'static str,
     names: &[&str],

@@ -1,5 +1,5 @@
-//! SRTM height tiles: big-endian 16-bit samples, nothing else. Size and place
-//! follow from the file's length and name.
+//! SRTM height tiles: big-endian 16-bit samples without a header. Size and place follow from the
+//! file's length and name.
 
 use crate::decoded::Decoded;
 use crate::file_layout::SamplesAre;
@@ -13,7 +13,7 @@ use crate::{
     CellSize, CellUnit, Certainty, Endian, OpenOptions, RasterError, ReferenceSystem, SampleType,
 };
 
-/// SRTM tiles: nothing but their name tells them.
+/// SRTM tiles, which can only be recognised by name.
 pub(super) const FORMAT: Format = Format {
     name: "SRTM",
     begins: |_| false,
@@ -22,10 +22,11 @@ pub(super) const FORMAT: Format = Format {
     decode,
 };
 
-/// SRTM's value for no height.
+/// SRTM's no-data value.
 const VOID: f64 = -32768.0;
 
-/// A tile covers one degree by one degree and shares its borders with the next.
+/// Decodes a tile. It covers one degree by one degree and shares its border samples with its
+/// neighbours.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let (columns, rows) = size(input.len())?;
     let stored = Stored::Held(SampleType::I16);
@@ -35,7 +36,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     decoded.no_data = Some(VOID);
     decoded.file_layout.samples_are = Some(SamplesAre::Points);
     decoded.metres_per_vertical_unit = Some(1.0);
-    // SRTM's heights are above the geoid EGM96, its places on WGS 84.
+    // SRTM's heights are above the geoid EGM96, its coordinates in WGS 84.
     decoded.set_vertical_datum(5773);
     decoded.system = ReferenceSystem::from_code(4326);
     let cells = [columns, rows].map(|samples| f64::from(samples.max(2) - 1));
@@ -59,7 +60,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     Ok(decoded)
 }
 
-/// Columns and rows of a tile of so many bytes.
+/// Returns the columns and rows of a tile of a size in bytes.
 fn size(bytes: u64) -> Result<(u32, u32), RasterError> {
     // Above 50° some producers halve the columns.
     if bytes == 2 * 1801 * 3601 {
@@ -75,7 +76,7 @@ fn size(bytes: u64) -> Result<(u32, u32), RasterError> {
     }
 }
 
-/// Longitude and latitude of the tile's south-western sample in degrees, from a name as
+/// Returns longitude and latitude of the tile's south-western sample in degrees, from a name as
 /// `N44W072.hgt` or `s05e100.SRTMGL1.hgt`.
 fn corner(name: &str) -> Option<(f64, f64)> {
     let name = name.to_ascii_uppercase();
@@ -85,7 +86,7 @@ fn corner(name: &str) -> Option<(f64, f64)> {
         let all_digits = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse().ok().filter(|_| all_digits)
     };
-    // A longer name, as N45W074T86.hgt, is that of a part of a tile.
+    // A longer name, as N45W074T86.hgt, means a part of a tile.
     if bytes.get(7).is_some_and(u8::is_ascii_alphanumeric) {
         return None;
     }

@@ -1,5 +1,5 @@
-//! The terrain formats, each in its own file or folder. To add one: write its
-//! file with a `FORMAT`, and name it in [`FORMATS`].
+//! The terrain formats, each in its own file or folder. To add one: write its file with a `FORMAT`,
+//! and add it to [`FORMATS`].
 
 mod asc;
 pub(super) mod flt_bil;
@@ -13,8 +13,8 @@ mod tiff;
 
 use super::format::{Claim, Format};
 
-/// All formats that are recognised by their content or their extension; the first that
-/// fits decides. Raw samples are not among them: only the user can state their layout.
+/// All formats that are recognised by content or extension; the first match is used. Raw samples
+/// are not included: only the user can state their layout.
 pub(super) const FORMATS: [Format; 6] = [
     tiff::FORMAT,
     png::FORMAT,
@@ -24,12 +24,12 @@ pub(super) const FORMATS: [Format; 6] = [
     flt_bil::FORMAT,
 ];
 
-/// Returns true if a file that begins with some bytes is read here, and not by GDAL.
+/// Returns true if a file with these first bytes is read here, not by GDAL.
 fn is_read_here(head: &[u8]) -> bool {
     FORMATS.iter().any(|format| (format.begins)(head))
 }
 
-/// Extensions of files that GDAL reads and that hold heights more often than not.
+/// Extensions of formats that GDAL reads, and whose files usually hold heights.
 const BY_GDAL: [&str; 9] = ["bag", "dem", "dt0", "dt1", "dt2", "grd", "img", "jp2", "nc"];
 
 /// Returns the strongest claim of any format on the extension of a file in a folder or archive.

@@ -6,11 +6,10 @@ use crate::raw_samples::RawSamples;
 use crate::read::Stored;
 use crate::{OpenOptions, RasterError, RawLayout};
 
-/// Extensions of files that are nothing but samples.
+/// Extensions of files with samples only.
 pub(crate) const EXTENSIONS: [&str; 4] = ["raw", "bin", "r16", "r32"];
 
-/// Reads `columns × rows` samples, north row first; the file must hold exactly
-/// those.
+/// Reads `columns × rows` samples, north row first; the file must hold exactly these.
 pub(crate) fn decode(
     input: &FileBytes,
     layout: RawLayout,

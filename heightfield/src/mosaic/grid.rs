@@ -1,14 +1,13 @@
-//! The grid that files share, and where on it each of them lies.
+//! The grid that files share, and the position of each file on it.
 
 use std::path::{Path, PathBuf};
 
 use super::super::decoded::Decoded;
 use super::super::{Bounds, RasterError};
 
-/// Samples that lie farther than this beside the grid of the first file do not belong to it,
-/// cells.
+/// Max offset of a file's samples from the first file's grid, cells.
 const TOLERANCE: f64 = 0.05;
-/// No grid is larger, samples each way.
+/// Max size of a grid, samples per direction.
 const LARGEST: f64 = 2_147_483_647.0;
 
 /// The grid of the first file.
@@ -16,28 +15,28 @@ pub(super) struct Grid {
     path: PathBuf,
     /// Header of that file.
     pub(super) first: Decoded,
-    /// Its south-west corner.
+    /// South-west corner of that file.
     corner: [f64; 2],
     /// Size of a cell.
     pub(super) step: [f64; 2],
 }
 
-/// Columns and rows of a grid: the south-western sample of a file, counted from that of the
-/// first one, and how many there are.
+/// Position of a file on the grid: its south-western sample, counted from the first file's, and its
+/// size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Spot {
     /// Its first column, from the west.
     pub(super) column: i64,
     /// Its first row, from the south.
     pub(super) row: i64,
-    /// Samples a row.
+    /// Samples per row.
     pub(super) columns: u32,
     /// Rows.
     pub(super) rows: u32,
 }
 
 impl Grid {
-    /// The grid of a file.
+    /// Returns the grid of a file.
     pub(super) fn of(path: &Path, first: Decoded) -> Result<Self, RasterError> {
         let (bounds, step) = laid_out(path, &first)?;
         Ok(Self {
@@ -48,10 +47,10 @@ impl Grid {
         })
     }
 
-    /// Returns the place of a file on it.
+    /// Returns the position of a file on the grid.
     ///
     /// # Errors
-    /// [`RasterError::TilesDiffer`], with what differs.
+    /// [`RasterError::TilesDiffer`], with the difference.
     pub(super) fn spot(&self, path: &Path, file: &Decoded) -> Result<Spot, RasterError> {
         let differs = |why: String| RasterError::TilesDiffer {
             file: path.to_owned(),
@@ -124,7 +123,7 @@ impl Grid {
         }
     }
 
-    /// Columns once around the globe, where the grid counts angles and that is a whole number.
+    /// Returns the columns around the globe, if coordinates are angles and this is an integer.
     pub(super) fn columns_around(&self) -> Option<i64> {
         use super::super::CellUnit;
         let is_angle = self.first.cell?.unit == CellUnit::Degree;
@@ -134,15 +133,15 @@ impl Grid {
         (is_angle && whole).then_some(columns.round() as i64)
     }
 
-    /// South-west corner of the sample at a column and row.
+    /// Returns the south-west corner of the sample at a column and row.
     pub(super) fn corner_of(&self, column: i64, row: i64) -> [f64; 2] {
         let along = |axis: usize, index: i64| self.corner[axis] + index as f64 * self.step[axis];
         [along(0, column), along(1, row)]
     }
 }
 
-/// Returns true if both systems see the corners of the second file in the same places: the same
-/// system has many texts.
+/// Returns true if both systems convert the corners of the second file to the same positions: the
+/// same system can have different texts.
 fn same_places(ours: &Decoded, theirs: &Decoded) -> bool {
     const DEGREES: f64 = 1e-7;
     let (Some(first), Some(second)) = (&ours.system, &theirs.system) else {
@@ -160,7 +159,7 @@ fn same_places(ours: &Decoded, theirs: &Decoded) -> bool {
     })
 }
 
-/// Bounds and cells of a file whose rows and columns are those of its coordinates.
+/// Returns bounds and cell size of a file whose rows and columns are along its coordinates.
 fn laid_out(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), RasterError> {
     let in_tile = |fault| RasterError::in_tile(path, fault);
     let map = file
@@ -177,8 +176,8 @@ fn laid_out(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), RasterErr
     Ok((bounds, [east, north]))
 }
 
-/// Moves files by whole turns around the globe, so that files on both sides of the 180th
-/// meridian are neighbours where that makes the terrain narrower.
+/// Moves files by full turns around the globe, so that files on both sides of the 180th meridian
+/// are neighbours, if that makes the terrain narrower.
 pub(super) fn unwrap_turns(spots: &mut [Spot], around: i64) {
     let width = |spots: &[Spot], start: &dyn Fn(&Spot) -> i64| {
         let ends = spots
@@ -192,7 +191,7 @@ pub(super) fn unwrap_turns(spots: &mut [Spot], around: i64) {
     };
     let turned = |spot: &Spot| from + (spot.column - from).rem_euclid(around);
     if width(spots, &turned) < width(spots, &|spot| spot.column) {
-        // The first file stays where it is.
+        // The first file is not moved.
         let back = spots
             .first()
             .map_or(0, |first| first.column - turned(first));
@@ -202,7 +201,7 @@ pub(super) fn unwrap_turns(spots: &mut [Spot], around: i64) {
     }
 }
 
-/// The first column after the widest gap between files on the circle of longitudes.
+/// Returns the first column after the widest gap between files on the circle of longitudes.
 fn after_widest_gap(spots: &[Spot], around: i64) -> Option<i64> {
     let mut arcs: Vec<(i64, i64)> = spots
         .iter()
@@ -243,14 +242,14 @@ mod tests {
 
     #[test]
     fn files_on_both_sides_of_a_meridian_become_neighbours() {
-        // 179° E and 180° W, counted from the first of them.
+        // 179° E and 180° W, counted from the first.
         assert_eq!(unwrapped(&[(0, 2), (-359, 2)]), [0, 1]);
         assert_eq!(
             unwrapped(&[(-359, 1), (0, 1), (-350, 1)]),
             [-359, -360, -350]
         );
         assert_eq!(unwrapped(&[(10, 1), (-20, 1), (300, 1)]), [10, -20, -60]);
-        // Nothing is gained: they stay.
+        // The terrain would not be narrower, so they are not moved.
         assert_eq!(unwrapped(&[(0, 1), (5, 1)]), [0, 5]);
         let all: Vec<_> = (0..360).map(|column| (column, 2)).collect();
         let stays: Vec<_> = (0..360).collect();

@@ -1,4 +1,4 @@
-//! The index of files that share a grid: the header of each is read, and nothing else.
+//! The index of files on a grid, from the header of each.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use super::reader::Mosaic;
 use super::source::Source;
 use super::tile_file;
 
-/// A file as it is on the grid.
+/// A file on the grid.
 struct Tile {
     path: PathBuf,
     sample: SampleType,
@@ -24,16 +24,16 @@ struct Tile {
     is_south_up: bool,
 }
 
-/// Knowledge of all files.
+/// The headers of all files.
 struct Index {
     grid: Grid,
     tiles: Vec<Tile>,
     spots: Vec<Spot>,
-    /// True if single floats hold all samples.
+    /// True if single floats can store all samples.
     is_single: bool,
 }
 
-/// A terrain of files: where they overlap the last one with a height counts.
+/// Returns a terrain of files: in overlaps, the last file with a height is used.
 pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let mut index = Index::read(files, options)?;
     let layers = index.remove_layers(options)?;
@@ -53,7 +53,7 @@ impl Index {
         for path in files {
             let outline = match outline(&path, &options) {
                 Ok(outline) => outline,
-                // All of it is holes.
+                // All of it is no-data.
                 Err(RasterError::AllNoData { samples }) => {
                     empty += samples;
                     continue;
@@ -88,7 +88,7 @@ impl Index {
         Ok(())
     }
 
-    /// Leaves out what lies on the same samples as heights and is none, and tells its files.
+    /// Removes layers that lie on the same samples as heights, and returns their files.
     fn remove_layers(&mut self, options: &OpenOptions) -> Result<Vec<PathBuf>, RasterError> {
         let mut at_spots: HashMap<Spot, Vec<usize>> = HashMap::new();
         for (number, spot) in self.spots.iter().enumerate() {
@@ -157,14 +157,14 @@ impl Index {
     }
 }
 
-/// Reads the header of a file, which is to be small enough to be opened later.
+/// Reads the header of a file, and checks that it can be opened later within the memory bound.
 fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let outline = tile_file::outline(path, options)?;
     whole_bytes(&outline)?;
     Ok(outline)
 }
 
-/// Returns true if single floats hold all heights of a file.
+/// Returns true if single floats can store all heights of a file.
 fn is_single(outline: &Decoded) -> bool {
     let is_plain = (outline.scale, outline.offset) == (1.0, 0.0);
     let is_turned = (outline.scale, outline.offset) == (-1.0, 0.0);
@@ -174,7 +174,7 @@ fn is_single(outline: &Decoded) -> bool {
 }
 
 fn source(tile: &Tile, spot: &Spot, [west, south]: [i64; 2]) -> Source {
-    // Both fit: they are inside the terrain.
+    // Both fit: the file is inside the terrain.
     let (column, row) = ((spot.column - west) as u32, (spot.row - south) as u32);
     Source {
         path: tile.path.clone(),

@@ -1,7 +1,7 @@
-//! The heights among several rasters at one place: by their names, then by their types.
+//! Finds the heights among several rasters at one place, by their names, then by their types.
 //!
-//! Providers ship a terrain with layers on the same samples: counts of scenes, masks, errors. A
-//! layer's name is that of the heights with another word (`_dem` and `_num`), or with one more
+//! Providers add layers on the same samples to a terrain: counts of scenes, masks, errors. A
+//! layer's name is the heights' name with another word (`_dem` and `_num`), or an additional one
 //! (`_dem` and `_dem_count`).
 
 use std::collections::HashSet;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::SampleType;
 
-/// Words for heights in names of files.
+/// Words in names of files with heights.
 const HEIGHTS: [&str; 22] = [
     "dem",
     "dsm",
@@ -34,8 +34,8 @@ const HEIGHTS: [&str; 22] = [
     "bathymetry",
     "z",
 ];
-/// Words for layers beside heights: of ASTER, AW3D30, Copernicus, ArcticDEM, TanDEM-X, NASADEM,
-/// MERIT, GEBCO, and what GDAL makes of a terrain.
+/// Words in names of layers beside heights: of ASTER, AW3D30, Copernicus, ArcticDEM, TanDEM-X,
+/// NASADEM, MERIT, GEBCO, and of GDAL's derived products.
 const LAYERS: [&str; 53] = [
     "num",
     "att",
@@ -92,7 +92,7 @@ const LAYERS: [&str; 53] = [
     "source",
 ];
 
-/// Words of a file's name, in lower case.
+/// Returns the words of a file's name, in lower case.
 fn words(path: &Path) -> Vec<String> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let words = stem.split(|c: char| !c.is_alphanumeric());
@@ -100,7 +100,7 @@ fn words(path: &Path) -> Vec<String> {
     words.map(str::to_lowercase).collect()
 }
 
-/// A name without one of its words, in its folder.
+/// Returns folder and name without one of its words.
 fn without(path: &Path, words: &[String], left_out: usize) -> (PathBuf, String) {
     let others = words.iter().enumerate().filter(|(at, _)| *at != left_out);
     let others: Vec<&str> = others.map(|(_, word)| word.as_str()).collect();
@@ -110,13 +110,13 @@ fn without(path: &Path, words: &[String], left_out: usize) -> (PathBuf, String) 
     )
 }
 
-/// Places of the words of a list in a name.
+/// Returns the positions of a list's words in a name.
 fn places(words: &[String], list: &[&str]) -> Vec<usize> {
     let known = |word: &String| list.contains(&word.as_str());
     (0..words.len()).filter(|at| known(&words[*at])).collect()
 }
 
-/// Splits files into those with heights and layers beside one of them, by their names.
+/// Splits files by name into heights, and layers beside them.
 pub(super) fn split_by_name(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let mut heights = HashSet::new();
     for file in &files {
@@ -133,9 +133,9 @@ pub(super) fn split_by_name(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>)
     })
 }
 
-/// Finds the heights among several rasters on the same samples: the only one whose name says so
-/// where the names differ, else the only one of numbers larger than a byte. `None` where that is
-/// not one.
+/// Finds the heights among several rasters on the same samples: if the names differ, the only one
+/// named as heights, else the only one with more than a byte per sample. `None` if there is no such
+/// one.
 pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
     let all: Vec<Vec<String>> = files.iter().map(|(path, _)| words(path)).collect();
     let is_shared = |word: &String| all.iter().all(|words| words.contains(word));
@@ -151,7 +151,7 @@ pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
     only(&is_named).or_else(|| only(&is_wide))
 }
 
-/// Returns the remark on layers that are left out.
+/// Returns the remark on ignored layers.
 pub(super) fn left_out(layers: &[PathBuf]) -> Option<String> {
     const MAX_NAMED: usize = 4;
     let name = |path: &PathBuf| {

@@ -1,18 +1,19 @@
 //! Many files as one terrain: a folder, or a pattern of names.
 //!
-//! The header of each file is read (`index`), and the files have to share a grid (`grid`). Each is
-//! a source (`source`): which samples of the terrain it has. A block of the terrain (`reader`,
-//! behind [`super::blocks`]) is filled from the last source to the first. Files are opened when
-//! they are touched, and few at once (`pool`).
+//! The header of each file is read (`index`), and the files must share a grid (`grid`). Each is a
+//! source (`source`) of certain samples of the terrain. A block of the terrain (`reader`, used by
+//! [`super::blocks`]) is filled from the last source to the first. Files are opened on access, and
+//! few at once (`pool`).
 //!
-//! Layers beside heights, as masks and counts of scenes, are left out (`layers`). Files that overlap
-//! and differ there are reported, and refused where they lie on the same samples (`overlaps`).
+//! Layers beside heights, such as masks and counts of scenes, are ignored (`layers`). Differences
+//! between overlapping files are reported, or rejected if the files have the same samples
+//! (`overlaps`).
 //!
-//! A place without a height in any file is no-data. So is a file that cannot be read, with a warning:
-//! one bad file of thousands does not make the terrain unusable.
+//! A position without a height in any file is no-data. So is a file that cannot be read, with a
+//! warning: one bad file of thousands must not make the terrain unusable.
 //!
-//! Level *L* has every 2ᴸ-th sample, as of a raster in memory; of a file that has overviews
-//! it has those.
+//! Level *L* has every 2ᴸ-th sample, as for a raster in memory, or the overviews of files that have
+//! them.
 
 mod grid;
 mod index;
@@ -33,7 +34,7 @@ use super::{Decoded, OpenOptions, RasterError, beside};
 use crate::remote::is_url;
 pub(super) use names::named;
 
-/// The terrain of the files that a path stands for.
+/// Returns the terrain of files.
 pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if options.raw.is_some() {
         return Err(RasterError::NoPlace(
@@ -47,12 +48,12 @@ pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Dec
     Ok(decoded)
 }
 
-/// The files of a terrain, and those beside them, that are read: a file and those that it names as
-/// a VRT, or all files of a folder or pattern.
+/// Returns the files of a terrain that are read, with the files beside them: a file and those that
+/// it references, as a VRT does, or all files of a folder or pattern.
 #[must_use]
 pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
     if path.to_str().is_some_and(is_url) {
-        // Nothing is written there.
+        // No output is written to a server.
         return Vec::new();
     }
     let files = match named(path) {

@@ -1,4 +1,4 @@
-//! Which files a folder or a pattern of names stands for.
+//! The files of a folder or of a pattern of names.
 
 use std::path::{Path, PathBuf};
 
@@ -7,11 +7,11 @@ use super::super::format::Claim;
 use super::super::formats::claim_of;
 use crate::remote::is_url;
 
-/// No terrain has more files: the 30 m tiles of all the Earth's land are 26,450.
+/// Max number of files of a terrain: the 30 m tiles of all land on Earth are 26,450.
 const MAX_FILES: usize = 1 << 20;
 
-/// The terrain files that a folder, or a pattern of names that is no file itself, stands
-/// for, in the order of their names; `None` where a path is neither.
+/// Returns the terrain files of a folder or a pattern, in the order of their names; `None` for
+/// another path.
 ///
 /// # Errors
 /// [`RasterError::NoTiles`]; a folder that cannot be read.
@@ -38,13 +38,13 @@ pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, RasterError> {
     }
 }
 
-/// A pattern: what is no file and has a sign of one.
+/// Returns the path as a pattern: it has a special character, and no file has this name.
 fn pattern(path: &Path) -> Option<&str> {
     let text = path.to_str()?;
     (text.contains(['*', '?', '[']) && !path.exists()).then_some(text)
 }
 
-/// Files of formats that know their place; folders inside are not looked into.
+/// Returns the files of a folder in formats that include the place; subfolders are ignored.
 fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, RasterError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(RasterError::Unreadable)? {
@@ -57,11 +57,11 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, RasterError> {
     Ok(files)
 }
 
-/// Files that match; a picture and an archive of any name count where they are asked for.
+/// Returns the files that match a pattern, including pictures and archives of any name.
 fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     let wrong = |error| RasterError::NoTiles(format!("this pattern cannot be read: {error}"));
     let found = glob::glob(pattern).map_err(wrong)?;
-    // A folder without permission has no file that could be read.
+    // Files in folders without permission cannot be read.
     let found = found.filter_map(Result::ok);
     let asked = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -74,8 +74,8 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     Ok(files)
 }
 
-/// Returns true if a name is that of a file that holds a terrain and its place, perhaps packed. A
-/// picture seldom does, and lies beside tiles to show them.
+/// Returns true for names of files that hold a terrain with its place, possibly compressed.
+/// Pictures seldom do: beside tiles, they are previews.
 pub(super) fn is_tile(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let lower = name.to_lowercase();

@@ -1,4 +1,4 @@
-//! Files that overlap: whether they have the same heights where both have some.
+//! Comparison of the heights of files that overlap.
 
 use std::collections::BTreeMap;
 
@@ -8,35 +8,37 @@ use super::reader::Mosaic;
 use super::source::Source;
 use crate::remote::is_url;
 
-/// No more pairs of neighbours are compared, evenly spread; those on the same samples all are.
+/// Max number of neighbours' pairs to compare, evenly spread; pairs on the same samples are all
+/// compared.
 const MAX_PAIRS: usize = 8;
-/// While pairs are looked for, so many comparisons are made at most.
+/// Max number of comparisons in the search for pairs.
 const MAX_LOOKS: usize = 1 << 22;
-/// All samples of a smaller overlap are compared, of a larger one so many each way.
+/// Overlaps of up to `FEW_SAMPLES` are compared whole, larger ones at `PLACES` positions per
+/// direction.
 const FEW_SAMPLES: u64 = 4096;
 const PLACES: u32 = 5;
-/// Heights that differ by less are the same, in the file's unit and as a share of the height.
+/// Max difference of equal heights, in the file's unit, and as a share of the height.
 const SAME: f64 = 1e-3;
 const SAME_SHARE: f64 = 1e-5;
 
-/// Two files with other heights at the same places.
+/// Two files with different heights at the same positions.
 struct Disagreement {
     /// Their numbers.
     files: [usize; 2],
-    /// Returns true if both have all their samples at the same places.
+    /// True if both have all their samples at the same positions.
     is_on_same_samples: bool,
-    /// Places with heights in both, and how many of them differ.
+    /// Number of positions with heights in both, and how many of them differ.
     compared: u32,
     different: u32,
-    /// The largest difference.
+    /// The max difference.
     most: f64,
 }
 
 impl Mosaic {
-    /// Remarks on files that overlap and have other heights there.
+    /// Returns remarks on files whose heights differ in an overlap.
     ///
     /// # Errors
-    /// [`RasterError::SamePlace`] where both lie on the same samples.
+    /// [`RasterError::SamePlace`] if both have the same samples.
     pub(super) fn remark_differences(&self) -> Result<Vec<String>, RasterError> {
         const MAX_NAMED: usize = 3;
         let found = self.disagreements()?;
@@ -74,7 +76,7 @@ impl Mosaic {
         Ok(found)
     }
 
-    /// Compares two files; `None` where one cannot be read.
+    /// Compares two files; `None` if one cannot be read.
     fn compared(&self, files: [usize; 2]) -> Result<Option<Disagreement>, RasterError> {
         let sources = files.map(|number| &self.sources[number]);
         let mut opened = Vec::new();
@@ -111,7 +113,7 @@ impl Mosaic {
     }
 }
 
-/// Places of an overlap: all, or a few evenly spread.
+/// Returns positions in an overlap: all, or a few evenly spread.
 fn places(overlap: &Part) -> Vec<(u32, u32)> {
     let is_small = u64::from(overlap.columns) * u64::from(overlap.rows) <= FEW_SAMPLES;
     let along = |first: u32, count: u32| -> Vec<u32> {
@@ -128,7 +130,8 @@ fn places(overlap: &Part) -> Vec<(u32, u32)> {
     each.collect()
 }
 
-/// Pairs of files that overlap: all on the same samples with the one before, and some others.
+/// Returns pairs of overlapping files: each file with the previous one on the same samples, and
+/// some others.
 fn chosen_pairs(sources: &[Source]) -> Vec<[usize; 2]> {
     let is_here = |number: &usize| !sources[*number].path.to_str().is_some_and(is_url);
     let mut same: BTreeMap<[u32; 4], usize> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! The files of a terrain that are open: few, and those touched last.
+//! The open files of a terrain: a limited number, those used last.
 
 use std::collections::{HashMap, HashSet};
 use std::io::{Error, ErrorKind};
@@ -16,25 +16,25 @@ use super::source::{Opened, Source};
 use super::tile_file;
 use crate::remote::{is_url, without_key};
 
-/// No more files are open at once: each may have a mask and overviews beside it.
+/// Max open files: each may have a mask and overviews beside it.
 const MAX_OPEN: usize = 32;
-/// Largest size of open files in memory, bytes; the one touched last may take more alone.
+/// Max memory of open files, bytes; the last used may exceed it alone.
 const MAX_BYTES: usize = 64 << 20;
-/// Share of one file's blocks of that, bytes.
+/// Part of it for one file's blocks, bytes.
 const SHARE_BYTES: usize = 16 << 20;
-/// A file that has no blocks is held as a whole, and has to fit, bytes.
+/// Max size of a file that cannot be read in blocks, bytes.
 const MAX_WHOLE_BYTES: u64 = 64 << 20;
 
-/// A file that is not open after so long is a hole.
+/// Max time to open a file; after that, it is no-data.
 const OPEN_WITHIN: Duration = Duration::from_secs(20);
 
 /// Open files by their number among the terrain's.
 pub(super) struct Pool {
     options: OpenOptions,
     open: LruCache<usize, Arc<Opened>>,
-    /// Files that could not be read: each was warned of, and is not tried again.
+    /// Files that could not be read: each caused one warning, and is not tried again.
     failed: HashSet<usize>,
-    /// Blocks of files closed since that could not be read.
+    /// Number of unreadable blocks of files that were closed since.
     unread: HashMap<usize, u32>,
 }
 
@@ -48,12 +48,12 @@ impl Pool {
         }
     }
 
-    /// Bytes that all open files take at most: one that was just decoded beside the others.
+    /// Returns the max memory of all open files, bytes, with a newly decoded one.
     pub(super) const fn most_bytes() -> usize {
         MAX_BYTES + MAX_WHOLE_BYTES as usize
     }
 
-    /// An open file; `None`, with a warning the first time, where it cannot be read.
+    /// Opens a file, or returns the open one; `None`, with one warning, if it cannot be read.
     ///
     /// # Errors
     /// If it is remote and cannot be read at present.
@@ -77,7 +77,7 @@ impl Pool {
             Err(fault) if fault.is_of_the_line() => Err(RasterError::in_tile(&source.path, fault)),
             Err(fault) => {
                 self.failed.insert(number);
-                // A file without samples is no fault among others.
+                // A file without heights is acceptable among others.
                 if !matches!(fault, RasterError::AllNoData { .. }) {
                     let path = without_key(&source.path);
                     tracing::warn!("{path} cannot be read and counts as no data: {fault}");
@@ -87,7 +87,7 @@ impl Pool {
         }
     }
 
-    /// A file that is open already.
+    /// Returns a file if it is open.
     pub(super) fn peek(&self, number: usize) -> Option<&Opened> {
         self.open.peek(&number).map(|opened| &**opened)
     }
@@ -119,8 +119,8 @@ impl Pool {
         Ok(Opened::new(decoded, stamps))
     }
 
-    /// Closes files until those that stay, and `more` bytes, are within bounds. The last one
-    /// stays where it alone is too large.
+    /// Closes files until the others and `more` bytes are within bounds. The last one stays open
+    /// even if it is too large.
     pub(super) fn make_room(&mut self, more: usize) {
         let bytes = |open: &LruCache<usize, Arc<Opened>>| {
             open.iter()
@@ -141,14 +141,14 @@ impl Pool {
         }
     }
 
-    /// Number of open files.
+    /// Returns the number of open files.
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.open.len()
     }
 }
 
-/// Returns the options for files among others: those that can be are read in blocks.
+/// Returns the options for one file of many: it is read in blocks, if possible.
 pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
     OpenOptions {
         most_in_memory_bytes: 0,
@@ -156,8 +156,8 @@ pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
     }
 }
 
-/// Opens a file in a thread of its own, which is abandoned after a time: a disk of
-/// another computer may never answer. Requests to servers have times of their own.
+/// Opens a file in its own thread, which is abandoned after a time: a network disk may never
+/// respond. Requests to servers have their own time-outs.
 fn in_time<T: Send + 'static>(
     source: &Source,
     within: Duration,
@@ -179,10 +179,10 @@ fn in_time<T: Send + 'static>(
     })
 }
 
-/// Bytes that a file takes that is held as a whole; none where it is read in blocks.
+/// Returns the memory of a file that is stored whole, bytes; zero if it is read in blocks.
 ///
 /// # Errors
-/// [`RasterError::Unsupported`] where these are too many.
+/// [`RasterError::Unsupported`] if that is too large.
 pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, RasterError> {
     let Storage::Held { samples, .. } = &outline.storage else {
         return Ok(0);

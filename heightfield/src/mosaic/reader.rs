@@ -1,4 +1,4 @@
-//! Reads samples of a terrain of many files, from those files that have them.
+//! Reads samples of a terrain of many files, each from the files that have it.
 
 use std::hash::Hasher;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,29 +12,30 @@ use super::pool::Pool;
 use super::source::{Opened, Source};
 use crate::remote::{RemoteFile, is_url};
 
-/// Samples of a block each way; fewer in coarse images, where a block is of many files.
+/// Side of a block, samples; smaller in coarse images, where a block covers many files.
 const BLOCK: u32 = 256;
 const COARSE_BLOCK: u32 = 32;
-/// Of a terrain with so few samples and files all samples are looked at when it is opened.
+/// Max samples and files of a terrain that is read whole at opening.
 const FEW_SAMPLES: u64 = 1 << 20;
 const FEW_FILES: usize = 64;
-/// Else places all over it: so many, or one a file, each of so many samples each way.
+/// Otherwise parts spread over the terrain, their number at least (or one per file), and their side
+/// in samples.
 const PLACES: usize = 32;
 const PLACE: u32 = 64;
 
-/// The files of a terrain, the last on top.
+/// The files of a terrain; the last has priority.
 pub(super) struct Mosaic {
     pub(super) sources: Vec<Source>,
     images: Vec<BlockImage>,
     sample: SampleType,
     pool: Mutex<Pool>,
-    /// Options of the user that change the files' samples.
+    /// The user's options that affect the files' samples.
     options: String,
 }
 
 impl Mosaic {
-    /// A terrain of a size from files, none of which is opened yet. `sample` is
-    /// [`SampleType::F32`] where that holds all their samples.
+    /// Returns a terrain of a size from files, without opening any. `sample` is [`SampleType::F32`]
+    /// if it can store all their samples.
     pub(super) fn new(
         (columns, rows): (u32, u32),
         sources: Vec<Source>,
@@ -73,11 +74,11 @@ impl Mosaic {
     }
 
     fn pool(&self) -> MutexGuard<'_, Pool> {
-        // What panics while this is held is a decoder, whose panics are caught.
+        // Only decoders can panic while the lock is held, and their panics are caught.
         self.pool.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A file, opened; `None`, with a warning the first time, where it cannot be read.
+    /// Opens a file; `None`, with one warning, if it cannot be read.
     ///
     /// # Errors
     /// If it is remote and cannot be read at present.
@@ -89,14 +90,14 @@ impl Mosaic {
         self.pool().get(number, source)
     }
 
-    /// Number of open files.
+    /// Returns the number of open files.
     #[cfg(test)]
     pub(super) fn open_files(&self) -> usize {
         self.pool().len()
     }
 }
 
-/// Samples that are filled from the last file to the first.
+/// Samples, filled from the last file to the first.
 struct Filling<'p> {
     part: &'p Part,
     values: Vec<f64>,
@@ -115,7 +116,7 @@ impl<'p> Filling<'p> {
         }
     }
 
-    /// Places in an overlap that nothing covers yet: column, row and index.
+    /// Returns the unfilled positions in an overlap: column, row and index.
     fn open_places(&self, overlap: &Part) -> Vec<[u32; 3]> {
         let part = self.part;
         let rows = overlap.row..overlap.row + overlap.rows;
@@ -134,10 +135,10 @@ impl<'p> Filling<'p> {
             .collect()
     }
 
-    /// Fills places from a file.
+    /// Fills positions from a file.
     ///
     /// # Errors
-    /// The reason why a height is not known.
+    /// The reason why a height is unknown.
     fn fill(
         &mut self,
         level: u8,
@@ -146,7 +147,7 @@ impl<'p> Filling<'p> {
         places: &[[u32; 3]],
     ) -> Result<(), RasterError> {
         for &[column, row, index] in places {
-            // Both fit: they are inside the terrain.
+            // Both fit: the position is inside the terrain.
             let place = source.place([column, row].map(|index| index << level));
             if let Some(height) = opened.height(level, place)? {
                 self.values[index as usize] = height;
@@ -190,7 +191,8 @@ impl BlockReader for Mosaic {
             if places.is_empty() {
                 continue;
             }
-            // Only while it is opened: other readers do not wait for all of this.
+            // The lock covers only the opening, so that other readers do not wait for the whole
+            // read.
             let opened = self.opened(number, source)?;
             if let Some(opened) = &opened {
                 filling.fill(image as u8, source, opened, &places)?;
@@ -220,7 +222,7 @@ impl BlockReader for Mosaic {
                 continue;
             }
             let stamps = source.stamps()?;
-            // A file that is open stays what it was when another takes its name.
+            // An open file keeps its content even if another file replaces its name.
             if let Some(opened) = self.pool().peek(number)
                 && opened.stamps() != Some(&stamps)
             {
@@ -237,7 +239,7 @@ impl BlockReader for Mosaic {
     fn index(&self) -> u64 {
         let mut hasher = XxHash64::with_seed(0);
         for source in &self.sources {
-            // A folder may be moved.
+            // Only the name, because the folder may be moved.
             let name = source.path.file_name().unwrap_or_default();
             hasher.write(name.as_encoded_bytes());
             hasher.write_u64(source.bytes);
@@ -271,7 +273,7 @@ impl BlockReader for Mosaic {
 }
 
 impl Mosaic {
-    /// Places all over the terrain, in the order of the files.
+    /// Returns parts spread over the terrain, in the order of the files.
     fn places(&self) -> Vec<Part> {
         let each = PLACES.div_ceil(self.sources.len().max(1)).isqrt() as u32 + 1;
         let each = if self.sources.len() >= PLACES {

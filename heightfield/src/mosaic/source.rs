@@ -1,4 +1,4 @@
-//! One file of many: which samples of the terrain it has, and how they follow from its own.
+//! One file of many: its samples on the terrain's grid.
 
 use std::path::PathBuf;
 
@@ -16,18 +16,17 @@ use crate::{RasterError, ReadStatus, Wait};
 pub(super) struct Source {
     /// The file.
     pub(super) path: PathBuf,
-    /// Its bytes when it was indexed.
+    /// Its size when it was indexed, bytes.
     pub(super) bytes: u64,
-    /// The samples of the terrain that it has: columns from the west, rows from the
-    /// **south**.
+    /// Its samples in the terrain: columns from the west, rows from the **south**.
     pub(super) covers: Part,
-    /// True if its columns begin in the east, and its rows in the north.
+    /// True if its columns begin in the east, and if its rows begin in the north.
     pub(super) turned: [bool; 2],
 }
 
 impl Source {
-    /// The present state of the file and of those beside it; none where it is at a URL, or
-    /// gone.
+    /// Returns the present stamps of the file and of those beside it; `None` for a URL, or if it is
+    /// missing.
     pub(super) fn stamps(&self) -> Option<Vec<FileStamp>> {
         if self.path.to_str().is_some_and(is_url) {
             return None;
@@ -36,7 +35,7 @@ impl Source {
         files.iter().map(|file| FileStamp::at(file)).collect()
     }
 
-    /// The file's column and row, in its own order, for those of the terrain that it has.
+    /// Converts a column and row of the terrain to the file's own order.
     pub(super) fn place(&self, [column, row]: [u32; 2]) -> [u32; 2] {
         let covers = &self.covers;
         let along = |index: u32, count: u32, is_turned: bool| match is_turned {
@@ -49,7 +48,7 @@ impl Source {
         ]
     }
 
-    /// The part of `part` of the samples with every 2ᵏ-th of the terrain that the file has.
+    /// Returns the overlap of the file with `part`, in samples of every 2ᵏ-th of the terrain.
     pub(super) fn overlap(&self, k: u32, part: &Part) -> Option<Part> {
         let cut = |first: u32, count: u32, from: u32, most: u32| {
             let at = |full: u64| u32::try_from(full.div_ceil(1 << k)).unwrap_or(u32::MAX);
@@ -69,7 +68,7 @@ impl Source {
     }
 }
 
-/// A file that was opened.
+/// An open file.
 pub(super) struct Opened {
     decoded: Decoded,
     /// [`Source::stamps`] before it was opened.
@@ -81,12 +80,12 @@ impl Opened {
         Self { decoded, stamps }
     }
 
-    /// [`Source::stamps`] before it was opened.
+    /// Returns [`Source::stamps`] from before it was opened.
     pub(super) fn stamps(&self) -> Option<&Vec<FileStamp>> {
         self.stamps.as_ref()
     }
 
-    /// Bytes that it takes in memory now, and blocks of it that could not be read.
+    /// Returns its memory, bytes, and the number of its unreadable blocks.
     pub(super) fn share(&self) -> (usize, u32) {
         match &self.decoded.storage {
             Storage::Held { samples, mask } => {
@@ -97,10 +96,10 @@ impl Opened {
         }
     }
 
-    /// The height at a place of the file for a level of detail; `None` in a hole.
+    /// Returns the height at a position of the file for a level; `None` for no-data.
     ///
     /// # Errors
-    /// The reason why it is not known.
+    /// The reason why it is unknown.
     pub(super) fn height(
         &self,
         level: u8,

@@ -1,4 +1,4 @@
-//! Files as one terrain, made on the spot: what is opened when, and how much is held.
+//! Terrains of generated files: when files are opened, and how much memory they use.
 
 use std::path::Path;
 
@@ -9,15 +9,15 @@ use super::pool::Pool;
 use super::reader::Mosaic;
 use super::source::Source;
 
-/// Samples of a tile each way.
+/// Side of a tile, samples.
 const SIDE: u32 = 40;
 
-/// The height of the sample at a column and row of all tiles together.
+/// Returns the height at a column and row of all tiles together.
 fn height(column: u32, row: u32) -> u32 {
     (column * 7 + row * 3) % 1000
 }
 
-/// A square of `count × count` tiles without a gap, as SRTM's files without a header.
+/// Writes a square of `count × count` tiles that share no samples, without gaps.
 fn tiles(folder: &Path, count: u32) {
     for (across, up) in (0..count * count).map(|number| (number % count, number / count)) {
         let mut text = format!(
@@ -81,7 +81,7 @@ fn few_files_are_open_at_once_and_all_are_read() {
         "{}",
         mosaic.open_files()
     );
-    // A coarse image has the very samples.
+    // A coarse image has exactly the same samples.
     let part = Part {
         column: 3,
         row: 5,
@@ -122,7 +122,7 @@ fn what_is_not_touched_is_not_opened() {
     assert_eq!(mosaic.open_files(), 1);
     mosaic.read(0, &part(SIDE - 2, 1)).expect("two files' part");
     assert_eq!(mosaic.open_files(), 2);
-    // What lies under another file is not opened for it, whatever lies beside both.
+    // A file that is covered by another is not opened, even if its neighbourhood is read.
     let covered = [names[1], names[0]].map(|name| source(folder.path(), name, 0, 0));
     let mosaic = Mosaic::new(size, covered.to_vec(), SampleType::F32, &options);
     let block = mosaic.read(0, &part(SIDE - 2, 0)).expect("a part");
@@ -130,7 +130,7 @@ fn what_is_not_touched_is_not_opened() {
     assert_eq!(mosaic.open_files(), 1);
 }
 
-/// Each is warned of once, however often it is touched.
+/// Each causes one warning, however often it is read.
 #[test]
 fn a_file_that_failed_is_not_tried_again() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -144,7 +144,7 @@ fn a_file_that_failed_is_not_tried_again() {
     }
 }
 
-/// Samples, open files and index of a terrain of many files take at most 256 MB.
+/// Samples, open files and index of a terrain of many files use at most 256 MB.
 #[test]
 fn the_memory_of_many_files_is_bounded() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -157,7 +157,7 @@ fn the_memory_of_many_files_is_bounded() {
         "{}",
         raster.memory_bytes()
     );
-    // A file that is not read in blocks and too large to be held is refused.
+    // A file that cannot be read in blocks and is too large for memory is rejected.
     let text = "ncols 9000\nnrows 9000\nxllcorner 120\nyllcorner 0\ncellsize 1\n";
     std::fs::write(folder.path().join("large.asc"), text).expect("written");
     let error = Raster::open(folder.path(), &OpenOptions::default()).expect_err("too large");
@@ -188,7 +188,7 @@ fn the_same_files_are_the_same_terrain_and_changed_ones_another() {
     assert!(prints[0].is_some() && prints[0] != prints[1] && prints[0] != prints[2]);
 }
 
-/// A tile of one height.
+/// Writes a tile of constant height.
 fn flat(folder: &Path, name: &str, west: u32, height: i32) {
     let header = format!("ncols 4\nnrows 3\nxllcorner {west}\nyllcorner 0\ncellsize 1\n");
     let samples = format!("{height} ").repeat(12);
@@ -200,7 +200,7 @@ fn layers_beside_heights_are_left_out_and_named() {
     let folder = tempfile::tempdir().expect("a folder");
     flat(folder.path(), "n38_dem.asc", 0, 500);
     flat(folder.path(), "n38_num.asc", 0, 12);
-    // Of no known name, but on the same samples.
+    // Its name is unknown, but it has the same samples.
     flat(folder.path(), "n38_aux.asc", 0, 7);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
     let summary = raster.summary();
@@ -224,7 +224,7 @@ fn rasters_that_differ_at_one_place_are_refused() {
         fault.contains("a_2019.asc") && fault.contains("a_2020.asc"),
         "{fault}"
     );
-    // The same heights twice are no choice.
+    // Two files with the same heights are not ambiguous.
     flat(folder.path(), "a_2020.asc", 0, 500);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
     assert_eq!(raster.remarks(), [""; 0]);

@@ -1,4 +1,4 @@
-//! One file of many: opened alone, whatever its format.
+//! One file of many: opened alone, in any format.
 
 use std::path::Path;
 
@@ -11,8 +11,7 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Rast
     one_file::decode(&FileBytes::open(path, &options.elsewhere)?, options)
 }
 
-/// Reads the header of one file of many. A format that has no short way there
-/// decodes the whole file.
+/// Reads the header of one file of many. Some formats decode the whole file for that.
 pub(super) fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let input = FileBytes::open(path, &options.elsewhere)?;
     one_file::decode(&input.in_outline(true), options)

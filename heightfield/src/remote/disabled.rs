@@ -6,16 +6,16 @@ use std::sync::Arc;
 
 use crate::disk_cache::{DiskCache, FileStamp};
 
-/// No file at a URL.
+/// A fetcher without files.
 #[derive(Clone, Debug, Default)]
 pub struct RemoteFetcher(());
 
-/// There is none.
+/// Never exists.
 #[derive(Debug)]
 pub(crate) enum RemoteFile {}
 
 impl RemoteFetcher {
-    /// Always an error.
+    /// Always returns an error.
     pub(crate) fn open(&self, _: &str) -> Result<Arc<RemoteFile>> {
         Err(Error::new(
             ErrorKind::Unsupported,
@@ -23,13 +23,13 @@ impl RemoteFetcher {
         ))
     }
 
-    /// There is none.
+    /// Does nothing.
     pub(crate) fn look_for(&self, _: &[String]) {}
 
-    /// Nothing is fetched.
+    /// Does nothing.
     pub(crate) fn set_disk_cache(&self, _: &DiskCache) {}
 
-    /// Nothing goes wrong.
+    /// Does nothing.
     pub(crate) fn touch(&self) {}
 }
 

@@ -1,4 +1,4 @@
-//! Messages for errors of `object_store`, in a line that a user can act on.
+//! Converts errors of `object_store` to one-line messages that the user can act on.
 
 use std::io::{Error, ErrorKind};
 
@@ -9,7 +9,7 @@ use super::redirects::RedirectError;
 use super::url::{in_text, is_url};
 use crate::printable_text::printable;
 
-/// No answer of a server is shown at more length than this, characters.
+/// Max characters of a server's response in a message.
 const SHOWN: usize = 300;
 
 /// Parts of the URLs at which a virtual machine of Amazon, Google or Microsoft requests its own
@@ -21,9 +21,9 @@ const KEYS_OF_COMPUTERS: [&str; 4] = [
     "/metadata/identity/",
 ];
 
-/// A server that answers a request for a range with all of the file.
+/// Returns true if the server answers a range request with the whole file.
 pub(super) fn is_without_ranges(error: &StoreError) -> bool {
-    // What the library finds is in its text alone.
+    // The library's own errors differ only in their texts.
     let text = match error {
         StoreError::NotSupported { source } | StoreError::Generic { source, .. } => {
             source.to_string()
@@ -43,7 +43,7 @@ pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
     Error::new(ErrorKind::InvalidInput, why)
 }
 
-/// Returns the error for a server's answer at opening: missing environment variables show here
+/// Returns the error for a server's response at opening, where missing environment variables show
 /// first.
 pub(super) fn at_opening(error: &StoreError) -> Error {
     let wrong = |why: String| Error::new(ErrorKind::InvalidInput, why);
@@ -72,7 +72,7 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
     told(error)
 }
 
-/// Returns the error for a server's answer.
+/// Returns the error for a server's response.
 pub(super) fn told(error: &StoreError) -> Error {
     if let Some(why) = redirect_error(error) {
         return Error::new(ErrorKind::Unsupported, why.to_string());
@@ -84,19 +84,19 @@ pub(super) fn told(error: &StoreError) -> Error {
         _ if has_status(error, "410") => {
             return Error::new(ErrorKind::NotFound, "there is no such file any more");
         }
-        // There is not even a first byte.
+        // The file has no first byte.
         _ if has_status(error, "416") => {
             return Error::new(ErrorKind::NotFound, "the file is empty");
         }
         StoreError::PermissionDenied { .. } | StoreError::Unauthenticated { .. } => {
             return forbidden(error);
         }
-        // So Microsoft's servers forbid it where nothing of an account is public.
+        // Microsoft's servers respond so if nothing in an account is public.
         _ if code(&error.to_string()) == Some("PublicAccessNotPermitted") => {
             return forbidden(error);
         }
-        // And so they refuse what is in their archive, and others what is being changed. The
-        // library takes it for a file that was to be written.
+        // Microsoft's servers also respond so for archived files, and others for files that are
+        // being changed. The library interprets it as an error of a write.
         StoreError::AlreadyExists { .. } => {
             let why = "its server does not hand it out";
             return Error::new(ErrorKind::Unsupported, with_code(why, error));
@@ -116,7 +116,7 @@ pub(super) fn told(error: &StoreError) -> Error {
     Error::new(kind, in_short(&with_cause(error)))
 }
 
-/// The redirect that was not followed, where that is what went wrong.
+/// Returns the redirect error that caused an error, if any.
 fn redirect_error(error: &StoreError) -> Option<&RedirectError> {
     let first: &dyn std::error::Error = error;
     let mut causes = std::iter::successors(Some(first), |cause| cause.source());
@@ -141,8 +141,7 @@ fn with_code(why: &str, error: &StoreError) -> String {
     }
 }
 
-/// The word for an error in the answer of a server that speaks as Amazon's, Google's and
-/// Microsoft's do.
+/// Returns the error code in a server's response, in the format of Amazon, Google and Microsoft.
 fn code(text: &str) -> Option<&str> {
     let (_, rest) = text.split_once("<Code>")?;
     let (code, _) = rest.split_once("</Code>")?;
@@ -150,7 +149,7 @@ fn code(text: &str) -> Option<&str> {
     is_word.then_some(code)
 }
 
-/// The text of an error, and what caused it where the text leaves that out.
+/// Returns the text of an error, with its cause if the text does not include it.
 fn with_cause(error: &StoreError) -> String {
     let text = error.to_string();
     let mut last: &dyn std::error::Error = error;
@@ -164,13 +163,13 @@ fn with_cause(error: &StoreError) -> String {
     }
 }
 
-/// On one line, without keys, and not more of it than a user reads.
+/// Shortens a text to one readable line without keys.
 fn in_short(text: &str) -> String {
-    // The library's name for a server, of which the user has a URL.
+    // The library's name for the server is redundant beside the URL.
     let named = text.strip_prefix("Generic ");
     let named = named.and_then(|text| text.split_once(" error: "));
     let text = named.map_or(text, |(_, text)| text);
-    // What a server says after its status is made for a browser.
+    // The text after the status is HTML for a browser.
     let status = text.find("status code: ").map_or(0, |at| at + 13);
     let end = text[status..].find(':').filter(|_| status > 0);
     let text = end.map_or(text, |end| &text[..status + end]);
@@ -225,7 +224,7 @@ mod tests {
             let error = at_opening(&generic(text));
             assert_eq!(error.kind(), ErrorKind::InvalidInput);
             assert!(error.to_string().contains(why), "{error}");
-            // Of a file that is open, another try may go well.
+            // For an open file, a retry may succeed.
             assert_eq!(told(&generic(text)).kind(), OUTAGE);
         }
     }

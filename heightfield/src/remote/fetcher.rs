@@ -1,4 +1,4 @@
-//! Opens the files at URLs that a terrain is made of, each once.
+//! Opens the files at a terrain's URLs, each once.
 
 use std::fmt;
 use std::io::{Error, ErrorKind, Result};
@@ -16,12 +16,12 @@ use super::url::in_text;
 use super::{is_outage, store};
 use crate::disk_cache::DiskCache;
 
-/// Files that are known at once: open, missing or on their way.
+/// Max stored files: open, missing or being opened.
 const MAX_FILES: NonZeroUsize = NonZeroUsize::new(256).unwrap();
-/// A server that did not answer is asked again after so long.
+/// Time between attempts to open a file on a server that did not respond.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
 
-/// Files at URLs, open or being opened. Clones are of the same.
+/// Files at URLs, open or being opened. Clones share them.
 #[derive(Clone)]
 pub struct RemoteFetcher(Arc<Shared>);
 
@@ -36,7 +36,7 @@ struct Shared {
 enum Known {
     OnItsWay,
     Open(Arc<RemoteFile>),
-    /// Reason for the refusal, and its time.
+    /// Time and reason of the failure.
     Failed(Instant, ErrorKind, String),
 }
 
@@ -51,11 +51,10 @@ impl Default for RemoteFetcher {
 }
 
 impl RemoteFetcher {
-    /// The file at a URL. A file that is open is not opened again, and one that is missing
-    /// is not looked for again.
+    /// Opens the file at a URL, once; missing files are not requested again.
     ///
     /// # Errors
-    /// [`super::is_missing`], [`super::is_outage`], or what is wrong with the URL.
+    /// [`super::is_missing`], [`super::is_outage`], or the fault of the URL.
     pub(crate) fn open(&self, url: &str) -> Result<Arc<RemoteFile>> {
         let background = background()?;
         let mut has_asked = false;
@@ -80,10 +79,10 @@ impl RemoteFetcher {
         }
     }
 
-    /// Asks for files at URLs that nothing is known of, all at once: [`Self::open`] of each then
-    /// waits for what is on its way already.
+    /// Starts opening files at new URLs, all at once; [`Self::open`] then waits for those being
+    /// opened.
     pub(crate) fn look_for(&self, urls: &[String]) {
-        // Where there is no background, opening says why.
+        // Without a runtime, `open` returns the error.
         let Ok(background) = background() else {
             return;
         };
@@ -95,18 +94,18 @@ impl RemoteFetcher {
         }
     }
 
-    /// Has pages of files kept for another run; the first folder that is named counts.
+    /// Sets the folder for pages that later runs use; only the first call has an effect.
     pub(crate) fn set_disk_cache(&self, disk: &DiskCache) {
         self.0.line.set_disk_cache(disk);
     }
 
-    /// The terrain is open: from now on errors are reported.
+    /// Marks the terrain as open: from now on errors are logged.
     pub(crate) fn touch(&self) {
         self.0.line.touch();
     }
 
     fn files(&self) -> MutexGuard<'_, LruCache<String, Known>> {
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -1,4 +1,4 @@
-//! A file at a URL, of which the pages touched last are here.
+//! A file at a URL, whose last used pages are in memory.
 
 use std::fmt;
 use std::io::{Error, ErrorKind, Result};
@@ -16,9 +16,9 @@ use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
 use crate::disk_cache::FileStamp;
 
-/// After a request that failed the next one is made after so long.
+/// Time before the next request after a failed one.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
-/// Between two looks at whether a page may be asked for, where many are on their way.
+/// Interval at which a page is requested again while too many are being fetched.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// A file at a URL.
@@ -28,14 +28,14 @@ pub(crate) struct RemoteFile {
     line: Arc<SharedPages>,
     background: &'static Runtime,
     object: Object,
-    /// All of it, where it is short or its server supports no ranges.
+    /// The whole file, if it is short or its server does not support ranges.
     all: Option<Vec<u8>>,
-    /// Its pages on disk, where they can be kept.
+    /// Its pages on disk, if they can be stored.
     kept: Option<PagesOnDisk>,
 }
 
 impl RemoteFile {
-    /// A file that a server has answered for.
+    /// Returns a file that its server has confirmed.
     pub(super) fn new(
         name: &str,
         line: &Arc<SharedPages>,
@@ -60,12 +60,12 @@ impl RemoteFile {
         }
     }
 
-    /// Bytes that all files keep in memory together, at most.
+    /// Returns the max memory of all files, bytes.
     pub(crate) const fn kept_bytes() -> usize {
         pages::MAX_BYTES
     }
 
-    /// Number of bytes.
+    /// Returns the number of bytes.
     pub(crate) fn len(&self) -> u64 {
         match &self.all {
             Some(all) => all.len() as u64,
@@ -73,13 +73,13 @@ impl RemoteFile {
         }
     }
 
-    /// Returns the stamp of the file in the state in which it was opened; `None` where its
-    /// server tells neither tag nor time.
+    /// Returns the stamp of the file's state at opening; `None` if the server sends neither tag nor
+    /// time.
     pub(crate) fn stamp(&self) -> Option<FileStamp> {
         self.object.stamp().map(FileStamp::of_text)
     }
 
-    /// Has bytes fetched that are going to be read; waits for nothing.
+    /// Prefetches bytes; does not wait.
     pub(crate) fn want(self: &Arc<Self>, ranges: impl Iterator<Item = Range<u64>>) {
         if self.all.is_some() {
             return;
@@ -92,7 +92,7 @@ impl RemoteFile {
         }
     }
 
-    /// The pages of a run, from disk as far as they were kept there.
+    /// Returns the pages of a run, from disk if they are stored there.
     async fn brought(&self, run: Range<u64>) -> Result<Vec<u8>> {
         let Some(kept) = &self.kept else {
             return self.fetched(run).await;
@@ -110,13 +110,13 @@ impl RemoteFile {
         let bytes = self.fetched(pages.clone()).await?;
         let run = joined(&found, &gap, &bytes);
         let disk = kept.clone();
-        // No reader waits for that.
+        // Stored in the background, so that no reader waits.
         self.background
             .spawn_blocking(move || disk.put(pages, &bytes));
         Ok(run)
     }
 
-    /// The pages of a run from the server.
+    /// Fetches the pages of a run from the server.
     async fn fetched(&self, run: Range<u64>) -> Result<Vec<u8>> {
         let _turn = self.line.turn().await;
         self.object.get(pages::bytes(&run, self.len())).await
@@ -137,10 +137,10 @@ impl RemoteFile {
         runs.collect()
     }
 
-    /// Bytes of the file, all of them inside of it.
+    /// Reads bytes inside the file.
     ///
     /// # Errors
-    /// [`is_outage`]; that the file was changed.
+    /// [`is_outage`]; or the file has changed.
     pub(crate) fn read_at(self: &Arc<Self>, offset: u64, count: usize) -> Result<Vec<u8>> {
         let end = offset.checked_add(count as u64);
         let Some(end) = end.filter(|end| *end <= self.len()) else {
@@ -162,7 +162,7 @@ impl RemoteFile {
         Ok(bytes)
     }
 
-    /// A page, which is waited for.
+    /// Returns a page, and waits for it.
     fn page(self: &Arc<Self>, number: u64) -> Result<Arc<[u8]>> {
         let key = (self.number, number);
         let mut has_waited = false;
@@ -183,7 +183,7 @@ impl RemoteFile {
             }
             if !held.pages.is_coming(key) {
                 drop(held);
-                // Others were on their way, or it has gone again since.
+                // Too many pages were being fetched, or it was dropped again.
                 let first = number * pages::PAGE;
                 self.want(once(first..first + 1));
                 held = self.line.held();
@@ -216,8 +216,8 @@ impl RemoteFile {
         self.line.arrived.notify_all();
     }
 
-    /// Notes what is wrong, and reports it if the caller does not: while a
-    /// terrain is opened, the opening thread does.
+    /// Stores a fault, and logs it unless the caller reports it, as the thread that opens the
+    /// terrain does.
     fn note(&self, held: &mut Held, why: &Error) {
         let name = &self.name;
         let trouble = match is_outage(why) {
@@ -226,7 +226,7 @@ impl RemoteFile {
         };
         let tells = self.line.is_touched();
         match (held.troubles.get(&self.number), &trouble) {
-            // Its last word.
+            // This state is final.
             (Some(Trouble::Lost(_)), _) => return,
             (None, Trouble::Outage(..)) if tells => tracing::warn!(
                 "{name} cannot be read at present; what was read stays, the rest is asked for again and again: {why}"
@@ -242,7 +242,7 @@ impl RemoteFile {
 
 impl Drop for RemoteFile {
     fn drop(&mut self) {
-        // Its pages go when others want their room.
+        // Its pages are dropped when others need the memory.
         self.line.held().troubles.remove(&self.number);
     }
 }

@@ -1,21 +1,20 @@
-//! Terrain files at URLs, of which only the touched parts are fetched.
+//! Terrain files at URLs, of which only the needed parts are fetched.
 //!
 //! ```text
 //! fetcher (open files by URL) ─▶ file, pages (64 KiB each) ─▶ store (HTTP requests)
 //! ```
 //!
-//! A file is cut into pages. Pages that are wanted are fetched in the background, several
-//! that follow each other with one request, and those touched last are kept. Every read
-//! waits for them; where a caller must not wait, a thread of the blocks reads ([`crate::Wait`]).
+//! A file is divided into pages. Requested pages are fetched in the background, adjacent ones in
+//! one request, and the last used are cached. Every read waits for its pages; for callers that must
+//! not wait, a background thread of the blocks reads ([`crate::Wait`]).
 //!
-//! Pages are kept on disk for another run (`pages_on_disk`), where the server says by a tag or a time
-//! which state of the file they are of.
+//! Pages are stored on disk for later runs (`pages_on_disk`), if the server identifies the file's
+//! state by a tag or a time.
 //!
-//! A file that was changed at its server is not read on: what was fetched of it and what
-//! would come do not belong together.
+//! Reading stops if a file changes on its server, because old and new pages do not match.
 //!
-//! `object_store` makes the requests; it is named in `store`, `servers`, `requests` and `errors` only.
-//! Without the feature `remote` there is no such file (`disabled`).
+//! `object_store` makes the requests; only `store`, `servers`, `requests` and `errors` use it.
+//! Without the feature `remote`, files at URLs cannot be opened (`disabled`).
 
 #[cfg(not(feature = "remote"))]
 mod disabled;
@@ -56,29 +55,29 @@ pub(crate) use reader::RemoteReader;
 pub use url::{file_name, is_url, without_key};
 pub(crate) use url::{gdal_names, neighbour, parts, without_rest};
 
-/// A failure of the line or the server: another try may go well.
+/// A failure of the connection or the server: a retry may succeed.
 const OUTAGE: ErrorKind = ErrorKind::ConnectionAborted;
 
-/// A file that cannot be read on: it was changed, or may not be read any more.
+/// A file that cannot be read any more: it has changed, or access is denied.
 const LOST: ErrorKind = ErrorKind::StaleNetworkFileHandle;
 
-/// Returns true if an error says that nothing more comes of a file that was opened.
+/// Returns true if an open file cannot be read any more.
 pub(crate) fn is_lost(error: &Error) -> bool {
     error.kind() == LOST
 }
 
-/// Bytes that were not received, if the reason is not known any more.
+/// Returns the error for missing bytes whose reason is no longer known.
 pub(crate) fn outage() -> Error {
     Error::new(OUTAGE, "it was not received: try again")
 }
 
-/// Returns true if an error is one of the line or the server.
+/// Returns true for an error of the connection or the server.
 pub(crate) fn is_outage(error: &Error) -> bool {
     error.kind() == OUTAGE
 }
 
-/// Returns true if an error says that there is no such file. To a user without list permission, a
-/// server answers that a missing file is forbidden.
+/// Returns true if the file does not exist. For a user without list permission, a server reports a
+/// missing file as forbidden.
 pub(crate) fn is_missing(error: &Error) -> bool {
     matches!(
         error.kind(),

@@ -1,4 +1,4 @@
-//! The pages of all remote files that are here, and those on their way.
+//! The pages of all remote files: those in memory, and those being fetched.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -6,22 +6,22 @@ use std::sync::Arc;
 
 use lru::LruCache;
 
-/// Bytes of a page.
+/// Size of a page, bytes.
 pub(super) const PAGE: u64 = 64 << 10;
-/// Pages that one request asks for, at most.
+/// Max pages per request.
 const RUN: u64 = 16;
-/// Pages that are kept: 64 MB, besides those on their way.
+/// Max cached pages: 64 MB, besides those being fetched.
 const MAX_KEPT: usize = 1024;
-/// Pages on their way at once: 32 MB.
+/// Max pages being fetched: 32 MB.
 const MAX_COMING: usize = 512;
 
-/// Bytes that all pages take at most.
+/// Max memory of all pages, bytes.
 pub(super) const MAX_BYTES: usize = (MAX_KEPT + MAX_COMING) * PAGE as usize;
 
-/// A page by the number of its file and its own.
+/// The number of a page's file, and its own.
 type Key = (u64, u64);
 
-/// Pages of files that are numbered.
+/// Pages of numbered files.
 pub(super) struct Pages {
     here: LruCache<Key, Arc<[u8]>>,
     coming: HashSet<Key>,
@@ -37,19 +37,18 @@ impl Default for Pages {
 }
 
 impl Pages {
-    /// A page that is here, now the one touched last.
+    /// Returns a page in memory, and marks it as used.
     pub(super) fn get(&mut self, key: Key) -> Option<Arc<[u8]>> {
         self.here.get(&key).cloned()
     }
 
-    /// Returns true if a page is on its way.
+    /// Returns true if a page is being fetched.
     pub(super) fn is_coming(&self, key: Key) -> bool {
         self.coming.contains(&key)
     }
 
-    /// The pages of a file in `wanted` that are neither here nor on their way, as runs that one
-    /// request each asks for: from now on they are on their way. What is more than may be
-    /// is left out, and has to be wanted again.
+    /// Returns the missing pages of a file in `wanted`, as runs for one request each, and marks
+    /// them as being fetched. Pages beyond `MAX_COMING` are omitted, and must be requested again.
     pub(super) fn take_missing(&mut self, file: u64, wanted: Range<u64>) -> Vec<Range<u64>> {
         let mut runs: Vec<Range<u64>> = vec![];
         for page in wanted {
@@ -69,7 +68,7 @@ impl Pages {
         runs
     }
 
-    /// A run has come; what is missing of it may be asked for again.
+    /// Stores a received run; its missing pages may be requested again.
     pub(super) fn arrived(&mut self, file: u64, run: Range<u64>, bytes: &[u8]) {
         self.failed(file, run.clone());
         for (page, bytes) in run.zip(bytes.chunks(PAGE as usize)) {
@@ -80,7 +79,7 @@ impl Pages {
         }
     }
 
-    /// A run is not on its way any more.
+    /// Marks a run as no longer being fetched.
     pub(super) fn failed(&mut self, file: u64, run: Range<u64>) {
         for page in run {
             self.coming.remove(&(file, page));
@@ -88,13 +87,13 @@ impl Pages {
     }
 }
 
-/// The pages that hold some bytes of a file of `len` bytes.
+/// Returns the pages with a byte range of a file of `len` bytes.
 pub(super) fn of(bytes: &Range<u64>, len: u64) -> Range<u64> {
     let end = bytes.end.min(len);
     bytes.start / PAGE..end.div_ceil(PAGE).max(bytes.start / PAGE)
 }
 
-/// The bytes of some pages of a file of `len` bytes.
+/// Returns the byte range of some pages of a file of `len` bytes.
 pub(super) fn bytes(pages: &Range<u64>, len: u64) -> Range<u64> {
     pages.start * PAGE..(pages.end * PAGE).min(len)
 }

@@ -1,4 +1,4 @@
-//! Pages of a file that are kept on disk for another run.
+//! Pages of a file that are stored on disk for later runs.
 
 use std::ops::Range;
 
@@ -9,13 +9,13 @@ use crate::disk_cache::{DiskCache, Name};
 #[derive(Clone)]
 pub(super) struct PagesOnDisk {
     disk: DiskCache,
-    /// The file, its size, and the tag and time that its server tells.
+    /// The file, its size, and the tag and time from its server.
     stamp: String,
     len: u64,
 }
 
 impl PagesOnDisk {
-    /// Of a file of `len` bytes in the state that `stamp` tells.
+    /// Returns the pages of a file of `len` bytes in the state `stamp`.
     pub(super) fn new(disk: &DiskCache, stamp: String, len: u64) -> Self {
         Self {
             disk: disk.clone(),
@@ -28,7 +28,7 @@ impl PagesOnDisk {
         Name::of(&["page", &self.stamp, &page.to_string()])
     }
 
-    /// The pages of a run, each where it was kept.
+    /// Returns the pages of a run that are stored.
     pub(super) fn get(&self, run: Range<u64>) -> Vec<Option<Vec<u8>>> {
         let page = |page: u64| {
             let bytes = pages::bytes(&(page..page + 1), self.len);
@@ -38,7 +38,7 @@ impl PagesOnDisk {
         run.map(page).collect()
     }
 
-    /// Keeps the pages of a run that has come.
+    /// Stores the pages of a received run.
     pub(super) fn put(&self, run: Range<u64>, bytes: &[u8]) {
         for (page, bytes) in run.zip(bytes.chunks(pages::PAGE as usize)) {
             self.disk.put(&self.name(page), bytes);
@@ -46,14 +46,14 @@ impl PagesOnDisk {
     }
 }
 
-/// From the first page that is missing to the last one, as places in their run.
+/// Returns the range from the first missing page to the last, as indices in the run.
 pub(super) fn missing(kept: &[Option<Vec<u8>>]) -> Option<Range<u64>> {
     let first = kept.iter().position(Option::is_none)?;
     let last = kept.iter().rposition(Option::is_none)?;
     Some(first as u64..last as u64 + 1)
 }
 
-/// The bytes of a run: those of the pages before and behind what came, and what came.
+/// Joins the received bytes with the stored pages before and after them.
 pub(super) fn joined(kept: &[Option<Vec<u8>>], came: &Range<u64>, bytes: &[u8]) -> Vec<u8> {
     let pages = |pages: &[Option<Vec<u8>>]| pages.iter().flatten().flatten().copied().collect();
     let before: Vec<u8> = pages(&kept[..came.start as usize]);
@@ -84,7 +84,7 @@ mod tests {
         let all = kept.get(0..6);
         assert_eq!(missing(&all), None);
         assert!(joined(&all, &(6..6), &[]) == file);
-        // Of the same file in another state nothing is found.
+        // Nothing is found for another state of the same file.
         let other = PagesOnDisk::new(&disk, "file now".into(), file.len() as u64);
         assert_eq!(missing(&other.get(0..6)), Some(0..6));
     }

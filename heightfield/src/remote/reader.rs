@@ -1,4 +1,4 @@
-//! A remote file read from its beginning to its end.
+//! Sequential reading of a remote file.
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::iter::once;
@@ -6,22 +6,20 @@ use std::sync::Arc;
 
 use super::RemoteFile;
 
-/// Bytes that are fetched ahead of what is read: what comes in order is waited for once,
-/// not once a page.
+/// Prefetched bytes: a sequential read waits once, not once per page.
 const AHEAD: u64 = 4 << 20;
 
-/// No more than this is read from the beginning on, bytes: what a server says of a file's
-/// size may be wrong.
+/// Max bytes of a sequential read: the file size from a server may be wrong.
 const MAX_IN_ORDER: u64 = 1 << 30;
 
-/// Reads a remote file from any place on.
+/// A reader of a remote file from any offset.
 pub(crate) struct RemoteReader {
     file: Arc<RemoteFile>,
     at: u64,
 }
 
 impl RemoteReader {
-    /// Begins at the first byte.
+    /// Returns a reader at the first byte.
     pub(crate) const fn new(file: Arc<RemoteFile>) -> Self {
         Self { file, at: 0 }
     }
@@ -38,7 +36,7 @@ impl Read for RemoteReader {
             let why = "it is larger than 1 GB, and its format is read as a whole";
             return Err(Error::new(ErrorKind::Unsupported, why));
         }
-        // The first bytes may be all that is looked at.
+        // The caller may need only the first bytes.
         if self.at > 0 {
             self.file.want(once(self.at..self.at.saturating_add(AHEAD)));
         }

@@ -1,10 +1,9 @@
-//! Redirects of servers, and which of them are followed: none leaves https, and none takes a
-//! request with a key to another host.
+//! The choice of redirects to follow: none from https to http, and none with a key to another host.
 
 use reqwest::Url;
 use reqwest::header::{HeaderMap, HeaderName};
 
-/// Headers that open nothing; any other may be a key.
+/// Headers that are not keys; any other may be one.
 const WITHOUT_KEY: [&str; 9] = [
     "accept",
     "content-length",
@@ -17,7 +16,7 @@ const WITHOUT_KEY: [&str; 9] = [
     "user-agent",
 ];
 
-/// Reason for which a redirect is not followed.
+/// Reason why a redirect is not followed.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum RedirectError {
     #[error(
@@ -34,8 +33,7 @@ pub(super) enum RedirectError {
     TooMany,
 }
 
-/// Returns true if a request opens more than a public one could: by a header, a password, or what
-/// follows the path of its URL.
+/// Returns true if a request may contain a key: in a header, a password, or the URL's query.
 pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
     let may_be_key = |name: &HeaderName| !WITHOUT_KEY.contains(&name.as_str());
     let in_url = url.query().is_some() || url.password().is_some() || !url.username().is_empty();
@@ -45,7 +43,7 @@ pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
 /// Returns the target of a redirect.
 ///
 /// # Errors
-/// The reason for which it is not followed.
+/// The reason why it is not followed.
 pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url, RedirectError> {
     let to = from.join(location).map_err(|_| RedirectError::NoUrl)?;
     let host = match (to.scheme(), to.host_str()) {
@@ -61,7 +59,7 @@ pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url,
     Ok(to)
 }
 
-/// Returns true if both are at one server, also where it continues from http to https.
+/// Returns true if both are on one server, even if the redirect is from http to https.
 fn is_same_host(from: &Url, to: &Url) -> bool {
     let port = |url: &Url| url.port_or_known_default();
     let goes_on_encrypted = (port(from), port(to)) == (Some(80), Some(443));

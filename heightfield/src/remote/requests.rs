@@ -1,5 +1,5 @@
-//! Requests: redirects are followed by the rules of `redirects`, and answers that are
-//! no files are cut, because the library would keep an endless error page until memory ends.
+//! Requests: redirects follow the rules of `redirects`, and the bodies of errors are truncated,
+//! because the library would read an endless error page until memory is full.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -18,12 +18,12 @@ use reqwest::{Client, NoProxy, Proxy, Url};
 
 use super::redirects::{self, RedirectError};
 
-/// Bytes that are read of an answer that is no file; some hundred of them are shown.
+/// Max bytes of an error's body; some hundred of them are shown.
 const MAX_ERROR_BYTES: usize = 1 << 16;
-/// Redirects that are followed one after the other, at most.
+/// Max number of successive redirects.
 const MAX_REDIRECTS: usize = 10;
 
-/// Makes clients for servers.
+/// A factory of clients for servers.
 #[derive(Debug, Default)]
 pub(super) struct Connector;
 
@@ -37,11 +37,11 @@ impl HttpConnector for Connector {
     }
 }
 
-/// A client that follows no redirects by itself: it would send keys and a `Referer` along.
+/// Creates a client that does not follow redirects itself: it would send keys and a `Referer`.
 fn client(options: &ClientOptions) -> reqwest::Result<Client> {
     let value = |key: Key| options.get_config_value(&key);
     let is_on = |key: Key| value(key).is_some_and(|text| text.parse() == Ok(true));
-    // All are stated in whole seconds (`servers`), or are the library's own second.
+    // All are in whole seconds (`servers`), or the library's default of one second.
     let seconds = |key: Key| {
         let text = value(key)?;
         let digits = text.split(|c: char| !c.is_ascii_digit()).next()?;
@@ -81,7 +81,7 @@ fn client(options: &ClientOptions) -> reqwest::Result<Client> {
     builder.build()
 }
 
-/// Makes requests as the module says.
+/// Makes requests by the module's rules.
 #[derive(Debug)]
 struct Requests(HttpClient);
 
@@ -105,7 +105,7 @@ impl HttpService for Requests {
 }
 
 impl Requests {
-    /// The answer at the end of all redirects.
+    /// Returns the response after all redirects.
     async fn followed(&self, mut request: HttpRequest) -> Result<HttpResponse, HttpError> {
         for _ in 0..=MAX_REDIRECTS {
             let response = self.0.execute(request.clone()).await?;
@@ -113,7 +113,7 @@ impl Requests {
             let (true, Some(location)) = (response.status().is_redirection(), location) else {
                 return Ok(response);
             };
-            // What is sent goes nowhere else.
+            // Requests that send data are not redirected.
             if !request.method().is_safe() {
                 return Ok(response);
             }
@@ -134,12 +134,11 @@ fn next(request: &HttpRequest, location: &str) -> Result<Url, RedirectError> {
 }
 
 fn refused(why: RedirectError) -> HttpError {
-    // Of this kind no request is made again.
+    // Errors of this kind are not retried.
     HttpError::new(HttpErrorKind::Unknown, why)
 }
 
-/// The same answer, and [`MAX_ERROR_BYTES`] of it at most. An answer that breaks off is the
-/// part that came.
+/// Truncates a response to [`MAX_ERROR_BYTES`]. If it breaks off, the received part is returned.
 async fn cut(response: HttpResponse) -> HttpResponse {
     let (parts, body) = response.into_parts();
     let mut stream = body.bytes_stream();

@@ -1,4 +1,4 @@
-//! The servers of URLs: how each is asked, and with which key of the environment.
+//! The servers of URLs: the protocol of each, and its key from the environment.
 
 use std::io::{Error, ErrorKind, Result};
 use std::num::NonZeroUsize;
@@ -17,28 +17,27 @@ use super::errors::wrong;
 use super::requests::Connector;
 use super::url::without_rest;
 
-/// A request is given up after so long, and when nothing comes for so long.
+/// Time-outs of a request: in total, without data, and for the connection.
 const REQUEST: &str = "60 seconds";
 const SILENCE: &str = "10 seconds";
 const CONNECT: &str = "5 seconds";
-/// So often, and in all for so long, a request is made again that the server could not
-/// answer.
+/// Max retries of a request after a server error, and their max total time.
 const RETRIES: usize = 3;
 const RETRIES_SECONDS: u64 = 15;
 
-/// Servers that are kept at once.
+/// Max cached servers.
 const MAX_SERVERS: NonZeroUsize = NonZeroUsize::new(64).unwrap();
 
-/// A server, or a bucket of one.
+/// A server, or a bucket on one.
 type Server = Arc<dyn ObjectStore>;
 
-/// The server of a URL, and the path there. All files of a server share it, with the lines to
-/// it that are open and the token that it gave for a key: each file would ask for its own.
+/// Returns the server of a URL, and the path there. All files of a server share its open
+/// connections and its access token, so that these are not requested for each file.
 pub(super) fn at(url: &str) -> Result<(Server, Path)> {
     static KNOWN: LazyLock<Mutex<LruCache<String, Server>>> =
         LazyLock::new(|| Mutex::new(LruCache::new(MAX_SERVERS)));
     let (server, path) = parts(url)?;
-    // A panic of the library's leaves it as it was.
+    // A panic in the library does not change the cache.
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(server) = known.get(&server) {
         return Ok((server.clone(), path));
@@ -48,7 +47,7 @@ pub(super) fn at(url: &str) -> Result<(Server, Path)> {
     Ok((made, path))
 }
 
-/// Returns the parts of a URL: the server, with the key after the path, and the path.
+/// Splits a URL into the server, including any key after the path, and the path.
 fn parts(url: &str) -> Result<(String, Path)> {
     let (scheme, rest) = url.split_once("://").unwrap_or_default();
     let scheme = scheme.to_ascii_lowercase();
@@ -60,7 +59,7 @@ fn parts(url: &str) -> Result<(String, Path)> {
     let (host, path) = named.split_at(named.find('/').unwrap_or(named.len()));
     let path = Path::from_url_path(path).map_err(|error| wrong(&error))?;
     let query = rest[named.len()..].split('#').next().unwrap_or_default();
-    // Of a bucket the key is in the environment.
+    // For a bucket, the key is in the environment.
     let query = if scheme.starts_with("http") {
         query
     } else {
@@ -73,7 +72,7 @@ fn made(url: &str) -> Result<Server> {
     use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
     static CHOSEN: Once = Once::new();
     CHOSEN.call_once(|| {
-        // Another thread's choice is as good.
+        // Another thread may have installed the same one.
         let _ = rustls::crypto::ring::default_provider().install_default();
     });
     let retry = RetryConfig {
@@ -118,7 +117,7 @@ fn made(url: &str) -> Result<Server> {
     })
 }
 
-/// Returns the settings of Microsoft's servers from the environment, also by the names that only
+/// Returns the settings of Microsoft's servers from the environment, including variables that only
 /// Microsoft's own command uses.
 fn microsofts() -> MicrosoftAzureBuilder {
     let names = [

@@ -1,4 +1,4 @@
-//! State that all remote files of a terrain share: the pages in memory, and the limit of concurrent
+//! State shared by all remote files of a terrain: the pages in memory, and the limit of concurrent
 //! requests.
 
 use std::collections::HashMap;
@@ -14,16 +14,16 @@ use super::OUTAGE;
 use super::pages::Pages;
 use crate::disk_cache::DiskCache;
 
-/// Requests under way at once.
+/// Max concurrent requests.
 const AT_ONCE: usize = 16;
 
-/// Shared by the files of a terrain.
+/// State shared by the files of a terrain.
 pub(super) struct SharedPages {
     is_touched: AtomicBool,
     requests: Semaphore,
     files: AtomicU64,
     held: Mutex<Held>,
-    /// Place where pages are kept for another run.
+    /// Disk cache of pages for later runs.
     disk: OnceLock<DiskCache>,
     pub(super) arrived: Condvar,
 }
@@ -38,9 +38,9 @@ pub(super) struct Held {
 
 /// Fault of a file.
 pub(super) enum Trouble {
-    /// Its last request failed, then, and why; another may go well.
+    /// Time and reason of the last failed request; a retry may succeed.
     Outage(Instant, String),
-    /// Reason for which no request can go well any more.
+    /// Reason why all further requests fail.
     Lost(String),
 }
 
@@ -58,18 +58,18 @@ impl Default for SharedPages {
 }
 
 impl SharedPages {
-    /// A number for another file.
+    /// Returns a new file number.
     pub(super) fn number(&self) -> u64 {
         self.files.fetch_add(1, Ordering::Relaxed)
     }
 
     /// Returns the pages in memory.
     pub(super) fn held(&self) -> MutexGuard<'_, Held> {
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has pages kept for another run; the first folder that is named counts.
+    /// Sets the disk cache for later runs; only the first call has an effect.
     pub(super) fn set_disk_cache(&self, disk: &DiskCache) {
         let _ = self.disk.set(disk.clone());
     }
@@ -79,7 +79,7 @@ impl SharedPages {
         self.disk.get().filter(|disk| disk.is_on())
     }
 
-    /// The terrain is open: from now on errors are reported.
+    /// Marks the terrain as open: from now on errors are logged.
     pub(super) fn touch(&self) {
         self.is_touched.store(true, Ordering::Relaxed);
     }
@@ -89,16 +89,16 @@ impl SharedPages {
         self.is_touched.load(Ordering::Relaxed)
     }
 
-    /// Waits until there are few enough requests under way.
+    /// Waits until there are fewer than `AT_ONCE` requests.
     pub(super) async fn turn(&self) -> Option<SemaphorePermit<'_>> {
         self.requests.acquire().await.ok()
     }
 }
 
-/// Returns the runtime that fetches, for the whole program and its lifetime.
+/// Returns the runtime for requests, which exists as long as the program.
 ///
 /// # Errors
-/// If the system has no thread for it.
+/// If the system cannot start its thread.
 pub(super) fn background() -> Result<&'static Runtime> {
     static BACKGROUND: OnceLock<std::result::Result<Runtime, String>> = OnceLock::new();
     let made = BACKGROUND.get_or_init(|| {
@@ -110,7 +110,7 @@ pub(super) fn background() -> Result<&'static Runtime> {
     made.as_ref().map_err(|why| Error::other(why.clone()))
 }
 
-/// Does something in the background, and `then` takes what came of it, in any case.
+/// Runs `work` in the background, and calls `then` with its result, even after a panic.
 pub(super) fn spawn<T: Send + 'static>(
     background: &'static Runtime,
     work: impl Future<Output = Result<T>> + Send + 'static,
@@ -118,7 +118,7 @@ pub(super) fn spawn<T: Send + 'static>(
 ) {
     let work = background.spawn(work);
     background.spawn(async move {
-        // A panic of the library's is an error like others.
+        // A panic in the library becomes an error.
         let done = work.await;
         then(done.unwrap_or_else(|error| Err(Error::new(OUTAGE, error.to_string()))));
     });

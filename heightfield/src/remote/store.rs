@@ -12,26 +12,26 @@ use super::errors::{at_opening, is_without_ranges, told};
 use super::servers::at;
 use super::{LOST, OUTAGE, pages};
 
-/// A file at a server, in the state in which it was opened.
+/// A file on a server, in its state at opening.
 #[derive(Debug)]
 pub(super) struct Object {
     url: String,
     store: Arc<dyn ObjectStore>,
     path: Path,
-    /// As it was when it was opened.
+    /// Its metadata at opening.
     was: ObjectMeta,
 }
 
-/// A file that was opened, and its first bytes.
+/// An opened file, and its first bytes.
 pub(super) struct Opened {
     pub(super) object: Object,
-    /// The first page, or all of the file where it is shorter or cannot be read in ranges.
+    /// The first page, or the whole file if it is shorter or its server does not support ranges.
     pub(super) first: Vec<u8>,
-    /// True if that is all of it.
+    /// True if `first` is the whole file.
     pub(super) is_all: bool,
 }
 
-/// Opens the file at a URL. One request tells how long it is and how it begins.
+/// Opens the file at a URL. One request returns its size and its first bytes.
 pub(super) async fn open(url: &str) -> Result<Opened> {
     let (store, path) = at(url)?;
     let first = GetOptions {
@@ -59,7 +59,7 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
     }
 }
 
-/// A server without ranges sends all of a file, which then is held in memory.
+/// Reads a whole file into memory, from a server without ranges.
 async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Opened> {
     const LARGEST: u64 = 256 << 20;
     let got = store.get_opts(&path, GetOptions::default()).await;
@@ -86,13 +86,13 @@ async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Ope
 }
 
 impl Object {
-    /// Bytes of the file.
+    /// Returns the size of the file, bytes.
     pub(super) const fn len(&self) -> u64 {
         self.was.size
     }
 
-    /// Returns the stamp of the file in the state in which it was opened; `None` where the
-    /// server tells neither tag nor time.
+    /// Returns the stamp of the file's state at opening; `None` if the server sends neither tag nor
+    /// time.
     pub(super) fn stamp(&self) -> Option<String> {
         let was = &self.was;
         let tells = was.e_tag.is_some() || was.last_modified.timestamp() > 0;
@@ -100,10 +100,10 @@ impl Object {
         tells.then(|| format!("{:?} {} {:?} {time}", self.url, was.size, was.e_tag))
     }
 
-    /// Some of its bytes, all of them inside the file.
+    /// Fetches a byte range inside the file.
     ///
     /// # Errors
-    /// [`super::is_outage`] where another try may go well; else nothing more comes of it.
+    /// [`super::is_outage`] if a retry may succeed; otherwise the file cannot be read any more.
     pub(super) async fn get(&self, range: Range<u64>) -> Result<Vec<u8>> {
         let options = GetOptions {
             range: Some(GetRange::Bounded(range.clone())),
@@ -123,7 +123,7 @@ impl Object {
     }
 }
 
-/// The bytes of an answer: those of the range, however many the server sends.
+/// Returns the bytes of a response, limited to the range.
 async fn body(got: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
     let wanted = range.end - range.start;
     let mut bytes = Vec::new();

@@ -1,4 +1,4 @@
-//! The parts of a URL, as far as file names have them.
+//! The parts of a URL that matter for file names.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ pub fn is_url(name: &str) -> bool {
     scheme.len() > 1 && scheme.chars().all(is_word) && !rest.is_empty()
 }
 
-/// A path or URL as it is shown to the user: without a key.
+/// Returns a path or URL for display, without a key.
 pub fn without_key(path: &Path) -> String {
     let text = path.display().to_string();
     match is_url(&text) {
@@ -20,7 +20,7 @@ pub fn without_key(path: &Path) -> String {
     }
 }
 
-/// The same of a URL: neither what follows its path nor a name and password before the host.
+/// Returns a URL without its query and without name and password.
 pub(super) fn in_text(url: &str) -> String {
     let (scheme, rest) = without_rest(url).split_once("://").unwrap_or(("", url));
     let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
@@ -28,18 +28,17 @@ pub(super) fn in_text(url: &str) -> String {
     format!("{scheme}://{host}{path}")
 }
 
-/// A URL without what follows its path, which may be a key that opens it.
+/// Returns a URL without its query or fragment, which may be a key.
 pub(crate) fn without_rest(url: &str) -> &str {
     split(url).0
 }
 
-/// The last part of a URL's path.
+/// Returns the last part of a URL's path.
 pub fn file_name(url: &str) -> &str {
     without_rest(url).rsplit('/').next().unwrap_or_default()
 }
 
-/// The URLs that a file beside another may have: with another extension, and with one
-/// behind its own.
+/// Returns the URLs of a file beside another: with its extension replaced, and with one appended.
 pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
     let (path, rest) = split(url);
     let name = file_name(url);
@@ -51,8 +50,8 @@ pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
     ]
 }
 
-/// A URL up to the slash behind its host or bucket, its path from there, and what follows, which may
-/// be a key.
+/// Splits a URL: up to the slash after its host or bucket, the path, and the rest, which may be a
+/// key.
 pub(crate) fn parts(url: &str) -> [&str; 3] {
     let (named, rest) = split(url);
     let host = named.find("://").map_or(0, |at| at + 3);
@@ -62,7 +61,7 @@ pub(crate) fn parts(url: &str) -> [&str; 3] {
     [&named[..path], &named[path..], rest]
 }
 
-/// Beginnings of the names that GDAL has for what is at the same host or in the same bucket; one
+/// Returns the prefixes of GDAL's names for files at the same host or in the same bucket; a prefix
 /// that contains another comes before it.
 pub(crate) fn gdal_names(root: &str) -> Vec<String> {
     let (scheme, host) = root.split_once("://").unwrap_or_default();
@@ -75,7 +74,7 @@ pub(crate) fn gdal_names(root: &str) -> Vec<String> {
     vec![of_gdal, root.to_owned()]
 }
 
-/// Up to the path's end, and what follows.
+/// Splits a URL at the end of its path.
 fn split(url: &str) -> (&str, &str) {
     url.split_at(url.find(['?', '#']).unwrap_or(url.len()))
 }

@@ -1,4 +1,4 @@
-//! The header: keys in any order and case, each followed by its number.
+//! The header: keys in any order and case, each followed by a number.
 
 use std::collections::HashMap;
 use std::io::Read;
@@ -7,20 +7,20 @@ use super::tokens::Tokens;
 use crate::RasterError;
 use crate::numbers::number;
 
-/// The key of the value that means no data.
+/// Key of the no-data value.
 const NO_DATA: &str = "nodata";
-/// Esri's default for no data.
+/// Esri's default no-data value.
 const DEFAULT_NO_DATA: f64 = -9999.0;
 
-/// The header's numbers, unchecked, each under the first of its key's spellings.
+/// The header's numbers, unchecked, by the first spelling of each key.
 #[derive(Debug, Default)]
 pub(super) struct Header {
     numbers: HashMap<&'static str, f64>,
-    /// Its word for no data, where that is no number: samples have it, too.
+    /// Its no-data value, if it is a word and not a number: samples use the same word.
     pub(super) no_data_word: Option<String>,
 }
 
-/// A key in lower case as its first spelling; `None` where there is no such key.
+/// Returns the first spelling of a lower-case key; `None` if it is unknown.
 fn known(key: &str) -> Option<&'static str> {
     Some(match key {
         "ncols" => "ncols",
@@ -83,20 +83,20 @@ impl Header {
         self.numbers.get(key).copied()
     }
 
-    /// Columns and rows, as far as numbers of samples go.
+    /// Returns columns and rows.
     pub(super) fn size(&self) -> Result<(u32, u32), RasterError> {
         Ok((self.count("ncols")?, self.count("nrows")?))
     }
 
-    /// Size of a cell, west to east and south to north.
+    /// Returns the size of a cell, west to east and south to north.
     pub(super) fn cell(&self) -> Result<(f64, f64), RasterError> {
         let east = self.side("dx")?;
         let north = self.side("dy")?;
         Ok((east, north))
     }
 
-    /// The south-west corner of the field of `east × north` cells: stated as such, or
-    /// as the centre of the cell there.
+    /// Returns the south-west corner of the field of `east × north` cells, stated as a corner or as
+    /// the centre of its cell.
     pub(super) fn south_west(&self, (east, north): (f64, f64)) -> Option<(f64, f64)> {
         let side = |corner, centre, step: f64| {
             let by_centre = || self.get(centre).map(|at| at - step / 2.0);
@@ -106,12 +106,12 @@ impl Header {
         Some((west, side("yllcorner", "yllcenter", north)?))
     }
 
-    /// The value that means no data.
+    /// Returns the no-data value.
     pub(super) fn no_data(&self) -> f64 {
         self.get(NO_DATA).unwrap_or(DEFAULT_NO_DATA)
     }
 
-    /// Returns true if a word that is no number is the header's for no data.
+    /// Returns true if a word is the header's word for no-data.
     pub(super) fn means_none(&self, word: &str) -> bool {
         self.no_data_word.as_deref() == Some(word)
     }
@@ -126,7 +126,7 @@ impl Header {
         }
     }
 
-    /// A cell's side, under its own key or that of both sides.
+    /// Returns a cell's side, by its own key or the key of both sides.
     fn side(&self, key: &str) -> Result<f64, RasterError> {
         let both = "cellsize";
         match self

@@ -1,4 +1,4 @@
-//! Esri ASCII grids: a header of keys, then numbers in any layout of white space.
+//! Esri ASCII grids: a header of keys, then numbers separated by any white space.
 
 mod header;
 mod tokens;
@@ -25,14 +25,15 @@ pub(super) const FORMAT: Format = Format {
     decode: |input, _| decode(input),
 };
 
-/// Reads a grid. Every sample takes at least a digit and a separator, so the
-/// file's length bounds what is allocated whatever its header says.
+/// Reads a grid. Every sample takes at least a digit and a separator, so the file's length bounds
+/// the allocation whatever the header states.
 fn decode(input: &FileBytes) -> Result<Decoded, RasterError> {
     let mut tokens = Tokens::new(input.reader()?);
     let header = Header::read(&mut tokens)?;
     let (columns, rows) = header.size()?;
     let samples = match input.is_outline() {
-        // What the numbers need is not known before they are read; heights need no more.
+        // The type depends on the numbers, which are not read for an outline; `f32` is enough for
+        // heights.
         true => SampleType::F32.none(),
         false => values::read(&mut tokens, &header, columns, rows, input.len())?,
     };

@@ -1,4 +1,4 @@
-//! Layouts of Esri ASCII grids that other programs write, and what is refused.
+//! Layouts of Esri ASCII grids from other programs, and rejected ones.
 
 use super::decode;
 use crate::input::FileBytes;

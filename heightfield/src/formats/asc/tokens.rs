@@ -4,28 +4,28 @@ use std::io::{BufReader, Bytes, Read};
 
 use crate::RasterError;
 
-/// No number or key is longer; what is, is not text.
+/// Longer words are neither numbers nor keys: the file is not text.
 const MAX_WORD: usize = 128;
 
-/// Hands out one word at a time.
+/// A reader of one word at a time.
 pub(super) struct Tokens<R> {
     bytes: Bytes<BufReader<R>>,
     word: Vec<u8>,
-    /// The current word is handed out once more.
+    /// True if the current word is returned again.
     again: bool,
 }
 
 impl<R: Read> Tokens<R> {
     pub(super) fn new(reader: R) -> Self {
         Self {
-            // Its own buffer makes a byte cheap, whatever the reader is.
+            // This buffer makes reading single bytes fast for any reader.
             bytes: BufReader::with_capacity(1 << 16, reader).bytes(),
             word: Vec::new(),
             again: false,
         }
     }
 
-    /// The next word, or `None` at the end of the file.
+    /// Returns the next word, or `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<&str>, RasterError> {
         if !std::mem::take(&mut self.again) {
             self.read_word()?;
@@ -39,7 +39,7 @@ impl<R: Read> Tokens<R> {
         }
     }
 
-    /// The word handed out last is handed out again.
+    /// Makes `next` return the last word again.
     pub(super) fn put_back(&mut self) {
         self.again = true;
     }
@@ -63,7 +63,7 @@ impl<R: Read> Tokens<R> {
     }
 }
 
-/// White space, and what editors of other times put at the ends of files.
+/// Returns true for white space, and for end-of-file bytes of old editors.
 fn is_space(byte: u8) -> bool {
     byte.is_ascii_whitespace() || matches!(byte, 0x0b | 0x1a | 0x00)
 }

@@ -1,4 +1,4 @@
-//! The samples: kept as 16-bit integers until one does not fit.
+//! The samples: stored as 16-bit integers until one does not fit.
 
 use std::io::Read;
 
@@ -8,10 +8,10 @@ use crate::numbers::number;
 use crate::samples::{SampleValue, with_samples};
 use crate::{RasterError, Samples};
 
-/// Integers up to this are exact in an `f32`.
+/// Integers up to this size are exact in an `f32`.
 const EXACT_IN_F32: f64 = 16_777_216.0;
 
-/// Reads `columns × rows` numbers and makes sure that no more follow.
+/// Reads `columns × rows` numbers, and checks that no more follow.
 pub(super) fn read<R: Read>(
     tokens: &mut Tokens<R>,
     header: &Header,
@@ -19,8 +19,8 @@ pub(super) fn read<R: Read>(
     rows: u32,
     file_bytes: u64,
 ) -> Result<Samples, RasterError> {
-    // The cell size is checked first: a wrong header is a better message than
-    // a sample that follows from it.
+    // The cell size is checked first: the error of a wrong header explains more than that of a
+    // wrong sample.
     header.cell()?;
     let promised = u64::from(columns) * u64::from(rows);
     let possible = promised.min(file_bytes / 2 + 1);
@@ -55,11 +55,11 @@ pub(super) fn read<R: Read>(
     Ok(growing.samples)
 }
 
-/// Samples whose type widens when a number does not fit: int16, then int32, then
-/// float32, or float64 when integers came that a float32 would round.
+/// Samples whose type widens when a number does not fit: int16, then int32, then float32, or
+/// float64 if there are integers that a float32 would round.
 struct Growing {
     samples: Samples,
-    /// Largest size of the whole numbers read.
+    /// Max magnitude of the integers read.
     largest: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Esri's headers: a key and its value a line, of `.flt` grids and of `.bil`, `.bip` and
-//! `.bsq` images.
+//! Esri's headers: a key and its value per line, for `.flt` grids and for `.bil`, `.bip` and `.bsq`
+//! images.
 
 use std::collections::HashMap;
 
@@ -11,18 +11,18 @@ use crate::numbers::{self, NoDataText};
 use crate::read::Stored;
 use crate::{Endian, RasterError, SampleType};
 
-/// Returns true if a text is such a header: it says how many columns and rows there are.
+/// Returns true if a text is such a header: it has the number of columns and rows.
 pub(super) fn is_header(text: &str) -> bool {
     let keys = Keys::read(text);
     keys.0.contains_key("ncols") && keys.0.contains_key("nrows")
 }
 
-/// The values by their keys in lower case.
+/// Values by lower-case key.
 struct Keys(HashMap<String, String>);
 
-/// Reads a header for data with an extension, of so many bytes. Where it does not state the type,
-/// the length of the data tells the bytes of a sample: four and more are floats, as in GDAL, and
-/// integers have a sign when the no-data value has one.
+/// Reads a header for data with an extension and a size in bytes. If it does not state the type,
+/// the data's size defines the bytes of a sample: four and more are floats, as in GDAL, and
+/// integers are signed if the no-data value is negative.
 pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, RasterError> {
     let keys = Keys::read(text);
     let (columns, rows) = (keys.count("ncols")?, keys.count("nrows")?);
@@ -58,7 +58,7 @@ pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, Ra
         },
         interleave,
         skip,
-        // Of one band the rows of all bands and of the band are the same.
+        // For a single band, the rows of all bands and of the band are the same.
         row_bytes: keys.bytes("totalrowbytes")?,
         band_row_bytes: keys.bytes("bandrowbytes")?,
         band_gap: keys.bytes("bandgapbytes")?.unwrap_or(0),
@@ -133,8 +133,8 @@ impl Keys {
         text.map_or(NoDataText::default(), |text| numbers::no_data(text, 0, 1))
     }
 
-    /// The type of a sample, and a remark where nothing states it; `by_length` are the bytes that
-    /// the length of the data leaves for one.
+    /// Returns the type of a sample, with a remark if it is not stated; `by_length` is the size of
+    /// a sample by the data's size, bytes.
     fn stored(
         &self,
         extension: &str,
@@ -174,8 +174,8 @@ impl Keys {
         Ok((stored, remark))
     }
 
-    /// By the centre of the north-western sample (images) or the south-western corner
-    /// (grids).
+    /// Returns the map, from the centre of the north-western sample (images) or the south-western
+    /// corner (grids).
     fn map(&self, rows: u32) -> Result<Option<GroundMap>, RasterError> {
         let cell = self.number("cellsize")?;
         let side = |key| Ok::<_, RasterError>(self.number(key)?.or(cell));
@@ -219,7 +219,7 @@ fn sample_type(kind: char, bits: u32) -> Result<SampleType, RasterError> {
     })
 }
 
-/// Bits and kind of a type as NOAA names it: `2_BYTE_INTEGER`, `4_BYTE_FLOAT`.
+/// Returns bits and kind of a type in NOAA's notation: `2_BYTE_INTEGER`, `4_BYTE_FLOAT`.
 fn number_type(name: &str) -> Result<(u32, char), RasterError> {
     let (bytes, kind) = name.split_once("_byte_").unwrap_or_default();
     let kind = match kind {

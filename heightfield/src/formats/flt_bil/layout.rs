@@ -7,15 +7,15 @@ use crate::{Endian, RasterError};
 /// Interleaving of several bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interleave {
-    /// A row of each band after another.
+    /// By row: a row of each band in turn.
     Line,
-    /// A sample of each band after another.
+    /// By sample: a sample of each band in turn.
     Pixel,
-    /// A band after another.
+    /// Whole bands, one after another.
     Sequential,
 }
 
-/// Layout of the samples: all lengths in bytes.
+/// Layout of the samples; all lengths in bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) columns: u32,
@@ -24,18 +24,18 @@ pub(super) struct Layout {
     pub(super) stored: Stored,
     pub(super) endian: Endian,
     pub(super) interleave: Interleave,
-    /// Before the first sample.
+    /// Bytes before the first sample.
     pub(super) skip: u64,
-    /// From row to row of all bands (of one band where a band follows another); `None`
-    /// where nothing lies between.
+    /// Step between rows of all bands (of one band for `Sequential`); `None` if there is no
+    /// padding.
     pub(super) row_bytes: Option<u64>,
-    /// From band to band within a row, for rows of each band after another.
+    /// Step between bands within a row, for `Line`.
     pub(super) band_row_bytes: Option<u64>,
-    /// Between bands that follow each other.
+    /// Gap between bands, for `Sequential`.
     pub(super) band_gap: u64,
 }
 
-/// Positions of a band's samples, in bytes.
+/// Positions of a band's samples, bytes.
 struct Steps {
     first: u64,
     row: u64,
@@ -43,7 +43,7 @@ struct Steps {
 }
 
 impl Layout {
-    /// Checks that the file holds what the header beside it, of a name, promises.
+    /// Checks that the file holds the samples that the header `header` states.
     pub(super) fn check(&self, band: u32, bytes: u64, header: &str) -> Result<(), RasterError> {
         if band > self.bands {
             let there = match self.bands {
@@ -69,13 +69,13 @@ impl Layout {
         self.check_rest(bytes, header)
     }
 
-    /// Checks that no whole row lies behind what the header promises: it would be of another type
-    /// or size of samples.
+    /// Checks that no whole row follows the stated samples: it would mean another sample type or
+    /// size.
     fn check_rest(&self, bytes: u64, header: &str) -> Result<(), RasterError> {
         let (columns, rows, bands) = (self.columns, self.rows, self.bands);
         let row = u64::from(columns).saturating_mul(self.stored.bytes());
         let end = self.end(bands).unwrap_or(u64::MAX);
-        // What pads rows or bands pads the last one, too.
+        // Padding of rows or bands follows the last one, too.
         let padding = self.row_bytes.unwrap_or(0).saturating_add(self.band_gap);
         if bytes > end && bytes - end >= row.max(padding) {
             return Err(RasterError::damaged(format!(
@@ -88,21 +88,21 @@ impl Layout {
         Ok(())
     }
 
-    /// Returns the place where the last sample of a band ends; `None` where that cannot be counted.
+    /// Returns the end of a band's last sample; `None` on overflow.
     fn end(&self, band: u32) -> Option<u64> {
         let steps = self.steps(band)?;
         let last_row = u64::from(self.rows)
             .checked_sub(1)?
             .checked_mul(steps.row)?;
         let row = self.row_end(&steps)?;
-        // No header may let rows overlap: a small file would hold any number of them.
+        // Rows must not overlap: a small file could then state any number of them.
         if steps.row < row && self.rows > 1 {
             return None;
         }
         steps.first.checked_add(last_row)?.checked_add(row)
     }
 
-    /// Bytes from the first sample of a row to the end of its last.
+    /// Returns the bytes from the first sample of a row to the end of its last.
     fn row_end(&self, steps: &Steps) -> Option<u64> {
         let last = u64::from(self.columns)
             .checked_sub(1)?
@@ -146,7 +146,7 @@ impl Layout {
         })
     }
 
-    /// Returns the place where the samples of a band lie; the size has been checked.
+    /// Returns the positions of a band's samples; the size has been checked.
     pub(super) fn plain(&self, band: u32) -> Result<RawSamples, RasterError> {
         let uncounted = || RasterError::AbsurdSize("its header's sizes".into());
         let steps = self.steps(band).ok_or_else(uncounted)?;

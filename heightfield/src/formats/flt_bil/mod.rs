@@ -1,4 +1,4 @@
-//! Esri's `.flt`, `.bil`, `.bip` and `.bsq`: raw samples whose header is a text file beside them.
+//! Esri's `.flt`, `.bil`, `.bip` and `.bsq`: raw samples with a text file beside them as header.
 
 mod esri;
 mod layout;
@@ -12,7 +12,7 @@ use crate::input::FileBytes;
 use crate::{OpenOptions, RasterError, beside};
 use layout::Layout;
 
-/// Extensions of such data. The header decides where another file has one, too.
+/// Such data, by extension. A header also decides for files with other extensions.
 pub(super) const FORMAT: Format = Format {
     name: "raster with a .hdr",
     begins: |_| false,
@@ -29,8 +29,8 @@ pub(super) const FORMAT: Format = Format {
     },
 };
 
-/// Returns true if a file begins as one of a kind that has no plain samples: a header of the same name
-/// beside it is that of another file.
+/// Returns true if a file begins like a kind without plain samples: a header of the same name
+/// belongs to another file.
 pub(crate) fn is_of_another_kind(head: &[u8]) -> bool {
     const BEGINNINGS: [&[u8]; 7] = [
         b"SQLite format 3\0",
@@ -46,18 +46,18 @@ pub(crate) fn is_of_another_kind(head: &[u8]) -> bool {
         .any(|beginning| head.starts_with(beginning))
 }
 
-/// Sets what a header says besides the layout of the samples.
+/// Setter of the metadata in a header, besides the layout of the samples.
 type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), RasterError>>;
 
 /// Content of a header.
 struct Header {
     format: &'static str,
     layout: Layout,
-    /// Sets what the header says besides the layout.
+    /// Setter of the metadata besides the layout.
     describe: Describe,
 }
 
-/// Decodes a file by the header beside it; `None` where there is no such header.
+/// Decodes a file by the header beside it; `None` if there is no header.
 pub(crate) fn decode_by_header(
     input: &FileBytes,
     options: &OpenOptions,
@@ -93,7 +93,7 @@ pub(crate) fn decode_by_header(
     Ok(Some(decoded))
 }
 
-/// Damage of a header is not in the file that was named.
+/// Names the header in the error if the damage is there.
 fn in_header(fault: RasterError, name: &str) -> RasterError {
     match fault {
         RasterError::Damaged(what) => RasterError::Damaged(format!("{name} beside it: {what}")),

@@ -1,4 +1,4 @@
-//! Headers as GDAL and Esri's programs write them, and what is refused.
+//! Headers as GDAL and Esri's programs write them, and rejected ones.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use tempfile::TempDir;
 
 use crate::{CellUnit, Error, OpenOptions, Raster, RasterError, ReferenceSystem};
 
-/// A file and its header in a folder of their own.
+/// A file and its header in their own folder.
 struct Pair {
     folder: TempDir,
     data: &'static str,
@@ -34,7 +34,7 @@ impl Pair {
     }
 }
 
-/// Heights from the north-western sample on.
+/// Returns the heights, from the north-western sample on.
 fn heights(raster: &Raster) -> Vec<f64> {
     let rows = (0..raster.rows()).rev();
     rows.flat_map(|row| (0..raster.columns()).map(move |column| (column, row)))
@@ -115,7 +115,7 @@ fn bands_by_line_by_pixel_and_after_each_other() {
     }
 }
 
-/// A folder may have a database or a picture of the name that a header has.
+/// A folder may contain a database or a picture with the name of a header.
 #[test]
 fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
     let header = "NROWS 2\nNCOLS 2\nNBITS 8\n";
@@ -131,7 +131,7 @@ fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
     }
 }
 
-/// GTOPO30's `.DEM` is such an image, though USGS' models have the same extension.
+/// GTOPO30's `.DEM` is such an image, though USGS models have the same extension.
 #[test]
 fn a_header_beside_wins_over_the_extension() {
     let header = "BYTEORDER      M\nLAYOUT       BIL\nNROWS         2\nNCOLS         2\n\
@@ -149,7 +149,7 @@ fn a_header_beside_wins_over_the_extension() {
     );
 }
 
-/// Rows of each band after another, each with its own padding.
+/// Interleaved rows, each with its own padding.
 #[test]
 fn rows_of_bands_may_be_padded() {
     let header = "NROWS 2\nNCOLS 2\nNBANDS 2\nNBITS 8\nLAYOUT BIL\nBANDROWBYTES 3\n";
@@ -228,7 +228,7 @@ fn a_missing_header_is_named() {
         matches!(error.fault(), RasterError::HeaderMissing(name) if name == "dem.hdr"),
         "{error}"
     );
-    // A picture's own header format has the same extension.
+    // A picture format for radiance has the same extension.
     fs::write(folder.path().join("dem.hdr"), "#?RADIANCE\n").expect("written");
     let error = Raster::open(&path, &OpenOptions::default()).expect_err("another header");
     assert!(
@@ -237,7 +237,7 @@ fn a_missing_header_is_named() {
     );
 }
 
-/// NOAA's ETOPO1 states the type in words of its own.
+/// NOAA's ETOPO1 states the type in its own words.
 #[test]
 fn number_type_and_unit_are_read() {
     let header = "NCOLS 3\nNROWS 2\nXLLCENTER -10\nYLLCENTER 40\nCELLSIZE 0.5\n\
@@ -287,6 +287,6 @@ fn length_that_contradicts_the_header_is_refused() {
     );
     assert!(told("NBITS 8\nNUMBERTYPE 2_BYTE_INTEGER\n", 12).contains("nbits is 8"));
     assert!(told("NUMBERTYPE 3_BYTE_COLOUR\n", 12).contains("3_byte_colour"));
-    // What some programs add behind the samples is less than a row.
+    // Some programs append less than a row after the samples.
     assert_eq!(told("NBITS 16\n", 14), "");
 }

@@ -1,5 +1,5 @@
-//! Files at URLs, which GDAL reads through this program's own client: keys, redirects, pages and
-//! time limits are the same as of files that are read here.
+//! Files at URLs, which GDAL reads through this program's own client, with the same keys,
+//! redirects, pages and time limits as files that are read here.
 
 use std::fs::File;
 use std::io::{self, copy};
@@ -14,17 +14,17 @@ use crate::beside;
 use crate::input::FileBytes;
 use crate::remote::{RemoteFetcher, RemoteFile, file_name, gdal_names, parts};
 
-/// Beginnings of files that GDAL reads from a disk only (NetCDF, HDF5, HDF4), or from their first
-/// byte on (gzip): they are fetched as a whole.
+/// First bytes of formats that GDAL reads only from a disk (NetCDF, HDF5, HDF4), or only
+/// sequentially (gzip): such files are downloaded whole.
 const FETCHED: [&[u8]; 4] = [
     b"CDF",
     b"\x89HDF\r\n\x1a\n",
     b"\x0e\x03\x13\x01",
     b"\x1f\x8b",
 ];
-/// No larger file is fetched as a whole.
+/// Max size of a file that is downloaded whole, bytes.
 const MAX_FETCHED_BYTES: u64 = 1 << 30;
-/// It takes no more than one of so many parts of what is free on the disk.
+/// It takes at most 1/`PARTS_OF_FREE` of the free disk space.
 const PARTS_OF_FREE: u64 = 2;
 
 /// The files at one host or in one bucket.
@@ -33,13 +33,13 @@ pub(super) struct Served {
     elsewhere: RemoteFetcher,
     /// As `https://host/`.
     root: String,
-    /// Query of each URL, which may be a key.
+    /// Query of each URL, possibly with a key.
     rest: String,
     roots: Arc<[String]>,
 }
 
 impl Served {
-    /// The server of a URL, and the file's name there.
+    /// Returns the server of a URL, and the file's name there.
     pub(super) fn of(url: &str, elsewhere: &RemoteFetcher) -> (Self, String) {
         let [root, name, rest] = parts(url);
         let served = Self {
@@ -94,24 +94,24 @@ fn io_error(fault: RasterError) -> io::Error {
     }
 }
 
-/// Returns the fault of a file that GDAL read through this program.
+/// Converts an error of a read by GDAL through this program.
 pub(super) fn fault(error: io::Error) -> RasterError {
     match error.kind() {
-        // A refusal of its content, and not of its server.
+        // An error of the content, not of the server.
         io::ErrorKind::Other => RasterError::Unreadable(error),
         _ => RasterError::Remote(error),
     }
 }
 
-/// Returns true if a file that begins so is fetched as a whole.
+/// Returns true if a file with these first bytes is downloaded whole.
 pub(super) fn is_fetched(head: &[u8]) -> bool {
     FETCHED.iter().any(|bytes| head.starts_with(bytes))
 }
 
-/// A file, and what GDAL notes beside it, in a folder that goes when it is dropped.
+/// Downloads a file and GDAL's notes beside it into a folder, which is deleted on drop.
 ///
 /// # Errors
-/// [`RasterError::AbsurdSize`] where it is too large for that.
+/// [`RasterError::AbsurdSize`] if it is too large for that.
 pub(super) fn fetched(
     url: &str,
     elsewhere: &RemoteFetcher,
@@ -138,7 +138,7 @@ pub(super) fn fetched(
     Ok((folder, name))
 }
 
-/// A name on every system, with the extension of the file at a URL.
+/// Returns a name that is valid on all systems, with the extension of the file at a URL.
 fn plain_name(url: &str) -> String {
     let plain = |c: char| match c.is_ascii_alphanumeric() || ".-_".contains(c) {
         true => c,

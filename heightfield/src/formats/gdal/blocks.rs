@@ -1,4 +1,4 @@
-//! A band that GDAL reads, block by block.
+//! A band that GDAL reads, in blocks.
 
 use std::hash::Hasher;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,10 +14,10 @@ use crate::raw_samples::{transposed, turned};
 use crate::samples::{HoleMask, SampleType, with_samples};
 use crate::{RasterError, subsampled};
 
-/// When a file that stays on disk is opened, so many places each way are looked at.
+/// Parts per direction that are read at opening, if a file stays on disk.
 const PLACES: u32 = 6;
 
-/// The type in which samples are held.
+/// Returns the type of the samples in memory.
 pub(super) const fn held(stored: Stored) -> SampleType {
     match stored {
         Stored::U8 => SampleType::U8,
@@ -32,7 +32,7 @@ pub(super) const fn held(stored: Stored) -> SampleType {
     }
 }
 
-/// Open dataset of a file, and how it is opened again.
+/// A file, and its name and options for reopening it.
 pub(super) struct Source {
     pub(super) place: Arc<Place>,
     /// GDAL's name for it.
@@ -40,20 +40,20 @@ pub(super) struct Source {
     pub(super) options: Vec<String>,
 }
 
-/// A band in its file. It is read by one thread, and no served reader waits for that one
-/// ([`Blocks`](crate::blocks::Blocks)).
+/// A band in its file. One thread at a time reads it, and readers of blocks in memory do not wait
+/// for that thread ([`Blocks`](crate::blocks::Blocks)).
 pub(super) struct GdalBlocks {
     source: Source,
-    /// GDAL is used by one thread at a time. None where its server has not answered: what GDAL then
-    /// remembers of it is wrong.
+    /// Used by one thread at a time. `None` after a failed request to the server, because GDAL's
+    /// cached state is then wrong.
     dataset: Mutex<Option<Dataset>>,
     /// Number of the band.
     number: u32,
     held: SampleType,
-    /// The first three bands are colours, and together the code of a height.
+    /// True if the first three bands are colours that encode the heights.
     has_codes: bool,
     images: Vec<BlockImage>,
-    /// Of each image but the full one, its number among the band's overviews.
+    /// For each image but the full one, its number among the band's overviews.
     overviews: Vec<usize>,
     is_masked: bool,
     index: u64,
@@ -79,7 +79,7 @@ impl GdalBlocks {
                 feature: format!("a file that is read {columns} × {rows} samples at once"),
             });
         }
-        // Those that GDAL would serve a coarse view of the band by.
+        // The overviews that GDAL would use for a coarse view of the band.
         let overviews = band.overviews();
         let mut coarser: Vec<_> = (0..overviews.len())
             .filter(|at| {
@@ -90,7 +90,7 @@ impl GdalBlocks {
             .collect();
         coarser.sort_by_key(|at| std::cmp::Reverse(overviews[*at].size()));
         coarser.dedup_by_key(|at| overviews[*at].size());
-        // The mean of encoded colours is no height.
+        // A mean of encoded colours is not a height.
         coarser.retain(|_| !has_codes);
         let images: Vec<_> = (coarser.iter().map(|at| image(&overviews[*at]))).collect();
         let mut hasher = XxHash64::with_seed(0);
@@ -161,7 +161,7 @@ impl GdalBlocks {
     }
 }
 
-/// An image in the program's own terms, in blocks of a few of GDAL's.
+/// Describes an image, in blocks of a few of GDAL's blocks.
 fn image(band: &Band<'_>) -> BlockImage {
     let [columns, rows] = band.size();
     let [across, down] = band.block_size();
@@ -192,7 +192,7 @@ impl BlockReader for GdalBlocks {
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
-        // A panic in between has changed nothing of it.
+        // A panic has not changed the state.
         let mut open = self.dataset.lock().unwrap_or_else(PoisonError::into_inner);
         let dataset = match open.take() {
             Some(dataset) => dataset,
@@ -211,7 +211,7 @@ impl BlockReader for GdalBlocks {
     }
 
     fn looks(&self) -> Option<Looks> {
-        // Overviews show all of it at once.
+        // Overviews cover the whole image.
         match &self.images[..] {
             [full] => Some(subsampled::places(full, PLACES)),
             _ => None,
@@ -232,7 +232,7 @@ fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, RasterError> 
     Ok(samples)
 }
 
-/// Samples that a mask or an alpha band calls none.
+/// Returns the samples that a mask or an alpha band marks as no-data.
 fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, RasterError> {
     let valid = read::<u8>(mask, part)?;
     let mut holes = HoleMask::with_capacity(valid.len());
@@ -242,7 +242,7 @@ fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, RasterError> {
     Ok(holes)
 }
 
-/// A band whose rows run from north to south: its samples are turned as they are read. Such bands
+/// A band stored with rows from north to south: its samples are transposed on reading. Such bands
 /// have neither masks nor overviews.
 pub(super) struct Turned {
     blocks: GdalBlocks,

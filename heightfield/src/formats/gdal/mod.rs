@@ -1,12 +1,11 @@
-//! All formats that nothing here reads, block by block, through a libgdal that is found when a file
-//! wants it. It is asked last, so that a machine with it reads nothing in another way than one
-//! without.
+//! All formats that are not implemented here, in blocks, through a libgdal that is loaded when a
+//! file needs it. It is tried last, so that all other files are read in the same way with and
+//! without it.
 //!
-//! A file goes through here in this order: GDAL gets a name for it, also where it is at a URL
-//! (`place`, `at_url`), an archive is looked into (`packed`), GDAL opens what
-//! was named or its label, one of several rasters is chosen, and its first band becomes blocks
-//! (`blocks`). What GDAL reads otherwise than its file means it is put right: NetCDF's depths and
-//! places (`netcdf`), and STAC items that do not say where their files lie (`stac`).
+//! The steps are: make a name for GDAL, also for a URL (`place`, `at_url`); list an archive
+//! (`packed`); open the file or its label; choose one of several rasters; and read its first band
+//! in blocks (`blocks`). Results that contradict the file's meaning are corrected: NetCDF's depths
+//! and places (`netcdf`), and STAC items that do not state the places of their files (`stac`).
 
 mod at_url;
 mod blocks;
@@ -36,22 +35,22 @@ use place::Place;
 
 /// The name in messages.
 const NAME: &str = "GDAL";
-/// Drivers that take any file for samples that has a header beside it.
+/// Drivers that read any file with a header beside it as samples.
 const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
-/// Drivers that put many files together.
+/// Drivers that combine many files.
 const OF_FILES: [&str; 2] = ["VRT", "STACIT"];
-/// Enough to tell a file's kind.
+/// Enough bytes to recognise a file's kind.
 const HEAD_BYTES: u64 = 1024;
-/// Colour pictures have three bands, or four, of bytes.
+/// Number of bands of a colour picture, of bytes.
 const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
-/// GDAL's message about a file without a driver.
+/// Parts of GDAL's messages about a file without a driver.
 const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
 
-/// Reads a file, folder or whatever else a driver opens.
+/// Reads a file, folder or other source that a driver opens.
 ///
 /// # Errors
-/// [`RasterError::UnknownFormat`] where no driver does; [`RasterError::WantsGdal`] where there is no
-/// libgdal; else what is wrong with the file.
+/// [`RasterError::UnknownFormat`] if no driver does; [`RasterError::WantsGdal`] without a libgdal;
+/// else the file's fault.
 pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let head = head(path, options)?;
     let library = gdal().map_err(|why| match names::of(path, &head) {
@@ -88,7 +87,7 @@ fn of_archive(
     Ok(decoded)
 }
 
-/// The files that a file which only GDAL reads names, or that lie beside it.
+/// Returns the files that a GDAL-only file references, and those beside it.
 pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     let options = OpenOptions::default();
     let is_own = head(path, &options).is_ok_and(|head| is_read_here(&head));
@@ -100,7 +99,7 @@ pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     }
 }
 
-/// The reference system that GDAL finds in a file.
+/// Returns the reference system that GDAL finds in a file.
 pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
     let library = gdal().ok()?;
     let place = Place::of(&library, input.path()?, &[], input.elsewhere()).ok()?;
@@ -108,7 +107,7 @@ pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
     ReferenceSystem::from_wkt(&dataset.wkt()?).0
 }
 
-/// The first bytes; none of a folder.
+/// Returns the first bytes; empty for a folder.
 fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, RasterError> {
     match path.is_dir() {
         true => Ok(Vec::new()),
@@ -183,7 +182,7 @@ fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset
     library.open(path, &open_options(options)).map_err(fault)
 }
 
-/// Checks that a text has a star, as GRASS writes where there is no height.
+/// Returns true if a text contains a star, which GRASS writes for no-data.
 fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> {
     let input = FileBytes::open(&place.source, &options.elsewhere)?;
     let mut reader = input.reader()?;
@@ -197,7 +196,7 @@ fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> 
     }
 }
 
-/// The label of a planetary image, in a file of its own beside it.
+/// Returns the label of a planetary image, a separate file beside it.
 fn label_beside(path: &Path) -> Option<PathBuf> {
     let labels = ["lbl", "LBL", "xml", "XML"].map(|end| path.with_extension(end));
     labels
@@ -205,14 +204,14 @@ fn label_beside(path: &Path) -> Option<PathBuf> {
         .find(|label| label != path && label.is_file())
 }
 
-/// A refusal of a file whose kind is known, and in which this GDAL finds nothing.
+/// Returns the error for a file of a known kind in which this GDAL finds no raster.
 fn no_raster(who: &str) -> RasterError {
     RasterError::ByGdal(Error::Refused(format!("{who} finds no raster in it")))
 }
 
-/// The name of the raster to take, where the file holds several.
+/// Returns the name of the chosen raster, if the file holds several.
 fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, RasterError> {
-    // As `depth` of `NETCDF:"ocean.nc":depth`.
+    // `depth` for `NETCDF:"ocean.nc":depth`.
     let short = |name: &str| {
         let last = name.rsplit([':', '/']).next().unwrap_or(name);
         last.trim_start_matches("asset=").to_owned()
@@ -238,7 +237,7 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
     let at = match exact {
         Some(at) => at,
         None => {
-            // Limits of cells, and not what is in them.
+            // These are cell limits, not heights.
             let is_height = |name: &&String| !name.ends_with("_bnds") && !name.ends_with("_bounds");
             let named: Vec<_> = names.iter().filter(is_height).map(String::as_str).collect();
             let at = height_name::choose("raster", &named, netcdf::HEIGHT_NAMES, asked)?;
@@ -330,7 +329,7 @@ fn decoded(
     Ok(decoded)
 }
 
-/// Checks that a file has colours that may be codes of heights.
+/// Checks that a file has colours that may encode heights.
 fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), RasterError> {
     match options.band {
         Some(band) => Err(RasterError::NoSuchPart {
@@ -342,7 +341,7 @@ fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), 
     }
 }
 
-/// Samples in memory where they are few, else in their file.
+/// Reads the samples into memory if they are few, else leaves them in the file.
 fn read(
     blocks: impl BlockReader + 'static,
     driver: &str,
@@ -354,7 +353,7 @@ fn read(
     let format = format!("{driver} by GDAL, {}", held.none().type_name());
     let samples = u64::from(full.columns) * u64::from(full.rows);
     if samples * held.bytes() > options.most_in_memory_bytes {
-        // A packing that GDAL cannot undo is known here, and is no hole.
+        // Fails now if GDAL cannot decompress the samples; later, they would be no-data.
         blocks.read(0, &full.part([0, 0]))?;
         return Ok(Decoded::new(format, size, blocks));
     }

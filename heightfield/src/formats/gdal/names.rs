@@ -5,7 +5,7 @@ use std::path::Path;
 use super::packed::Packing;
 use crate::beside::appended;
 
-/// Formats by how a file begins, or a part of its first kibibyte.
+/// Formats by first bytes, or by a part of the first kibibyte.
 const BEGINNINGS: [(&str, &[u8]); 18] = [
     ("NetCDF", b"CDF\x01"),
     ("NetCDF", b"CDF\x02"),
@@ -43,14 +43,15 @@ const EXTENSIONS: [(&str, &str); 12] = [
     ("zarr", "Zarr"),
 ];
 
-/// The format of a file that begins as no other.
+/// Returns the format of a file with distinctive first bytes.
 pub(crate) fn by_beginning(head: &[u8]) -> Option<&'static str> {
     let mut known = BEGINNINGS.iter();
     let known = known.find(|(_, bytes)| head.starts_with(bytes));
     known.map(|(name, _)| *name)
 }
 
-/// The format of a file or folder that begins with some bytes; none where it may be anything.
+/// Returns the format of a file or folder with some first bytes; `None` if they are not
+/// distinctive.
 pub(super) fn of(path: &Path, head: &[u8]) -> Option<&'static str> {
     if let Some(packing) = Packing::of(head) {
         return Some(packing.name());

@@ -1,4 +1,4 @@
-//! NetCDF's conventions (CF) for heights and places, where GDAL leaves them to its callers.
+//! NetCDF conventions (CF) for heights and places that GDAL does not apply itself.
 
 use std::path::Path;
 
@@ -14,28 +14,28 @@ use crate::{RasterError, ReferenceSystem};
 pub(super) const HEIGHT_NAMES: &str = "z elevation elev topo topography height altitude dem relief \
                                        bedrock surface band1";
 
-/// Statements of a file about its heights and axes.
+/// Metadata of a file about its heights and axes.
 #[derive(Default)]
 pub(super) struct Conventions {
     /// The `standard_name` of the variable.
     name: String,
-    /// Its `positive`.
+    /// The `positive` of the variable.
     positive: String,
-    /// Its `missing_value`.
+    /// The `missing_value` of the variable.
     missing: Option<String>,
     /// Metres in a unit of the axes.
     axes_m: Option<f64>,
-    /// True if the samples of a row lie from north to south.
+    /// True if a row of the raster runs from north to south.
     pub(super) is_turned: bool,
 }
 
-/// The name of the variable that the first band of a file without parts is of.
+/// Returns the variable of the first band, for a file without parts.
 pub(super) fn variable(dataset: &Dataset) -> Option<String> {
     dataset.band(1).ok()?.metadata("NETCDF_VARNAME").ok()?
 }
 
 impl Conventions {
-    /// Returns the statements of a NetCDF variable's attributes; none in a file of another format.
+    /// Reads a NetCDF variable's attributes; empty for a file of another format.
     pub(super) fn of(
         library: &Library,
         path: &Path,
@@ -63,7 +63,7 @@ impl Conventions {
         Ok(found)
     }
 
-    /// Returns the place of the samples, by axes in the unit of the reference system.
+    /// Returns the place of the samples, from axes in the unit of the reference system.
     pub(super) fn placed(
         &self,
         map: Option<[f64; 6]>,
@@ -81,7 +81,7 @@ impl Conventions {
         Some(map.map(|number| number * times))
     }
 
-    /// Turns depths into heights, and says what is left out.
+    /// Turns depths into heights, and adds remarks on ignored metadata.
     pub(super) fn describe(&self, decoded: &mut Decoded) {
         let is_depth = self.name == "depth" || self.name.contains("floor_depth");
         match self.positive.as_str() {

@@ -1,4 +1,4 @@
-//! Archives, which GDAL looks into: one raster of those in them is read.
+//! Archives, which GDAL can open: one raster in them is read.
 
 use std::io::{Read, copy, sink};
 use std::path::{Path, PathBuf};
@@ -12,14 +12,14 @@ use crate::format::Claim;
 use crate::formats::claim_of;
 use crate::{OpenOptions, RasterError};
 
-/// No file that is larger is read inside of an archive: samples in it are found by unpacking what
-/// lies before them.
+/// Max size of a file inside an archive, bytes: to reach a sample, all bytes before it are
+/// decompressed.
 const MAX_BYTES: u64 = 1 << 30;
-/// An archive of more files is no terrain's.
+/// Max number of files in an archive.
 const MAX_ENTRIES: usize = 1 << 14;
-/// Files that GDAL is asked for.
+/// Max number of files that GDAL tries to open.
 const MAX_TRIED: usize = 64;
-/// Place where a tar file says that it is one.
+/// Offset of a tar file's signature.
 const TAR_SIGN: usize = 257;
 /// Packing of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub(super) enum Packing {
 }
 
 impl Packing {
-    /// By the beginning of a file.
+    /// Returns the packing of a file, by its first bytes.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         match head {
             _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => {
@@ -47,7 +47,7 @@ impl Packing {
         }
     }
 
-    /// The name in messages.
+    /// Returns the name for messages.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Zip => "ZIP",
@@ -56,10 +56,11 @@ impl Packing {
         }
     }
 
-    /// Returns GDAL's name of the raster in an archive, and the options that are left for it.
+    /// Returns GDAL's name of the raster in an archive, and the remaining options for it.
     ///
     /// # Errors
-    /// [`RasterError::SeveralHeights`] where none of several is chosen by `--input variable=NAME`.
+    /// [`RasterError::SeveralHeights`] if there are several and none is chosen by `--input
+    /// variable=NAME`.
     pub(super) fn entry(
         self,
         library: &Library,
@@ -113,7 +114,7 @@ impl Packing {
     }
 }
 
-/// Files and folders that some systems add.
+/// Returns true for files and folders that some systems add.
 fn is_hidden(name: &str) -> bool {
     name.split('/').any(|part| {
         part.starts_with("__MACOSX")
@@ -122,13 +123,13 @@ fn is_hidden(name: &str) -> bool {
     })
 }
 
-/// The entry that is asked for, by its whole name or what follows the last folder.
+/// Returns the requested entry, by its whole name or its last part.
 fn named(entries: &[String], asked: &str) -> Option<String> {
     let is_it = |name: &&String| *name == asked || name.rsplit('/').next() == Some(asked);
     entries.iter().find(is_it).cloned()
 }
 
-/// The one raster among entries.
+/// Returns the only raster among entries.
 fn only(
     library: &Library,
     entries: &[String],
@@ -141,7 +142,7 @@ fn only(
         for name in tried {
             match library.open_part(&full(name).display().to_string(), &[]) {
                 Ok(_) => rasters.push(name.clone()),
-                // Each of the others may take as long.
+                // Each further entry may take as long.
                 Err(error @ Error::Slow { .. }) => return Err(fault(error)),
                 Err(_) => {}
             }
@@ -169,7 +170,7 @@ fn too_large(name: &str) -> RasterError {
     }
 }
 
-/// Checks that a gzip file unpacks, to no more than [`MAX_BYTES`].
+/// Checks that a gzip file can be decompressed, to at most [`MAX_BYTES`].
 fn check_unpacked(path: &Path) -> Result<(), RasterError> {
     let file = std::fs::File::open(path).map_err(RasterError::Unreadable)?;
     let unpacked = MultiGzDecoder::new(std::io::BufReader::new(file));

@@ -1,4 +1,4 @@
-//! Names of files for GDAL, and what must stay there while it reads.
+//! File names for GDAL, and the resources that must exist while it reads.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::fault;
 use crate::RasterError;
 use crate::remote::{RemoteFetcher, is_url, without_key};
 
-/// A file here or at a URL.
+/// A file on disk or at a URL.
 pub(super) struct Place {
     library: Library,
     /// The user's name for it.
@@ -18,12 +18,12 @@ pub(super) struct Place {
     /// GDAL's name for it.
     pub(super) path: PathBuf,
     served: Option<(Served, Mount)>,
-    /// A copy of what is at a URL, or another name of an archive.
+    /// A copy of a remote file, or a link to an archive.
     _folder: Option<TempDir>,
 }
 
 impl Place {
-    /// A file that begins with some bytes.
+    /// Returns the place of a file with some first bytes.
     pub(super) fn of(
         library: &Library,
         source: &Path,
@@ -57,8 +57,8 @@ impl Place {
         })
     }
 
-    /// An archive under a name that GDAL has not seen: it remembers the files of an archive by name,
-    /// and reads past their end where another one has come to lie there (3.6 crashes).
+    /// Links the archive under a new name. GDAL caches the files of an archive by name, and reads
+    /// beyond their end if another archive has replaced it (3.6 crashes).
     #[cfg(unix)]
     pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
         if self.served.is_some() || self._folder.is_some() {
@@ -78,18 +78,18 @@ impl Place {
         })
     }
 
-    /// The archive by its own name: who makes a link needs a privilege here.
+    /// Returns the archive under its own name, because links need a privilege on this system.
     #[cfg(not(unix))]
     pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
         Ok(self)
     }
 
-    /// Returns true if GDAL reads it through this program.
+    /// Returns true if GDAL reads the file through this program.
     pub(super) const fn is_served(&self) -> bool {
         self.served.is_some()
     }
 
-    /// GDAL's refusal without the folder of the file, which the user has named or never saw.
+    /// Removes the file's folder from GDAL's message: the user named it, or does not know it.
     pub(super) fn in_words(&self, refusal: RasterError) -> RasterError {
         let folder = self
             .path
@@ -108,10 +108,10 @@ impl Place {
         }
     }
 
-    /// Checks that a file at a URL, which begins with some bytes, names no file of this computer.
+    /// Checks that a file at a URL, with some first bytes, references no file of this computer.
     ///
     /// # Errors
-    /// The file that it names, and what to do.
+    /// The referenced file, and a remedy.
     pub(super) fn check_files(&self, dataset: &Dataset, head: &[u8]) -> Result<(), RasterError> {
         let root = match (&self.served, &self._folder) {
             (Some((_, mount)), _) => mount.path(""),
@@ -125,7 +125,7 @@ impl Place {
         let has = |sign: &str| head.windows(sign.len()).any(|part| part == sign.as_bytes());
         let is_looked_at = |(name, sign)| name == driver && has(sign);
         if self.served.is_some() && signs.into_iter().any(is_looked_at) {
-            // Its mount has checked each name in it.
+            // Its mount checks every name.
             return Ok(());
         }
         let mut names = dataset
@@ -134,7 +134,7 @@ impl Place {
             .map(|it| it.display().to_string());
         let what = match names.find(|name| !name.contains(&root)) {
             Some(name) => format!("it names {name}"),
-            // Of an MRF the files with its samples are not listed.
+            // GDAL does not list an MRF's sample files.
             None if driver == "MRF" => "an MRF in an archive may name files".into(),
             None => return Ok(()),
         };
@@ -143,13 +143,13 @@ impl Place {
         Err(fault(Error::NotOpened { path, why }))
     }
 
-    /// Returns the reason for which something at its server could not be read.
+    /// Returns the reason why something on the server could not be read.
     pub(super) fn take_fault(&self) -> Option<std::io::Error> {
         let (_, mount) = self.served.as_ref()?;
         mount.take_fault()
     }
 
-    /// Opens a part of the file anew after something could not be read: GDAL remembers it.
+    /// Reopens a part of the file after a failed read, which GDAL caches.
     pub(super) fn open_again(&self, name: &str, options: &[&str]) -> Result<Dataset, RasterError> {
         let Some((served, mount)) = &self.served else {
             return self.library.open_part(name, options).map_err(fault);

@@ -1,6 +1,6 @@
-//! STAC items. GDAL's driver STACIT reads a collection of items that say where all their files lie.
-//! Items that it does not read are refused with the command that makes a VRT of the files themselves.
-//! So is a collection with an item that lies elsewhere than its file.
+//! STAC items. GDAL's driver STACIT reads a collection of items that state the places of all their
+//! files. Items that it cannot read are rejected with the command that makes a VRT of the files
+//! themselves. So is a collection whose item contradicts the place of its file.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -14,23 +14,23 @@ use crate::input::FileBytes;
 use crate::remote::{is_url, without_rest};
 use crate::{OpenOptions, RasterError, file_name};
 
-/// A larger document is no list of items that can be opened. In memory it takes fifty times as much.
+/// Max size of a document, bytes. In memory it takes fifty times as much.
 const MAX_BYTES: u64 = 4 << 20;
-/// A file lies where its item says within this share of a cell.
+/// Max difference of the places of a file and its item, in cells.
 const TOLERANCE: f64 = 0.05;
-/// Media types of files of heights.
+/// Media types of files that may hold heights.
 const MEDIA: [&str; 3] = ["tif", "jp2", "netcdf"];
 
-/// An item, and of its assets those that may be heights.
+/// An item, with those of its assets that may be heights.
 struct Item {
     id: String,
     /// Names and files.
     assets: Vec<(String, String)>,
-    /// Columns and rows, and x and y of a sample's corner, as it says.
+    /// Columns and rows, and x and y of a sample's corner, as stated.
     stated: Option<([u32; 2], [f64; 6])>,
 }
 
-/// Returns the reason for which a document of items is not read; none where a file is something else.
+/// Returns the reason why a document of items cannot be read; `None` if the file is something else.
 pub(super) fn refused(
     place: &Place,
     options: &OpenOptions,
@@ -41,10 +41,10 @@ pub(super) fn refused(
         .transpose()
 }
 
-/// Checks that files lie where their items say, and that GDAL has found the same files.
+/// Checks that files lie at the places in their items, and that GDAL has found the same files.
 ///
 /// # Errors
-/// [`RasterError::ToBuild`] where one does not.
+/// [`RasterError::ToBuild`] if one does not.
 pub(super) fn check_places(
     library: &Library,
     opened: &Dataset,
@@ -81,7 +81,7 @@ pub(super) fn check_places(
     Ok(())
 }
 
-/// The refusal that names the files to make a VRT of.
+/// Returns the error that names the files for a VRT.
 fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
     let mut files = Vec::new();
     for item in items {
@@ -107,7 +107,7 @@ fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
     })
 }
 
-/// The items of a document; none where it is something else.
+/// Returns the items of a document; `None` if it is something else.
 fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, RasterError> {
     let url = path.to_str().filter(|path| is_url(path));
     let named = url.map_or(path, |url| Path::new(file_name(url)));
@@ -139,7 +139,7 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
         _ if document["assets"].is_object() => vec![&document],
         _ => return Ok(None),
     };
-    // Also of a URL, without what follows its path.
+    // Also for a URL, without its query.
     let named = url.map_or(path, |url| Path::new(without_rest(url)));
     let folder = named.parent().unwrap_or(Path::new(""));
     let items = features
@@ -194,7 +194,7 @@ impl Item {
 }
 
 impl Item {
-    /// Returns true if a file lies where the item says, if it does.
+    /// Returns true if the file's place matches the item's, or the item states none.
     fn is_place_of(&self, file: &Dataset) -> bool {
         let Some((size, stated)) = self.stated else {
             return true;
@@ -205,7 +205,7 @@ impl Item {
             && place.is_some_and(|found| {
                 let cell = found[1].abs().max(found[5].abs());
                 let [columns, rows] = size.map(f64::from);
-                // The two far corners tell whether cells are as large as they are stated.
+                // The two far corners show whether the cell size is as stated.
                 let corner = |of: [f64; 6], column: f64, row: f64| {
                     [0, 3].map(|at| of[at] + of[at + 1] * column + of[at + 2] * row)
                 };
@@ -229,7 +229,7 @@ fn is_raster(asset: &Value) -> bool {
     is_one_of("type") || (asset["type"].is_null() && is_one_of("href"))
 }
 
-/// Returns GDAL's name of a file that an item names.
+/// Returns GDAL's name of a file that an item references.
 fn file(href: &str, folder: &Path) -> String {
     match href.split_once("://") {
         Some(("s3", rest)) => format!("/vsis3/{rest}"),

@@ -1,13 +1,13 @@
-//! The header of a NumPy array: a Python dictionary of three keys. Nothing else of Python is read,
-//! so that no header takes longer than its bytes.
+//! The header of a NumPy array: a Python dictionary of three keys. No other Python syntax is read,
+//! so the time is linear in the header's bytes.
 
 use std::io::Read;
 
 use crate::RasterError;
 
-/// Bytes a header may have; real ones have 128.
+/// Max size of a header, bytes; real ones have 128.
 const MAX_BYTES: u64 = 1 << 16;
-/// Dimensions of an array.
+/// Max number of dimensions.
 const MAX_SIDES: usize = 32;
 
 /// Content of a header.
@@ -15,7 +15,7 @@ const MAX_SIDES: usize = 32;
 pub(super) struct Header {
     /// Byte order, kind and bytes of a sample, as `<f4`.
     pub(super) descr: String,
-    /// True if the first index runs fastest.
+    /// True if the first index varies fastest.
     pub(super) column_major: bool,
     pub(super) shape: Vec<u64>,
     /// Bytes before the samples.
@@ -23,10 +23,10 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads it from the beginning of a file.
+    /// Reads the header at the beginning of a file.
     ///
     /// # Errors
-    /// [`RasterError::NoNumbers`] for records; what is not as NumPy writes it.
+    /// [`RasterError::NoNumbers`] for records; the part that differs from NumPy's format.
     pub(super) fn read(reader: &mut dyn Read) -> Result<Self, RasterError> {
         let cut = |error| RasterError::from_io(error, "the array's header");
         let mut head = [0; 8];
@@ -93,7 +93,7 @@ fn unfamiliar(what: &str) -> RasterError {
 struct Rest<'t>(&'t str);
 
 impl<'t> Rest<'t> {
-    /// Returns true if a sign comes next, which is passed then.
+    /// Returns true if a sign is next, and skips it.
     fn takes(&mut self, sign: &str) -> bool {
         let rest = self.0.trim_start();
         let after = rest.strip_prefix(sign);
@@ -111,7 +111,7 @@ impl<'t> Rest<'t> {
         }
     }
 
-    /// A text in quotes.
+    /// Reads a quoted text.
     fn text(&mut self) -> Result<&'t str, RasterError> {
         let quote = if self.takes("\"") { '"' } else { '\'' };
         if quote == '\'' {
@@ -125,7 +125,7 @@ impl<'t> Rest<'t> {
         Ok(text)
     }
 
-    /// The type of a sample; that of a record is a list.
+    /// Reads the type of a sample; records have a list.
     fn descr(&mut self) -> Result<&'t str, RasterError> {
         match self.takes("[") {
             true => Err(RasterError::NoNumbers("an array of records".into())),
@@ -140,7 +140,7 @@ impl<'t> Rest<'t> {
         }
     }
 
-    /// Sides, as `(2, 3)`.
+    /// Reads dimensions, as `(2, 3)`.
     fn sides(&mut self) -> Result<Vec<u64>, RasterError> {
         let mut sides = Vec::new();
         self.expect("(")?;
@@ -155,7 +155,7 @@ impl<'t> Rest<'t> {
             if sides.len() > MAX_SIDES {
                 return Err(unfamiliar(&format!("more than {MAX_SIDES} sides")));
             }
-            // As Python 2 wrote long numbers.
+            // Python 2 wrote long integers so.
             self.0 = rest.strip_prefix('L').unwrap_or(rest);
             if !self.takes(",") {
                 self.expect(")")?;

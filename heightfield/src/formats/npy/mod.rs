@@ -1,4 +1,4 @@
-//! NumPy arrays, one a file. The samples are read into their own type.
+//! NumPy arrays, one per file. The samples keep their own type.
 
 mod header;
 
@@ -10,7 +10,7 @@ use crate::read::Stored;
 use crate::{Endian, OpenOptions, RasterError, SampleType};
 use header::Header;
 
-/// A NumPy array in a file of its own.
+/// Files with one NumPy array.
 pub(super) const FORMAT: Format = Format {
     name: "NumPy",
     begins: |head| head.starts_with(b"\x93NUMPY"),
@@ -19,17 +19,17 @@ pub(super) const FORMAT: Format = Format {
     decode: |input, options| Array::in_file(input)?.heights(input, options),
 };
 
-/// Place of an array's samples.
+/// Layout of an array's samples.
 struct Array {
     shape: Vec<u64>,
     stored: Stored,
     endian: Endian,
     column_major: bool,
-    /// The first of them, bytes.
+    /// Offset of the first sample, bytes.
     first: u64,
 }
 
-/// The type and order of samples that NumPy describes, as `<f4`.
+/// Parses NumPy's type and byte order, as `<f4`.
 fn sample_type(descr: &str) -> Result<(Stored, Endian), RasterError> {
     let what = || format!("an array of {descr}");
     let (order, kind) = match descr.split_at_checked(1) {
@@ -59,7 +59,7 @@ fn sample_type(descr: &str) -> Result<(Stored, Endian), RasterError> {
 }
 
 impl Array {
-    /// Reads an array's header; the file holds its samples.
+    /// Reads an array's header; the samples stay in the file.
     fn in_file(input: &FileBytes) -> Result<Self, RasterError> {
         let Header {
             descr,
@@ -91,7 +91,7 @@ impl Array {
         })
     }
 
-    /// The array as heights, its first row the northernmost.
+    /// Returns the array as heights, its first row the northernmost.
     fn heights(&self, input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
         let &[rows, columns] = self.shape.as_slice() else {
             let what = format!(
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use crate::Samples;
 
-    /// A 2 × 3 array as numpy writes it.
+    /// Returns a 2 × 3 array as NumPy writes it.
     fn npy(descr: &str, samples: &[u8]) -> FileBytes {
         let mut header =
             format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (2, 3), }}");

@@ -1,4 +1,4 @@
-//! Heights encoded in the colours of a picture, as web maps hand them out.
+//! Heights encoded in the colours of a picture, as in web maps.
 
 use ::png::{BitDepth, ColorType};
 
@@ -9,7 +9,7 @@ use crate::input::FileBytes;
 use crate::samples::HoleMask;
 use crate::{Encoding, RasterError, Samples};
 
-/// Reads a picture whose colours encode heights. An alpha of 0 is no data, too.
+/// Reads a picture whose colours encode heights. An alpha of 0 is no-data.
 pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, RasterError> {
     let codes = Codes::read(input)?;
     let mut decoded = Decoded::new("PNG".into(), codes.size, Samples::from(codes.codes));
@@ -18,7 +18,7 @@ pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, R
     Ok(decoded)
 }
 
-/// A fault of ambiguous channels, or that the picture looks like encoded heights.
+/// Converts the fault of ambiguous channels if the picture looks like encoded heights.
 pub(super) fn suspected(fault: RasterError, input: &FileBytes) -> RasterError {
     if !matches!(fault, RasterError::AmbiguousChannels(_)) {
         return fault;
@@ -69,12 +69,12 @@ impl Codes {
         })
     }
 
-    /// Returns true if the heights are those of ground: on Earth, and for the most part close
-    /// to those beside them, which the colours of a photograph are not.
+    /// Returns true if the heights are possible on Earth, and mostly near their neighbours', unlike
+    /// the colours of a photograph.
     fn look_like(&self, encoding: Encoding) -> bool {
-        /// Metres: below the deepest sea and above the highest mountain.
+        /// Range from below the deepest sea to above the highest mountain, m.
         const GROUND: std::ops::RangeInclusive<f64> = -11_500.0..=9_000.0;
-        /// Metres between neighbours, steep even for cells of a kilometre.
+        /// Height difference of neighbours that is steep even for cells of a kilometre, m.
         const STEEP: f64 = 700.0;
         let (lowest, step) = encoding.metres();
         let height = |code: i32| lowest + f64::from(code) * step;
@@ -88,7 +88,7 @@ impl Codes {
         let on_earth = on_earth
             .map(|code| height(*code))
             .all(|height| GROUND.contains(&height));
-        // A flat colour says nothing.
+        // A uniform colour proves nothing.
         let first = self.codes.first();
         let varies = self.codes.iter().any(|code| Some(code) != first);
         varies && on_earth && all > 0 && 100 * steep.count() <= all
@@ -122,7 +122,7 @@ mod tests {
         FileBytes::unpacked("tile.png", file)
     }
 
-    /// Metres: hills from a sea floor to a mountain.
+    /// Returns heights of hills from a sea floor to a mountain, m.
     fn ground(column: u32, row: u32) -> f64 {
         -200.0 + 37.0 * f64::from(column) + 11.0 * f64::from(row * row % 97)
     }

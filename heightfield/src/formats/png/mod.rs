@@ -1,5 +1,4 @@
-//! PNG pictures: grey, grey with holes, or the height in one channel of a
-//! colour picture.
+//! PNG pictures: grey, grey with no-data, or the height in one channel of a colour picture.
 
 mod encoded;
 
@@ -33,17 +32,15 @@ pub(super) const FORMAT: Format = Format {
 /// Extensions of a PNG's world files.
 const WORLD_FILES: [&str; 3] = ["pgw", "pngw", "pgwx"];
 
-/// Bytes that PNG's own chunks may take (text, profiles, tables).
+/// Max memory of a PNG's own chunks (text, profiles, tables), bytes.
 const CHUNK_BYTES: usize = 64 << 20;
 
 /// Reads one channel of a picture as heights.
 ///
-/// - Grey: the grey is the height. With alpha, a sample of alpha 0 is a hole and
-///   any other alpha means nothing. A grey that is called transparent (`tRNS`) is no
-///   data.
-/// - Colour with alpha: the alpha is the height, as in the paper's data, 0 being
-///   a height like any other. An alpha that is opaque everywhere marks a
-///   photograph, not a height field.
+/// - Grey: the grey is the height. A sample of alpha 0 is no-data; any other alpha is ignored. A
+///   grey that is marked transparent (`tRNS`) is no-data.
+/// - Colour with alpha: the alpha is the height, as in the paper's data, and 0 is an ordinary
+///   height. An alpha that is opaque everywhere means a photograph, not a height field.
 /// - Colour without alpha, or a palette: not a height field.
 ///
 /// `channel` overrides this choice.
@@ -92,7 +89,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
     Ok(decoded)
 }
 
-/// A decoder of the picture, its header read.
+/// Returns a decoder that has read the picture's header.
 fn reader(input: &FileBytes) -> Result<Reader<Box<dyn ReadSeek + '_>>, RasterError> {
     let limits = Limits { bytes: CHUNK_BYTES };
     let mut decoder = Decoder::new_with_limits(input.reader()?, limits);
@@ -101,7 +98,7 @@ fn reader(input: &FileBytes) -> Result<Reader<Box<dyn ReadSeek + '_>>, RasterErr
     decoder.read_info().map_err(fault)
 }
 
-/// The grey of a `tRNS` chunk, which holds 16 bits whatever the picture's depth.
+/// Returns the grey of a `tRNS` chunk, which has 16 bits at any depth of the picture.
 fn transparent_grey(info: &::png::Info<'_>) -> Option<f64> {
     let grey = match info.trns.as_deref() {
         Some(&[high, low]) if info.color_type == ColorType::Grayscale => [high, low],
@@ -110,7 +107,7 @@ fn transparent_grey(info: &::png::Info<'_>) -> Option<f64> {
     Some(u16::from_be_bytes(grey).into())
 }
 
-/// Which channel is the height, and which marks holes.
+/// The channel of the height, and the channel that marks no-data.
 #[derive(Clone, Copy)]
 struct Choice {
     height: PngChannel,
@@ -165,7 +162,7 @@ struct Pixels {
 }
 
 impl Pixels {
-    /// An interlaced picture has to be put together before it has rows.
+    /// Reads the rows. An interlaced picture is decoded whole before it has rows.
     fn read<R: BufRead + Seek>(&mut self, reader: &mut Reader<R>) -> Result<(), RasterError> {
         if reader.info().interlaced {
             let mut frame = vec![0; reader.output_buffer_size().unwrap_or(0)];
@@ -203,7 +200,7 @@ impl Pixels {
     }
 }
 
-/// A photograph's alpha is opaque everywhere: that is no relief.
+/// Rejects an alpha that is opaque everywhere: it is a photograph, not a relief.
 fn refuse_opaque(alpha: &Samples) -> Result<(), RasterError> {
     let opaque = f64::from(match alpha {
         Samples::U8(_) => u16::from(u8::MAX),

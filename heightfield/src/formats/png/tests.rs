@@ -1,10 +1,10 @@
-//! Which channel of which picture is the height.
+//! The choice of the height's channel, for all kinds of pictures.
 
 use super::decode;
 use crate::input::FileBytes;
 use crate::{PngChannel, Raster, RasterError};
 
-/// A 2 × 2 picture from its samples, row by row from the north.
+/// Returns a 2 × 2 picture from its samples, row by row from the north.
 fn picture(color: ::png::ColorType, depth: ::png::BitDepth, bytes: &[u8]) -> FileBytes {
     let mut file = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut file, 2, 2);
@@ -48,7 +48,7 @@ fn an_opaque_colour_picture_is_not_a_height_field() {
         open(&opaque, None),
         Err(RasterError::AmbiguousChannels(_))
     ));
-    // Unless the user states it.
+    // Unless the user chooses it.
     assert_eq!(
         open(&opaque, Some(PngChannel::Alpha)).expect("heights"),
         [255.0; 4]

@@ -1,4 +1,4 @@
-//! A band of an image, as the library decodes it.
+//! A band of an image, decoded by `tiff-reader`.
 
 use tiff_reader::{Ifd, TiffFile, TiffSample};
 
@@ -15,7 +15,7 @@ pub(super) struct Band<'f> {
 }
 
 impl<'f> Band<'f> {
-    /// A band of an image, the first being 0.
+    /// Returns a band of an image, the first being 0.
     pub(super) fn new(directory: &'f Directory, band: usize) -> Self {
         Self {
             file: directory.file(),
@@ -24,8 +24,8 @@ impl<'f> Band<'f> {
         }
     }
 
-    /// Reads the samples of a part, each converted. They are held once: a row of chunks is
-    /// decoded, copied to its place and let go.
+    /// Reads the samples of a part, each converted. Only one row of chunks is in memory besides the
+    /// result.
     pub(super) fn read<T: TiffSample, U>(
         &self,
         part: &Part,

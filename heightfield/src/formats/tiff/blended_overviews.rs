@@ -1,20 +1,20 @@
-//! Overviews in which heights were averaged with no-data values: made before these were declared,
-//! they have pits or peaks along the rim of each hole that the full image has not.
+//! Detects overviews that average heights with no-data values: if they were made before the values
+//! were declared, they have pits or peaks along the rim of no-data, unlike the full image.
 
 use crate::RasterError;
 use crate::blocks::{BlockImage, BlockReader, Part, stored_parts};
 
-/// Of the coarsest overview so many blocks are looked at.
+/// Number of blocks of the coarsest overview that are checked.
 const LOOKS: usize = 16;
-/// No more samples of the full image are read to compare them with one of an overview.
+/// Max samples of the full image that are compared with one of an overview.
 const MAX_COMPARED: u64 = 1 << 22;
-/// A lossy packing may change stored values by so much ...
+/// Lossy compression may change stored values by this difference ...
 const SLACK: f64 = 1.0;
-/// ... or by this share.
+/// ... or by this share of the value.
 const SLACK_SHARE: f64 = 1e-3;
 
-/// Compares the outermost values of the coarsest overview with the full image around them, where a
-/// no-data value is declared. Returns the remark where the overview cannot be trusted.
+/// Compares the extremes of the coarsest overview with the full image around them, if a no-data
+/// value is declared. Returns a remark if the overview is unreliable.
 ///
 /// # Errors
 /// A file at a URL that cannot be read at present.
@@ -50,8 +50,8 @@ pub(super) fn blended(
     Ok(None)
 }
 
-/// The lowest and the highest value of an image, as far as they lie towards the no-data value, and
-/// where they are.
+/// Returns the lowest and the highest value of an image, if towards the no-data value, with their
+/// positions.
 fn outermost(
     blocks: &impl BlockReader,
     image: usize,
@@ -81,7 +81,7 @@ fn outermost(
     Ok(found)
 }
 
-/// The part of the full image that a sample of an overview shows, and as much around it.
+/// Returns the part of the full image under a sample of an overview and its neighbours.
 fn around(coarse: &BlockImage, full: &BlockImage, [column, row]: [u32; 2]) -> Part {
     let along = |at: u32, coarse: u32, full: u32| {
         let times = f64::from(full) / f64::from(coarse);
@@ -112,7 +112,7 @@ fn range(
     Ok(range)
 }
 
-/// Visits the samples of a part that are data.
+/// Visits the samples of a part that have data.
 fn for_each(
     blocks: &impl BlockReader,
     image: usize,

@@ -1,4 +1,4 @@
-//! Files with one overview, half of them no data.
+//! Files with one overview, half of them no-data.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use crate::{OpenOptions, Raster};
 const SIDE: u32 = 64;
 const NO_DATA: f64 = -9999.0;
 
-/// A file whose western 33 columns have no data, and whose overview has `rim` where half of a
-/// sample has none.
+/// Opens a file whose western 33 columns are no-data, and whose overview has `rim` where half of a
+/// sample is no-data.
 fn opened(folder: &Path, rim: f32) -> Raster {
     let row = |side: u32, value: &dyn Fn(u32) -> f32| -> Vec<u8> {
         let samples = (0..side * side).map(|index| value(index % side));

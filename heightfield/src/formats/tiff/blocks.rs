@@ -1,5 +1,5 @@
-//! A TIFF that stays on disk: full image, overviews and masks, read in blocks of whole
-//! strips or tiles, or of parts of large ones that are plain samples.
+//! A TIFF that stays on disk: full image, overviews and masks, read in blocks of whole strips or
+//! tiles, or in parts of large uncompressed ones.
 
 use std::hash::Hasher;
 use std::ops::Range;
@@ -23,26 +23,27 @@ use crate::samples::{HoleMask, SampleValue, with_samples};
 use crate::unreadable_parts::UnreadableParts;
 use crate::{RasterError, SampleType};
 
-/// Small strips and tiles are read several at once, samples each way.
+/// Side of a usual block: smaller strips and tiles are read several at once.
 const USUAL_BLOCK: u32 = 256;
-/// Of longer rows of plain samples parts are read.
+/// Max columns of a part of an uncompressed row.
 const MAX_ROW: u32 = 32_768;
 
-/// Returns true if single blocks of an image can be read: its rows can, or a strip or tile is not too
-/// large.
+/// Returns true if single blocks of an image can be read: its rows can, or a strip or tile is small
+/// enough.
 fn suit(layout: &Layout) -> bool {
     layout.is_read_by_rows() || is_small(layout, chunks(layout))
 }
 
-/// Returns true if a block of so many columns and rows is not too large to be decoded.
+/// Returns true if a block of some columns and rows is small enough to be decoded.
 fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
     let [columns, rows] = block.map(u64::from);
     let samples = columns.saturating_mul(rows);
     samples.saturating_mul(layout.texel_bytes().max(8)) <= MAX_BLOCK_BYTES
 }
 
-/// Columns and rows of a block. Of plain samples it is a square, or of a file elsewhere a wide one,
-/// because what lies together comes together; with all of its bands it is not too large.
+/// Returns the columns and rows of a block. For uncompressed samples it is a square, or for a
+/// remote file a wide rectangle, because adjacent bytes arrive in one response; its size with all
+/// bands is limited.
 fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
     if !layout.is_read_by_rows() {
         return chunks(layout);
@@ -54,11 +55,11 @@ fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
     [columns, rows.min(texels / columns).max(1)]
 }
 
-/// As few whole strips or tiles as make a usual block.
+/// Returns the fewest whole strips or tiles that make a usual block.
 fn chunks(layout: &Layout) -> [u32; 2] {
     let (columns, rows) = layout.chunk;
     let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
-    // A strip is as wide as the image: of wide ones few are read at once.
+    // A strip is as wide as the image, so only a few wide ones are read at once.
     let usual = USUAL_BLOCK * USUAL_BLOCK / columns.clamp(1, USUAL_BLOCK * USUAL_BLOCK);
     let down = match columns > USUAL_BLOCK {
         true => rows.saturating_mul(usual.max(1).div_ceil(rows)),
@@ -67,7 +68,7 @@ fn chunks(layout: &Layout) -> [u32; 2] {
     [several(columns), down]
 }
 
-/// Returns the place where the bytes of a part lie in the file.
+/// Returns the byte ranges of a part in the file.
 fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
     let mut ranges = vec![];
     let bands = layout.bands_read();
@@ -86,49 +87,49 @@ fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
 
 /// A TIFF on disk.
 pub(super) struct TiffBlocks {
-    /// The main file and the one of overviews beside it, where they are elsewhere.
+    /// The main file and the overview file beside it, if remote.
     remote: Vec<Option<Arc<RemoteFile>>>,
     unread: UnreadableParts,
-    /// The main file and the mask's, each with its state when it was opened; `None` where one
-    /// was changed meanwhile.
+    /// The main file and the mask's, each with its state at opening; `None` if one has changed
+    /// since.
     inputs: Option<Vec<(FileBytes, FileStamp)>>,
-    /// [`BlockReader::index`], once it was asked for.
+    /// Cached [`BlockReader::index`].
     index: OnceLock<u64>,
     /// The full image and its overviews.
     images: Vec<Image>,
-    /// The same in the program's own terms.
+    /// The same images, for [`Blocks`](crate::blocks::Blocks).
     blocks: Vec<BlockImage>,
 }
 
-/// A file, and the same as it is elsewhere.
+/// A file, and its source if it is remote.
 pub(super) type Opened = (Arc<TiffFile>, Option<Arc<RemoteFile>>);
 
-/// The main file, and one of overviews beside it.
+/// Number of the main file; the overview file beside it is the next.
 const MAIN: usize = 0;
 
-/// Knowledge of a file before its blocks are read.
+/// What is known of a file before its blocks are read.
 #[derive(Clone, Copy)]
 pub(super) struct Known<'k> {
-    /// Its name in warnings.
+    /// Its name for warnings.
     pub(super) name: &'k str,
     /// The kind of numbers to read from it.
     pub(super) wanted: Wanted,
-    /// The file of a mask beside it.
+    /// The mask's file beside it.
     pub(super) mask: Option<&'k Arc<TiffFile>>,
-    /// Folder for unpacking large strips and tiles, or the reason against it.
+    /// Folder for decompressed large strips and tiles, or the reason why there is none.
     pub(super) disk: Result<&'k DiskCache, &'k str>,
 }
 
 /// An image with its masks.
 pub(super) struct Image {
-    /// Number of the file that it is in.
+    /// Number of its file.
     file: usize,
     pub(super) layout: Layout,
     pub(super) masks: Vec<Mask>,
 }
 
 impl Image {
-    /// An image of the main file.
+    /// Returns an image of the main file.
     pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, RasterError> {
         Ok(Self {
             file: MAIN,
@@ -137,15 +138,15 @@ impl Image {
         })
     }
 
-    /// Returns true if parts of it can be read, and nothing has to be unpacked for that.
+    /// Returns true if parts of it can be read without decompressing it to disk.
     pub(super) fn has_parts(&self) -> bool {
         suit(&self.layout)
     }
 
-    /// Makes it an image of which blocks are read.
+    /// Prepares reading the image in blocks.
     ///
     /// # Errors
-    /// The reason for which that is impossible.
+    /// The reason why that is impossible.
     pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let chunks = self.layout.chunks_name();
         if !suit(&self.layout) {
@@ -167,7 +168,7 @@ impl Image {
         })
     }
 
-    /// Bytes that it takes unpacked on disk at most.
+    /// Returns the max disk space for its decompressed chunks, bytes.
     pub(super) fn unpacked_bytes(&self) -> u64 {
         let own = self.layout.unpacked.as_ref();
         let masks = self.masks.iter().map(Mask::unpacked_bytes);
@@ -176,8 +177,8 @@ impl Image {
 }
 
 impl TiffBlocks {
-    /// The full image of a file, [left in it](Image::leave_in_file), and the overviews in the file
-    /// and in one beside it that are of the same kind.
+    /// Returns the full image of a file, [left in it](Image::leave_in_file), and the overviews of
+    /// the same kind in the file and in the one beside it.
     pub(super) fn new(
         (file, remote): Opened,
         full: Image,
@@ -191,7 +192,7 @@ impl TiffBlocks {
         let mut found = vec![full];
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
-                // An overview that cannot be used is no reason not to feel the field.
+                // An unusable overview must not make the field unusable.
                 let Ok(image) = Image::of(&directory, known) else {
                     continue;
                 };
@@ -228,18 +229,18 @@ impl TiffBlocks {
         })
     }
 
-    /// Returns true if overviews serve coarse levels.
+    /// Returns true if overviews are used for coarse levels.
     pub(super) fn has_overviews(&self) -> bool {
         self.images.len() > 1
     }
 
-    /// From now on coarse levels are made of the full image.
+    /// Drops the overviews: coarse levels are then computed from the full image.
     pub(super) fn leave_overviews_out(&mut self) {
         self.images.truncate(1);
         self.blocks.truncate(1);
     }
 
-    /// A part of an image.
+    /// Reads a part of an image.
     fn block(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let Image { layout, masks, .. } = &self.images[image];
         Ok(Block {
@@ -249,8 +250,8 @@ impl TiffBlocks {
         })
     }
 
-    /// A part of an image of which something cannot be read: strips and tiles that cannot are
-    /// holes, with a warning, and the others are not.
+    /// Reads a part of an image chunk by chunk after an error: only unreadable strips and tiles
+    /// become no-data, with a warning.
     fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let mut all = self.nothing_of(part);
         let stored = self.images[image].layout.chunks_in(part);
@@ -264,8 +265,8 @@ impl TiffBlocks {
         Ok(all)
     }
 
-    /// The same of samples that are read by rows, of which any row may be read without the others. What masks
-    /// them is decoded once.
+    /// As `by_chunks`, for samples that are read by rows: only unreadable rows become no-data. The
+    /// masks are decoded once.
     fn by_rows(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let Image { layout, masks, .. } = &self.images[image];
         let mut all = self.nothing_of(part);
@@ -300,7 +301,7 @@ impl TiffBlocks {
         Ok(all)
     }
 
-    /// Reads a piece; `None`, with a warning the first time, where it cannot be read.
+    /// Reads a piece; returns `None`, with one warning, if it cannot be read.
     fn try_read<T>(
         &self,
         image: usize,
@@ -321,7 +322,7 @@ impl TiffBlocks {
         }
     }
 
-    /// A part in which everything is a hole as yet.
+    /// Returns a part with all samples no-data.
     fn nothing_of(&self, part: &Part) -> Block {
         let count = part.columns as usize * part.rows as usize;
         let mut samples = self.images[MAIN].layout.held().none();
@@ -336,7 +337,7 @@ impl TiffBlocks {
     }
 }
 
-/// Copies a piece of a part to its place there. What is no hole of the piece is none of the part.
+/// Copies a piece into a part. Samples with data become data in the part.
 fn copy(block: &Block, piece: &Part, to: &mut Block, part: &Part) {
     let (columns, width) = (piece.columns as usize, part.columns as usize);
     for index in 0..columns * piece.rows as usize {
@@ -352,11 +353,11 @@ fn copy(block: &Block, piece: &Part, to: &mut Block, part: &Part) {
     }
 }
 
-/// Files that were opened, to be asked for their state again.
+/// Returns opened files with their stamps, for later comparison.
 fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>, RasterError> {
     let mut all = vec![];
     for input in inputs {
-        // The decoder has opened the file at the path by itself.
+        // The decoder opened the path separately.
         let stamp = input.stamp().filter(|_| input.is_at_its_path());
         match (input.again()?, stamp) {
             (Some(own), Some(stamp)) => all.push((own, stamp)),
@@ -367,14 +368,14 @@ fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>,
 }
 
 impl Image {
-    /// Returns true if it shows all of another image in fewer samples of the same type and index.
+    /// Returns true if it covers the other image with fewer samples of the same type and layout.
     fn is_overview_of(&self, full: &Self) -> bool {
         let (ours, theirs) = (&self.layout, &full.layout);
         let times = [
             f64::from(theirs.columns) / f64::from(ours.columns),
             f64::from(theirs.rows) / f64::from(ours.rows),
         ];
-        // Half an odd number of samples is rounded up or down.
+        // Half of an odd number of samples is rounded up or down.
         let one = 1.0 / f64::from(ours.columns.min(ours.rows).max(1));
         ours.stored == theirs.stored
             && ours.bands == theirs.bands
@@ -392,13 +393,13 @@ impl Image {
             .map(|tag| &tag.value)
     }
 
-    /// Returns true if it lies where another image lies, as far as it states it: most overviews do not.
+    /// Returns true if its place is that of another image, or is not stated, as in most overviews.
     fn has_place_of(&self, full: &Self, times: [f64; 2]) -> bool {
         const PIXEL_SCALE: u16 = 33550;
         const TIE_POINTS: u16 = 33922;
         const TRANSFORM: u16 = 34264;
         const GEO_KEYS: u16 = 34735;
-        // Sizes are those of cells; half a cell of the overview is no other place.
+        // Max difference, in cells of the overview.
         const OF_A_CELL: f64 = 0.5;
         let keys = |image: &Self| Some(image.tag(GEO_KEYS)?.as_u16_slice()?.to_vec());
         if keys(self).is_some_and(|own| keys(full) != Some(own)) {
@@ -407,7 +408,7 @@ impl Image {
         let numbers = |image: &Self, number: u16| image.tag(number).and_then(TagValue::as_f64_vec);
         let (Some(cell), Some(tie)) = (numbers(self, PIXEL_SCALE), numbers(self, TIE_POINTS))
         else {
-            // A transform says what scale and tie points say.
+            // A transform replaces scale and tie points.
             return self.tag(TRANSFORM).is_none() || full.tag(TRANSFORM).is_some();
         };
         let (Some(full_cell), Some(full_tie)) =
@@ -416,7 +417,7 @@ impl Image {
             return false;
         };
         if (&cell, &tie) == (&full_cell, &full_tie) {
-            // Copied with the other tags of the full image: it does not describe the overview.
+            // The tags were copied from the full image and do not describe the overview.
             return true;
         }
         (0..2).all(|axis| {
@@ -461,7 +462,7 @@ impl BlockReader for TiffBlocks {
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
-        // The decoder asks for one chunk after the other.
+        // The decoder requests the chunks one by one, so they are prefetched together.
         self.want(image, std::slice::from_ref(part));
         match self.block(image, part) {
             Err(fault) if !fault.is_of_the_line() => {
@@ -496,8 +497,8 @@ impl BlockReader for TiffBlocks {
     fn looks(&self) -> Option<Looks> {
         let image = self.images.len() - 1;
         let layout = &self.images[image].layout;
-        // The same file is looked at in the same places whether it is here or elsewhere, and in
-        // whole strips or tiles where these are small, as in versions that decoded them.
+        // The same parts of a file are read whether it is local or remote, and in whole strips or
+        // tiles if these are small, so that the hash matches that of earlier versions.
         let decoded = chunks(layout);
         let looked_at = BlockImage {
             block: match is_small(layout, decoded) {

@@ -1,23 +1,23 @@
-//! Check that a file can hold what its header promises, before memory is allocated.
+//! Check that a file can hold the samples in its header, before memory is allocated.
 
 use super::layout::Layout;
 use super::unpack;
 use crate::RasterError;
 use crate::blocks::Part;
 
-/// Room that a sparse file's holes may take beyond its data, so that a small file
-/// does not fill a machine's memory with nothing.
+/// Memory for a sparse file's no-data beyond its data, so that a small file cannot fill a machine's
+/// memory.
 const SPARSE_FLOOR: u64 = 64 << 20;
 const SPARSE_RATIO: u64 = 1024;
 
-/// More samples than this are not held in memory, however well the file packs them:
-/// 16 GB of them would leave a usual machine no room.
+/// Max size of samples in memory, whatever their compression: more than 16 GB would not fit in a
+/// usual machine.
 const MAX_BYTES: u64 = 16 << 30;
-/// Larger strips and tiles are not decoded: as `tiff-reader` has it.
+/// Max size of strips and tiles to decode, as in `tiff-reader`.
 const MAX_CHUNK: u64 = 1 << 30;
 
-/// Checks that a machine can hold all samples. A sparse or well packed file may hold more:
-/// that is no damage.
+/// Checks that all samples fit in memory. If not, the file is not damaged: it may be sparse or well
+/// compressed.
 pub(super) fn check_memory(layout: &Layout) -> Result<(), RasterError> {
     let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
     let all = Part::whole(layout.columns, layout.rows);
@@ -34,8 +34,8 @@ pub(super) fn check_memory(layout: &Layout) -> Result<(), RasterError> {
     }
 }
 
-/// Checks the promised size against the bytes that are stored for it. Where samples stay in the
-/// file no room is made for its holes.
+/// Checks the stated size against the stored bytes. If samples stay in the file, no memory is
+/// needed for its no-data.
 pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(), RasterError> {
     let (columns, rows) = (u64::from(layout.columns), u64::from(layout.rows));
     let absurd = |why: &str| RasterError::AbsurdSize(format!("{columns} × {rows} samples {why}"));
@@ -56,7 +56,7 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
         let what = "the samples are said to lie behind its end".into();
         return Err(RasterError::Truncated(what));
     }
-    // Both sides of a product are at most 2^32 and a texel at most 2^19 bytes.
+    // These cannot overflow: columns and rows are below 2^32, and a texel has at most 2^19 bytes.
     let ratio = u128::from(layout.compression.1);
     let texel = u128::from(layout.texel_bytes());
     let image = u128::from(columns) * u128::from(rows) * texel;

@@ -4,7 +4,7 @@ use tiff_reader::TiffError;
 
 use crate::RasterError;
 
-/// The same error in this program's terms.
+/// Converts an error.
 pub(super) fn fault(error: TiffError) -> RasterError {
     use TiffError as E;
     match error {
@@ -30,7 +30,7 @@ pub(super) fn fault(error: TiffError) -> RasterError {
     }
 }
 
-/// A variant of TIFF that is not read.
+/// Returns the error for an unsupported variant of TIFF.
 pub(super) fn unsupported(feature: String) -> RasterError {
     RasterError::Unsupported {
         format: "TIFF",

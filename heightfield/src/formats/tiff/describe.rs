@@ -1,4 +1,4 @@
-//! The user's choice of numbers, and the descriptions of samples in a file and its neighbours.
+//! The user's choice of a band, and the metadata in a file and its neighbours.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::{OpenOptions, RasterError};
 /// Extensions of a TIFF's world files.
 const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 
-/// Takes the descriptions of the samples from the file and its neighbours.
+/// Sets the metadata from the file and its neighbours.
 pub(super) fn describe(
     decoded: &mut Decoded,
     image: &Ifd,
@@ -27,7 +27,7 @@ pub(super) fn describe(
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
     decoded.remarks.extend(metadata.remarks);
-    // What keys spell out libgdal reads.
+    // libgdal reads systems that are defined by keys.
     let by_gdal = options.gdal.then_some(input);
     georef::apply(image, decoded, metadata.metres_per_vertical_unit, by_gdal);
     match decoded.place {
@@ -42,7 +42,7 @@ pub(super) fn describe(
     Ok(())
 }
 
-/// Columns and rows of the overviews in a file, and of those in one beside it on disk.
+/// Returns columns and rows of the overviews in a file, and in one beside it on disk.
 pub(super) fn overview_sizes(
     file: &Arc<TiffFile>,
     input: &FileBytes,
@@ -51,7 +51,7 @@ pub(super) fn overview_sizes(
     if let (Data::File(..), false) = (input.data(), input.is_outline())
         && let Some(beside) = find_appended(input, "ovr")?
     {
-        // What is wrong with it is reported where it is used.
+        // Its faults are reported where it is used.
         found
             .extend(super::open(&beside).map_or(vec![], |file| images::overviews(&Arc::new(file))));
     }
@@ -59,7 +59,7 @@ pub(super) fn overview_sizes(
     Ok(found.iter().map(size).collect())
 }
 
-/// Returns the user's choice of numbers.
+/// Returns the kind of numbers that the user chose.
 pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, RasterError> {
     match (options.encoding, options.band) {
         (Some(_), Some(band)) => Err(RasterError::NoSuchPart {
@@ -72,7 +72,7 @@ pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, RasterError> {
     }
 }
 
-/// Remarks on the tag that says where the first row and column lie: GDAL does not use it, either.
+/// Adds a remark on the tag for the position of the first row and column, which GDAL ignores, too.
 fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
     const ORIENTATION: u16 = 274;
     let first = match image.tag(ORIENTATION).and_then(|tag| tag.value.as_u32()) {

@@ -1,4 +1,4 @@
-//! GDAL's tags of a TIFF: the no-data value, scale, offset and unit of a band.
+//! GDAL's tags in a TIFF: the no-data value, scale, offset and unit of a band.
 
 use tiff_reader::Ifd;
 
@@ -8,10 +8,10 @@ use crate::xml;
 
 const GDAL_METADATA: u16 = 42112;
 const GDAL_NODATA: u16 = 42113;
-/// The file's own notes are short; what is not, is no such note.
+/// Max size of GDAL's metadata, bytes: a longer text is something else.
 const MAX_NOTE: usize = 1 << 20;
 
-/// GDAL's metadata beside a band's samples.
+/// GDAL's metadata of a band.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Metadata {
     pub(super) no_data: Option<f64>,
@@ -23,7 +23,7 @@ pub(super) struct Metadata {
 }
 
 impl Metadata {
-    /// The notes on one of some bands, the first being 0.
+    /// Reads the metadata of one of `bands` bands, the first being 0.
     pub(super) fn read(image: &Ifd, band: usize, bands: u16) -> Self {
         let mut metadata = match text(image, GDAL_METADATA) {
             Some(xml) => Self::from_xml(xml, band),
@@ -37,7 +37,7 @@ impl Metadata {
         metadata
     }
 
-    /// `<Item name="SCALE" sample="0" role="scale">0.3048</Item>` and its like.
+    /// Reads items such as `<Item name="SCALE" sample="0" role="scale">0.3048</Item>`.
     fn from_xml(text: &str, band: usize) -> Self {
         let mut metadata = Self::default();
         let read = xml::for_each(text, |open| {
@@ -72,7 +72,7 @@ impl Metadata {
     }
 }
 
-/// A text tag without its closing zero and blanks.
+/// Returns a text tag without its final zero and white space.
 fn text(image: &Ifd, tag: u16) -> Option<&str> {
     let text = image.tag(tag)?.value.as_str()?;
     let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());

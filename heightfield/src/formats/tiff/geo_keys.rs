@@ -16,7 +16,7 @@ const GEO_KEY_DIRECTORY: u16 = 34735;
 /// Values of [`GT_MODEL_TYPE`].
 const PROJECTED: u16 = 1;
 const GEOGRAPHIC: u16 = 2;
-/// The key of a linear unit's size in metres, where the unit has no code.
+/// Key of a linear unit's size in metres, for a unit without a code.
 const LINEAR_UNIT_SIZE: u16 = 3077;
 
 /// The GeoTIFF keys, if there are any.
@@ -40,20 +40,20 @@ impl GeoKeys {
         self.0.as_ref()?.get_double(key)?.first().copied()
     }
 
-    /// The first line of a text.
+    /// Returns the first line of a text.
     pub(super) fn text(&self, key: u16) -> Option<&str> {
         let text = self.whole_text(key)?.split('|').next()?.trim();
         (!text.is_empty()).then_some(text)
     }
 
-    /// A text, its lines between bars.
+    /// Returns a text with its lines separated by bars.
     pub(super) fn whole_text(&self, key: u16) -> Option<&str> {
         let text = self.0.as_ref()?.get_ascii(key)?;
         Some(text.trim_matches(['\0', ' ']))
     }
 
-    /// Returns the meaning of a sample: coordinates belong to the centres of points, and to the corners
-    /// of areas.
+    /// Returns the meaning of a sample: coordinates refer to the centres of points, and to the
+    /// corners of areas.
     pub(super) fn samples_are(&self) -> Option<SamplesAre> {
         match self.code(GT_RASTER_TYPE)? {
             1 => Some(SamplesAre::Areas),
@@ -62,13 +62,13 @@ impl GeoKeys {
         }
     }
 
-    /// A code that is one of EPSG's.
+    /// Returns a code if it is EPSG's.
     pub(super) fn known(&self, key: u16) -> Option<u16> {
         const USER_DEFINED: u16 = 32767;
         self.code(key).filter(|code| *code != USER_DEFINED)
     }
 
-    /// Metres in the linear unit, where the file states it.
+    /// Returns the metres in the linear unit, if the file states it.
     pub(super) fn stated_metres(&self) -> Option<f64> {
         let named = self.code(PROJ_LINEAR_UNITS).and_then(metres_of_code);
         let metres = named.or(self.number(LINEAR_UNIT_SIZE));
@@ -81,14 +81,15 @@ impl GeoKeys {
             Some(PROJECTED) => Some(true),
             Some(GEOGRAPHIC) => Some(false),
             _ if self.code(PROJECTED_CRS_TYPE).is_some() => Some(true),
-            // A map of a kind of its own, which stands on a geographic system.
+            // A user-defined projected system on a geographic one.
             _ if self.code(PROJ_LINEAR_UNITS).is_some() => Some(true),
             _ if self.code(GEODETIC_CRS_TYPE).is_some() => Some(false),
             _ => None,
         }
     }
 
-    /// The unit of the ground coordinates, where the keys state it: else the system's counts.
+    /// Returns the unit of the ground coordinates, if the keys state it; otherwise it is the
+    /// system's.
     pub(super) fn unit(&self) -> Option<GroundUnit> {
         match self.is_projected()? {
             true => {
@@ -99,7 +100,7 @@ impl GeoKeys {
         }
     }
 
-    /// Degrees in the angular unit; one where nothing states it.
+    /// Returns the degrees in the angular unit; one if it is not stated.
     pub(super) fn degrees(&self) -> f64 {
         self.stated_degrees().unwrap_or(1.0)
     }
@@ -116,7 +117,7 @@ impl GeoKeys {
     }
 }
 
-/// The numbers of a tag; none without it.
+/// Returns the numbers of a tag; empty if it is missing.
 pub(super) fn numbers(image: &Ifd, tag: u16) -> Vec<f64> {
     let tag = image.tag(tag);
     tag.and_then(|tag| tag.value.as_f64_vec())
@@ -174,7 +175,7 @@ const LENGTHS: [(u16, f64); 47] = [
     (9302, 0.201_167_56),
 ];
 
-/// Metres in a unit of length by its EPSG code.
+/// Returns the metres in a unit of length by its EPSG code.
 pub(super) fn metres_of_code(code: u16) -> Option<f64> {
     let found = LENGTHS.iter().find(|(known, _)| *known == code);
     found.map(|(_, metres)| *metres)

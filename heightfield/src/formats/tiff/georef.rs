@@ -16,13 +16,13 @@ use crate::input::FileBytes;
 
 const MODEL_PIXEL_SCALE: u16 = 33550;
 const MODEL_TIEPOINT: u16 = 33922;
-/// Column, row and level of a sample, and its three coordinates.
+/// Numbers of a tie point: column, row and level of a sample, and three coordinates.
 const NUMBERS_OF_A_TIE: usize = 6;
 const MODEL_TRANSFORMATION: u16 = 34264;
 
-/// Sets reference system, place, cell size, units and orientation as far as the file
-/// states them. `stated` are the metres in a vertical unit by the file's own notes.
-/// `file` is where libgdal may read what keys spell out.
+/// Sets reference system, place, cell size, units and orientation, as far as the file states them.
+/// `stated` is the number of metres in a vertical unit by the file's GDAL tags. libgdal may read
+/// systems that are defined by keys from `file`.
 pub(super) fn apply(
     image: &Ifd,
     decoded: &mut Decoded,
@@ -54,14 +54,14 @@ pub(super) fn apply(
     }
 }
 
-/// A scale alone tells the cells' size, but not where they are.
+/// Returns true if the place is stated; a scale alone states only the cell size.
 fn has_place(image: &Ifd) -> bool {
     let placed = [MODEL_TRANSFORMATION, MODEL_TIEPOINT];
     placed.iter().any(|tag| !numbers(image, *tag).is_empty())
 }
 
-/// The map from column and row to ground coordinates. A negative step of the scale
-/// stays one: such files are south-up.
+/// Returns the map from column and row to ground coordinates. A negative step of the scale is kept:
+/// such files are south-up.
 fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
     let numbers = |tag| numbers(image, tag);
     let (x, y) = match (
@@ -74,7 +74,7 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
             [x - column * east, east, 0.0],
             [y + row * north, 0.0, -north],
         ),
-        // A scale without a place.
+        // A scale without a position.
         (_, &[east, north, ..], _) => ([0.0, east, 0.0], [0.0, 0.0, -north]),
         _ => return None,
     };
@@ -84,7 +84,7 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
     }
 }
 
-/// The horizontal reference system: by its code, or by what it is called.
+/// Returns the horizontal reference system, by its code or its name.
 fn reference_system(keys: &GeoKeys, by_gdal: Option<&FileBytes>) -> Option<ReferenceSystem> {
     let code = match keys.is_projected()? {
         true => keys.known(PROJECTED_CRS_TYPE),
@@ -108,7 +108,7 @@ fn reference_system(keys: &GeoKeys, by_gdal: Option<&FileBytes>) -> Option<Refer
     Some(user_defined::system(keys, is_projected, name, by_gdal))
 }
 
-/// Projections that no keys are made for are written as Esri's text into the citation.
+/// Returns a system from Esri's text in the citation, which is used for projections without keys.
 fn system_in_text(keys: &GeoKeys) -> Option<ReferenceSystem> {
     let texts = [PROJ_CITATION, GT_CITATION].map(|key| keys.whole_text(key));
     let mut texts = texts.into_iter().flatten();

@@ -1,4 +1,4 @@
-//! Kinds of the images of a file.
+//! The kinds of images in a file.
 
 use std::sync::Arc;
 
@@ -6,12 +6,12 @@ use tiff_reader::{Ifd, TiffFile};
 
 use crate::RasterError;
 
-/// The tag that says what an image is, and two of its bits.
+/// The tag for the kind of an image, and two of its bits.
 const NEW_SUBFILE_TYPE: u16 = 254;
 const REDUCED: u32 = 1;
 const MASK: u32 = 4;
 
-/// An image of a file. Its lists of places may be long: they are not copied.
+/// An image of a file. It refers to its directory, whose lists may be too long to copy.
 #[derive(Clone)]
 pub(super) struct Directory {
     file: Arc<TiffFile>,
@@ -19,7 +19,7 @@ pub(super) struct Directory {
 }
 
 impl Directory {
-    /// The file that it is in.
+    /// Returns its file.
     pub(super) fn file(&self) -> &TiffFile {
         &self.file
     }
@@ -30,7 +30,7 @@ impl Directory {
     }
 }
 
-/// The first image that is neither an overview nor a mask; else the last.
+/// Returns the first image that is neither an overview nor a mask; else the last.
 pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, RasterError> {
     let images = file.ifds();
     let full = images.iter().position(|image| kind(image) == 0);
@@ -43,8 +43,8 @@ pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, RasterError> {
     })
 }
 
-/// The masks of an image or overview: the one that GDAL keeps in the same file, and the one in a
-/// file `beside`; they are of its size. 0 is no data.
+/// Returns the masks of an image or overview, of its size: the one in the same file, and the one in
+/// a file `beside`. 0 is no-data.
 pub(super) fn masks(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Directory> {
     let size = |image: &Ifd| (image.width(), image.height());
     let wanted = size(image.ifd());
@@ -62,7 +62,7 @@ pub(super) fn masks(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Di
     inside.into_iter().chain(outside).collect()
 }
 
-/// The overviews in a file, the finest first.
+/// Returns the overviews in a file, the finest first.
 pub(super) fn overviews(file: &Arc<TiffFile>) -> Vec<Directory> {
     let reduced = (0..file.ifds().len()).filter(|number| kind(&file.ifds()[*number]) == REDUCED);
     let mut reduced: Vec<_> = reduced
@@ -75,7 +75,7 @@ pub(super) fn overviews(file: &Arc<TiffFile>) -> Vec<Directory> {
     reduced
 }
 
-/// Returns the bits for a reduced image and a mask.
+/// Returns the bits for overviews and masks.
 fn kind(image: &Ifd) -> u32 {
     let bits = image.tag(NEW_SUBFILE_TYPE);
     bits.and_then(|tag| tag.value.as_u32()).unwrap_or(0) & (REDUCED | MASK)

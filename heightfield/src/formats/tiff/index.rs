@@ -1,4 +1,4 @@
-//! Index of an image's strips or tiles: the lists of its directory, as the decoder has them.
+//! Index of an image's strips or tiles: the lists in its directory, as `tiff-reader` parsed them.
 
 use tiff_reader::{Ifd, TagValue};
 
@@ -12,22 +12,22 @@ const TILE_BYTE_COUNTS: u16 = 325;
 /// A strip or tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Chunk {
-    /// Place where it lies in the file.
+    /// Its offset in the file.
     pub(super) place: u64,
-    /// Bytes stored for it; 0 for one that a sparse file leaves out.
+    /// Bytes stored for it; 0 if it is missing in a sparse file.
     pub(super) bytes: u64,
     /// Its samples.
     pub(super) covers: Part,
 }
 
-/// The places and sizes of strips or tiles.
+/// The offsets and sizes of strips or tiles.
 pub(super) struct Index<'f> {
     places: &'f TagValue,
     bytes: &'f TagValue,
 }
 
 impl<'f> Index<'f> {
-    /// Of an image of tiles or of strips; `None` where it has none.
+    /// Returns the index of an image in tiles or strips; `None` if it is missing.
     pub(super) fn of(image: &'f Ifd, tiled: bool) -> Option<Self> {
         let tags = match tiled {
             true => [TILE_OFFSETS, TILE_BYTE_COUNTS],
@@ -39,14 +39,14 @@ impl<'f> Index<'f> {
         Some(Self { places, bytes })
     }
 
-    /// Place and bytes of a strip or tile. What lies at 0, where the file's header is, is left
-    /// out, whatever its size: it has 0 bytes.
+    /// Returns offset and size of a strip or tile. Offset 0 is the file's header: such a chunk is
+    /// missing, and its size is 0.
     pub(super) fn at(&self, index: usize) -> Option<(u64, u64)> {
         let (place, bytes) = number(self.places, index).zip(number(self.bytes, index))?;
         Some((place, if place == 0 { 0 } else { bytes }))
     }
 
-    /// Returns the offset of a strip or tile, also of one without a size.
+    /// Returns the offset of a strip or tile, even if its size is missing.
     pub(super) fn place(&self, index: usize) -> Option<u64> {
         number(self.places, index)
     }
@@ -64,7 +64,7 @@ impl<'f> Index<'f> {
     }
 }
 
-/// A number of a list of whole ones.
+/// Returns an integer of a list.
 fn number(list: &TagValue, index: usize) -> Option<u64> {
     match list {
         TagValue::Byte(all) => all.get(index).copied().map(u64::from),

@@ -1,4 +1,4 @@
-//! Storage of an image's samples, and whether they can be heights.
+//! Storage of an image's samples, and whether these can be heights.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::encoding::no_codes;
 use crate::read::Stored;
 use crate::{RasterError, SampleType};
 
-/// Larger chunks are not decoded as a whole where that can be helped, bytes.
+/// Larger chunks are not decoded whole if there is an alternative, bytes.
 pub(super) const MAX_DECODED: u64 = 1 << 20;
 
 /// Storage of an image's samples.
@@ -26,37 +26,37 @@ pub(super) struct Layout {
     /// Type of a sample.
     pub(super) stored: (SampleFormat, u16),
     pub(super) bands: u16,
-    /// The band that is the height, the first being 0.
+    /// The band with the heights, the first being 0.
     pub(super) band: usize,
-    /// The first three bands are red, green and blue, and together the code of a height.
+    /// True if the first three bands are red, green and blue, and encode the heights.
     pub(super) has_codes: bool,
-    /// The band that says what is transparent, if one does.
+    /// The band with the transparency, if there is one.
     pub(super) alpha: Option<usize>,
-    /// Name, and how many bytes one stored byte may hold.
+    /// Its name, and the max bytes that a stored byte may expand to.
     pub(super) compression: (&'static str, u64),
-    /// Each band has its own chunks.
+    /// True if each band has its own chunks.
     planar: bool,
     tiled: bool,
     /// Columns and rows of a strip or tile.
     pub(super) chunk: (u32, u32),
-    /// Bytes are samples, in an order without surprises, and chunks are so large that they are
-    /// read row by row.
+    /// True if the bytes are samples in plain order, and the chunks are so large that they are read
+    /// row by row.
     pub(super) is_plain: bool,
-    /// Chunks that are too large to be decoded where they are touched, once they are.
+    /// Chunks that are too large to be decoded on access, once they are decompressed on disk.
     pub(super) unpacked: Option<Arc<Unpacked>>,
 }
 
-/// Bands of a code.
+/// Number of bands of encoded heights.
 pub(super) const COLOURS: usize = 3;
 
 /// The kind of numbers to read from a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wanted {
-    /// Heights in a band, the first being 1; in the first one where the user chose none.
+    /// Heights in a band, the first being 1; by default, in the first.
     Heights(Option<u32>),
-    /// The same of numbers that are classes: a palette is taken for what it is.
+    /// As `Heights`, for numbers that are classes: the numbers of a palette are used directly.
     Classes(Option<u32>),
-    /// Heights that are encoded in colours.
+    /// Heights encoded in colours.
     Codes,
 }
 
@@ -77,7 +77,7 @@ pub(super) enum SampleFormat {
     Float,
 }
 
-/// Name of a compression, and how many bytes one stored byte may hold.
+/// Returns the name of a compression, and the max bytes that a stored byte may expand to.
 fn compression(code: u16) -> Result<(&'static str, u64), RasterError> {
     let refused = match code {
         1 => return Ok(("uncompressed", 1)),
@@ -88,7 +88,7 @@ fn compression(code: u16) -> Result<(&'static str, u64), RasterError> {
         // Zstandard repeats a block of 128 KiB with a few bytes.
         50000 => return Ok(("zstd", 40_000)),
         6 | 7 => "JPEG compression",
-        // LERC stores a flat block in some hundred bytes; blocks of a megapixel fit.
+        // LERC stores a uniform block in some hundred bytes; this allows blocks of a megapixel.
         34887 => return Ok(("lerc", 40_000)),
         34925 => "LZMA compression",
         50001 => "WebP compression",
@@ -99,7 +99,7 @@ fn compression(code: u16) -> Result<(&'static str, u64), RasterError> {
 }
 
 impl Layout {
-    /// Reads and checks the layout of an image for what is wanted of it.
+    /// Reads and checks the layout of an image for the requested kind of numbers.
     pub(super) fn read(directory: &Directory, wanted: Wanted) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let bands = image.samples_per_pixel();
@@ -118,12 +118,12 @@ impl Layout {
             ..Self::of(directory, stored_type(image)?)?
         };
         check_predictor(image, layout.stored.0)?;
-        // What the decoder refuses is refused here, too, where it does not come to decode.
+        // Fails here for layouts that the decoder rejects, even if it is not used later.
         image.raster_layout().map_err(fault)?;
         Ok(layout)
     }
 
-    /// The layout of a mask, of as few bits a sample as it has.
+    /// Reads the layout of a mask, whose samples may have few bits.
     pub(super) fn of_mask(directory: &Directory) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let bits = image.bits_per_sample().map_err(fault)?;
@@ -136,7 +136,7 @@ impl Layout {
         }
     }
 
-    /// Reads how the samples of the first band are laid out.
+    /// Reads the layout of the first band's samples.
     fn of(directory: &Directory, stored: (SampleFormat, u16)) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let (columns, rows) = (image.width(), image.height());
@@ -180,12 +180,12 @@ impl Layout {
         })
     }
 
-    /// Returns true if rows are read without the others of their strip or tile.
+    /// Returns true if rows can be read without the rest of their strip or tile.
     pub(super) fn is_read_by_rows(&self) -> bool {
         self.is_plain || self.unpacked.is_some()
     }
 
-    /// Returns true if nothing has to be unpacked on disk for a part.
+    /// Returns true if a part can be read without decompressing to disk first.
     #[cfg(test)]
     pub(super) fn is_at_hand(&self, part: &Part) -> bool {
         self.unpacked.as_ref().is_none_or(|unpacked| {
@@ -196,7 +196,7 @@ impl Layout {
         })
     }
 
-    /// Strips, or tiles.
+    /// Returns `strips` or `tiles`.
     pub(super) const fn chunks_name(&self) -> &'static str {
         if self.tiled { "tiles" } else { "strips" }
     }
@@ -206,23 +206,23 @@ impl Layout {
         !self.tiled
     }
 
-    /// Bytes of the samples of a chunk.
+    /// Returns the size of a chunk's samples, bytes.
     pub(super) fn chunk_size(&self) -> u64 {
         self.row_bytes().saturating_mul(self.chunk.1.into())
     }
 
-    /// Bytes of a row of a chunk.
+    /// Returns the size of a chunk's row, bytes.
     pub(super) fn row_bytes(&self) -> u64 {
         self.bytes_of(self.chunk.0)
     }
 
-    /// Bytes of so many texels of a row, the last one filled up.
+    /// Returns the size of some texels of a row, rounded up to bytes.
     fn bytes_of(&self, columns: u32) -> u64 {
         let bits = u64::from(self.stored.1) * u64::from(self.bands_together());
         bits.saturating_mul(columns.into()).div_ceil(8)
     }
 
-    /// The bytes of a row of a chunk, counted from its first one, that have some of its columns.
+    /// Returns the byte range of some columns in a chunk's row.
     pub(super) fn row_range(&self, first: u32, columns: u32) -> Range<u64> {
         let bits = u64::from(self.stored.1) * u64::from(self.bands_together());
         bits.saturating_mul(first.into()) / 8..self.bytes_of(first.saturating_add(columns))
@@ -246,7 +246,7 @@ impl Layout {
         }
     }
 
-    /// The type in which heights are held.
+    /// Returns the type of the heights in memory.
     pub(super) const fn held(&self) -> SampleType {
         match self.has_codes {
             true => SampleType::I32,
@@ -254,18 +254,18 @@ impl Layout {
         }
     }
 
-    /// Chunks from west to east.
+    /// Returns the number of chunks from west to east.
     pub(super) fn chunks_across(&self) -> u32 {
         self.columns.div_ceil(self.chunk.0)
     }
 
-    /// The chunks that have samples of a part of the band that is the height. Those that the
-    /// index has too few of are left out.
+    /// Returns the chunks with samples of a part, in the band of the heights, without those missing
+    /// in the index.
     pub(super) fn chunks_in(&self, part: &Part) -> impl Iterator<Item = Chunk> {
         self.chunks_of(self.band, part)
     }
 
-    /// The same of another band.
+    /// As `chunks_in`, for another band.
     pub(super) fn chunks_of(&self, band: usize, part: &Part) -> impl Iterator<Item = Chunk> {
         let (width, height) = self.chunk;
         let across = part.column / width..(part.column + part.columns).div_ceil(width);
@@ -291,14 +291,14 @@ impl Layout {
         })
     }
 
-    /// Bytes that all samples take in memory.
+    /// Returns the size of all samples in memory, bytes.
     pub(super) fn bytes(&self) -> u64 {
         let samples = u64::from(self.columns) * u64::from(self.rows);
         samples.saturating_mul(self.held().bytes())
     }
 
-    /// Place and bytes of each chunk with samples of the band that is the height; `None` when the
-    /// index has too few. A chunk that a sparse file leaves out has 0 bytes.
+    /// Returns offset and size of each chunk of the heights' band; `None` if the index is too
+    /// short. The size is 0 for chunks that are missing in a sparse file.
     pub(super) fn of_band(&self) -> Option<impl Iterator<Item = (u64, u64)>> {
         let (index, first) = (self.index()?, self.first_of(self.band)?);
         let end = first.checked_add(usize::try_from(self.chunks_of_band()).ok()?)?;
@@ -306,12 +306,12 @@ impl Layout {
         Some((first..end).map_while(move |number| index.at(number)))
     }
 
-    /// Returns the number of chunks that a band has.
+    /// Returns the number of a band's chunks.
     pub(super) fn chunks_of_band(&self) -> u64 {
         u64::from(self.chunks_across()) * u64::from(self.rows.div_ceil(self.chunk.1))
     }
 
-    /// Returns the offsets of all chunks, those of all bands.
+    /// Returns the offsets of all chunks of all bands.
     pub(super) fn places(&self) -> impl Iterator<Item = u64> {
         let index = self.index();
         (0..).map_while(move |number| index.as_ref()?.place(number))
@@ -326,7 +326,7 @@ impl Layout {
         Index::of(self.directory.ifd(), self.tiled)
     }
 
-    /// Number of a band's first chunk among those of all bands.
+    /// Returns the number of a band's first chunk among those of all bands.
     fn first_of(&self, band: usize) -> Option<usize> {
         let chunks = usize::try_from(self.chunks_of_band()).ok()?;
         match self.planar {
@@ -335,7 +335,7 @@ impl Layout {
         }
     }
 
-    /// The bands of which chunks are read for heights: with them lies what is transparent.
+    /// Returns the bands whose chunks are read for heights, including the transparency.
     pub(super) fn bands_read(&self) -> impl Iterator<Item = usize> + use<> {
         let apart = self.alpha.filter(|_| self.planar);
         let colours = if self.has_codes && self.planar {
@@ -346,24 +346,24 @@ impl Layout {
         std::iter::once(self.band).chain(colours).chain(apart)
     }
 
-    /// Bytes of a texel that come before a band's sample.
+    /// Returns the bytes of a texel before a band's sample.
     pub(super) fn bytes_before(&self, band: usize) -> usize {
         let band = if self.planar { 0 } else { band };
         usize::from(self.stored.1 / 8) * band
     }
 
-    /// Bytes of the samples that are stored together: one of each band, or of one
-    /// band only where each has its own chunks.
+    /// Returns the bytes of samples that are stored together: one of each band, or only one if each
+    /// band has its own chunks.
     pub(super) fn texel_bytes(&self) -> u64 {
         u64::from(self.stored.1 / 8) * u64::from(self.bands_together())
     }
 
-    /// Bands that have their samples in the same chunks.
+    /// Returns the number of bands that share chunks.
     pub(super) const fn bands_together(&self) -> u16 {
         if self.planar { 1 } else { self.bands }
     }
 
-    /// The variant in words.
+    /// Returns a description of the variant.
     pub(super) fn described(&self, order: ByteOrder) -> String {
         let sample = match self.stored.0 {
             SampleFormat::Unsigned => "uint",
@@ -383,7 +383,7 @@ impl Layout {
     }
 }
 
-/// Checks that differences are taken of samples that can have such: of floats only in predictor 3.
+/// Checks the predictor: floats support only predictor 3.
 fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError> {
     const OF_FLOATS: u16 = 3;
     match (image.predictor(), format) {
@@ -394,22 +394,22 @@ fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError>
     }
 }
 
-/// Returns true if bytes are samples: neither packed, nor differences, nor with their bits turned.
+/// Returns true if the bytes are samples: not compressed, without predictor, bits not reversed.
 fn has_plain_samples(image: &Ifd) -> bool {
     (image.compression(), image.predictor(), image.fill_order()) == (1, 1, 1)
 }
 
-/// The band that its tag calls alpha, associated or not.
+/// Returns the band that its tag marks as alpha, associated or not.
 fn alpha(image: &Ifd, bands: u16) -> Option<usize> {
     const EXTRA_SAMPLES: u16 = 338;
     let extra = image.tag(EXTRA_SAMPLES)?.value.as_u16_slice()?;
     let first = usize::from(bands).checked_sub(extra.len())?;
     let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2))?;
-    // The first band is the height, whatever it is called.
+    // The first band is the height, whatever its tag.
     Some(first + alpha).filter(|band| *band > 0)
 }
 
-/// The band that the user chose, or the first, which is 0.
+/// Returns the band that the user chose, or the first, which is 0.
 fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, RasterError> {
     let band = asked.unwrap_or(1).max(1);
     if band > u32::from(bands) {
@@ -423,7 +423,7 @@ fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, RasterError> {
     Ok(band as usize - 1)
 }
 
-/// Checks that an image has colours that may be codes of heights.
+/// Checks that an image has colours that may encode heights.
 fn check_codes(image: &Ifd, bands: u16) -> Result<(), RasterError> {
     use PhotometricInterpretation::{MinIsBlack, Rgb};
     let meaning = image.photometric_interpretation_enum();
@@ -439,8 +439,7 @@ fn is_palette(image: &Ifd) -> bool {
     image.photometric_interpretation_enum() == Some(PhotometricInterpretation::Palette)
 }
 
-/// Colours are no heights, however many bands they have, unless the user has `chosen`
-/// one of them.
+/// Rejects colours, with any number of bands, unless the user has `chosen` one of them.
 fn refuse_colour(image: &Ifd, bands: u16, chosen: bool) -> Result<(), RasterError> {
     use PhotometricInterpretation as Meaning;
     let what = match image.photometric_interpretation_enum() {

@@ -1,4 +1,4 @@
-//! The masks of an image: which of its samples have data.
+//! The masks of an image, which mark its no-data.
 
 use std::sync::Arc;
 
@@ -14,15 +14,15 @@ use crate::RasterError;
 use crate::blocks::{MAX_BLOCK_BYTES, Part};
 use crate::disk_cache::DiskCache;
 
-/// A mask. 0 is no data.
+/// A mask. 0 is no-data.
 pub(super) struct Mask {
     directory: Directory,
-    /// Place where it is laid out as masks are.
+    /// Its layout, if it is usual for masks.
     layout: Option<Layout>,
 }
 
 impl Mask {
-    /// The masks of an image or overview, in its file and in one beside it.
+    /// Returns the masks of an image or overview, in its file and in one beside it.
     pub(super) fn all(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Self> {
         let masks = images::masks(image, beside).into_iter();
         let masks = masks.map(|directory| Self {
@@ -32,7 +32,7 @@ impl Mask {
         masks.collect()
     }
 
-    /// Samples of a strip or tile.
+    /// Returns the number of samples of a strip or tile.
     fn chunk_samples(&self) -> u64 {
         let mask = self.directory.ifd();
         let columns = mask.tile_width().unwrap_or(mask.width());
@@ -41,10 +41,10 @@ impl Mask {
         u64::from(columns) * u64::from(rows)
     }
 
-    /// Makes it a mask of which parts are read. `disk` is where it may be unpacked.
+    /// Prepares reading the mask in parts. It may be decompressed to `disk`.
     ///
     /// # Errors
-    /// The reason for which that is impossible.
+    /// The reason why that is impossible.
     pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let samples = self.chunk_samples();
         let is_large = samples > MAX_DECODED;
@@ -57,19 +57,19 @@ impl Mask {
             _ => Err("its samples are packed in an unusual way".into()),
         };
         match unpacked {
-            // It is decoded with each block.
+            // Small enough to be decoded with each block.
             Err(_) if samples <= MAX_BLOCK_BYTES => Ok(()),
             unpacked => unpacked,
         }
     }
 
-    /// Bytes that it takes unpacked on disk at most.
+    /// Returns the max disk space for its decompressed chunks, bytes.
     pub(super) fn unpacked_bytes(&self) -> u64 {
         let unpacked = self.layout.as_ref().and_then(|mask| mask.unpacked.as_ref());
         unpacked.map_or(0, |unpacked| unpacked.most_bytes())
     }
 
-    /// Hands over each sample of a part that has no data, counted from the part's first.
+    /// Calls `set` with the index, in the part, of each no-data sample.
     pub(super) fn missing(
         &self,
         part: &Part,
@@ -108,7 +108,7 @@ fn by_rows(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(),
     all_there(found, part)
 }
 
-/// All of a mask whose strips are unpacked one after the other.
+/// Reads a whole mask, strip by strip.
 fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), RasterError> {
     let mut found = 0;
     for chunk in mask.chunks_in(part) {
@@ -144,7 +144,7 @@ fn all_there(found: u64, part: &Part) -> Result<(), RasterError> {
     }
 }
 
-/// The samples of a row of a part that have no data, by the bytes of a strip or tile that have them.
+/// Visits the no-data samples of a row of a part, by the bytes of its strip or tile.
 fn row_missing(
     mask: &Layout,
     chunk: &Chunk,
@@ -155,7 +155,7 @@ fn row_missing(
 ) {
     let bits = usize::from(mask.stored.1);
     let inside = chunk.covers.within(row);
-    // The first byte may begin with samples to the west.
+    // The first byte may contain samples to the west.
     let skipped = (inside.column - chunk.covers.column) as usize * bits % 8;
     let to = (row.row - part.row) as usize * part.columns as usize;
     let to = to + (inside.column - part.column) as usize;

@@ -1,4 +1,4 @@
-//! Masks of few bits a sample, in strips and tiles, read in each way.
+//! Masks of few bits per sample, in strips and tiles, read in every way.
 
 use std::io::Write;
 
@@ -20,8 +20,8 @@ const DEFLATE: Packing = Packing {
     predictor: 1,
 };
 
-/// The samples of a part without data. The bytes are those of a file with a byte a sample, of which
-/// a mask of fewer bits takes the first.
+/// Returns the no-data samples of a part. The bytes are those of a file with one byte per sample; a
+/// mask of fewer bits uses the first ones.
 fn expected(made: &Made, bits: usize, part: &Part) -> Vec<usize> {
     let chunks = Made {
         packing: PLAIN,
@@ -93,12 +93,12 @@ fn a_mask_of_few_bits_is_the_same_in_each_way_of_reading_it() {
                 ..ONE_STRIP
             };
             let bits = bits[0] as usize;
-            // All of it once: to work out what is expected takes long.
+            // The whole mask only once, because the expected result is slow to compute.
             for part in [whole, inner].into_iter().skip(usize::from(bits > 1)) {
                 let expected = expected(&made, bits, &part);
                 let all = part.columns as usize * part.rows as usize;
                 assert!(!expected.is_empty() && expected.len() < all, "{bits}");
-                // As the decoder has it.
+                // Read by the decoder.
                 assert!(found(&mask(&made), &part) == expected, "{bits} {chunk:?}");
                 let mut plain = mask(&made);
                 plain.layout.as_mut().expect("laid out").is_plain = true;
@@ -108,7 +108,7 @@ fn a_mask_of_few_bits_is_the_same_in_each_way_of_reading_it() {
                     ..made
                 };
                 let mut packed = mask(&packed);
-                // The decoder refuses more bytes than there are samples.
+                // The decoder rejects more bytes than samples.
                 if bits == 8 {
                     assert!(found(&packed, &part) == expected, "{bits} {chunk:?}");
                 }

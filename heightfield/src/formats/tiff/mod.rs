@@ -1,15 +1,15 @@
-//! TIFF, GeoTIFF, BigTIFF and cloud-optimised GeoTIFF: the first band of the
-//! first full image, in memory or, where it is large, read in blocks when it is touched.
+//! TIFF, GeoTIFF, BigTIFF and cloud-optimised GeoTIFF: the first band of the first full image, in
+//! memory or, if it is large, read in blocks on access.
 //!
-//! `tiff-reader` decodes; it is named in this folder only.
+//! `tiff-reader` decodes; only this folder uses it.
 //!
-//! - `images`, `layout`, `index`, `budget`: the directories of a file, the type and arrangement of its
-//!   samples, the offsets of its strips and tiles, and the memory that these lists may take;
-//! - `gdal_metadata`, `georef`, `geo_keys`, `user_defined`, `describe`: no-data, scale and unit; the
-//!   place of the samples and their reference system;
+//! - `images`, `layout`, `index`, `budget`: the directories of a file, the type and arrangement of
+//!   its samples, the offsets of its strips and tiles, and the memory that these lists may take;
+//! - `gdal_metadata`, `georef`, `geo_keys`, `user_defined`, `describe`: no-data, scale and unit;
+//!   the place of the samples and their reference system;
 //! - `band`, `samples`, `masks`: the heights of a band, and which of them are no-data;
-//! - `blocks`, `uncompressed`, `unpack`, `unpacked_on_disk`: parts of large images, read when touched;
-//! - `blended_overviews`: overviews that were averaged with no-data values, and are left out;
+//! - `blocks`, `uncompressed`, `unpack`, `unpacked_on_disk`: parts of large images, read on access;
+//! - `blended_overviews`: detection of overviews averaged with no-data values, which are ignored;
 //! - `remote_source`, `decoder_error`: files at URLs, and the decoder's errors.
 
 mod band;
@@ -63,16 +63,16 @@ pub(super) const FORMAT: Format = Format {
     decode,
 };
 
-/// A file at a URL whose samples take no more than this is fetched as a whole.
+/// Max size of samples that are downloaded whole, for a file at a URL, bytes.
 const FEW_BYTES: u64 = 1 << 20;
 
-/// The longest list of a directory, and all lists of all of them, bytes: a whole earth of cells of
-/// a second in tiles of 256 × 256 samples has an index of 100 MB.
+/// Max size of a list in a directory, and of all lists, bytes: the whole Earth in cells of one
+/// second and tiles of 256 × 256 samples has an index of 100 MB.
 const MAX_LIST: usize = 72 << 20;
 const ALL_LISTS: usize = 128 << 20;
 
-/// Reads the heights, or lets them stay in the file: of several bands the chosen one or
-/// the first, of several images the first that is neither an overview nor a mask.
+/// Reads the heights, or leaves them in the file: from the chosen band or the first, and from the
+/// first image that is neither an overview nor a mask.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let file = Arc::new(open(input)?);
     let full = images::full(&file)?;
@@ -124,17 +124,17 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     Ok(decoded)
 }
 
-/// Remark on where the samples are.
+/// Remark on the storage of the samples.
 enum Told {
     /// A remark on how they are read.
     Remark(String),
-    /// Reason for which all are in memory.
+    /// Reason why all are in memory.
     Whole(String),
 }
 
-/// The samples of the full image: left in the file where they are many and that can be, else all
-/// of them. `files` are the TIFF and the one of its mask, if it has one; `no_data` is as a sample can
-/// hold it.
+/// Returns the samples of the full image: left in the file if they are many and it allows that,
+/// else all of them. `files` are the TIFF and its mask's, if any; `no_data` is the value as a
+/// sample stores it.
 fn stored(
     files: &[&FileBytes],
     options: &OpenOptions,
@@ -145,7 +145,7 @@ fn stored(
 ) -> Result<(Storage, Vec<Told>), RasterError> {
     let input = files[0];
     let most = match input.remote() {
-        // What is not touched is not fetched, either.
+        // Parts that are not accessed are not downloaded.
         Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
         None => options.most_in_memory_bytes,
     };
@@ -202,8 +202,7 @@ fn stored(
     Ok((storage, told.into_iter().collect()))
 }
 
-/// Returns a remark on the memory while a file is read as a whole, where that is more
-/// than its samples take.
+/// Returns a remark on the peak memory, if reading needs more than the samples themselves.
 fn at_once(layout: &Layout) -> &'static str {
     let all = Part::whole(layout.columns, layout.rows);
     match layout.is_plain || unpack::suits_whole(layout, &all) {
@@ -212,7 +211,7 @@ fn at_once(layout: &Layout) -> &'static str {
     }
 }
 
-/// Returns a remark on strips or tiles that are unpacked on disk, if some are.
+/// Returns a remark on strips or tiles that are decompressed to disk, if there are any.
 fn unpacked_told(image: &Image) -> Option<Told> {
     let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
     let whose = match &image.layout.unpacked {
@@ -226,11 +225,11 @@ fn unpacked_told(image: &Image) -> Option<Told> {
     })
 }
 
-/// Opens the file. No list in its directories may be longer than the file is.
+/// Opens the file. Its directories' lists must not be longer than the file.
 fn open(input: &FileBytes) -> Result<TiffFile, RasterError> {
     let bytes = usize::try_from(input.len()).unwrap_or(usize::MAX);
     let options = tiff_reader::OpenOptions {
-        // Blocks are kept where all formats keep theirs.
+        // Blocks are cached in one place for all formats.
         block_cache_bytes: 0,
         parse_budgets: ParseBudgets {
             max_ifds: 64,
@@ -257,7 +256,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, RasterError> {
     })
 }
 
-/// Returns true if a list is not read because it is too long, however long the file is.
+/// Returns true if a list is rejected as too long for any file.
 fn is_long(reason: &str) -> bool {
     [MAX_LIST, ALL_LISTS]
         .iter()
@@ -270,7 +269,7 @@ mod odd_tags_tests;
 mod test_files;
 #[cfg(test)]
 mod tests;
-/// TIFFs tag by tag, as the tests of all crates make them.
+/// TIFFs written tag by tag, for the tests of all crates.
 #[cfg(test)]
 #[path = "../../../../tests/src/tiffs.rs"]
 #[allow(dead_code, unreachable_pub)]

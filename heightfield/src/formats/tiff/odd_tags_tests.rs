@@ -1,4 +1,4 @@
-//! Files whose tags want a remark, a refusal or an option.
+//! Files whose tags cause a remark or an error, or need an option.
 
 use super::tiffs::{DATA, Directory, Values, floats_in_a_strip, placed, tiff};
 use crate::{Encoding, Error, OpenOptions, Raster};
@@ -13,7 +13,7 @@ fn opened(data: &[u8], mut tags: Directory, options: &OpenOptions) -> Result<Ras
     Raster::open(path, options)
 }
 
-/// The heights 0 to 11, with more tags.
+/// Opens the heights 0 to 11, with more tags.
 fn with_tags(more: Directory) -> Result<Raster, Error> {
     let data: Vec<u8> = (0..12).flat_map(|at| (at as f32).to_le_bytes()).collect();
     let mut tags = floats_in_a_strip(SIZE, DATA);

@@ -1,4 +1,4 @@
-//! A file at a URL as the decoder reads it.
+//! A file at a URL as a source for `tiff-reader`.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! The samples of a part of a band, and which of them are holes that no value marks:
-//! left out of a sparse file, masked, transparent.
+//! The samples of a part of a band, and its no-data that no value marks: missing in a sparse file,
+//! masked, transparent.
 
 use half::f16;
 
@@ -12,7 +12,7 @@ use crate::encoding::codes;
 use crate::samples::{HoleMask, SampleValue, with_samples};
 use crate::{RasterError, Samples};
 
-/// Reads a part of the band that is the height, or of the codes of heights.
+/// Reads a part of the heights' band, or of encoded heights.
 pub(super) fn heights(layout: &Layout, part: &Part) -> Result<Samples, RasterError> {
     if !layout.has_codes {
         return read(layout, layout.band, part);
@@ -49,8 +49,8 @@ fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterErro
     })
 }
 
-/// The samples of a part in chunks that a sparse file leaves out, those that a mask calls no data,
-/// and those whose alpha is zero.
+/// Returns the no-data of a part: chunks missing in a sparse file, masked samples, and samples with
+/// zero alpha.
 pub(super) fn holes(
     layout: &Layout,
     masks: &[Mask],

@@ -1,4 +1,4 @@
-//! TIFF files that tests write: all types, orders and arrangements of samples.
+//! TIFF files for tests: all types, orders and arrangements of samples.
 
 use half::f16;
 
@@ -7,16 +7,16 @@ use crate::input::FileBytes;
 use crate::{OpenOptions, Raster, RasterError};
 
 pub(super) const SIZE: [u32; 2] = [1201, 1103];
-/// Bands of images that have several, and the one that is asked for, the first being 1.
+/// Number of bands, and the requested band, the first being 1.
 pub(super) const BANDS: u32 = 3;
 pub(super) const BAND: u32 = 2;
 
-/// A sample that every type can hold.
+/// Returns a sample that every type can store.
 pub(super) fn value([column, row]: [u32; 2], band: u32) -> i64 {
     i64::from((column * 7 + row * 13 + band * 29) % 101)
 }
 
-/// Writer of a type of samples.
+/// A sample type and its writer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
     pub(super) bits: u16,
@@ -24,7 +24,7 @@ pub(super) struct Kind {
     pub(super) bytes: fn(i64) -> Vec<u8>,
 }
 
-/// Types with their bytes, the least significant first.
+/// All types, with the least significant byte first.
 pub(super) const KINDS: [Kind; 11] = [
     kind(8, 1, |value| (value as u8).to_le_bytes().into()),
     kind(8, 2, |value| (value as i8).to_le_bytes().into()),
@@ -58,16 +58,16 @@ pub(super) struct Made {
     /// Columns and rows of a strip or tile.
     pub(super) chunk: [u32; 2],
     pub(super) bands: u32,
-    /// Each band has its own chunks.
+    /// True if each band has its own chunks.
     pub(super) is_planar: bool,
-    /// Other values of a tag.
+    /// A tag with other values.
     pub(super) other: Option<(u16, &'static [u32])>,
-    /// A chunk that a sparse file leaves out.
+    /// A chunk to leave out, as in a sparse file.
     pub(super) left_out: Option<usize>,
     pub(super) packing: Packing,
 }
 
-/// Packing of samples.
+/// Compression of samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Packing {
     pub(super) code: u16,
@@ -75,7 +75,7 @@ pub(super) struct Packing {
     pub(super) predictor: u16,
 }
 
-/// Not at all.
+/// No compression.
 pub(super) const PLAIN: Packing = Packing {
     code: 1,
     pack: <[u8]>::to_vec,
@@ -102,7 +102,7 @@ impl Made {
         bytes
     }
 
-    /// A row of samples, the least significant byte first, as it is before it is packed.
+    /// Returns a row of samples before compression, the least significant byte first.
     fn row(&self, samples: &[Vec<u8>], bands: usize) -> Vec<u8> {
         let value = |bytes: &Vec<u8>| {
             let mut eight = [0; 8];
@@ -135,7 +135,7 @@ impl Made {
         }
     }
 
-    /// The chunks of all bands, one after the other.
+    /// Returns the chunks of all bands, in order.
     pub(super) fn chunks(&self) -> Vec<Vec<u8>> {
         let is_tiled = self.chunk[0] != SIZE[0];
         let planes = if self.is_planar { self.bands } else { 1 };
@@ -250,7 +250,7 @@ pub(super) fn open(made: &Made, most_in_memory_bytes: u64) -> Result<Raster, Ras
     Raster::checked(decode(&input, &options)?, None)
 }
 
-/// Holds samples all over the image, and all of some rows, against what was written.
+/// Compares samples all over the image, and all of some rows, with the written ones.
 pub(super) fn check(made: &Made, raster: &Raster) {
     let band = if made.bands > 1 { BAND - 1 } else { 0 };
     let rows = [0, 1, 639, 640, 641, SIZE[1] - 1];

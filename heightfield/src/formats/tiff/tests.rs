@@ -1,4 +1,4 @@
-//! Several images in a file, and headers that promise too much.
+//! Several images in a file, and headers that state too much.
 
 use std::io::Cursor;
 
@@ -89,7 +89,7 @@ fn the_mask_beside_an_image_makes_holes() {
     assert_eq!(raster.height(2, 1), 3.0);
 }
 
-/// One image of indices of a palette.
+/// Returns a file with one image of palette indices.
 fn with_palette() -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut bytes).expect("a file");
@@ -128,7 +128,7 @@ fn the_numbers_of_a_palette_are_classes_and_no_heights() {
     }
 }
 
-/// Left in the file, whatever its size.
+/// Returns options that leave samples in the file, whatever their size.
 fn in_blocks() -> OpenOptions {
     OpenOptions {
         most_in_memory_bytes: 0,
@@ -136,7 +136,7 @@ fn in_blocks() -> OpenOptions {
     }
 }
 
-/// A full image of 64 × 48 samples, and an overview of a size and one height.
+/// Returns a full image of 64 × 48 samples, and a uniform overview.
 fn with_overview(size: (u32, u32), height: u8) -> Vec<u8> {
     let samples: Vec<u8> = (0..64 * 48).map(|index| (index % 199) as u8).collect();
     let full = Part {
@@ -178,7 +178,7 @@ fn overviews_and_masks_beside_a_file_are_its_own() {
     std::fs::write(&path, file(&[part(0, (64, 48), &samples)])).expect("written");
     let overview = file(&[part(1, (16, 12), &[9; 16 * 12])]);
     std::fs::write(folder.path().join("dem.tif.ovr"), overview).expect("written");
-    // The mask and its own overview hide the first sample of each.
+    // The mask and its overview mark the first sample of each as no-data.
     let mut mask = [255; 64 * 48];
     mask[0] = 0;
     let mut coarse_mask = [255; 16 * 12];
@@ -203,7 +203,7 @@ fn a_strip_that_is_cut_off_is_a_hole_in_a_file_that_is_not_held() {
         samples: &samples,
     }];
     let mut bytes = file(&parts);
-    // The writer puts the samples first and the directory last: move one strip's place.
+    // The writer puts the samples first and the directory last: change one strip's offset.
     let raster = |bytes: Vec<u8>| {
         let input = FileBytes::unpacked("test.tif", bytes);
         Raster::checked(decode(&input, &in_blocks()).expect("decoded"), None).expect("heights")
@@ -222,7 +222,7 @@ fn a_strip_that_is_cut_off_is_a_hole_in_a_file_that_is_not_held() {
     assert_eq!(raster.height(10, 0), 5.0);
 }
 
-/// Overwrites the number of the first directory's entry for a tag.
+/// Overwrites the count and value of a tag in the first directory.
 fn with_tag(mut bytes: Vec<u8>, tag: u16, count: u32, value: u32) -> Vec<u8> {
     let directory = u32::from_le_bytes(bytes[4..8].try_into().expect("4 bytes")) as usize;
     let entries = u16::from_le_bytes(bytes[directory..][..2].try_into().expect("2 bytes"));
@@ -248,7 +248,7 @@ fn a_size_that_the_file_cannot_hold_is_refused_before_room_is_made() {
     assert!(matches!(fault, RasterError::Truncated(_)), "{fault}");
 }
 
-/// A little-endian file of one strip from tags with their type, count and bytes.
+/// Returns a little-endian file of one strip from tags with type, count and bytes.
 fn by_hand(tags: &[(u16, u16, u32, Vec<u8>)], samples: &[u8]) -> Vec<u8> {
     let mut bytes = b"II*\0".to_vec();
     bytes.extend((8 + samples.len() as u32).to_le_bytes());
@@ -282,7 +282,7 @@ fn doubles(tag: u16, values: &[f64]) -> (u16, u16, u32, Vec<u8>) {
     (tag, 12, values.len() as u32, bytes.collect())
 }
 
-/// Tags of an uncompressed strip of bytes.
+/// Returns the tags of an uncompressed strip of bytes.
 fn grey(size: [u16; 2], bands: u16) -> Vec<(u16, u16, u32, Vec<u8>)> {
     vec![
         shorts(256, &[size[0]]),
@@ -331,7 +331,7 @@ fn a_mask_in_a_file_beside_makes_holes() {
     assert!(raster.height(1, 1).is_nan() && raster.height(2, 0).is_nan());
 }
 
-/// A projected grid of 10 units with these GeoKeys besides model type and raster type.
+/// Opens a projected grid of 10 units with these GeoKeys besides model type and raster type.
 fn projected(keys: &[(u16, u16)], origin: [f64; 2]) -> Raster {
     let is_point = keys.iter().any(|(key, _)| *key == 1025);
     let mut directory = vec![1, 1, 0, 1 + keys.len() as u16, 1024, 0, 1, 1];
@@ -369,15 +369,15 @@ fn units_follow_from_the_codes_of_the_reference_systems() {
         (datum.code, datum.name.as_str()),
         (Some(8228), "NAVD88 height (ft)")
     );
-    // California zone 5 in US survey feet, without a unit of its own.
+    // California zone 5, whose own unit is the US survey foot.
     let feet = projected(&[(projected_system, 2229)], [6_490_000.0, 1_870_000.0]);
     let (east, _) = feet.cell().expect("a cell").ground_metres();
     assert!((east - 3.0481).abs() < 1e-3, "{east}");
-    // Pseudo-Mercator at 60° N is half as large on the ground as on the map.
+    // At 60° N, pseudo-Mercator lengths are half as large on the ground as on the map.
     let mercator = projected(&[(projected_system, 3857)], [0.0, 8_399_737.9]);
     let (east, north) = mercator.cell().expect("a cell").ground_metres();
     assert!((east - 5.0126).abs() < 1e-3 && (north - 5.0042).abs() < 1e-3);
-    // A depth.
+    // A depth system.
     let depth = projected(
         &[(projected_system, 26911), (vertical_system, 6357)],
         [386_000.0, 3_790_000.0],
@@ -420,7 +420,7 @@ fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
     assert!(fault.to_string().contains("bands 1 to 3"), "{fault}");
 }
 
-/// The tags of a grey square in tiles, with their offsets and sizes.
+/// Returns the tags of a grey square in tiles, with their offsets and sizes.
 fn in_tiles(side: u32, tile: u32, [offsets, sizes]: [&[u32]; 2]) -> Vec<(u16, u16, u32, Vec<u8>)> {
     let long = |tag: u16, values: &[u32]| {
         let bytes = values.iter().flat_map(|value| value.to_le_bytes());
@@ -437,7 +437,7 @@ fn in_tiles(side: u32, tile: u32, [offsets, sizes]: [&[u32]; 2]) -> Vec<(u16, u1
     tags
 }
 
-/// One stored tile in six thousand, without compression: nothing is wrong with it.
+/// One stored tile in six thousand, without compression, is a valid file.
 #[test]
 fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
     let (side, tile) = (20_000_u32, 256_u32);
@@ -455,7 +455,7 @@ fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
     assert!(raster.height(0, 0).is_nan());
 }
 
-/// A sparse file says that it is large, not that it is damaged.
+/// A sparse file is too large, but not damaged.
 #[test]
 fn what_memory_cannot_hold_is_no_damage() {
     // 200,000 × 200,000 in four deflated tiles, the last of which is stored.

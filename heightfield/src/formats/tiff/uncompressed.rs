@@ -1,7 +1,7 @@
-//! Large strips and tiles without compression, or unpacked into a file: the rows that are wanted
-//! are read, and no more.
+//! Large strips and tiles without compression, or decompressed into a file: only the needed rows
+//! are read.
 //!
-//! The decoder reads a strip or tile as a whole, and some writers put all of an image into one.
+//! The decoder reads whole strips and tiles, and some writers use a single one for an image.
 
 use std::ops::Range;
 
@@ -15,7 +15,8 @@ use crate::blocks::Part;
 use crate::samples::{Endian, with_samples};
 use crate::{RasterError, Samples};
 
-/// Reads a part of a band, the first being 0, of a layout that [is read so](Layout::is_read_by_rows).
+/// Reads a part of a band, the first being 0, from a layout with [readable
+/// rows](Layout::is_read_by_rows).
 pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterError> {
     let stored = layout.sample();
     let endian = match layout.directory.file().byte_order() {
@@ -49,7 +50,7 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
     }
 }
 
-/// Returns the offsets of the rows of a strip or tile in a part, counted from its first byte.
+/// Returns the byte ranges of a part's rows in a strip or tile.
 pub(super) fn rows(
     layout: &Layout,
     chunk: &Chunk,
@@ -59,13 +60,13 @@ pub(super) fn rows(
     let columns = layout.row_range(inside.column - covers.column, inside.columns);
     let row_bytes = layout.row_bytes();
     (inside.row..inside.row + inside.rows).map(move |row| {
-        // What is beyond all numbers is beyond the file.
+        // A saturated offset is beyond the end of the file.
         let before = u64::from(row - covers.row).saturating_mul(row_bytes);
         before.saturating_add(columns.start)..before.saturating_add(columns.end)
     })
 }
 
-/// The bytes of a row; zeros where a sparse file leaves its strip or tile out.
+/// Reads the bytes of a row; zeros if its strip or tile is missing in a sparse file.
 pub(super) fn bytes(
     layout: &Layout,
     chunk: &Chunk,

@@ -56,7 +56,7 @@ fn a_tile_that_is_left_out_is_a_hole_and_no_other_is() {
 #[test]
 fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
     const ROW: u32 = 4 * SIZE[0];
-    // The first strip ends 140 rows early, and the second states as many more.
+    // The first strip ends 140 rows early, and the second states the missing rows.
     let made = Made {
         chunk: [SIZE[0], 640],
         other: Some((279, &[500 * ROW, (SIZE[1] - 500) * ROW])),
@@ -78,7 +78,7 @@ fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
 
 #[test]
 fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
-    // The decoder reads each, or reports that it cannot.
+    // The decoder reads each, or reports an error.
     let turned = Made {
         kind: KINDS[0],
         other: Some((266, &[2])),
@@ -97,7 +97,7 @@ fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
     assert_eq!(raster.height(3, SIZE[1] - 5), sum as f64);
 }
 
-/// Decoded, they are refused; read as they lie, they were heights of other bands.
+/// The decoder rejects these; read by rows, they would be the heights of other bands.
 #[test]
 fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
     for (tag, values, why) in [

@@ -1,5 +1,6 @@
-//! Strips and tiles that are too large to be unpacked each time: unpacked once, into a file
-//! without a name that goes with the program, and read there row by row.
+//! Strips and tiles that are too large to be decompressed for each read: they are decompressed
+//! once, into a file without a name, which exists as long as the program, and read there row by
+//! row.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -12,49 +13,49 @@ use crate::decoder_panic::guarded;
 use crate::disk_cache::{DiskCache, TemporaryFile};
 use crate::input::read_exact_at;
 
-/// Bytes that are written at once.
+/// Size of a write, bytes.
 const AT_ONCE: usize = 1 << 20;
 
-/// Takes the rows of a strip or tile, one after the other.
+/// Receives the rows of a strip or tile, in order.
 pub(super) type RowSink<'s> = dyn FnMut(&[u8]) -> Result<(), RasterError> + 's;
 
-/// Unpacked strips or tiles of an image.
+/// Decompressed strips or tiles of an image.
 pub(super) struct Unpacked {
     unnamed: TemporaryFile,
-    /// Places in it.
+    /// Number of slots in the file.
     count: u64,
-    /// Bytes that one takes.
+    /// Size of a slot, bytes.
     each: u64,
     kept: Mutex<Kept>,
-    /// Held during an unpacking.
+    /// Locked during decompression.
     turn: Mutex<()>,
 }
 
 /// Content of the file.
 struct Kept {
-    /// The strip or tile at each place of the file.
+    /// The strip or tile in each slot.
     slots: Vec<Option<Slot>>,
-    /// Number of times that something was asked for.
+    /// Number of reads so far.
     asked: u64,
 }
 
-/// A strip or tile that was unpacked.
+/// A decompressed strip or tile.
 struct Slot {
-    /// Its offset in the TIFF, and the number of wanted rows.
+    /// Its offset in the TIFF, and its number of rows.
     is_of: (u64, u32),
-    /// Number of bytes that are here, and what is wrong with the others.
+    /// Number of decompressed bytes, and the fault of the others.
     bytes: u64,
     fault: Option<String>,
-    /// When it was asked for last.
+    /// `asked` at its last use.
     used: u64,
 }
 
 impl Unpacked {
-    /// An empty file for strips or tiles of `each` bytes: as many as the bound of the cache allows,
-    /// within `counts`.
+    /// Creates an empty file for strips or tiles of `each` bytes: as many as the bound of the cache
+    /// allows, within `counts`.
     ///
     /// # Errors
-    /// The reason for which there is no room for them.
+    /// The reason why there is no space for them.
     pub(super) fn new(
         each: u64,
         counts: RangeInclusive<u64>,
@@ -72,12 +73,12 @@ impl Unpacked {
         })
     }
 
-    /// Bytes that it takes on disk at most.
+    /// Returns its max size on disk, bytes.
     pub(super) const fn most_bytes(&self) -> u64 {
         self.each.saturating_mul(self.count)
     }
 
-    /// Bytes of a strip or tile, counted from its first one. `unpack` hands over its rows.
+    /// Returns a byte range of a strip or tile. `unpack` decompresses its rows.
     pub(super) fn read(
         &self,
         chunk: &Chunk,
@@ -90,7 +91,7 @@ impl Unpacked {
         let turn = self.turn.lock();
         // The panics of decoders are caught.
         let _turn = turn.unwrap_or_else(PoisonError::into_inner);
-        // It may have been unpacked by the one who had the turn before.
+        // The previous owner of the lock may have decompressed it.
         if let Some(read) = self.read_kept(chunk, &range) {
             return read;
         }
@@ -101,15 +102,15 @@ impl Unpacked {
         read.unwrap_or_else(|| Err(RasterError::damaged("TIFF: nothing was unpacked")))
     }
 
-    /// Returns true if a strip or tile is unpacked already.
+    /// Returns true if a strip or tile is already decompressed.
     #[cfg(test)]
     pub(super) fn has(&self, chunk: &Chunk) -> bool {
         self.kept().find(chunk).is_some()
     }
 
-    /// The same bytes of what is unpacked already.
+    /// Returns the bytes if they are already decompressed.
     fn read_kept(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, RasterError>> {
-        // Is held until the bytes are read: another may want the place for something else.
+        // Locked until the bytes are read, so that the slot is not reused.
         let mut kept = self.kept();
         let index = kept.find(chunk)?;
         kept.asked += 1;
@@ -127,8 +128,8 @@ impl Unpacked {
         Some(read.map(|()| bytes))
     }
 
-    /// Writes the rows of a strip or tile to a place; after an error those before it. The fault is
-    /// kept, and the strip or tile is not tried again.
+    /// Writes the rows of a strip or tile to a slot. After an error, the rows before it and the
+    /// fault are stored, and there is no retry.
     fn unpack(
         &self,
         chunk: &Chunk,
@@ -167,20 +168,20 @@ impl Unpacked {
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Kept {
-    /// The place of a strip or tile.
+    /// Returns the slot of a strip or tile.
     fn find(&self, chunk: &Chunk) -> Option<usize> {
         let is_of = (chunk.place, chunk.covers.rows);
         let known = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.is_of == is_of);
         self.slots.iter().position(known)
     }
 
-    /// The place that is free, or was asked for longest ago: nothing is there from now on.
+    /// Empties a free slot or the least recently used one, and returns it.
     fn leave_oldest(&mut self) -> usize {
         let used = |index: &usize| self.slots[*index].as_ref().map_or(0, |slot| slot.used);
         let oldest = (0..self.slots.len()).min_by_key(used).unwrap_or(0);
@@ -189,7 +190,7 @@ impl Kept {
     }
 }
 
-/// Writes from a place of a file on, wherever others read meanwhile.
+/// Writes at an offset of a file, independent of concurrent reads.
 struct Placed<'f> {
     file: &'f File,
     place: u64,

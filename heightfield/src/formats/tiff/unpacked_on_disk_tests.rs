@@ -1,4 +1,4 @@
-//! Packed strips and tiles, unpacked on disk and read by rows, and as a whole.
+//! Compressed strips and tiles, decompressed to disk and read by rows, or as a whole.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -48,7 +48,7 @@ const fn packing(code: u16, pack: fn(&[u8]) -> Vec<u8>, predictor: u16) -> Packi
     }
 }
 
-/// A layout whose strips or tiles are unpacked into a folder of so many bytes.
+/// Returns a layout whose strips or tiles are decompressed into a folder with a max size.
 fn layout(made: &Made, bytes: Vec<u8>, most_bytes: u64) -> (tempfile::TempDir, Layout) {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), most_bytes);
@@ -61,7 +61,7 @@ fn layout(made: &Made, bytes: Vec<u8>, most_bytes: u64) -> (tempfile::TempDir, L
     (folder, layout)
 }
 
-/// Holds parts all over the image against what was written.
+/// Compares parts all over the image with the written values.
 fn check_parts(made: &Made, layout: &Layout) {
     let part = |column, row, columns, rows| Part {
         column,
@@ -134,7 +134,7 @@ fn strips_and_tiles_of_several_bands_are_what_was_written() {
     }
 }
 
-/// Two tiles beside each other, three times.
+/// Two adjacent tiles, three times.
 const TILES: Made = Made {
     chunk: [1024, 400],
     packing: DEFLATE,
@@ -146,7 +146,7 @@ fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
     let tile = 1024 * 400 * 4;
     for (most, kept) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
         let (_folder, layout) = layout(&TILES, TILES.bytes(), most);
-        // Each tile is asked for twice, in turns.
+        // Each tile is read twice, alternately.
         check_parts(&TILES, &layout);
         check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
@@ -156,7 +156,7 @@ fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
     }
 }
 
-/// Else each block of a row of blocks would unpack both of its strips again.
+/// Otherwise each block of a row of blocks would decompress both of its strips again.
 #[test]
 fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
     let at_border = Part {
@@ -177,7 +177,7 @@ fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
     for made in [TILES, strips, apart] {
         let (folder, mut layout) = layout(&made, made.bytes(), 1);
         if made.is_planar {
-            // Its third band tells what is transparent.
+            // Its third band is the transparency.
             layout.alpha = Some(2);
             let disk = DiskCache::at(folder.path(), 1);
             unpack::into_file(&mut layout, &disk).expect("unpacked");
@@ -196,7 +196,7 @@ fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
     }
 }
 
-/// A reader that must not wait never unpacks a tile.
+/// A read that does not wait never decompresses a tile.
 #[test]
 fn a_tile_is_at_hand_once_it_is_unpacked() {
     let made = Made {

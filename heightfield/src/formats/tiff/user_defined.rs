@@ -1,5 +1,5 @@
-//! Reference systems without a code, which a GeoTIFF's keys spell out: libgdal reads them, where there
-//! is one; else the name, the unit and the ellipsoid are known.
+//! Reference systems without a code, defined by a GeoTIFF's keys: read by libgdal, if it is
+//! installed; otherwise only name, unit and ellipsoid are known.
 
 use geotiff_core::geokeys::{GEODETIC_CRS_TYPE, GEOG_CITATION};
 
@@ -13,7 +13,7 @@ const SEMI_MAJOR_AXIS: u16 = 2057;
 const SEMI_MINOR_AXIS: u16 = 2058;
 const INVERSE_FLATTENING: u16 = 2059;
 
-/// The system that the keys of a file describe under a name.
+/// Returns the system that a file's keys define under a name.
 pub(super) fn system(
     keys: &GeoKeys,
     is_projected: bool,
@@ -37,7 +37,7 @@ pub(super) fn system(
     ReferenceSystem::new(named.or(name).unwrap_or(otherwise), unit, datum(keys))
 }
 
-/// The datum of the geographic system with a code, or of an ellipsoid of the keys' own.
+/// Returns the datum of the keys' geographic system, by its code or by the keys' own ellipsoid.
 fn datum(keys: &GeoKeys) -> Option<Datum> {
     let base = keys.known(GEODETIC_CRS_TYPE);
     if let Some(system) = base.and_then(ReferenceSystem::from_code) {
@@ -51,8 +51,8 @@ fn datum(keys: &GeoKeys) -> Option<Datum> {
     Some(Datum::unplaced(name.unwrap_or("without a name"), globe))
 }
 
-/// Of `GCS Name = Moon 2000|Datum = D_Moon_2000|…`, as GDAL writes it, the part with a
-/// name.
+/// Returns a named part of a citation in GDAL's format, `GCS Name = Moon 2000|Datum =
+/// D_Moon_2000|…`.
 fn part_of_citation<'k>(keys: &'k GeoKeys, name: &str) -> Option<&'k str> {
     let parts = keys.whole_text(GEOG_CITATION)?.split('|');
     let mut found = parts.filter_map(|part| part.split_once(" = "));

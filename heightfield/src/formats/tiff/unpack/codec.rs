@@ -1,4 +1,4 @@
-//! Compressions that can be undone piece by piece.
+//! Compressions that can be decompressed as a stream.
 
 use std::io::{self, BufRead, Error, ErrorKind, Read};
 
@@ -7,13 +7,13 @@ use ruzstd::decoding::StreamingDecoder;
 use weezl::decode::{Configuration, Decoder};
 use weezl::{BitOrder, LzwStatus};
 
-/// Returns true if what a compression of this code has packed can be unpacked piece by piece. LERC has
-/// bits of all samples of a strip or tile beside their values.
+/// Returns true if a compression code can be decompressed as a stream. LERC cannot: it stores bits
+/// of all samples of a chunk apart from their values.
 pub(super) const fn is_known(code: u16) -> bool {
     matches!(code, 1 | 5 | 8 | 32773 | 32946 | 50000)
 }
 
-/// Unpacks bytes of a compression's code.
+/// Decompresses bytes by the compression's code.
 pub(super) fn unpacked<'f>(code: u16, packed: impl BufRead + 'f) -> io::Result<Box<dyn Read + 'f>> {
     Ok(match code {
         1 => Box::new(packed),
@@ -25,7 +25,7 @@ pub(super) fn unpacked<'f>(code: u16, packed: impl BufRead + 'f) -> io::Result<B
     })
 }
 
-/// LZW as TIFF has it, the most significant bit first.
+/// LZW in TIFF's variant, the most significant bit first.
 struct Lzw<R> {
     packed: R,
     decoder: Decoder,
@@ -42,7 +42,7 @@ impl<R: BufRead> Lzw<R> {
 
 impl<R: BufRead> Read for Lzw<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        // Each pass takes or gives something, or is the last.
+        // Each pass consumes or returns bytes, or is the last.
         loop {
             let packed = self.packed.fill_buf()?;
             let is_over = packed.is_empty();
@@ -64,7 +64,7 @@ impl<R: BufRead> Read for Lzw<R> {
     }
 }
 
-/// Runs of equal bytes, and of others.
+/// Runs of equal bytes, and of different ones.
 struct PackBits<R> {
     packed: R,
     run: Run,
@@ -88,12 +88,12 @@ impl<R: BufRead> PackBits<R> {
         Ok(byte)
     }
 
-    /// The next run that is not empty; `None` at the end.
+    /// Reads the next run that is not empty; `None` at the end.
     fn next(&mut self) -> io::Result<Option<Run>> {
         let cut = || Error::new(ErrorKind::UnexpectedEof, "it ends in a run");
         while let Some(head) = self.byte()? {
             match head {
-                // It stands for nothing.
+                // This code has no effect.
                 128 => {}
                 0..=127 => return Ok(Some(Run::Of(usize::from(head) + 1))),
                 _ => {
@@ -135,7 +135,7 @@ impl<R: BufRead> Read for PackBits<R> {
 mod tests {
     use super::*;
 
-    /// Unpacks what comes in pieces of some bytes, and is asked for in other pieces.
+    /// Decompresses input in small pieces, with reads of other sizes.
     fn all(code: u16, packed: &[u8]) -> io::Result<Vec<u8>> {
         let pieces = io::BufReader::with_capacity(3, packed);
         let mut from = unpacked(code, pieces)?;
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn runs_go_on_from_piece_to_piece() {
-        // The example of the TIFF specification, and a head that stands for nothing.
+        // The example of the TIFF specification, with a code without effect.
         let packed = b"\xfe\xaa\x02\x80\x00\x2a\x80\xfd\xaa\x03\x80\x00\x2a\x22\xf7\xaa";
         let found = all(32773, packed).expect("unpacked");
         let expected = b"\xaa\xaa\xaa\x80\x00\x2a\xaa\xaa\xaa\xaa\x80\x00\x2a\x22";

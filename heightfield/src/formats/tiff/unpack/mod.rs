@@ -1,8 +1,8 @@
-//! Large strips and tiles that are packed: their rows come one after the other, in the memory of
-//! a row and of what the compression looks back to.
+//! Large compressed strips and tiles: their rows are decompressed one by one, in the memory of a
+//! row and of the compression's history.
 //!
-//! The decoder unpacks a strip or tile as a whole and then copies it, and some writers put all of
-//! an image into one.
+//! The decoder decompresses a whole strip or tile and then copies it, and some writers use a single
+//! one for an image.
 
 mod codec;
 mod stored;
@@ -22,25 +22,26 @@ use crate::samples::{Endian, SampleValue, with_samples};
 use crate::{RasterError, Samples};
 use stored::StoredBytes;
 
-/// Byte order of unpacked rows: this machine's.
+/// Byte order of decompressed rows: this machine's.
 pub(super) const ENDIAN: Endian = match cfg!(target_endian = "big") {
     true => Endian::Big,
     false => Endian::Little,
 };
 
-/// Returns true if the strips or tiles of a layout can be unpacked row by row. A row is held in memory.
+/// Returns true if the strips or tiles of a layout can be decompressed row by row. One row must fit
+/// in memory.
 pub(super) fn suits(layout: &Layout) -> bool {
     codec::is_known(layout.directory.ifd().compression())
         && (1..=MAX_BLOCK_BYTES).contains(&layout.row_bytes())
 }
 
-/// Has strips or tiles unpacked into a file on disk when they are touched. Two strips, or rows of
-/// tiles, are kept whatever their size, and as many of the alpha band where that lies apart: a row of
-/// blocks may lie in two, and none is unpacked again for each of its blocks. More of them are kept
-/// within the bound of the cache.
+/// Decompresses strips or tiles into a file on disk on access. The file has space for two strips or
+/// rows of tiles of any size, and as many of a separate alpha band: a row of blocks may overlap
+/// two, and they are then not decompressed again for each block. More are stored within the bound
+/// of the cache.
 ///
 /// # Errors
-/// The reason for which that is impossible.
+/// The reason why that is impossible.
 pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()> {
     if !suits(layout) {
         let what = format!("what {} has packed comes as a whole", layout.compression.0);
@@ -54,7 +55,7 @@ pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()>
     Ok(())
 }
 
-/// Checks that of an image in one strip or tile, which is unpacked on disk, the first row is there.
+/// Checks the first row of an image with one strip or tile that is decompressed to disk.
 pub(super) fn check_first(layout: &Layout) -> Result<(), RasterError> {
     let all = Part::whole(layout.columns, layout.rows);
     if layout.unpacked.is_some() && layout.chunks_of_band() == 1 {
@@ -65,7 +66,7 @@ pub(super) fn check_first(layout: &Layout) -> Result<(), RasterError> {
     Ok(())
 }
 
-/// Hands over the rows of a strip or tile.
+/// Calls a function with each row of a strip or tile.
 pub(super) fn each_row(
     layout: &Layout,
     chunk: &Chunk,
@@ -80,13 +81,13 @@ pub(super) struct Rows<'f> {
     layout: &'f Layout,
     chunk: Chunk,
     unpacked: Box<dyn Read + 'f>,
-    /// Those that have arrived.
+    /// Number of rows read so far.
     count: u32,
     row: Vec<u8>,
 }
 
 impl<'f> Rows<'f> {
-    /// Nothing is unpacked yet. The layout [suits].
+    /// Opens a strip or tile without decompressing anything. The layout must be one that [suits].
     pub(super) fn of(layout: &'f Layout, chunk: &Chunk) -> Result<Self, RasterError> {
         let image = layout.directory.ifd();
         let source = layout.directory.file().source();
@@ -102,13 +103,13 @@ impl<'f> Rows<'f> {
         })
     }
 
-    /// The bytes of the next row, its numbers in this machine's byte order.
+    /// Reads the next row, with its numbers in this machine's byte order.
     pub(super) fn next(&mut self) -> Result<&[u8], RasterError> {
         let layout = self.layout;
         let read = self.unpacked.read_exact(&mut self.row);
         read.map_err(|error| cannot(layout, &self.chunk, self.count, &error))?;
         self.count += 1;
-        // Bits are in the same order in every file.
+        // The order of bits is the same in every file.
         if layout.stored.1 >= 8 {
             let order = layout.directory.file().byte_order();
             let predictor = layout.directory.ifd().predictor();
@@ -133,14 +134,14 @@ fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> R
     ))
 }
 
-/// Returns true if all of a band is best read so: its strips are large.
+/// Returns true if a whole band is best read by rows: its strips are large.
 pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
     let is_whole = *part == Part::whole(layout.columns, layout.rows);
     is_whole && layout.has_strips() && layout.chunk_size() > MAX_DECODED && suits(layout)
 }
 
-/// Reads all of a band, the first being 0, of a layout that [suits](suits_whole): the samples are
-/// held once.
+/// Reads a whole band, the first being 0, of a layout that [suits](suits_whole), without a second
+/// copy of the samples.
 pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, RasterError> {
     let all = Part::whole(layout.columns, layout.rows);
     let stored = layout.sample();

@@ -1,26 +1,26 @@
-//! The bytes of a strip or tile as they lie in the file, piece by piece.
+//! The bytes of a strip or tile as stored in the file, in pieces.
 
 use std::io::{self, BufRead, Read};
 
 use tiff_reader::TiffError;
 use tiff_reader::source::TiffSource;
 
-/// Bytes that are read at once.
+/// Size of a read, bytes.
 const PIECE: u64 = 256 << 10;
 
-/// The bytes of a strip or tile, as far as they are in the file.
+/// The stored bytes of a strip or tile, up to the end of the file.
 pub(super) struct StoredBytes<'f> {
     source: &'f dyn TiffSource,
     next: u64,
     end: u64,
-    /// Bits of a byte come in the other order.
+    /// True if the bits of each byte are reversed.
     is_reversed: bool,
     piece: Vec<u8>,
     taken: usize,
 }
 
 impl<'f> StoredBytes<'f> {
-    /// So many bytes at a place.
+    /// Returns a reader of some bytes at an offset.
     pub(super) fn new(
         source: &'f dyn TiffSource,
         place: u64,
