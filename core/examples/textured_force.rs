@@ -64,7 +64,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
 <text x="0" y="14">A grating of 0.1 mm every 2 mm, over 10 mm, at 1 mm depth: 0.05 N more and less than 0.5 N</text>
 <text x="0" y="31"><tspan fill="#1f5f9e">along the normal</tspan>, and up to 0.13 N <tspan fill="#b5482c">along the surface</tspan></text>
 <text x="0" y="175">Grain of the same amplitude and wavelength</text>
-<text x="0" y="325">How much of a texture is rendered, by the way of the proxy in a tick</text>
+<text x="0" y="325">Rendered part of a texture against the path of the proxy in a tick</text>
 <text x="238" y="460">1/8 wavelength</text><text x="518" y="460">1/4 wavelength</text>
 {lines}</svg>"##
     ))
