@@ -17,7 +17,7 @@ impl Stopwatch {
         Self(timer)
     }
 
-    /// Timer counts that `work` takes, without those of looking at the timer.
+    /// Returns the timer counts of `work`, without those of reading the timer.
     #[inline(always)]
     pub(crate) fn counted<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let empty = self.between(|| black_box(()));

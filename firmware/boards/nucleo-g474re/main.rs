@@ -22,7 +22,7 @@
 //! PA5 also drives the board's LED LD2: open its solder bridge.
 #![no_std]
 #![no_main]
-// Interrupt handlers bear the names of the vectors.
+// Interrupt handlers have the names of the vectors.
 #![allow(non_snake_case)]
 
 #[path = "../common/application.rs"]

@@ -20,7 +20,7 @@
 //! | mark, high for 10 ms | PG0 | |
 #![no_std]
 #![no_main]
-// Interrupt handlers bear the names of the vectors.
+// Interrupt handlers have the names of the vectors.
 #![allow(non_snake_case)]
 
 #[path = "../common/application.rs"]
