@@ -1,9 +1,9 @@
 // The arm and the hand that holds it.
 //
 // The hand is the pointer. It pulls the arm sideways through a spring and a damper, and presses
-// straight down with a constant force. The arm is a small mass: the ground's force pushes it
-// back, so that it stays behind the hand uphill and runs ahead downhill.
-// Frame as elsewhere: millimetres, x east, y north, z up, origin at the south-west sample.
+// straight down with a constant force. The arm is a small mass: the ground's force pushes it back,
+// so that it is behind the hand uphill and ahead of it downhill. Frame as everywhere: millimetres,
+// x east, y north, z up, origin at the south-west sample.
 
 import { TICK_HZ } from "./clock.js";
 

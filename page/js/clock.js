@@ -1,4 +1,4 @@
-// Time in whole ticks: a thousand a second, whatever the screen's rate is.
+// Time in whole ticks: a thousand a second, at any rate of the screen.
 
 export const TICK_HZ = 1000;
 /** Ticks that one frame runs at most: after a pause the page does not freeze to catch up. */

@@ -1,4 +1,4 @@
-// The path of the haptic interface point (HIP), and files that `hapterra replay` reads.
+// The path of the haptic interface point (HIP), and its files for `hapterra replay`.
 
 import { TICK_HZ } from "./clock.js";
 

@@ -29,7 +29,7 @@ export class Pointer {
   }
 
   #move(canvas, event) {
-    // Any button but none: the view is turned, the hand stays.
+    // Any button turns the view, and the hand does not move.
     if (event.buttons !== 0 && event.pointerType === "mouse") return this.hand.turn(event.movementX * 0.006, event.movementY * 0.005);
     const box = canvas.getBoundingClientRect();
     this.at = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];

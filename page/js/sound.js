@@ -1,4 +1,4 @@
-// The force as sound: the pitch follows its size, and its changes are heard as a rustle.
+// The force as sound: its size is the pitch, and its changes are a rustling noise.
 
 /** Hz without force, and for each newton more. */
 const BASE_HZ = 85;

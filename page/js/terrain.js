@@ -128,7 +128,7 @@ export function made(seed, size = 512) {
 
 /** Ridges on ridges: high ground is rough, valleys are even. Metres. */
 function range_m(x, y, seed) {
-  // Bent, so that ridges wind.
+  // Distorted, so that ridges wind.
   const bentX = x + 0.35 * noise(x * 0.9, y * 0.9, seed + 71);
   const bentY = y + 0.35 * noise(x * 0.9, y * 0.9, seed + 72);
   let [sum, weight, scale, reach] = [0, 1, 1, 1];

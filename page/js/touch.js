@@ -1,4 +1,4 @@
-// A terrain being touched: kernel, arm and path, a tick at a time.
+// A terrain being touched: kernel, arm and path, one tick at a time.
 
 import { Arm } from "./arm.js";
 import { Path } from "./path.js";
@@ -85,14 +85,14 @@ export class Touch {
 
   tick() {
     this.arm.step(this.force);
-    // A step that cannot happen has no force.
+    // A step that is not possible has no force.
     this.force = [0, 0, 0];
     const step = this.kernel.step(this.arm.at);
     this.force = step.force;
     this.proxy = step.proxy;
     this.state = step.state;
     this.path.add(this.arm.at, step.force);
-    // The ground let go: of a ball's proxy that stays behind by more than 15 radii, or at a hole.
+    // Contact was lost: a ball's proxy is more than 15 radii behind, or at no-data.
     if (step.state === "unseeded") this.#lift();
   }
 }

@@ -1,4 +1,4 @@
-// What the page says while it is touched: numbers, captions, cursor.
+// Texts of the page during touch: numbers, captions, cursor.
 
 const element = (id) => document.getElementById(id);
 const set = (id, values) => Object.entries(values).forEach(([name, value]) => element(id).setAttribute(name, value));

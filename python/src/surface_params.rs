@@ -54,7 +54,7 @@ impl Surface {
         shading="none", texture="none", texture_amplitude=None, texture_wavelength=WAVELENGTH_MM,
         texture_direction=0.0, texture_seed=0, materials=Vec::new(),
     ))]
-    // One for each word of Python.
+    // One for each keyword of Python.
     #[expect(clippy::too_many_arguments)]
     fn new(
         stiffness: f32,
@@ -107,8 +107,8 @@ impl Surface {
         Ok(Self { surface, others })
     }
 
-    /// The parameters by the names of the constructor, without those of a texture that is not
-    /// there, and how many materials there are.
+    /// Returns the parameters by the names of the constructor, without those of an absent texture,
+    /// and the number of materials.
     fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let params = self.surface.params();
         let dict = PyDict::new(py);

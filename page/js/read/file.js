@@ -1,7 +1,7 @@
-// Files that were dropped: by what they begin with, else by their names' ends.
+// Dropped files: recognised by their first bytes, else by their extensions.
 //
-// Each reader returns what `fit` of terrain.js takes, and throws an `Error` that says what is wrong,
-// where, and what to do.
+// Each reader returns the argument of `fit` in terrain.js, and throws an `Error` with the fault,
+// its place, and the remedy.
 
 import { asc } from "./asc.js";
 import { hgt } from "./hgt.js";

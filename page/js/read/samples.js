@@ -1,4 +1,4 @@
-// What readers share: errors and samples.
+// Shared by all readers: errors and samples.
 
 /** An error whose words are for the user. */
 export class Told extends Error {}

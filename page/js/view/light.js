@@ -1,4 +1,5 @@
-// Light on the terrain, worked out once a terrain: slopes, and how much light reaches a place.
+// Light on the terrain, computed once for a terrain: slopes, and the share of light at each
+// position.
 
 import { every } from "../terrain.js";
 

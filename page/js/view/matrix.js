@@ -1,4 +1,4 @@
-// 4 × 4 matrices, column by column as WebGL has them, and vectors of three.
+// 4 × 4 matrices, column by column as in WebGL, and vectors of three.
 
 export const add = (a, b) => a.map((x, i) => x + b[i]);
 export const minus = (a, b) => a.map((x, i) => x - b[i]);
@@ -43,7 +43,7 @@ export class Camera {
     this.right = [cy, -sy, 0];
     this.up = cross(this.right, this.forward);
     this.eye = minus(this.centre, times(this.forward, this.distance));
-    // In a narrow window the sides have to be seen, too.
+    // In a narrow window the sides must be visible, too.
     this.tan = this.#tan * Math.max(1, 1.25 / aspect);
     this.aspect = aspect;
     const [near, far] = [this.distance / 20, this.distance * 4];

@@ -55,7 +55,7 @@ impl Gather {
         }
     }
 
-    /// Returns the pieces since the last call.
+    /// Returns the pieces of the waiting entries.
     pub(super) fn pieces(&self) -> &[Blob] {
         &self.pieces
     }
