@@ -19,24 +19,24 @@ const MAX_AMPLITUDE_MM: f32 = 0.2;
 /// ----------
 /// stiffness : N/mm between the haptic interface point (HIP) and the proxy; 0.5.
 /// max_force : N, the limit of the force; 8.5.
-/// friction : Coulomb's coefficient while the proxy slides, 0 to 10; 0, like ice.
+/// friction : Coulomb's coefficient while the proxy slides, 0 to 10; 0, frictionless.
 /// static_friction : the same until it begins to slide; as friction.
-/// viscous_friction : s, 0 to 1; the time by which the proxy trails; 0.
+/// viscous_friction : s, 0 to 1; the delay of the proxy; 0.
 /// damping : N·s/m along the force, 0 to 20; 0.
-/// shading : "none", edges between cells are rendered, or "smooth", the force turns evenly.
+/// shading : "none", with edges between cells, or "smooth", with gradual changes of direction.
 /// texture : "none", "grain" or "grating".
 /// texture_amplitude : mm above and below the surface, at most 2 and an eighth of the wavelength;
 ///     a tenth of the wavelength, at most 0.2.
 /// texture_wavelength : mm from ridge to ridge, 0.25 to 100; 1.
-/// texture_direction : degrees from east to north in which the ridges of a grating follow; 0.
-/// texture_seed : which of the textures that are alike; 0.
+/// texture_direction : direction across the ridges of a grating, degrees from east to north; 0.
+/// texture_seed : selects a variant of the texture; 0.
 /// materials : surfaces for the numbers 1, 2, ... of ``Terrain(materials=)``, 15 at most. Their
 ///     stiffness, friction, damping and texture count; limit and shading are the surface's own.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Names the number that is out of bounds.
+///     With the name of the number that is out of bounds.
 #[pyclass(frozen, eq, module = "hapterra")]
 #[derive(PartialEq)]
 pub(crate) struct Surface {

@@ -1,4 +1,4 @@
-"""A question to a person at the terminal."""
+"""A question to the user at the terminal."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 
 def at_the_terminal(said: str) -> bool:
-    """Shows a question and waits for Enter, alone on its line and pressed after that; nobody is
-    asked where there is no terminal."""
+    """Shows a question and waits for Enter, alone on its line and pressed after the question.
+    Without a terminal there is no question."""
     shown = next(filter(_is_terminal, (sys.stderr, sys.stdout)), None)
     if shown is None or not _is_terminal(sys.stdin):
         return False
