@@ -18,7 +18,7 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`app`] | assembles the application from a board's parts |
-//! | [`board`], [`amplifier`], [`encoder`], [`led`] | the hardware seam, and parts that boards share |
+//! | [`board`], [`amplifier`], [`encoder`], [`led`] | the hardware seam, and shared parts |
 //! | `queues` | the queues between the two halves, and their messages |
 //! | [`haptic_loop`] | the timer interrupt: encoders, the pure tick, amplifiers |
 //! | [`link`] | the communication with the host: requests, tiles, telemetry |

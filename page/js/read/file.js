@@ -12,7 +12,7 @@ import { tiff } from "./tiff.js";
 
 const KINDS = "GeoTIFF, .hgt, Esri ASCII (.asc), grey PNG or NumPy (.npy)";
 
-/** Bytes of a file named `name`, as a terrain. */
+/** Returns the bytes of a file named `name` as a terrain. */
 export async function read(name, bytes) {
   const raw = await reader(name, bytes)(bytes, name).catch((why) => {
     throw why instanceof Told ? why : new Told(`${name}: it cannot be read: ${why.message}. Is the file whole? Try to open it with gdalinfo.`);
