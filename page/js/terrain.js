@@ -93,7 +93,7 @@ function split(place) {
   return [sample, place - sample];
 }
 
-/** Returns the step between samples under a ball: a power of two, for a radius of at most 8 cells. */
+/** Returns the step between samples under a ball: a power of two, for at most 8 cells of radius. */
 export function stepOf(cellMm, tipMm) {
   const times = tipMm / (MAX_TIP_CELLS * cellMm);
   return times > 1 ? 2 ** Math.ceil(Math.log2(times)) : 1;

@@ -8,7 +8,7 @@ import { BALL, PEN, POINT, SHAFT, sides } from "./shapes.js";
 /** Maximum vertices along a side of the ground's mesh; fewer on a slow machine. */
 const MAX_MESH = 320;
 const LEAST_MESH = 80;
-/** Duration of a slow frame, ms, and the number of slow frames after which the picture gets coarser. */
+/** Duration of a slow frame, ms, and the number of them after which the picture gets coarser. */
 const SLOW_MS = 60;
 const SLOW_FRAMES = 4;
 const LEAST_PIXELS = 0.5;
@@ -79,7 +79,7 @@ export class Scene {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
   }
 
-  /** Draws a picture of touch.js' state: `arm`, `proxy`, `force`, …; `scaleMm` is the bar's length. */
+  /** Draws the state of touch.js: `arm`, `proxy`, `force`, …; `scaleMm` is the bar's length. */
   draw({ arm, proxy, foot, force, state, tipMm }, scaleMm) {
     const { gl, camera, canvas } = this;
     this.#keepUp();

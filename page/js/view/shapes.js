@@ -1,6 +1,6 @@
 // Shapes: rotated profiles around the z axis, and the sides of the terrain's block.
 
-/** Returns the corners (position and normal, six numbers each) of a profile of [radius, z], rotated around z. */
+/** Returns the corners (position, normal) of a profile of [radius, z], rotated around z. */
 export function lathe(profile, sides = 20) {
   const corners = [];
   const ring = (k, i) => {
