@@ -17,7 +17,7 @@ fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     }
 }
 
-/// A caller's array.
+/// Returns a caller's array.
 ///
 /// # Safety
 /// At `pointer` are `count` values that no other thread changes during the call.
@@ -31,7 +31,7 @@ pub(crate) unsafe fn array<'a, T>(
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 
-/// A caller's memory for an array, with any content.
+/// Returns a caller's memory for an array, with any content.
 ///
 /// # Safety
 /// At `pointer` is room for `count` values that no other thread uses during the call.

@@ -66,9 +66,9 @@ export class Kernel {
     this.#check(status, () => this.#c.hapterra_terrain_message(this.#terrain));
   }
 
-  /** Sets the terrain of later contacts, as returned by `fit` of terrain.js, under a ball of `tipMm`,
-   * or a point for 0. If the ball's radius is more than 8 cells, it is rendered on every second,
-   * fourth, … sample, as in the command. */
+  /** Sets the terrain of later contacts, as returned by `fit` of terrain.js, under a ball of
+   * `tipMm`, or a point for 0. If the ball's radius is more than 8 cells, it is rendered on every
+   * second, fourth, … sample, as in the command. */
   setTerrain(terrain, tipMm) {
     const step = stepOf(terrain.cellMm, tipMm);
     const { heights, nx, ny, cellMm } = every(terrain, step);

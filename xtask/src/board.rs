@@ -14,7 +14,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Returns true if `address` lies in this memory.
+    /// Returns true if `address` is in this memory.
     pub(crate) fn contains(&self, address: u64) -> bool {
         (self.origin..self.origin + self.length).contains(&address)
     }

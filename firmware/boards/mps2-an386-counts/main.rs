@@ -61,8 +61,8 @@ use stopwatch::Stopwatch;
 
 /// Tiles along the side of the window, as in the product's image.
 const WINDOW: usize = 16;
-/// Words of a record: timer counts, state, whether settled, work, three of the
-/// stretch or force, three of the proxy's cell, three of its fraction.
+/// Words of a record: timer counts, state, a flag for settled, work, three of the displacement or
+/// force, three of the proxy's cell, three of its fraction.
 pub(crate) const RECORD: usize = 13;
 
 static TILES: ConstStaticCell<[[Tile; WINDOW]; WINDOW]> =

@@ -63,7 +63,7 @@ static LINK: Serial = Serial::new(registers::link_uart);
 static PLANT: Serial = Serial::new(registers::plant_uart);
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// The haptic tick, above everything else.
+/// Runs the haptic tick, above all other interrupts.
 #[interrupt]
 fn HapticTick() {
     static mut LOOP: Option<&'static mut Loop> = None;

@@ -63,7 +63,7 @@ impl Uart {
     }
 }
 
-/// TIMER0: the timer of the haptic tick.
+/// Returns TIMER0: the timer of the haptic tick.
 pub(crate) fn tick_timer() -> &'static Timer {
     // SAFETY: TIMER0 of the memory map, four words, always present and only accessed through
     // volatile cells. `VolatileCell` is not `Sync`, so the reference cannot leave its caller's
@@ -71,31 +71,31 @@ pub(crate) fn tick_timer() -> &'static Timer {
     unsafe { &*(0x4000_0000 as *const Timer) }
 }
 
-/// TIMER1: the free-running timer that measures the cost of a tick.
+/// Returns TIMER1: the free-running timer that measures the cost of a tick.
 pub(crate) fn clock_timer() -> &'static Timer {
     // SAFETY: TIMER1 of the memory map; as for `tick_timer`.
     unsafe { &*(0x4000_1000 as *const Timer) }
 }
 
-/// UART0: the link to the host.
+/// Returns UART0: the link to the host.
 pub(crate) fn link_uart() -> &'static Uart {
     // SAFETY: UART0 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_4000 as *const Uart) }
 }
 
-/// UART1: the virtual Phantom, encoder counts in and currents out.
+/// Returns UART1: the virtual Phantom, encoder counts in and currents out.
 pub(crate) fn plant_uart() -> &'static Uart {
     // SAFETY: UART1 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_5000 as *const Uart) }
 }
 
-/// UART2: the reason of a failure.
+/// Returns UART2: the reason of a failure.
 pub(crate) fn report_uart() -> &'static Uart {
     // SAFETY: UART2 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_6000 as *const Uart) }
 }
 
-/// UART3: log lines.
+/// Returns UART3: log lines.
 pub(crate) fn log_uart() -> &'static Uart {
     // SAFETY: UART3 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_7000 as *const Uart) }

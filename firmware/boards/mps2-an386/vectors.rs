@@ -36,8 +36,8 @@ unsafe extern "C" {
 }
 
 /// The vector table behind the core's own sixteen entries.
-// SAFETY: the section and the name are the ones cortex-m-rt's `device` feature
-// asks for, and the table holds functions only.
+// SAFETY: cortex-m-rt's `device` feature requires this section and this name, and the table
+// contains only functions.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [extern "C" fn(); 32] = vectors();

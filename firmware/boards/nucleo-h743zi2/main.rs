@@ -37,7 +37,7 @@ mod usb;
 
 use embassy_stm32::interrupt;
 
-/// The haptic tick, above everything else.
+/// Runs the haptic tick, above all other interrupts except the supply's.
 #[interrupt]
 fn TIM7() {
     static mut LOOP: Option<&'static mut application::Loop> = None;

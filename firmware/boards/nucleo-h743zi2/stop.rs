@@ -65,7 +65,7 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
 }
 
 impl Stop for EmergencyStop {
-    /// Also returns true for a stop that was too short for the tick to read. The outputs return
+    /// Returns true also for a stop that was too short for the tick to read. The outputs return
     /// when the stop is released and the amplifiers are off, at the earliest one tick after the
     /// stop was reported: the compare registers contain the last command until then.
     fn is_pressed(&mut self) -> bool {

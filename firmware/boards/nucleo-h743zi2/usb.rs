@@ -28,7 +28,8 @@ global_asm!(
 pub(crate) struct EndpointHalts;
 
 impl EndpointHalt for EndpointHalts {
-    /// The endpoint stays enabled: to disable it means to wait for the peripheral.
+    /// Ends the halt of an endpoint that stays enabled: to disable it means to wait for the
+    /// peripheral.
     fn end(_bus: &mut impl Bus, address: EndpointAddress) {
         let index = address.index();
         // The peripheral's interrupt also writes these registers.

@@ -26,7 +26,7 @@ impl<const D: usize> Link<'_, D> {
         self.say_goodbye();
     }
 
-    /// Reads what the loop recorded since the last poll.
+    /// Reads the loop's records since the last poll.
     pub(super) fn read_records(&mut self) {
         while self.tx.has_room() {
             let Some(record) = self.ends.records.dequeue() else {

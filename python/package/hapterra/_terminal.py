@@ -16,7 +16,7 @@ def at_the_terminal(said: str) -> bool:
         return False
     _forget_typed()
     print(said, file=shown, flush=True)
-    # Past the buffer of Python, which may hold what was typed before.
+    # Without Python's buffer, which may contain earlier input.
     return os.read(sys.stdin.fileno(), 1024) in (b"\n", b"\r", b"\r\n")
 
 

@@ -55,7 +55,7 @@ class Terrain:
         by ``Contact``.
     """
 
-    #: Whether samples have numbers of materials.
+    #: True if samples have numbers of materials.
     _has_materials = False
 
     def __init__(
@@ -88,7 +88,7 @@ class Terrain:
         #: Device millimetres for one unit of the heights.
         self.height_mm_per_unit = float(height_mm_per_unit)
         self._has_materials = materials is not None
-        #: What the data stated about itself; none of a plain array.
+        #: The data's statements about itself; none for a plain array.
         self.source: dict[str, Any] | None = None
         #: Radius of the ball that touches it, mm; 0 for a point.
         self.tip_mm = 0.0

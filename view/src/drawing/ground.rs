@@ -171,7 +171,7 @@ pub(super) mod tests {
         }
     }
 
-    /// The same position of the terrain, in a placement with twice the scale and level 1.
+    /// Returns the same position of the terrain, in a placement with twice the scale and level 1.
     fn zoomed(ground_m_per_mm: Option<f64>) -> (Scene, Scene) {
         let scene = Scene {
             ground_m_per_mm,

@@ -1,4 +1,4 @@
-//! Check that the code of an interrupt lies in the memory without wait states.
+//! Check that the code of an interrupt is in the memory without wait states.
 //!
 //! Its linker script defines two areas: that memory, and the functions that stay in flash. A
 //! function in neither area is an error.

@@ -21,7 +21,7 @@ const ON_OVER_DEFAULT: u32 = 1 << 2 | 1;
 
 /// Forbids the addresses below the stack.
 pub(crate) fn set_up(mpu: &MPU) {
-    // SAFETY: nothing of the program lies in the region.
+    // SAFETY: no memory of the program is in the region.
     unsafe {
         mpu.rbar.write(FIRST | VALID);
         mpu.rasr.write(NO_ACCESS);

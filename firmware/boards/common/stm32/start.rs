@@ -44,7 +44,7 @@ pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
     }
 }
 
-/// Raised by the haptic interrupt at the end of a tick; TIM6 itself is not used.
+/// Handles the interrupt that the haptic one raises at the end of a tick; TIM6 itself is not used.
 #[interrupt]
 fn TIM6_DAC() {
     failure::count_tick();

@@ -22,7 +22,7 @@ pub(crate) fn raised() {
     RAISED.signal(());
 }
 
-/// Does the work of each interrupt, for ever.
+/// Does the work of each interrupt, forever.
 pub(crate) async fn serve() {
     loop {
         RAISED.wait().await;

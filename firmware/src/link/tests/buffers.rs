@@ -18,7 +18,7 @@ use crate::link::{DeviceState, KnownArm, Link};
 use crate::native::{FULL_SCALE_A, StoppedClock};
 use crate::queues::{LoopEnds, QueuedTick, SPARES};
 
-/// A link in a session, and the loop's ends of its queues.
+/// Returns a link in a session, and the loop's ends of its queues.
 pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     let tiles = Box::leak(Box::new(TileBuffers::<D>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));

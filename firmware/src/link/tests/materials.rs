@@ -60,7 +60,7 @@ fn greeted() -> Rig {
     rig
 }
 
-/// A flat tile at height 1.5.
+/// Returns a flat tile at height 1.5.
 fn flat<'t>(epoch: u32, key: TileKey) -> TileMessage<'t> {
     TileMessage {
         epoch,

@@ -35,7 +35,7 @@ pub(super) const HELLO: HostHello = HostHello {
 /// The rig's first session.
 pub(super) const FIRST: SessionNumber = SessionNumber::new(1 << 8);
 
-/// A device without a host. Its memory is leaked, as a board's is never freed.
+/// Creates a device without a host. Its memory is leaked, as a board's is never freed.
 pub(super) fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
     Device::new(
         Box::leak(Box::new(TileBuffers::VACANT)),
@@ -46,7 +46,7 @@ pub(super) fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D
     )
 }
 
-/// A scene whose terrain is the plane at height 1.5.
+/// Returns a scene whose terrain is the plane at height 1.5.
 pub(super) fn scene(source: Source) -> Scene {
     Scene {
         epoch: 7,
@@ -63,13 +63,13 @@ pub(super) fn scene(source: Source) -> Scene {
     }
 }
 
-/// A frame of a session.
+/// Returns a frame of a session.
 pub(super) fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
     let framed = InSession { session, message };
     encode(&framed, &mut [0; MAX_FRAME]).unwrap().to_vec()
 }
 
-/// A frame of the first session.
+/// Returns a frame of the first session.
 pub(super) fn frame(message: &ToDevice<'_>) -> Vec<u8> {
     framed(FIRST, message)
 }
@@ -80,7 +80,7 @@ pub(super) fn asked(protocol: u16) -> Vec<u8> {
     encode(&asked, &mut [0; 16]).unwrap().to_vec()
 }
 
-/// A tile of the plane at height 1.5, with every sample sent, in the first session.
+/// Returns a tile of the plane at height 1.5, with every sample sent, in the first session.
 pub(super) fn tile(epoch: u32, key: TileKey) -> Vec<u8> {
     tile_in(FIRST, epoch, key)
 }
@@ -99,7 +99,7 @@ fn tile_in(session: SessionNumber, epoch: u32, key: TileKey) -> Vec<u8> {
     framed(session, &ToDevice::Tile(message))
 }
 
-/// A point in the first session.
+/// Returns a point in the first session.
 pub(super) fn point(seq: u32, x: f32, z: f32) -> Vec<u8> {
     point_in(FIRST, seq, x, z)
 }
@@ -138,13 +138,13 @@ pub(super) struct Rig {
 }
 
 impl Rig {
-    /// A host that has not sent anything yet.
+    /// Creates a host that has not sent anything yet.
     pub(super) fn new() -> Self {
         let stored = Stored::Found(Calibration::PREMIUM_1_5);
         Self::started(stored, BootReport::default())
     }
 
-    /// A host with a device that started with this memory and boot report.
+    /// Creates a host with a device that started with this memory and boot report.
     pub(super) fn started(stored: Stored, boot: BootReport) -> Self {
         Self {
             device: device(stored, boot),
@@ -165,7 +165,7 @@ impl Rig {
         }
     }
 
-    /// A session in this scene.
+    /// Opens a session in this scene.
     pub(super) fn in_scene(scene: Scene) -> Self {
         let mut rig = Self::asking(scene);
         rig.answers_tiles = true;
@@ -175,7 +175,7 @@ impl Rig {
         rig
     }
 
-    /// A session in this scene whose first tiles were requested but not answered.
+    /// Opens a session in this scene whose first tiles are requested but not answered.
     pub(super) fn asking(scene: Scene) -> Self {
         let mut rig = Self::new();
         rig.answers_tiles = false;
@@ -186,7 +186,7 @@ impl Rig {
         rig
     }
 
-    /// A session in a scene that the arm touches, armed.
+    /// Opens a session in a scene that the arm touches, and arms.
     pub(super) fn armed() -> Self {
         let mut rig = Self::in_scene(scene(Source::Encoders));
         rig.arm();

@@ -26,7 +26,7 @@ fn view(number: u8, hip: GridPoint) -> SceneChange {
     }
 }
 
-/// The latest reported sample.
+/// Returns the latest reported sample.
 fn latest(rig: &Rig) -> TickRecord {
     let told = rig.telemetry();
     let last = told.last().and_then(|telemetry| telemetry.samples.last());
