@@ -137,7 +137,7 @@ static void numbers(void) {
            "material 3 of 3");
     expect(hapterra_contact_begin(contact, terrain, surfaces, 4, 1000), 0, "material 3 of 4");
 
-    /* The third coordinate is not a number. */
+    /* The third position of the path is not a number. */
     path[7] = path[7] / path[7];
     expect(hapterra_contact_run(contact, path, 3, steps, &done), HAPTERRA_STATUS_PLACE, "run");
     expect((uint32_t)done, 2, "steps done");
