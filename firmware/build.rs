@@ -1,8 +1,8 @@
-//! Puts the memory map of the chosen board where the linker finds it.
+//! Copies the memory map of the chosen board to the linker's search path.
 //!
-//! The linker runs in the workspace root and reads the `memory.x` there before
-//! any `-L` copy; that file only says `INCLUDE board.x`, and this script puts
-//! the right `board.x` on the search path.
+//! The linker runs in the workspace root and reads the `memory.x` there before any `-L` copy. That
+//! file only contains `INCLUDE board.x`, and this script adds the right `board.x` to the search
+//! path.
 
 #[path = "build/tick_rate.rs"]
 mod tick_rate;
@@ -10,9 +10,8 @@ mod tick_rate;
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// A board: its name, which is that of its feature without `board-`, its memory
-/// map, and how often its tick timer counts in a second, where its tick rate
-/// can be chosen.
+/// A board: its name, which is its feature without `board-`; its memory map; and the counts of its
+/// tick timer in a second, if its tick rate can be chosen.
 struct Board(&'static str, &'static str, Option<u32>);
 
 const BOARDS: [Board; 4] = [
@@ -46,19 +45,18 @@ fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     fs::copy(format!("memory/{memory}.x"), out.join("board.x")).expect("copy the memory map");
     if *board == "mps2-an386" {
-        // cortex-m-rt wants the names of a device crate's interrupts; this
-        // board's own vector table names its handlers itself.
+        // cortex-m-rt needs the interrupt names of a device crate; this board's own vector table
+        // names its handlers itself.
         fs::write(out.join("device.x"), "/* none */\n").expect("write device.x");
     }
     println!("cargo::rustc-link-search={}", out.display());
-    // Page alignment would waste flash; cortex-m-rt's script; where defmt's
-    // strings go in the ELF. Here and not in `.cargo/config.toml`, where a
-    // RUSTFLAGS of the user's would replace them.
+    // No page alignment, which would waste flash; cortex-m-rt's script; the place of defmt's
+    // strings in the ELF. Not in `.cargo/config.toml`, where a user's RUSTFLAGS would replace them.
     for flag in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo::rustc-link-arg-bins={flag}");
     }
-    // A symbol that names the board, in the ELF only: `hapterra flash` looks at it.
-    // The linker takes a dash for a minus.
+    // A symbol with the board's name, in the ELF only: `hapterra flash` checks it. The linker reads
+    // a dash as a minus.
     let mark = board.replace('-', "_");
     println!("cargo::rustc-link-arg-bins=--defsym=hapterra.board.{mark}=0");
 }

@@ -28,11 +28,11 @@ BROWSERS = ["chromium-headless-shell", "chromium", "chromium-browser", "google-c
 WINDOW = (1000, 620)
 FRAME_MS = 50
 FRAMES = 160
-# Frames before the first one that is kept: the hand comes to the ground.
+# Frames before the first stored one, in which the hand reaches the ground.
 LEAD = 20
 WIDTH = 640
 COLOURS = 200
-# Colours of HIP, proxy and force in `style.css`, which few pixels have.
+# Colours of HIP, proxy and force in `style.css`, which only a few pixels have.
 ACCENTS = ["#48a8ff", "#ff8a2b", "#ffd84a"]
 # Keeps the page's request for a frame until the script draws it.
 CLOCK = """
@@ -55,7 +55,7 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 
 class Browser:
-    """A Chromium that is driven through two pipes."""
+    """A Chromium controlled through two pipes."""
 
     def __init__(self, profile):
         program = os.environ.get("HAPTERRA_BROWSER") or next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -123,7 +123,7 @@ def open_page(browser, address):
 
 
 def hand_at(share):
-    """Where the mouse is, from left and top of the window: round the range, once."""
+    """Returns the mouse's position, from left and top of the window: once around the range."""
     angle = 2 * math.pi * share
     return [0.40 - 0.17 * math.cos(angle), 0.60 - 0.13 * math.sin(angle)]
 

@@ -2,7 +2,7 @@
 //
 //   c++ -std=c++11 -Ic/include c/examples/chai.cpp -Ltarget/release -lhapterra_c
 //
-// With CHAI3D itself include "chai3d.h" in place of the stand-in, and keep the results of
+// With CHAI3D itself, include "chai3d.h" instead of the stand-in, and store the results of
 // computeLocalInteraction in the interaction recorder of the object.
 
 #include <cmath>
@@ -32,7 +32,7 @@ class HeightField : public cGenericObject {
     HeightField &operator=(const HeightField &) = delete;
     ~HeightField() override { end(); }
 
-    // In the haptics thread alone. An error gives no force.
+    // Called in the haptics thread only. An error has no force.
     cVector3d computeLocalInteraction(const cVector3d &tool, cVector3d &proxy) override {
         const double hip_mm[3] = {1e3 * tool.x(), 1e3 * tool.y(), 1e3 * tool.z()};
         HapterraStep step;
@@ -54,7 +54,7 @@ class HeightField : public cGenericObject {
     HapterraContact *contact;
 };
 
-// Waves, 3 mm high, over 100,000 × 100,000 samples that no memory holds.
+// Waves, 3 mm high, over 100,000 × 100,000 samples, too many for the memory.
 extern "C" uint32_t read_waves(void *user, uint32_t column, uint32_t row, uint32_t columns,
                                uint32_t rows, double *heights) {
     const double height_mm = *static_cast<double *>(user);
@@ -74,7 +74,7 @@ int main() {
     cVector3d force, proxy;
     double most = 0.0;
     for (int tick = 0; tick < 2000; tick++) {
-        // Down from 10 mm, then along.
+        // Down from 10 mm, then sideways.
         const double t = 1e-3 * tick;
         const double height = std::fmax(0.010 - 0.020 * t, -0.002);
         force = world.computeInteractionForces(cVector3d(20.0 + 0.05 * t, 30.0, height), proxy);

@@ -1,4 +1,4 @@
-/* Stands in for the few parts of CHAI3D that chai.cpp uses, so that it is built and run without
+/* Replaces the few parts of CHAI3D that chai.cpp uses, so that it can be built and run without
  * CHAI3D: a vector, an object of the world that a tool touches, and the loop of a tool. Names and
  * meaning are CHAI3D's; lengths are metres. */
 #ifndef CHAI_STAND_IN_H
@@ -24,7 +24,7 @@ class cGenericObject {
   public:
     virtual ~cGenericObject() {}
 
-    /* The force on a tool at a place in the object's frame, N, and where its proxy is. */
+    /* The force on a tool at a position in the object's frame, N, and the proxy's position. */
     virtual cVector3d computeLocalInteraction(const cVector3d &tool, cVector3d &proxy) = 0;
 };
 
@@ -32,7 +32,7 @@ class cWorld {
   public:
     void addChild(cGenericObject *object) { objects.push_back(object); }
 
-    /* What a haptics thread does a thousand times a second. */
+    /* Called by a haptics thread a thousand times a second. */
     cVector3d computeInteractionForces(const cVector3d &tool, cVector3d &proxy) {
         cVector3d force;
         for (cGenericObject *object : objects) {

@@ -47,7 +47,7 @@ int main(void) {
                    step.force_n[1], step.force_n[2], (unsigned)step.state);
         }
     }
-    /* What cannot be is said. */
+    /* An impossible value is reported. */
     surface.dynamic_friction = -1.0f;
     if (hapterra_contact_set_surface(contact, &surface, 1) != HAPTERRA_STATUS_SURFACE) {
         return 1;

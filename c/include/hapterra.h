@@ -49,7 +49,7 @@ enum HapterraStatus
    */
   HAPTERRA_STATUS_HEIGHTS = 6,
   /**
-   * A parameter of a surface is out of its bounds.
+   * A parameter of a surface is out of bounds.
    */
   HAPTERRA_STATUS_SURFACE = 7,
   /**
@@ -57,7 +57,7 @@ enum HapterraStatus
    */
   HAPTERRA_STATUS_MATERIAL = 8,
   /**
-   * No tick rate: 1,000 to 10,000 in whole thousands.
+   * The tick rate is not 1,000 to 10,000 in whole thousands.
    */
   HAPTERRA_STATUS_RATE = 9,
   /**
@@ -98,7 +98,7 @@ typedef uint32_t HapterraStatus;
 #endif // __cplusplus
 
 /**
- * The normals that a force follows.
+ * The normals that the force's direction follows.
  */
 enum HapterraShading
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -106,11 +106,11 @@ enum HapterraShading
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Normals of the cells: the force turns at once where two cells meet.
+   * Normals of the cells: the force's direction changes abruptly where two cells meet.
    */
   HAPTERRA_SHADING_NONE = 0,
   /**
-   * Normals that turn evenly from cell to cell.
+   * Normals that change gradually from cell to cell.
    */
   HAPTERRA_SHADING_SMOOTH = 1,
 };
@@ -131,15 +131,15 @@ enum HapterraTexture
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * None: the surface is even.
+   * None: the surface is smooth.
    */
   HAPTERRA_TEXTURE_NONE = 0,
   /**
-   * Heights at random, in all directions.
+   * Random heights, in all directions.
    */
   HAPTERRA_TEXTURE_GRAIN = 1,
   /**
-   * Ridges one after the other.
+   * Parallel ridges.
    */
   HAPTERRA_TEXTURE_GRATING = 2,
 };
@@ -160,11 +160,11 @@ enum HapterraRowOrder
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * The northernmost, as in images and GeoTIFF.
+   * The first row is the northernmost, as in images and GeoTIFF.
    */
   HAPTERRA_ROW_ORDER_NORTH_FIRST = 0,
   /**
-   * The southernmost.
+   * The first row is the southernmost.
    */
   HAPTERRA_ROW_ORDER_SOUTH_FIRST = 1,
 };
@@ -197,11 +197,11 @@ enum HapterraState
    */
   HAPTERRA_STATE_RELEASING = 2,
   /**
-   * The HIP is below the surface and was not above it yet: no force until it was.
+   * The HIP is below the surface and has not been above it yet: no force until then.
    */
   HAPTERRA_STATE_BELOW_GROUND = 3,
   /**
-   * The HIP is in a no-data area or outside, and was not above the surface yet: no force.
+   * The HIP is in a no-data area or outside, and has not been above the surface yet: no force.
    */
   HAPTERRA_STATE_OUTSIDE = 4,
 };
@@ -214,7 +214,8 @@ typedef uint32_t HapterraState;
 #endif // __cplusplus
 
 /**
- * One haptic interface point (HIP) over a terrain, created by `hapterra_contact_new` and not begun.
+ * One haptic interface point (HIP) over a terrain, created by `hapterra_contact_new` and not
+ * begun.
  */
 typedef struct HapterraContact HapterraContact;
 
@@ -224,8 +225,8 @@ typedef struct HapterraContact HapterraContact;
 typedef struct HapterraTerrain HapterraTerrain;
 
 /**
- * The parameters of a surface. Fill it with `hapterra_surface_default`, then change what you like; it
- * is checked when it is used. 48 bytes.
+ * The parameters of a surface. Fill it with `hapterra_surface_default`, then change fields; it is
+ * checked when it is used. 48 bytes.
  */
 typedef struct HapterraSurface {
   /**
@@ -233,7 +234,7 @@ typedef struct HapterraSurface {
    */
   float stiffness_n_per_mm;
   /**
-   * Largest force, N; not negative.
+   * Maximum force, N; not negative.
    */
   float max_force_n;
   /**
@@ -253,11 +254,11 @@ typedef struct HapterraSurface {
    */
   float damping_ns_per_m;
   /**
-   * A `HapterraShading`.
+   * A value of `HapterraShading`.
    */
   uint32_t shading;
   /**
-   * A `HapterraTexture`.
+   * A value of `HapterraTexture`.
    */
   uint32_t texture;
   /**
@@ -274,17 +275,17 @@ typedef struct HapterraSurface {
    */
   float texture_direction_deg;
   /**
-   * Seed of a texture: another variant of the same pattern.
+   * Seed of a texture: selects a variant of the same pattern.
    */
   uint32_t texture_seed;
 } HapterraSurface;
 
 /**
  * Reads heights of a block of samples into `heights`, row by row from the south and each row from
- * west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for no-data. `column` and `row` count
- * from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
- * that was passed with the function. It is called during calls with a contact or terrain only, and
- * must not end by an exception or `longjmp`.
+ * west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for no-data.
+ * `column` and `row` count from the south-west sample. Returns 0, or any other number for an
+ * error. `user` is the pointer that was passed with the function. The function is only called
+ * during calls with a contact or terrain, and must not end by an exception or `longjmp`.
  */
 typedef uint32_t (*HapterraRead)(void *user,
                                  uint32_t column,
@@ -298,7 +299,7 @@ typedef uint32_t (*HapterraRead)(void *user,
  */
 typedef struct HapterraStep {
   /**
-   * The force on the hand, N: east, north, up. Each is a number of single precision.
+   * The force on the hand, N: east, north, up. Each has single precision.
    */
   double force_n[3];
   /**
@@ -306,11 +307,12 @@ typedef struct HapterraStep {
    */
   double proxy_mm[3];
   /**
-   * The height of the surface over the HIP, mm, in the state `HAPTERRA_STATE_BELOW_GROUND`; NaN in all others.
+   * The height of the surface over the HIP, mm, in the state `HAPTERRA_STATE_BELOW_GROUND`; NaN
+   * in all others.
    */
   double surface_mm;
   /**
-   * A `HapterraState`.
+   * A value of `HapterraState`.
    */
   uint32_t state;
   /**
@@ -324,13 +326,13 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Returns the text of a status, for ever valid; that of `HAPTERRA_STATUS_CHOICE` for any other
- * number. Not to be freed.
+ * Returns the text of a status, valid forever; for any other number the text of
+ * `HAPTERRA_STATUS_CHOICE`. Not to be freed.
  */
 const char *hapterra_error_text(uint32_t status);
 
 /**
- * Returns the version of the library, such as `0.1.0`, for ever valid. Not to be freed.
+ * Returns the version of the library, such as `0.1.0`, valid forever. Not to be freed.
  */
 const char *hapterra_version(void);
 
@@ -346,14 +348,14 @@ HapterraStatus hapterra_surface_default(struct HapterraSurface *surface);
 struct HapterraTerrain *hapterra_terrain_new(void);
 
 /**
- * Frees a terrain; null is ignored. Contacts on it stay as they are.
+ * Frees a terrain; null is ignored. Its contacts stay valid.
  */
 void hapterra_terrain_free(struct HapterraTerrain *terrain);
 
 /**
  * Sets `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
- * `HapterraRowOrder`, each row from west to east; NaN is no-data. They are copied. Contacts that
- * have begun keep the terrain that they have.
+ * `HapterraRowOrder`, each row from west to east; NaN is no-data. The heights are copied. Contacts
+ * that have begun keep their terrain.
  *
  * # Safety
  * At `heights` are `columns` times `rows` values.
@@ -366,7 +368,7 @@ HapterraStatus hapterra_terrain_set_f32(struct HapterraTerrain *terrain,
                                         uint32_t row_order);
 
 /**
- * As `hapterra_terrain_set_f32`, in double precision.
+ * Sets heights as `hapterra_terrain_set_f32` does, in double precision.
  *
  * # Safety
  * At `heights` are `columns` times `rows` values.
@@ -379,9 +381,9 @@ HapterraStatus hapterra_terrain_set_f64(struct HapterraTerrain *terrain,
                                         uint32_t row_order);
 
 /**
- * Gives a terrain heights in millimetres that a function reads where they are touched. Function and
- * `user` are the caller's, and valid until the terrain and all contacts that began on it have ended.
- * A contact that was moved to another thread calls it from there.
+ * Sets a function that reads heights in millimetres where they are touched. The caller owns the
+ * function and `user`, which must stay valid until the terrain and all contacts that began on it
+ * are freed. A contact that was moved to another thread calls the function there.
  */
 HapterraStatus hapterra_terrain_set_reader(struct HapterraTerrain *terrain,
                                            HapterraRead read,
@@ -391,25 +393,25 @@ HapterraStatus hapterra_terrain_set_reader(struct HapterraTerrain *terrain,
                                            double cell_mm);
 
 /**
- * Sets the millimetres of a unit of the heights, if they are not millimetres. It counts for
- * the heights that the terrain has, and for contacts that begin later.
+ * Sets the millimetres of a unit of the heights, if they are not in millimetres. Applies to the
+ * current heights, and to contacts that begin later.
  */
 HapterraStatus hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain,
                                                  double mm_per_unit);
 
 /**
- * Puts a ball of a radius in millimetres in place of the point that touches the terrain, or with 0 the
- * point again. The HIP and the proxy are then the ball's centre, one radius above flat ground, and so
- * is `hapterra_terrain_height_mm`. The radius is at most 8 cells. It counts for the heights that the
- * terrain has, and for contacts that begin later.
+ * Sets the radius of the ball that touches the terrain, mm; 0 for a point. The HIP and the proxy
+ * are then the ball's centre, one radius above flat ground, and so is
+ * `hapterra_terrain_height_mm`. The radius is at most 8 cells. Applies to the current heights, and
+ * to contacts that begin later.
  */
 HapterraStatus hapterra_terrain_set_tip(struct HapterraTerrain *terrain,
                                         double tip_mm);
 
 /**
- * Sets the material of each sample: the number of one of the surfaces of
- * `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
- * has samples, and they are copied.
+ * Sets the material of each sample: the index of one of the surfaces of `hapterra_contact_begin`,
+ * row by row in a `HapterraRowOrder`. `count` is the number of samples of the terrain. The
+ * materials are copied.
  *
  * # Safety
  * At `materials` are `count` values.
@@ -420,16 +422,16 @@ HapterraStatus hapterra_terrain_set_materials(struct HapterraTerrain *terrain,
                                               uint32_t order);
 
 /**
- * Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a no-data area, off the terrain, where it cannot
- * be read, and for null.
+ * Returns the height of the surface at a position, mm, or of a ball's centre over it; NaN for
+ * no-data, outside the terrain, if it cannot be read, and for null.
  */
 double hapterra_terrain_height_mm(const struct HapterraTerrain *terrain,
                                   double east_mm,
                                   double north_mm);
 
 /**
- * Returns the message of the terrain's last error, empty where there was none, null for null. It is
- * the terrain's, and valid until the next call with it.
+ * Returns the message of the terrain's last error, empty if there was none, null for null. The
+ * terrain owns the message, which is valid until the next call with it.
  */
 const char *hapterra_terrain_message(const struct HapterraTerrain *terrain);
 
@@ -444,10 +446,10 @@ struct HapterraContact *hapterra_contact_new(void);
 void hapterra_contact_free(struct HapterraContact *contact);
 
 /**
- * Begins a contact, or begins it anew, on the heights that a terrain has now: `rate_hz` steps a
- * second, 1,000 to 10,000 in whole thousands. The first of the `count` surfaces, 1 to 16, is the
- * surface, and the others are materials of the terrain, of which stiffness, friction, damping and
- * texture count. Surfaces are copied, and the terrain may end before the contact.
+ * Begins or restarts a contact on the current heights of a terrain: `rate_hz` steps a second,
+ * 1,000 to 10,000 in whole thousands. The first of the `count` surfaces, 1 to 16, is the surface.
+ * The others are materials of the terrain, of which only stiffness, friction, damping and texture
+ * are used. Surfaces are copied, and the terrain may be freed before the contact.
  *
  * # Safety
  * At `surfaces` are `count` values.
@@ -459,8 +461,8 @@ HapterraStatus hapterra_contact_begin(struct HapterraContact *contact,
                                       uint32_t rate_hz);
 
 /**
- * Changes the surfaces between two steps, as `hapterra_contact_begin` takes them. The proxy stays
- * where it is, and the next force is that of the other surface.
+ * Changes the surfaces between two steps; the arguments are as in `hapterra_contact_begin`. The
+ * proxy stays where it is, and the next step has the force of the new surface.
  *
  * # Safety
  * At `surfaces` are `count` values.
@@ -471,8 +473,8 @@ HapterraStatus hapterra_contact_set_surface(struct HapterraContact *contact,
 
 /**
  * Makes one step with the HIP at three numbers, mm: east, north, up from the south-west sample at
- * height zero. Where it returns an error the step has not happened and `step` is as before. An
- * error gives no force: a program that drives a device has to set its force to zero.
+ * height zero. After an error the contact and `step` are unchanged. An error has no force: a
+ * program that drives a device must set its force to zero.
  *
  * # Safety
  * At `hip_mm` are 3 numbers, and at `step` is room for one step.
@@ -482,8 +484,8 @@ HapterraStatus hapterra_contact_step(struct HapterraContact *contact,
                                      struct HapterraStep *step);
 
 /**
- * Makes `count` steps, of three numbers each, one after the other into `steps`. It ends with the
- * first that cannot happen. `done` may be null; else it receives how many steps have happened.
+ * Makes `count` steps, of three numbers each, and stores their results in `steps`. Stops at the
+ * first step that is not possible. `done` receives the number of steps made, unless it is null.
  *
  * # Safety
  * At `hips_mm` are 3 times `count` numbers, and at `steps` is room for `count` steps.
@@ -495,14 +497,14 @@ HapterraStatus hapterra_contact_run(struct HapterraContact *contact,
                                     size_t *done);
 
 /**
- * Returns the message of the contact's last error, empty where there was none, null for null. It is
- * the contact's, and valid until the next call with it.
+ * Returns the message of the contact's last error, empty if there was none, null for null. The
+ * contact owns the message, which is valid until the next call with it.
  */
 const char *hapterra_contact_message(const struct HapterraContact *contact);
 
 /**
  * Returns memory of `bytes` bytes, aligned to 16, that the caller owns until `hapterra_free`; null
- * for no bytes, and where there is none. Meant for WebAssembly; C has `malloc`.
+ * for no bytes, and if there is no memory. Meant for WebAssembly; C has `malloc`.
  */
 void *hapterra_alloc(size_t bytes);
 
@@ -510,7 +512,7 @@ void *hapterra_alloc(size_t bytes);
  * Frees memory that `hapterra_alloc` returned for the same number of bytes. Null is ignored.
  *
  * # Safety
- * `pointer` is null, or came from `hapterra_alloc(bytes)` and was not freed.
+ * `pointer` is null, or a result of `hapterra_alloc(bytes)` that was not freed.
  */
 void hapterra_free(void *pointer, size_t bytes);
 

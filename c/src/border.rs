@@ -1,4 +1,4 @@
-//! The border to C: arrays that a caller owns, and calls that must not panic.
+//! The interface to C: arrays that a caller owns, and calls that must not panic.
 
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -6,7 +6,7 @@ use std::slice;
 
 use crate::status::{Failure, HapterraStatus};
 
-/// Checks that a pointer may be that of an array.
+/// Checks that a pointer can be that of an array.
 fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     let bytes = count.checked_mul(size_of::<T>());
     match pointer {
@@ -17,7 +17,7 @@ fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     }
 }
 
-/// A caller's array.
+/// Returns a caller's array.
 ///
 /// # Safety
 /// At `pointer` are `count` values that no other thread changes during the call.
@@ -26,12 +26,12 @@ pub(crate) unsafe fn array<'a, T>(
     count: usize,
 ) -> Result<&'a [T], HapterraStatus> {
     check(pointer, count)?;
-    // SAFETY: not null, aligned, no larger than memory; the values are there by the contract of the
-    // header, which every caller of this function repeats.
+    // SAFETY: not null, aligned, no larger than memory; the contract of the header, which every
+    // caller of this function repeats, guarantees the values.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 
-/// A caller's room for an array, whatever it holds.
+/// Returns a caller's memory for an array, with any content.
 ///
 /// # Safety
 /// At `pointer` is room for `count` values that no other thread uses during the call.
@@ -40,11 +40,11 @@ pub(crate) unsafe fn room<'a, T>(
     count: usize,
 ) -> Result<&'a mut [MaybeUninit<T>], HapterraStatus> {
     check(pointer, count)?;
-    // SAFETY: as above, and what need not be initialised may hold anything.
+    // SAFETY: as above, and the type allows any content, also uninitialised.
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
-/// Runs a call; a panic is a failure.
+/// Runs a call and returns a panic as a failure.
 pub(crate) fn caught<R>(call: impl FnOnce() -> Result<R, Failure>) -> Result<R, Failure> {
     catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|_| Err(HapterraStatus::Internal.into()))
 }

@@ -20,9 +20,9 @@ pub enum HapterraState {
     Touching = 1,
     /// The surface has ended, and the last force ramps down.
     Releasing = 2,
-    /// The HIP is below the surface and was not above it yet: no force until it was.
+    /// The HIP is below the surface and has not been above it yet: no force until then.
     BelowGround = 3,
-    /// The HIP is in a no-data area or outside, and was not above the surface yet: no force.
+    /// The HIP is in a no-data area or outside, and has not been above the surface yet: no force.
     Outside = 4,
 }
 
@@ -30,13 +30,14 @@ pub enum HapterraState {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HapterraStep {
-    /// The force on the hand, N: east, north, up. Each is a number of single precision.
+    /// The force on the hand, N: east, north, up. Each has single precision.
     pub force_n: [f64; 3],
     /// The proxy, mm: east, north, up.
     pub proxy_mm: [f64; 3],
-    /// The height of the surface over the HIP, mm, in the state `HAPTERRA_STATE_BELOW_GROUND`; NaN in all others.
+    /// The height of the surface over the HIP, mm, in the state `HAPTERRA_STATE_BELOW_GROUND`; NaN
+    /// in all others.
     pub surface_mm: f64,
-    /// A `HapterraState`.
+    /// A value of `HapterraState`.
     pub state: u32,
     /// 0.
     pub reserved: u32,
@@ -61,7 +62,8 @@ impl From<Step> for HapterraStep {
     }
 }
 
-/// One haptic interface point (HIP) over a terrain, created by `hapterra_contact_new` and not begun.
+/// One haptic interface point (HIP) over a terrain, created by `hapterra_contact_new` and not
+/// begun.
 #[derive(Default)]
 pub struct HapterraContact {
     contact: Option<Contact>,
@@ -69,7 +71,7 @@ pub struct HapterraContact {
 }
 
 impl HapterraContact {
-    /// Makes a call; after a panic there is no contact any more.
+    /// Makes a call; a panic drops the contact.
     fn call(
         &mut self,
         call: impl FnOnce(&mut Option<Contact>) -> Result<(), Failure>,
@@ -96,10 +98,10 @@ pub extern "C" fn hapterra_contact_free(contact: Option<Box<HapterraContact>>) {
     drop(contact);
 }
 
-/// Begins a contact, or begins it anew, on the heights that a terrain has now: `rate_hz` steps a
-/// second, 1,000 to 10,000 in whole thousands. The first of the `count` surfaces, 1 to 16, is the
-/// surface, and the others are materials of the terrain, of which stiffness, friction, damping and
-/// texture count. Surfaces are copied, and the terrain may end before the contact.
+/// Begins or restarts a contact on the current heights of a terrain: `rate_hz` steps a second,
+/// 1,000 to 10,000 in whole thousands. The first of the `count` surfaces, 1 to 16, is the surface.
+/// The others are materials of the terrain, of which only stiffness, friction, damping and texture
+/// are used. Surfaces are copied, and the terrain may be freed before the contact.
 ///
 /// # Safety
 /// At `surfaces` are `count` values.
@@ -123,8 +125,8 @@ pub unsafe extern "C" fn hapterra_contact_begin(
     })
 }
 
-/// Changes the surfaces between two steps, as `hapterra_contact_begin` takes them. The proxy stays
-/// where it is, and the next force is that of the other surface.
+/// Changes the surfaces between two steps; the arguments are as in `hapterra_contact_begin`. The
+/// proxy stays where it is, and the next step has the force of the new surface.
 ///
 /// # Safety
 /// At `surfaces` are `count` values.
@@ -144,8 +146,8 @@ pub unsafe extern "C" fn hapterra_contact_set_surface(
 }
 
 /// Makes one step with the HIP at three numbers, mm: east, north, up from the south-west sample at
-/// height zero. Where it returns an error the step has not happened and `step` is as before. An
-/// error gives no force: a program that drives a device has to set its force to zero.
+/// height zero. After an error the contact and `step` are unchanged. An error has no force: a
+/// program that drives a device must set its force to zero.
 ///
 /// # Safety
 /// At `hip_mm` are 3 numbers, and at `step` is room for one step.
@@ -159,8 +161,8 @@ pub unsafe extern "C" fn hapterra_contact_step(
     unsafe { hapterra_contact_run(contact, hip_mm, 1, step, None) }
 }
 
-/// Makes `count` steps, of three numbers each, one after the other into `steps`. It ends with the
-/// first that cannot happen. `done` may be null; else it receives how many steps have happened.
+/// Makes `count` steps, of three numbers each, and stores their results in `steps`. Stops at the
+/// first step that is not possible. `done` receives the number of steps made, unless it is null.
 ///
 /// # Safety
 /// At `hips_mm` are 3 times `count` numbers, and at `steps` is room for `count` steps.
@@ -193,8 +195,8 @@ pub unsafe extern "C" fn hapterra_contact_run(
     status
 }
 
-/// Returns the message of the contact's last error, empty where there was none, null for null. It is
-/// the contact's, and valid until the next call with it.
+/// Returns the message of the contact's last error, empty if there was none, null for null. The
+/// contact owns the message, which is valid until the next call with it.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_contact_message(contact: Option<&HapterraContact>) -> *const c_char {
     contact.map_or(std::ptr::null(), |contact| contact.message.as_ptr())

@@ -1,8 +1,9 @@
-//! `hapterra-touch` for C, C++ and WebAssembly: what `include/hapterra.h` declares.
+//! `hapterra-touch` for C, C++ and WebAssembly: the functions of `include/hapterra.h`.
 //!
-//! Objects are made by `..._new` and end by `..._free`; each keeps a message of its last error. A null
-//! pointer is an error, and so is what the library does not know. A panic would be a fault of the
-//! library: it ends in [`HapterraStatus::Internal`](status::HapterraStatus::Internal) where it can be caught, and traps in WebAssembly.
+//! Objects are created by `..._new` and freed by `..._free`; each keeps a message of its last
+//! error. A null pointer is an error, and so is an unknown value. A panic is a defect of the
+//! library: it is returned as [`HapterraStatus::Internal`](status::HapterraStatus::Internal) where
+//! it can be caught, and traps in WebAssembly.
 
 mod border;
 pub mod contact;

@@ -1,4 +1,4 @@
-//! Memory for a caller that lives in the library's own, as the page around a WebAssembly module does.
+//! Memory for a caller that shares the library's own, such as the page around a WebAssembly module.
 
 use std::alloc::{Layout, alloc, dealloc};
 use std::ffi::c_void;
@@ -8,7 +8,7 @@ use std::ptr::null_mut;
 const ALIGNMENT: usize = 16;
 
 /// Returns memory of `bytes` bytes, aligned to 16, that the caller owns until `hapterra_free`; null
-/// for no bytes, and where there is none. Meant for WebAssembly; C has `malloc`.
+/// for no bytes, and if there is no memory. Meant for WebAssembly; C has `malloc`.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_alloc(bytes: usize) -> *mut c_void {
     match Layout::from_size_align(bytes, ALIGNMENT) {
@@ -21,7 +21,7 @@ pub extern "C" fn hapterra_alloc(bytes: usize) -> *mut c_void {
 /// Frees memory that `hapterra_alloc` returned for the same number of bytes. Null is ignored.
 ///
 /// # Safety
-/// `pointer` is null, or came from `hapterra_alloc(bytes)` and was not freed.
+/// `pointer` is null, or a result of `hapterra_alloc(bytes)` that was not freed.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub unsafe extern "C" fn hapterra_free(pointer: *mut c_void, bytes: usize) {
     if let Ok(layout) = Layout::from_size_align(bytes, ALIGNMENT)

@@ -22,11 +22,11 @@ pub enum HapterraStatus {
     Scale = 5,
     /// Heights are too tall or too steep.
     Heights = 6,
-    /// A parameter of a surface is out of its bounds.
+    /// A parameter of a surface is out of bounds.
     Surface = 7,
     /// A material of the terrain is not one of the surfaces.
     Material = 8,
-    /// No tick rate: 1,000 to 10,000 in whole thousands.
+    /// The tick rate is not 1,000 to 10,000 in whole thousands.
     Rate = 9,
     /// A position is not a number, or too far away.
     Place = 10,
@@ -132,7 +132,7 @@ pub(crate) struct Message(CString);
 
 impl Message {
     pub(crate) fn keep(&mut self, failure: Failure) -> HapterraStatus {
-        // No message has a zero in it.
+        // No message contains a zero.
         self.0 = CString::new(failure.message).unwrap_or_default();
         failure.status
     }
@@ -142,8 +142,8 @@ impl Message {
     }
 }
 
-/// Returns the text of a status, for ever valid; that of `HAPTERRA_STATUS_CHOICE` for any other
-/// number. Not to be freed.
+/// Returns the text of a status, valid forever; for any other number the text of
+/// `HAPTERRA_STATUS_CHOICE`. Not to be freed.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_error_text(status: u32) -> *const c_char {
     let text = TEXTS.get(status as usize);
@@ -151,7 +151,7 @@ pub extern "C" fn hapterra_error_text(status: u32) -> *const c_char {
         .as_ptr()
 }
 
-/// Returns the version of the library, such as `0.1.0`, for ever valid. Not to be freed.
+/// Returns the version of the library, such as `0.1.0`, valid forever. Not to be freed.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_version() -> *const c_char {
     const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");

@@ -9,13 +9,13 @@ use hapterra_touch::{
 use crate::border::array;
 use crate::status::{Failure, HapterraStatus};
 
-/// The normals that a force follows.
+/// The normals that the force's direction follows.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraShading {
-    /// Normals of the cells: the force turns at once where two cells meet.
+    /// Normals of the cells: the force's direction changes abruptly where two cells meet.
     None = 0,
-    /// Normals that turn evenly from cell to cell.
+    /// Normals that change gradually from cell to cell.
     Smooth = 1,
 }
 
@@ -23,22 +23,22 @@ pub enum HapterraShading {
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraTexture {
-    /// None: the surface is even.
+    /// None: the surface is smooth.
     None = 0,
-    /// Heights at random, in all directions.
+    /// Random heights, in all directions.
     Grain = 1,
-    /// Ridges one after the other.
+    /// Parallel ridges.
     Grating = 2,
 }
 
-/// The parameters of a surface. Fill it with `hapterra_surface_default`, then change what you like; it
-/// is checked when it is used. 48 bytes.
+/// The parameters of a surface. Fill it with `hapterra_surface_default`, then change fields; it is
+/// checked when it is used. 48 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HapterraSurface {
     /// Stiffness, N/mm; not negative.
     pub stiffness_n_per_mm: f32,
-    /// Largest force, N; not negative.
+    /// Maximum force, N; not negative.
     pub max_force_n: f32,
     /// Coulomb's coefficient at rest, 0 to 10, not less than the dynamic one.
     pub static_friction: f32,
@@ -48,9 +48,9 @@ pub struct HapterraSurface {
     pub viscous_friction_s: f32,
     /// Damping along the force, N·s/m, 0 to 20.
     pub damping_ns_per_m: f32,
-    /// A `HapterraShading`.
+    /// A value of `HapterraShading`.
     pub shading: u32,
-    /// A `HapterraTexture`.
+    /// A value of `HapterraTexture`.
     pub texture: u32,
     /// Height of a texture above and below the surface, mm, 0 to 2, and at most an eighth of
     /// its wavelength.
@@ -59,7 +59,7 @@ pub struct HapterraSurface {
     pub texture_wavelength_mm: f32,
     /// Direction across the ridges of a grating, degrees from east to north.
     pub texture_direction_deg: f32,
-    /// Seed of a texture: another variant of the same pattern.
+    /// Seed of a texture: selects a variant of the same pattern.
     pub texture_seed: u32,
 }
 
@@ -148,10 +148,10 @@ pub extern "C" fn hapterra_surface_default(
     HapterraStatus::Ok
 }
 
-/// A surface and its materials.
+/// Creates a surface with its materials.
 ///
 /// # Safety
-/// At `surfaces` are `count` of them.
+/// At `surfaces` are `count` values.
 pub(crate) unsafe fn surface(
     surfaces: *const HapterraSurface,
     count: usize,

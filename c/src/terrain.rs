@@ -11,9 +11,9 @@ use crate::status::{Failure, HapterraStatus, Message};
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraRowOrder {
-    /// The northernmost, as in images and GeoTIFF.
+    /// The first row is the northernmost, as in images and GeoTIFF.
     NorthFirst = 0,
-    /// The southernmost.
+    /// The first row is the southernmost.
     SouthFirst = 1,
 }
 
@@ -25,10 +25,10 @@ pub struct HapterraTerrain {
 }
 
 /// Reads heights of a block of samples into `heights`, row by row from the south and each row from
-/// west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for no-data. `column` and `row` count
-/// from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
-/// that was passed with the function. It is called during calls with a contact or terrain only, and
-/// must not end by an exception or `longjmp`.
+/// west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for no-data.
+/// `column` and `row` count from the south-west sample. Returns 0, or any other number for an
+/// error. `user` is the pointer that was passed with the function. The function is only called
+/// during calls with a contact or terrain, and must not end by an exception or `longjmp`.
 pub type HapterraRead = Option<
     extern "C" fn(
         user: *mut c_void,
@@ -46,8 +46,8 @@ struct Reader {
     user: *mut c_void,
 }
 
-// SAFETY: the pointer is handed to the caller's function and not used here; the header asks that the
-// function be right in whichever thread uses the terrain.
+// SAFETY: the pointer is passed to the caller's function and not used here; the header requires
+// that the function work in any thread that uses the terrain.
 unsafe impl Send for Reader {}
 // SAFETY: as above.
 unsafe impl Sync for Reader {}
@@ -69,7 +69,7 @@ impl Heights for Reader {
 }
 
 impl HapterraTerrain {
-    /// Puts other heights in; the ones before stay where there are none.
+    /// Replaces the heights; keeps the previous ones after an error.
     fn put(
         &mut self,
         made: impl FnOnce(Option<&Terrain>) -> Result<Terrain, Failure>,
@@ -84,7 +84,7 @@ impl HapterraTerrain {
     }
 
     /// # Safety
-    /// At `heights` are columns times rows of them.
+    /// At `heights` are columns times rows values.
     unsafe fn put_array<T: Height>(
         &mut self,
         heights: *const T,
@@ -120,15 +120,15 @@ pub extern "C" fn hapterra_terrain_new() -> Box<HapterraTerrain> {
     Box::default()
 }
 
-/// Frees a terrain; null is ignored. Contacts on it stay as they are.
+/// Frees a terrain; null is ignored. Its contacts stay valid.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_free(terrain: Option<Box<HapterraTerrain>>) {
     drop(terrain);
 }
 
 /// Sets `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
-/// `HapterraRowOrder`, each row from west to east; NaN is no-data. They are copied. Contacts that
-/// have begun keep the terrain that they have.
+/// `HapterraRowOrder`, each row from west to east; NaN is no-data. The heights are copied. Contacts
+/// that have begun keep their terrain.
 ///
 /// # Safety
 /// At `heights` are `columns` times `rows` values.
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn hapterra_terrain_set_f32(
     })
 }
 
-/// As `hapterra_terrain_set_f32`, in double precision.
+/// Sets heights as `hapterra_terrain_set_f32` does, in double precision.
 ///
 /// # Safety
 /// At `heights` are `columns` times `rows` values.
@@ -166,9 +166,9 @@ pub unsafe extern "C" fn hapterra_terrain_set_f64(
     })
 }
 
-/// Gives a terrain heights in millimetres that a function reads where they are touched. Function and
-/// `user` are the caller's, and valid until the terrain and all contacts that began on it have ended.
-/// A contact that was moved to another thread calls it from there.
+/// Sets a function that reads heights in millimetres where they are touched. The caller owns the
+/// function and `user`, which must stay valid until the terrain and all contacts that began on it
+/// are freed. A contact that was moved to another thread calls the function there.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_set_reader(
     terrain: Option<&mut HapterraTerrain>,
@@ -187,8 +187,8 @@ pub extern "C" fn hapterra_terrain_set_reader(
     })
 }
 
-/// Sets the millimetres of a unit of the heights, if they are not millimetres. It counts for
-/// the heights that the terrain has, and for contacts that begin later.
+/// Sets the millimetres of a unit of the heights, if they are not in millimetres. Applies to the
+/// current heights, and to contacts that begin later.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_set_height_scale(
     terrain: Option<&mut HapterraTerrain>,
@@ -202,10 +202,10 @@ pub extern "C" fn hapterra_terrain_set_height_scale(
     })
 }
 
-/// Puts a ball of a radius in millimetres in place of the point that touches the terrain, or with 0 the
-/// point again. The HIP and the proxy are then the ball's centre, one radius above flat ground, and so
-/// is `hapterra_terrain_height_mm`. The radius is at most 8 cells. It counts for the heights that the
-/// terrain has, and for contacts that begin later.
+/// Sets the radius of the ball that touches the terrain, mm; 0 for a point. The HIP and the proxy
+/// are then the ball's centre, one radius above flat ground, and so is
+/// `hapterra_terrain_height_mm`. The radius is at most 8 cells. Applies to the current heights, and
+/// to contacts that begin later.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_set_tip(
     terrain: Option<&mut HapterraTerrain>,
@@ -219,9 +219,9 @@ pub extern "C" fn hapterra_terrain_set_tip(
     })
 }
 
-/// Sets the material of each sample: the number of one of the surfaces of
-/// `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
-/// has samples, and they are copied.
+/// Sets the material of each sample: the index of one of the surfaces of `hapterra_contact_begin`,
+/// row by row in a `HapterraRowOrder`. `count` is the number of samples of the terrain. The
+/// materials are copied.
 ///
 /// # Safety
 /// At `materials` are `count` values.
@@ -242,8 +242,8 @@ pub unsafe extern "C" fn hapterra_terrain_set_materials(
     })
 }
 
-/// Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a no-data area, off the terrain, where it cannot
-/// be read, and for null.
+/// Returns the height of the surface at a position, mm, or of a ball's centre over it; NaN for
+/// no-data, outside the terrain, if it cannot be read, and for null.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_height_mm(
     terrain: Option<&HapterraTerrain>,
@@ -255,8 +255,8 @@ pub extern "C" fn hapterra_terrain_height_mm(
     height.ok().flatten().unwrap_or(f64::NAN)
 }
 
-/// Returns the message of the terrain's last error, empty where there was none, null for null. It is
-/// the terrain's, and valid until the next call with it.
+/// Returns the message of the terrain's last error, empty if there was none, null for null. The
+/// terrain owns the message, which is valid until the next call with it.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_message(terrain: Option<&HapterraTerrain>) -> *const c_char {
     terrain.map_or(std::ptr::null(), |terrain| terrain.message.as_ptr())

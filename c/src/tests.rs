@@ -1,4 +1,4 @@
-//! The border keeps numbers as they are.
+//! Numbers pass the interface unchanged.
 
 use std::mem::MaybeUninit;
 
@@ -12,7 +12,7 @@ use crate::surface_params::{
 };
 use crate::terrain::{hapterra_terrain_new, hapterra_terrain_set_f64, hapterra_terrain_set_tip};
 
-/// All of it that can differ from the defaults.
+/// Returns a surface in which every field differs from the default.
 fn rough() -> HapterraSurface {
     HapterraSurface {
         stiffness_n_per_mm: 0.4,

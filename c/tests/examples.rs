@@ -1,5 +1,5 @@
 //! The examples and wrong calls, built with the machine's compilers against the static and the
-//! shared library. Skips, with a line, what the machine has no compiler or no valgrind for.
+//! shared library. Tests without a compiler or valgrind on the machine are skipped, with a message.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -31,7 +31,7 @@ const PROGRAMS: [Program; 3] = [
     },
 ];
 
-/// The folder with both libraries, built once: for a test cargo builds neither.
+/// Returns the folder with both libraries, built once: cargo builds neither for a test.
 fn libraries() -> &'static Path {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     BUILT.get_or_init(|| {
@@ -71,7 +71,7 @@ fn runs(command: &mut Command) -> String {
     text(&output)
 }
 
-/// Builds a program against the static or the shared library, runs it, and returns what it prints.
+/// Builds a program against the static or the shared library, runs it, and returns its output.
 fn built_and_run(program: &Program, is_static: bool, under: &[&str]) -> String {
     let (home, libraries) = (Path::new(env!("CARGO_MANIFEST_DIR")), libraries());
     let folder = libraries.join(format!("hapterra-c/{}-{is_static}", under.len()));

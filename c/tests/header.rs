@@ -1,4 +1,4 @@
-//! The header is what cbindgen makes of the sources.
+//! Check that the header equals the one that cbindgen generates from the sources.
 
 use std::fs;
 use std::path::Path;

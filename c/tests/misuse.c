@@ -1,4 +1,4 @@
-/* Wrong calls: each is an error with a text, and leaves nothing behind. */
+/* Wrong calls: each returns an error with a text, and changes nothing. */
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -79,7 +79,7 @@ static void nulls(void) {
         failures++;
     }
     hapterra_terrain_free(terrain);
-    /* The contact has its terrain still. */
+    /* The contact still has its terrain. */
     expect(hapterra_contact_step(contact, numbers, &step), 0, "step");
     hapterra_contact_free(contact);
     hapterra_contact_free(NULL);
@@ -137,7 +137,7 @@ static void numbers(void) {
            "material 3 of 3");
     expect(hapterra_contact_begin(contact, terrain, surfaces, 4, 1000), 0, "material 3 of 4");
 
-    /* The third place is no number. */
+    /* The third position of the path is not a number. */
     path[7] = path[7] / path[7];
     expect(hapterra_contact_run(contact, path, 3, steps, &done), HAPTERRA_STATUS_PLACE, "run");
     expect((uint32_t)done, 2, "steps done");

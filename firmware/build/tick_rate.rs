@@ -1,22 +1,22 @@
-//! The tick rate that an image is built for.
+//! The tick rate of an image.
 
-/// Whole kilohertz up to ten: `hapterra_core::rate::TickRate` takes no others.
+/// Whole kilohertz up to ten: `hapterra_core::rate::TickRate` accepts no others.
 const KILOHERTZ: std::ops::RangeInclusive<u32> = 1..=10;
 
-/// Ticks a second that a board is built for at most: its whole interrupt, by the bound of
-/// docs/reference/hardware.md ("From encoder to output"), takes no longer than a period. A test of the images
-/// compares both.
+/// Maximum tick rate of each board, Hz: its whole interrupt, by the bound of
+/// docs/reference/hardware.md ("From encoder to output"), takes at most a period. A test of the
+/// images compares both.
 pub(crate) const FASTEST_HZ: [(&str, u32); 3] = [
     ("nucleo-g474re", 4_000),
     ("nucleo-h743zi2", 8_000),
     ("nucleo-h743zi2-spi", 6_000),
 ];
 
-/// Ticks a second for a board whose tick timer counts `counts_a_second` times:
-/// what `HAPTERRA_TICK_HZ` says, or 1,000.
+/// Returns the tick rate for a board whose tick timer counts `counts_a_second` times a second:
+/// `HAPTERRA_TICK_HZ`, or 1,000 if it is not set.
 ///
 /// # Errors
-/// A message about a value that the board cannot have.
+/// A message about a rate that the board does not support.
 pub(crate) fn tick_hz(
     chosen: Option<&str>,
     board: &str,

@@ -1,5 +1,5 @@
-//! Assembles the application from what a board brings: the haptic loop for the
-//! timer interrupt and the link for its task, over memory that stays in its place.
+//! Assembles the application from a board's parts: the haptic loop for the timer interrupt and the
+//! link for its task, over memory that is not moved.
 
 use hapterra_core::guard::Fault;
 use hapterra_core::guard::thermal::Temperatures;
@@ -36,8 +36,8 @@ impl<const D: usize> TileBuffers<D> {
     }
 }
 
-/// The application's memory besides its tiles: the queues and the link's large
-/// buffers. It is placed once, because moving it would need as much stack.
+/// The application's memory besides its tiles: the queues and the link's large buffers. It is
+/// placed once, because moving it would need the same size of stack.
 pub struct WorkingMemory<'t> {
     pub(crate) queues: Queues<'t>,
     pub(crate) link: Buffers,
@@ -68,21 +68,20 @@ pub struct Hardware<E, A, C> {
     pub amplifiers: A,
     /// The tick's timer and the clock.
     pub clock: C,
-    /// The current at the ends of the amplifiers' range, A: no calibration may ask for
-    /// more.
+    /// The current at the ends of the amplifiers' range, A: the maximum of any calibration.
     pub full_scale_a: f32,
-    /// From the beginning of a tick until the motors have its current, at most, µs: what the
-    /// tick takes, the outputs, the amplifiers' reading of them, and the lag of their current
-    /// loops. The passivity controller counts on it, and the host receives it.
+    /// Maximum time from the beginning of a tick until the motors have its current, µs: the tick,
+    /// the outputs, the amplifiers' reading of them, and the lag of their current loops. The
+    /// passivity controller uses it, and the host receives it.
     pub latency_us: u16,
-    /// The Phantom's calibration record, as the board's memory has it.
+    /// The Phantom's calibration record, as the board's memory contains it.
     pub calibration: Stored,
-    /// Assumed temperatures of the motors: [`crate::motor_memory::begin`] returns them, and
-    /// [`Temperatures::HOT`] where nothing is known.
+    /// Assumed temperatures of the motors, from [`crate::motor_memory::begin`];
+    /// [`Temperatures::HOT`] if they are unknown.
     pub motors: Temperatures,
     /// Serial number among boards of its kind.
     pub serial: SerialNumber,
-    /// Findings of the board at its start.
+    /// Report of the board's start.
     pub boot: BootReport,
 }
 
@@ -96,8 +95,8 @@ pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
     pub monitor: &'t Monitor,
 }
 
-/// The arm of the stored calibration, if this firmware and this board can work with it,
-/// and what is reported to the host.
+/// Returns the arm of the stored calibration, if this firmware and this board support it, and its
+/// source for the host.
 fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Kinematics>, CalibrationSource) {
     let bad = match stored {
         Stored::Found(calibration) => {

@@ -1,26 +1,24 @@
 //! End of a program, as bytes in a RAM that survives the reset.
 //!
-//! A board's panic and fault handlers write a [`CrashRecord`] where start-up
-//! does not clear the memory, and reset. The next start reads it
-//! ([`CrashRecord::read`]), clears it, and hands it to the application in the
-//! boot report. Whatever else that RAM holds after power-up is not mistaken for
-//! a crash: a record begins with a magic number, ends with a check sum, and zeros
-//! follow it.
+//! A board's panic and fault handlers write a [`CrashRecord`] to memory that start-up does not
+//! clear, and reset. The next start reads it ([`CrashRecord::read`]), clears it, and passes it to
+//! the application in the boot report. Random content after a power-up is not read as a crash: a
+//! record begins with a magic number, ends with a checksum, and zeros follow it.
 
 use hapterra_core::crc;
 use hapterra_core::wire::status::{CRASH_FILE, Crash, CrashKind};
 use heapless::String;
 
-/// Bytes of a record at its longest, in whole words: a magic number, the fields of
-/// [`Crash`] as postcard writes them, and the CRC-32 of both.
+/// Maximum bytes of a record, in whole words: a magic number, the fields of [`Crash`] as postcard
+/// writes them, and the CRC-32 of both.
 pub const CRASH_BYTES: usize = 60;
 
 /// "HAPX".
 const MAGIC: u32 = 0x4841_5058;
-/// "HAPB": of a bare record.
+/// "HAPB": the magic number of a minimal record.
 const BARE: u32 = 0x4841_5042;
 
-/// All kinds of ends.
+/// All kinds of crashes.
 const KINDS: [CrashKind; 5] = [
     CrashKind::Panic,
     CrashKind::HardFault,
@@ -37,8 +35,8 @@ impl CrashRecord {
     /// Content of the memory without a crash.
     pub const NONE: Self = Self([0; CRASH_BYTES]);
 
-    /// Returns the first bytes to write: the kind of end alone, made without a serialiser, a check sum
-    /// or a call. It stays where making the whole record fails.
+    /// Returns the first bytes to write: the kind of crash only, made without a serialiser, a
+    /// checksum or a call. They remain if making the whole record fails.
     #[must_use]
     pub const fn bare(kind: CrashKind) -> Self {
         let words = [BARE, !BARE, kind as u32, !(kind as u32)];
@@ -51,40 +49,40 @@ impl CrashRecord {
         Self(bytes)
     }
 
-    /// A panic in `line` of `file`, `tick` ticks after the start.
+    /// Creates the record of a panic in `line` of `file`, `tick` ticks after the start.
     #[must_use]
     pub fn panic(file: &str, line: u32, tick: u32) -> Self {
         Self::new(CrashKind::Panic, [0, 0, 0, line, tick], file)
     }
 
-    /// A hard fault at `pc`, called from about `lr`, with the fault `status`.
+    /// Creates the record of a hard fault at `pc`, called from about `lr`, with the fault `status`.
     #[must_use]
     pub fn hard_fault(pc: u32, lr: u32, status: u32, tick: u32) -> Self {
         Self::new(CrashKind::HardFault, [pc, lr, status, 0, tick], "")
     }
 
-    /// An interrupt that has no handler.
+    /// Creates the record of an interrupt without a handler.
     #[must_use]
     pub fn unhandled(number: i16, tick: u32) -> Self {
         let number = u32::from(number.cast_unsigned());
         Self::new(CrashKind::UnhandledInterrupt, [0, 0, number, 0, tick], "")
     }
 
-    /// A stack that ran into its guard, at `pc` and `lr` where they could be kept, with
-    /// the fault `status`.
+    /// Creates the record of a stack overflow, at `pc` and `lr` if they could be stored, with the
+    /// fault `status`.
     #[must_use]
     pub fn stack_overflow(pc: u32, lr: u32, status: u32, tick: u32) -> Self {
         Self::new(CrashKind::StackOverflow, [pc, lr, status, 0, tick], "")
     }
 
-    /// A supply that fell too low.
+    /// Creates the record of a supply that fell too low.
     #[must_use]
     pub fn supply_low(tick: u32) -> Self {
         Self::new(CrashKind::SupplyLow, [0, 0, 0, 0, tick], "")
     }
 
     fn new(kind: CrashKind, [pc, lr, status, line, tick]: [u32; 5], path: &str) -> Self {
-        // The end of the path; characters that are not ASCII become `?`.
+        // The end of the path; other characters than ASCII become `?`.
         let skipped = path.len().saturating_sub(CRASH_FILE);
         let mut file = String::new();
         for byte in path.bytes().skip(skipped) {
@@ -106,13 +104,13 @@ impl CrashRecord {
         Self(bytes)
     }
 
-    /// The bytes to write.
+    /// Returns the bytes to write.
     #[must_use]
     pub const fn bytes(&self) -> &[u8; CRASH_BYTES] {
         &self.0
     }
 
-    /// Reads what the memory holds; nothing if that is no crash.
+    /// Reads the memory's content; `None` if it is no crash.
     #[must_use]
     pub fn read(bytes: &[u8; CRASH_BYTES]) -> Option<Crash> {
         if let Some(kind) = KINDS.into_iter().find(|kind| Self::bare(*kind).0 == *bytes) {

@@ -1,9 +1,8 @@
-//! A press of the dead-man switch as consent, which no host can give.
+//! A press of the dead-man switch as consent, which a host cannot give.
 //!
-//! A record that is stored decides what the guard protects from the next start on,
-//! for every later user of the arm. So the user at the arm has to agree: the switch has to be
-//! seen open after the request, and then pressed, within [`PRESS_MS`], while the arm is
-//! disarmed.
+//! A stored record decides what the guard protects from the next start on, for every later user of
+//! the arm. So the user at the arm has to agree: after the request, the switch must be open and
+//! then pressed, within [`PRESS_MS`], while the arm is disarmed.
 
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Health;
@@ -15,7 +14,7 @@ use hapterra_core::wire::status::PRESS_MS;
 pub(crate) struct PressWait {
     /// The tick of the request.
     began: u32,
-    /// Ticks that it may take.
+    /// Max ticks of the wait.
     patience: u32,
     seen_open: bool,
 }
@@ -30,11 +29,10 @@ impl PressWait {
         }
     }
 
-    /// Takes a report of the loop that came in tick `now`. Returns the decision, once
-    /// there is one.
+    /// Handles a report of the loop, received in tick `now`. Returns the decision, if there is one.
     pub(crate) fn look(&mut self, health: &Health, now: u32) -> Option<Result<(), Refusal>> {
         if health.report.mode != Mode::Disarmed {
-            // That press would be for something else.
+            // A press while armed has another purpose.
             return Some(Err(Refusal::NotWhileArmed));
         }
         if now.wrapping_sub(self.began) > self.patience {

@@ -1,10 +1,9 @@
-//! Endless encoder counts from the 16-bit counters of encoder timers.
+//! Unbounded encoder counts from the 16-bit counters of encoder timers.
 
-/// Follows a counter that wraps around at 2^16.
+/// A counter that wraps around at 2^16, followed to a total count.
 ///
-/// The count is exact while the counter moves less than 32,768 counts between two
-/// readings. With a reading each millisecond that is 8 motor turns, hundreds of
-/// times a Phantom's top speed.
+/// The count is exact while the counter moves by less than 32,768 counts between two readings. With
+/// a reading each millisecond that is 8 motor turns, hundreds of times a Phantom's top speed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EndlessCount {
     last: u16,
@@ -12,7 +11,7 @@ pub struct EndlessCount {
 }
 
 impl EndlessCount {
-    /// Takes the counter's present reading and returns the total count.
+    /// Updates with the counter's current reading and returns the total count.
     pub fn follow(&mut self, reading: u16) -> i32 {
         let moved = reading.wrapping_sub(self.last).cast_signed();
         self.last = reading;

@@ -8,28 +8,27 @@ pub enum LedPattern {
     /// Off: a short flash every two seconds.
     #[default]
     Disarmed,
-    /// Asked to arm; it waits for the dead-man switch or for a small force: four
-    /// flashes a second.
+    /// Arming, with the wait for the dead-man switch or for a small force: four flashes a second.
     Waiting,
     /// Amplifiers on: lit.
     On,
     /// Amplifiers on and touching: lit, with four short gaps a second.
     Touching,
-    /// A fault: as many flashes as its number, then a pause.
+    /// A fault: its number as a count of flashes, then a pause.
     Fault(u8),
-    /// A chip that the program refuses to run on: a long and a short flash, then a pause.
+    /// A chip that the program does not support: a long and a short flash, then a pause.
     WrongChip,
 }
 
 /// Length of a fault's flash, ms.
 const FLASH: u32 = 200;
-/// From one flash of a fault to the next, ms.
+/// Time from one flash of a fault to the next, ms.
 const FLASH_AND_GAP: u32 = 400;
-/// After the last flash of a fault, ms.
+/// Time after the last flash of a fault, ms.
 const PAUSE: u32 = 1_500;
 
 impl LedPattern {
-    /// States and how each looks, for people.
+    /// States and their patterns, as texts for the user.
     pub const MEANINGS: [(&'static str, &'static str); 6] = [
         ("amplifiers off", "a short flash every two seconds"),
         (
@@ -48,7 +47,7 @@ impl LedPattern {
         ),
     ];
 
-    /// The pattern for the guard's report, and for whether the HIP touches.
+    /// Returns the pattern for the guard's report and for contact of the HIP.
     #[must_use]
     pub const fn of(report: &Report, touching: bool) -> Self {
         match (report.fault, report.mode) {

@@ -15,18 +15,18 @@
 //!        from host                                          to host
 //! ```
 //!
-//! | module | what is in it |
+//! | module | content |
 //! | --- | --- |
-//! | [`app`] | assembles the application from what a board brings |
-//! | [`board`], [`amplifier`], [`encoder`], [`led`] | the hardware seam, and what boards share |
-//! | `queues` | the queues between the two halves, and what travels in them |
+//! | [`app`] | assembles the application from a board's parts |
+//! | [`board`], [`amplifier`], [`encoder`], [`led`] | the hardware seam, and shared parts |
+//! | `queues` | the queues between the two halves, and their messages |
 //! | [`haptic_loop`] | the timer interrupt: encoders, the pure tick, amplifiers |
-//! | [`link`] | the conversation with the host: requests, tiles, telemetry |
+//! | [`link`] | the communication with the host: requests, tiles, telemetry |
 //! | [`usb`] | the link's USB interface |
-//! | [`monitor`] | check-ins and counters; whether the watchdog is fed |
+//! | [`monitor`] | check-ins and counters, which decide on feeding the watchdog |
 //! | [`store`] | the calibration record in flash |
-//! | [`crash`] | how a program ended, kept over the reset |
-//! | [`motor_memory`] | how warm the motors are, kept over the reset |
+//! | [`crash`] | the record of a program's end, kept over the reset |
+//! | [`motor_memory`] | the motors' temperatures, kept over the reset |
 //! | `dead_man_press` | the press of the dead-man switch that a stored record needs |
 //! | [`native`] | the same application as a value in a host program |
 //!
@@ -34,10 +34,10 @@
 //!
 //! # Priorities
 //!
-//! From the most urgent down. A critical section masks everything from "ceiling"
-//! down, by BASEPRI; the haptic interrupt is above and nothing delays it.
+//! The most urgent comes first. A critical section masks everything from "ceiling" down, by
+//! BASEPRI; the haptic interrupt is above and nothing delays it.
 //!
-//! | priority | what | may |
+//! | priority | code | may |
 //! | --- | --- | --- |
 //! | faults, panic | amplifiers off, record, reset or exit | not return |
 //! | STM32 0 | the supply's interrupt: amplifiers off, record, reset | not return |
@@ -52,17 +52,16 @@
 //!
 //! # Time
 //!
-//! The application's time is the number of ticks, and time-outs are counted in
-//! ticks. In a scene that sets [`hold_clock`], a tile that the host owes takes no
-//! time; in a replay, no time passes between two points.
-//! [`link::Link::may_stand_still`] says when that is so. The emulated board then
-//! stops its two timers, its only clocks; the native device is not
-//! ticked; a real board cannot stop time and continues. So the host's speed changes
-//! nothing that is rendered, and a run repeats to the last bit.
+//! The application's time is the number of ticks, and time-outs are counted in ticks. In a scene
+//! that sets [`hold_clock`], no time passes while a requested tile is missing; in a replay, no time
+//! passes between two points. [`link::Link::may_stand_still`] returns true in these cases. The
+//! emulated board then stops its two timers, its only clocks; the native device is not ticked; a
+//! real board cannot stop time and continues. So the host's speed does not change the rendering,
+//! and a run is repeatable to the last bit.
 //!
-//! While time stands still, no time-out comes. The device requests a tile again at
-//! once when a frame arrives damaged, but it cannot notice a frame that is lost
-//! without a trace. So `hold_clock` is for links that lose nothing: sockets, pipes.
+//! While time stands still, no time-out expires. The device requests a tile again at once when a
+//! frame arrives damaged, but it cannot detect a lost frame. So `hold_clock` is for links that lose
+//! nothing: sockets, pipes.
 //!
 //! [`hold_clock`]: hapterra_core::scene::Scene::hold_clock
 #![cfg_attr(not(test), no_std)]
@@ -84,7 +83,7 @@ mod queues;
 pub mod store;
 pub mod usb;
 
-// The build script's, for its tests.
+// Module of the build script, for its tests.
 #[cfg(test)]
 #[path = "../build/tick_rate.rs"]
 mod tick_rate;

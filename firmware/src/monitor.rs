@@ -1,5 +1,5 @@
-//! Liveness and measurements of the application's parts: that they run, and what they
-//! count. It decides whether the watchdog is fed; the tick and the status message read it.
+//! Check-ins and counters of the application's parts. They decide if the watchdog is fed; the tick
+//! and the status message also read them.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 
@@ -35,7 +35,7 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Makes a monitor before anything has happened.
+    /// Creates a monitor without check-ins.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -49,18 +49,17 @@ impl Monitor {
         }
     }
 
-    /// A part says that it runs. Each watched part calls this at least every few
-    /// milliseconds, from any priority.
+    /// Records that a part runs. Each watched part calls this at least every few milliseconds, from
+    /// any priority.
     pub fn check_in(&self, part: Part) {
         self.checked_in.fetch_or(part.bit(), Relaxed);
     }
 
     /// Returns true if the watchdog is to be fed now: all of `parts` have checked in since this
-    /// was last true. Asked a few times within the watchdog's time.
+    /// last returned true. Called a few times within the watchdog's time.
     ///
-    /// A named part that never checks in leads to a reset; a part that is not named is
-    /// not watched. The tick sees from the count of feedings whether the watchdog is
-    /// being fed.
+    /// A part in `parts` that does not check in leads to a reset; other parts are not watched. From
+    /// the count of feedings the tick knows that the watchdog is being fed.
     #[must_use]
     pub fn may_feed_watchdog(&self, parts: &[Part]) -> bool {
         let all = parts.iter().fold(0, |bits, part| bits | part.bit());
@@ -82,7 +81,7 @@ impl Monitor {
         self.ticks.load(Relaxed)
     }
 
-    /// Counts a sample that found the record queue full.
+    /// Counts a sample that was dropped because the record queue was full.
     pub(crate) fn count_dropped(&self) {
         self.dropped.fetch_add(1, Relaxed);
     }
@@ -91,24 +90,23 @@ impl Monitor {
         self.dropped.load(Relaxed)
     }
 
-    /// Returns how often the watchdog was fed, wrapping.
+    /// Returns the count of the watchdog's feedings, wrapping.
     pub(crate) fn fed(&self) -> u32 {
         self.fed.load(Relaxed)
     }
 
-    /// Takes the size of the board's stack and how much of it was ever used,
-    /// bytes.
+    /// Sets the size and the high-water mark of the board's stack, bytes.
     pub fn measure_stack(&self, (size, high_water): (u32, u32)) {
         self.stack_size.store(size, Relaxed);
         self.stack_high_water.store(high_water, Relaxed);
     }
 
-    /// Takes whether the oscillator of USB followed the host in the last second.
+    /// Sets the state of USB's oscillator in the last second.
     pub fn measure_usb_clock(&self, clock: UsbClock) {
         self.usb_clock.store(clock as u8, Relaxed);
     }
 
-    /// Returns whether the oscillator of USB followed the host when that was last measured.
+    /// Returns the last measured state of USB's oscillator.
     #[must_use]
     pub fn usb_clock(&self) -> UsbClock {
         let all = [UsbClock::Unknown, UsbClock::Locked, UsbClock::Unlocked];
@@ -116,7 +114,7 @@ impl Monitor {
         found.copied().unwrap_or_default()
     }
 
-    /// Returns the size of the stack and how much of it was ever used, bytes.
+    /// Returns the size and the high-water mark of the stack, bytes.
     #[must_use]
     pub fn stack(&self) -> (u32, u32) {
         (

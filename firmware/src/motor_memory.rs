@@ -1,13 +1,13 @@
-//! The motors' temperatures as words in a RAM that survives the reset.
+//! The motors' temperatures as words in RAM that survives the reset.
 //!
-//! A reset does not cool a motor. Ten times a second the haptic interrupt writes a copy
-//! of the temperatures (`MotorLog`) where start-up does not clear the memory, into one
-//! of two places by turns. A reset in the middle of a write damages that copy, and the
-//! one before it is still whole. The next start takes the newest whole copy ([`begin`]).
+//! A reset does not cool a motor. Ten times a second the haptic interrupt writes a copy of the
+//! temperatures (`MotorLog`) to memory that start-up does not clear, alternating between two
+//! places. A reset during a write damages that copy, and the other one is still valid. The next
+//! start uses the newest valid copy ([`begin`]).
 //!
-//! A start that finds none, or that follows a power-up, has no temperatures: it
-//! takes them to be as hot as derating lets them become ([`Temperatures::HOT`]). That
-//! leaves the continuous current at once and the peak current after about a minute.
+//! A start without a valid copy, or after a power-up, assumes the maximum temperatures that
+//! derating allows ([`Temperatures::HOT`]). The continuous current is then available at once and
+//! the peak current after about a minute.
 //!
 //! ```text
 //! words of a copy:   number   winding 1 2 3   housing 1 2 3 (f32, K)   CRC-32
@@ -26,12 +26,12 @@ pub type Words = [u32; WORDS];
 /// Both copies.
 pub type Copies = [Words; 2];
 
-/// "HAPT", ahead of the words in the check sum: a memory of zeros is no copy.
+/// "HAPT", before the words in the checksum: a memory of zeros is no copy.
 const MAGIC: u32 = 0x4841_5054;
 /// Time between two copies, ms.
 const EVERY_MS: u32 = 100;
 
-/// Decides when the next copy is due, and where it goes.
+/// Selects the time and the place of the next copy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotorLog {
     every: u32,
@@ -40,7 +40,7 @@ pub(crate) struct MotorLog {
 }
 
 impl MotorLog {
-    /// The log of a loop at this rate, after the copy that [`begin`] made.
+    /// Creates the log of a loop at this rate, after the copy of [`begin`].
     pub(crate) fn new(rate: TickRate) -> Self {
         Self {
             every: rate.ticks(EVERY_MS),
@@ -49,8 +49,7 @@ impl MotorLog {
         }
     }
 
-    /// Takes the temperatures after a tick. Returns a copy where one is due, and which of
-    /// the two it is.
+    /// Updates with the temperatures after a tick. Returns a copy and its index if one is due.
     pub(crate) fn tick(&mut self, temperatures: &Temperatures) -> Option<(usize, Words)> {
         self.ticks += 1;
         if self.ticks < self.every {
@@ -63,14 +62,12 @@ impl MotorLog {
     }
 }
 
-/// Takes why the board started and what its RAM holds. Returns what the motors are to
-/// be taken for, and what the RAM is to hold from now on, so that nothing older is ever
-/// found again.
+/// Returns the assumed temperatures of the motors, from the cause of the reset and the RAM's
+/// content, and the RAM's new content, which contains no older copy.
 #[must_use]
 pub fn begin(cause: ResetCause, found: &Copies) -> (Temperatures, Copies) {
     let kept = match cause {
-        // What a RAM holds after a power-up is chance, and how long the power was off is
-        // not known.
+        // After a power-up the RAM's content is random, and the time without power is unknown.
         ResetCause::PowerOn | ResetCause::Unknown => None,
         ResetCause::Pin | ResetCause::Software | ResetCause::Watchdog | ResetCause::BrownOut => {
             newest(found).and_then(Temperatures::after_reset)
@@ -80,7 +77,7 @@ pub fn begin(cause: ResetCause, found: &Copies) -> (Temperatures, Copies) {
     (temperatures, [encode(0, &temperatures), [0; WORDS]])
 }
 
-/// The newest whole copy.
+/// Returns the newest valid copy.
 fn newest(copies: &Copies) -> Option<Temperatures> {
     let [first, second] = copies.each_ref().map(decode);
     match (first, second) {

@@ -1,8 +1,8 @@
 //! The application as a value, for a host program: no interrupts, no tasks.
 //!
-//! The caller moves bytes and calls [`Device::tick`]. In lock-step it calls that only
-//! while [`Link::may_stand_still`] is false, as the emulated board's clock does; in
-//! real time it calls it a thousand times a second regardless.
+//! The caller moves bytes and calls [`Device::tick`]: in lock-step only while
+//! [`Link::may_stand_still`] is false, as the emulated board's clock does; in real time always a
+//! thousand times a second.
 
 use hapterra_core::guard::GuardOutputs;
 use hapterra_core::guard::thermal::Temperatures;
@@ -19,13 +19,13 @@ use crate::monitor::{Monitor, Part};
 use crate::motor_memory::{self, Copies};
 use crate::store::Stored;
 
-/// Its name, as a board that has no chip.
+/// Name of the device, as of a board without a chip.
 pub const BOARD: &str = "native";
-/// Current at the ends of the range of a device without real amplifiers, A: every
-/// board's.
+/// Current at the ends of the range of a device without real amplifiers, A: the same as on every
+/// board.
 pub const FULL_SCALE_A: f32 = 5.5;
 
-/// Encoders and switches that read what the caller last set.
+/// Encoders and switches that return the caller's last values.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualEncoders(pub GuardInputs);
 
@@ -35,7 +35,7 @@ impl Encoders for VirtualEncoders {
     }
 }
 
-/// Amplifiers whose currents the caller of the tick takes from its result.
+/// Amplifiers whose currents are in the result of the tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualAmplifiersOff;
 
@@ -63,8 +63,7 @@ impl EnabledAmplifiers for VirtualAmplifiersOn {
     }
 }
 
-/// A clock for lock-step, in which no tick takes any time, at `TICKS_A_MS` ticks a
-/// millisecond.
+/// A clock for lock-step, in which a tick takes no time, at `TICKS_A_MS` ticks a millisecond.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StoppedClock<const TICKS_A_MS: u32 = 1>;
 
@@ -80,7 +79,7 @@ impl<const TICKS_A_MS: u32> TickClock for StoppedClock<TICKS_A_MS> {
         0
     }
 
-    /// No time passes outside of ticks.
+    /// Returns a period: no time passes outside of ticks.
     fn since_last_tick(&mut self) -> u32 {
         Self::PERIOD
     }
@@ -95,25 +94,25 @@ impl<const TICKS_A_MS: u32> TickClock for StoppedClock<TICKS_A_MS> {
 /// A device in the host's memory, with a window of `D × D` tiles and a clock `C`.
 pub struct Device<C, const D: usize> {
     haptic_loop: HapticLoop<'static, VirtualEncoders, VirtualAmplifiersOff, C, D>,
-    /// The device's end of the link. [`Device::receive`] takes bytes for it, because the
-    /// link's task then runs, too.
+    /// The device's end of the link. [`Device::receive`] passes bytes to it, and then also runs the
+    /// link's task.
     pub link: Link<'static, D>,
     monitor: &'static Monitor,
-    /// Stored calibration, kept without power.
+    /// Stored calibration, which survives without power.
     stored: Stored,
     /// RAM that survives a reset.
     retained: Copies,
 }
 
 impl<C: TickClock, const D: usize> Device<C, D> {
-    /// The check-ins and counters of its parts.
+    /// Returns the check-ins and counters of its parts.
     #[must_use]
     pub const fn monitor(&self) -> &'static Monitor {
         self.monitor
     }
 
-    /// Builds the device in memory that lives as long as the program, such as a
-    /// leaked box, because its halves hand tile buffers to each other by reference.
+    /// Builds the device in memory that is never freed, such as a leaked box, because its halves
+    /// exchange tile buffers by reference.
     pub fn new(
         tiles: &'static mut TileBuffers<D>,
         memory: &'static mut WorkingMemory<'static>,
@@ -125,8 +124,8 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         Self::with_motors(tiles, memory, clock, calibration, boot, cold)
     }
 
-    /// As [`Device::new`], after a device that left this in its RAM
-    /// ([`Device::retained`]). Motors of which nothing is known are hot.
+    /// Builds the device as [`Device::new`] does, with the RAM of an earlier device
+    /// ([`Device::retained`]). Motors of unknown temperature are hot.
     pub fn restarted(
         tiles: &'static mut TileBuffers<D>,
         memory: &'static mut WorkingMemory<'static>,
@@ -184,7 +183,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         &self.retained
     }
 
-    /// The calibration in force.
+    /// Returns the current calibration.
     #[must_use]
     pub fn calibration(&self) -> Option<&Calibration> {
         self.haptic_loop.calibration()
@@ -196,7 +195,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.haptic_loop.temperatures()
     }
 
-    /// Takes bytes from the host ([`Link::receive`]) and runs the link's task.
+    /// Passes bytes from the host to the link ([`Link::receive`]) and runs the link's task.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let taken = self.link.receive(bytes);
         self.poll();
@@ -211,17 +210,17 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.link.poll();
     }
 
-    /// Runs one tick with these encoders and switches, then the link's task. Returns
-    /// what the amplifiers got.
+    /// Runs one tick with these encoders and switches, then the link's task. Returns the
+    /// amplifiers' commands.
     pub fn tick(&mut self, sense: GuardInputs) -> GuardOutputs {
         let drive = self.tick_alone(sense);
         self.poll();
-        // No watchdog is behind this, but the tick wants to see one fed.
+        // There is no watchdog here, but the tick expects one to be fed.
         let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
         drive
     }
 
-    /// Runs one tick alone, as if the link's task hung.
+    /// Runs one tick only, as if the link's task hung.
     pub fn tick_alone(&mut self, sense: GuardInputs) -> GuardOutputs {
         self.haptic_loop.encoders_mut().0 = sense;
         let drive = self.haptic_loop.tick();

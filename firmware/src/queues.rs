@@ -1,8 +1,8 @@
-//! The queues between the haptic loop and the link, and what travels in them.
+//! The queues between the haptic loop and the link, and their messages.
 //!
-//! The loop runs in an interrupt, the link in a task below it. Single-producer
-//! queues and the counters of [`Monitor`] are all that they share: neither half
-//! ever waits for a lock, and no tile is reachable from both halves at once.
+//! The loop runs in an interrupt, the link in a task below it. They share only single-producer
+//! queues and the counters of [`Monitor`]: neither half ever waits for a lock, and no tile is
+//! reachable from both halves at once.
 
 use hapterra_core::force::MaterialTable;
 use hapterra_core::phantom::Kinematics;
@@ -14,13 +14,13 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use crate::monitor::Monitor;
 
-/// Tile buffers besides the window's: one for each tile on its way, and one more. The two tiles of
-/// a fallback keep two of them, so three tiles of the field are on their way over it.
+/// Tile buffers besides the window's: one for each requested tile, and one more. The two tiles of a
+/// fallback use two of them, so at most three tiles of the field are requested with a fallback.
 pub(crate) const SPARES: usize = IN_FLIGHT + 1;
 /// Slots of the command queue, one of which stays empty.
 const COMMANDS: usize = 16;
-/// Slots of the record queue: the link may sleep through this many samples. Unpacking the
-/// slowest tile takes it three.
+/// Slots of the record queue: the link may be delayed by this many samples. Unpacking the slowest
+/// tile takes it three.
 const RECORDS: usize = 28;
 /// Slots of the settings queue: one set of settings at a time.
 const SETTINGS: usize = 2;
@@ -29,7 +29,7 @@ const MATERIALS: usize = 2;
 /// Slots of the health queue: one report at a time.
 const HEALTH: usize = 2;
 
-/// One tick as the loop reports it to the link.
+/// The loop's record of one tick for the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct QueuedTick {
     /// Record of the tick.
@@ -38,12 +38,12 @@ pub(crate) struct QueuedTick {
     pub(crate) answers: Option<u32>,
 }
 
-/// The state of the loop as it reports it to the link.
+/// The loop's state as reported to the link.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LoopReport {
-    /// The guard's state, and what was measured and driven.
+    /// The guard's state, and the measured and commanded values.
     pub(crate) health: Health,
-    /// The epoch of the scene in force.
+    /// The epoch of the current scene.
     pub(crate) epoch: Option<u32>,
     /// The latest mark whose pulse is over.
     pub(crate) marked: Marked,
@@ -61,7 +61,7 @@ pub(crate) struct Marked {
 /// All queues between the loop and the link.
 pub(crate) struct Queues<'t> {
     commands: Queue<Command<'t>, COMMANDS>,
-    /// Room for every buffer that can be on its way back.
+    /// Room for every buffer that can be returned.
     spent: Queue<&'t mut Tile, { SPARES + 1 }>,
     records: Queue<QueuedTick, RECORDS>,
     settings: Queue<Kinematics, SETTINGS>,

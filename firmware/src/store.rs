@@ -1,59 +1,56 @@
-//! The calibration record in flash, so that a loss of power at any moment
-//! leaves the old record or the new one, never none.
+//! The calibration record in flash. After a loss of power at any moment, either the old or the new
+//! record is valid.
 //!
-//! Two areas of one or more erase blocks each hold a row of places for a
-//! record. A record is written into the next blank place, never over another;
-//! an area is erased only when the one that holds the newest record is the
-//! other.
+//! Two areas of one or more erase blocks each contain a row of places for records. A record is
+//! written into the next blank place, never over another; an area is erased only while the other
+//! area contains the newest record.
 //!
 //! ```text
 //! place:   number (u32)   its complement (u32)   record (`Calibration::encode`)   0xFF …   mark
 //! ```
 //!
-//! The newest record is the valid one with the highest number. The mark is written
-//! last. A place without a valid check sum, or one that cannot be read, is damaged if it
-//! has the mark. Without the mark its write was cut off, and the record counts as never
-//! written.
+//! The newest record is the valid one with the highest number. The mark is written last. A place
+//! with an invalid checksum, or one that cannot be read, is damaged if it has the mark. Without the
+//! mark its write was cut off, and the record is ignored.
 //!
-//! Erasing is slow (a sector of a large chip: seconds), so only
-//! [`CalibrationStore::prepare`] does it, at start-up, before there is a tick or a
-//! watchdog. Saving only writes, which takes some milliseconds; where no place is left,
-//! it reports it.
+//! Erasing is slow (a sector of a large chip: seconds), so only [`CalibrationStore::prepare`] does
+//! it, at start-up, before there is a tick or a watchdog. Saving only writes, which takes some
+//! milliseconds; it fails if no place is left.
 
 use embedded_storage::nor_flash::NorFlash;
 use hapterra_core::phantom::{Calibration, CalibrationError, RECORD_BYTES, RecordError};
 
 /// Number and complement.
 const HEAD: usize = 8;
-/// The mark, a write of its own on every chip.
+/// The mark, written separately on every chip.
 const MARK: [u8; 32] = [0; 32];
 /// Offset of the mark in a place: a multiple of 32, the largest write size of the chips.
 const MARK_AT: usize = HEAD + RECORD_BYTES + 24;
 /// Bytes of a place.
 pub const PLACE: usize = MARK_AT + MARK.len();
-/// The most places of an area that are used. Saving a record reads all of them, which may
-/// take no more than a fraction of the watchdog's time.
+/// Maximum number of places of an area that are used. Saving a record reads all of them, which must
+/// take only a fraction of the watchdog's time.
 const MAX_PLACES: u32 = 8;
 
-/// Content found in the memory.
+/// Content of the memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 // Read once, at start-up.
 #[allow(clippy::large_enum_variant)]
 pub enum Stored {
-    /// Nothing was ever stored, or there is no memory.
+    /// No record was ever stored, or there is no memory.
     #[default]
     Missing,
     /// A record.
     Found(Calibration),
-    /// A whole record that this firmware does not work with, because a number of it makes
-    /// no sense or is above what the model or the board may have. No older record is taken
-    /// instead: the user has stored this one.
+    /// A whole record that this firmware does not accept, because one of its numbers is impossible
+    /// or above the maximum of the model or the board. No older record is used instead: the user
+    /// has stored this one.
     Refused(CalibrationError),
-    /// Something, but no record that could be read.
+    /// Data without a readable record.
     Damaged,
 }
 
-/// Reason for which a record was not stored. The one before is still there.
+/// Reason why a record was not stored. The previous record is still valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
     /// The flash does not erase.
@@ -62,7 +59,7 @@ pub enum StoreError {
     /// Every place is used: [`CalibrationStore::prepare`] makes room.
     #[error("there is no room before the next start")]
     Full,
-    /// No place would take it.
+    /// No place could be written.
     #[error("the flash cannot be written")]
     Write,
 }
@@ -70,11 +67,11 @@ pub enum StoreError {
 /// Content of a place.
 enum Place {
     Blank,
-    /// A record and its number; why it cannot be worked with, if so.
+    /// A record and its number, or the reason why it is not accepted.
     Record(u32, Result<Calibration, CalibrationError>),
-    /// A record that was being written when the power went.
+    /// A record whose write was cut off by a loss of power.
     CutOff,
-    /// A record that was whole once.
+    /// A record that was valid once.
     Damaged,
 }
 
@@ -83,7 +80,7 @@ enum Place {
 struct Contents {
     /// The newest record and its number.
     newest: Option<(u32, Result<Calibration, CalibrationError>)>,
-    /// The area that the newest record is in.
+    /// The area with the newest record.
     area: usize,
     has_damage: bool,
 }
@@ -98,8 +95,8 @@ pub struct CalibrationStore<F> {
 }
 
 impl<F: NorFlash> CalibrationStore<F> {
-    /// Makes a store over two areas of `size` bytes that begin at `areas`: whole erase
-    /// blocks of this flash, used for nothing else.
+    /// Creates a store over two areas of `size` bytes that begin at `areas`: whole erase blocks of
+    /// this flash, used for nothing else.
     pub const fn new(flash: F, areas: [u32; 2], size: u32) -> Self {
         assert!(PLACE.is_multiple_of(F::WRITE_SIZE) && size as usize >= PLACE);
         assert!((size as usize).is_multiple_of(F::ERASE_SIZE));
@@ -117,8 +114,7 @@ impl<F: NorFlash> CalibrationStore<F> {
         }
     }
 
-    /// Erases the area that the newest record is not in, unless it is blank. Called at
-    /// start-up.
+    /// Erases the area without the newest record, unless it is blank. Called at start-up.
     ///
     /// # Errors
     /// [`StoreError::Erase`].
@@ -134,7 +130,7 @@ impl<F: NorFlash> CalibrationStore<F> {
     /// Stores a record. Never erases.
     ///
     /// # Errors
-    /// [`StoreError`]; the record before is still there.
+    /// [`StoreError`]; the previous record is still valid.
     pub fn save(&mut self, calibration: &Calibration) -> Result<(), StoreError> {
         let found = self.scan();
         let number = found.newest.map_or(0, |(number, _)| number.wrapping_add(1));
@@ -152,7 +148,8 @@ impl<F: NorFlash> CalibrationStore<F> {
         })
     }
 
-    /// Writes into the first blank place of an area that keeps what is written.
+    /// Writes into the first blank place of an area that then reads back as written. Returns true
+    /// if there is one.
     fn write_into(&mut self, area: usize, bytes: &[u8; PLACE]) -> bool {
         let mut from = 0;
         while let Some(place) = self.next_blank(area, from) {
@@ -213,8 +210,8 @@ impl<F: NorFlash> CalibrationStore<F> {
         let mut bytes = [0; PLACE];
         let at = self.at(area, place);
         let (written, mark) = bytes.split_at_mut(MARK_AT);
-        // A part that was being written when the power went may not be readable; the
-        // parts before and behind it are.
+        // A word that was being written at a loss of power may be unreadable; the words before and
+        // after it are readable.
         let is_whole = self.flash.read(at, written).is_ok();
         let is_read = self.flash.read(at + MARK_AT as u32, mark).is_ok();
         let is_blank = |bytes: &[u8]| bytes.iter().all(|byte| *byte == 0xFF);
@@ -230,7 +227,7 @@ impl<F: NorFlash> CalibrationStore<F> {
     }
 }
 
-/// Decodes a place's record and number; nothing unless both are whole.
+/// Decodes a place's record and number; `None` unless both are valid.
 fn decoded(written: &[u8]) -> Option<(u32, Result<Calibration, CalibrationError>)> {
     let (number, rest) = written.split_first_chunk()?;
     let (check, record) = rest.split_first_chunk()?;

@@ -6,8 +6,8 @@ use std::cell::RefCell;
 use hapterra_tests::fuzzing::wire::Wire;
 
 thread_local! {
-    // One device for all inputs: its memory cannot be had back. Each input
-    // begins a session and a scene of its own.
+    // One device for all inputs, because its memory cannot be freed. Each input begins a session
+    // and a scene of its own.
     static WIRE: RefCell<Wire> = RefCell::default();
 }
 

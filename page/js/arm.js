@@ -1,37 +1,37 @@
 // The arm and the hand that holds it.
 //
 // The hand is the pointer. It pulls the arm sideways through a spring and a damper, and presses
-// straight down with a constant force. The arm is a small mass: the ground's force pushes it
-// back, so that it stays behind the hand uphill and runs ahead downhill.
-// Frame as elsewhere: millimetres, x east, y north, z up, origin at the south-west sample.
+// straight down with a constant force. The arm is a small mass: the ground's force pushes it back,
+// so that it is behind the hand uphill and ahead of it downhill. Frame as everywhere: millimetres,
+// x east, y north, z up, origin at the south-west sample.
 
 import { TICK_HZ } from "./clock.js";
 
 const TICK_S = 1 / TICK_HZ;
-/** Of the arm, kg. */
+/** Mass of the arm, kg. */
 const MASS = 0.06;
-/** The hand's spring, N/mm, and what it pulls at most, N. */
+/** The hand's spring, N/mm, and its maximum force, N. */
 const PULL = 0.12;
 const MAX_PULL = 5;
 /** The hand's damper, N·s/mm: the spring's motion dies out without a swing. */
 const DAMPING = (2 * Math.sqrt(PULL * 1000 * MASS)) / 1000;
 /** The spring that keeps a lifted arm above the ground, N/mm. */
 const LIFT = 0.05;
-/** Pointers move in steps; a hand does not: the time in which it follows, s. */
+/** Time constant of the hand behind the pointer, s: pointers move in steps, hands do not. */
 const FOLLOW_S = 0.015;
 
 export class Arm {
-  /** Where the haptic interface point (HIP) is, mm, and how fast it moves, mm/s. */
+  /** Position of the haptic interface point (HIP), mm, and its speed, mm/s. */
   at = [0, 0, 0];
   speed = [0, 0, 0];
-  /** Where the pointer is; where the hand is, which follows it. */
+  /** Positions of the pointer, and of the hand that follows it. */
   pointer = [0, 0];
   hand = [0, 0];
   /** Force with which the hand presses down, N; 0 lifts the arm to `hoverMm`. */
   pressN = 1;
   hoverMm = 40;
 
-  /** Puts the arm at rest at a place, with the hand above it. */
+  /** Sets the arm to rest at a position, with the hand above it. */
   put([x, y, z]) {
     this.at = [x, y, z];
     this.speed = [0, 0, 0];
@@ -43,7 +43,7 @@ export class Arm {
     this.hand = [x, y];
   }
 
-  /** One tick under the ground's force, N. */
+  /** Runs one tick under the ground's force, N. */
   step(force) {
     const follow = TICK_S / FOLLOW_S;
     const pull = [0, 0];

@@ -1,17 +1,17 @@
-// Time in whole ticks: a thousand a second, whatever the screen's rate is.
+// Time in whole ticks: a thousand a second, at any rate of the screen.
 
 export const TICK_HZ = 1000;
-/** Ticks that one frame runs at most: after a pause the page does not freeze to catch up. */
+/** Maximum ticks of one frame, so that the page does not freeze after a pause. */
 export const MAX_TICKS = 50;
 
-/** Says how many ticks a frame has to run, and counts the time that was given up. */
+/** Computes the number of ticks of a frame, and counts the skipped time. */
 export class Clock {
   #last = null;
   #owed = 0;
-  /** Milliseconds that were not run. */
+  /** Skipped milliseconds. */
   lostMs = 0;
 
-  /** Whole ticks since the last call, at most `MAX_TICKS`. `nowMs` is the frame's time. */
+  /** Returns the ticks since the last call, at most `MAX_TICKS`. `nowMs` is the frame's time. */
   ticks(nowMs) {
     const passed = this.#last === null ? 0 : Math.max(0, nowMs - this.#last);
     this.#last = nowMs;
@@ -23,7 +23,7 @@ export class Clock {
     return run;
   }
 
-  /** A page that was hidden goes on without the time that passed. */
+  /** Continues after the page was hidden, without the time that has passed. */
   pause() {
     this.#last = null;
   }

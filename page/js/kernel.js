@@ -12,7 +12,7 @@ const SOUTH_FIRST = 1;
 const GRAIN = 1;
 const STATES = ["free", "touching", "releasing", "unseeded", "unseeded"];
 
-/** Loads it from an address, or from bytes. */
+/** Loads the kernel from an address, or from bytes. */
 export async function load(from) {
   const bytes = typeof from === "string" ? await (await fetch(from)).arrayBuffer() : from;
   const { instance } = await WebAssembly.instantiate(bytes, {}).catch((why) => {
@@ -43,7 +43,7 @@ export class Kernel {
     return at;
   }
 
-  /** Its memory as numbers; memory that has grown has another buffer. */
+  /** Returns its memory as numbers; the buffer changes when the memory grows. */
   get #memory() {
     const { buffer } = this.#c.memory;
     if (this.#buffer?.bytes !== buffer) {
@@ -66,9 +66,9 @@ export class Kernel {
     this.#check(status, () => this.#c.hapterra_terrain_message(this.#terrain));
   }
 
-  /** The terrain of contacts that begin from now on, as `fit` of terrain.js makes it, under a ball of
-   * `tipMm`, or a point for 0. A ball is rendered on every second, fourth, … sample where its radius is
-   * more than 8 cells, as in the command. */
+  /** Sets the terrain of later contacts, as returned by `fit` of terrain.js, under a ball of
+   * `tipMm`, or a point for 0. If the ball's radius is more than 8 cells, it is rendered on every
+   * second, fourth, … sample, as in the command. */
   setTerrain(terrain, tipMm) {
     const step = stepOf(terrain.cellMm, tipMm);
     const { heights, nx, ny, cellMm } = every(terrain, step);
@@ -81,7 +81,7 @@ export class Kernel {
     this.#checkTerrain(c.hapterra_terrain_set_tip(this.#terrain, tipMm));
   }
 
-  /** Height of the ground at a place, or of the ball's centre, mm; 0 where there is none. */
+  /** Returns the height of the ground at a position, or of the ball's centre, mm; 0 for no-data. */
   heightAt(x, y) {
     return this.#c.hapterra_terrain_height_mm(this.#terrain, x, y) || 0;
   }
@@ -92,13 +92,13 @@ export class Kernel {
     this.#checkContact(this.#c.hapterra_contact_begin(this.#contact, this.#terrain, this.#surface, 1, TICK_HZ));
   }
 
-  /** Changes the surface between two steps; the contact goes on. */
+  /** Changes the surface between two steps; the contact continues. */
   setSurface(surface) {
     this.#write(surface);
     this.#checkContact(this.#c.hapterra_contact_set_surface(this.#contact, this.#surface, 1));
   }
 
-  /** Puts forces of a surface into a path, as a contact has them that begins with it. */
+  /** Writes the forces of a surface into a path, as computed by a new contact. */
   again(surface, path) {
     const now = this.#contact;
     this.#contact = this.#c.hapterra_contact_new();
@@ -125,7 +125,7 @@ export class Kernel {
     }
   }
 
-  /** One tick with the HIP at three numbers, mm. Returns `force`, N, `proxy`, mm, and `state`. */
+  /** Runs one tick with the HIP at a position, mm. Returns `force`, N, `proxy`, mm, and `state`. */
   step(hip) {
     this.#memory.f64.set(hip, this.#hip / 8);
     this.#checkContact(this.#c.hapterra_contact_step(this.#contact, this.#hip, this.#step));

@@ -13,7 +13,7 @@ import { facts, scale, show, title } from "./words.js";
 
 const MAX_PRESS_N = 4;
 const WAVELENGTH_MM = 2;
-/** Radians a tick of the path that the pen follows before a hand takes it. */
+/** Radians a tick of the pen's automatic path until the first input. */
 const WANDER = 0.0006;
 const PRESETS = { Ice: [0, 0.5, 0], Wood: [0.35, 1, 0.05], Rubber: [1, 0.25, 0], Gravel: [0.5, 0.8, 0.22] };
 const element = (id) => document.getElementById(id);
@@ -28,7 +28,7 @@ function say(text) {
   element("said").textContent = text;
 }
 
-/** The terrain that the server has, or one by formula. */
+/** Returns the server's terrain, or one by formula. */
 async function first() {
   const about = await fetch("terrain.json").then((answer) => (answer.ok ? answer.json() : null));
   if (about === null || !about.file) return made(7);

@@ -1,8 +1,8 @@
-// The path of the haptic interface point (HIP), and files that `hapterra replay` reads.
+// The path of the haptic interface point (HIP), and its files for `hapterra replay`.
 
 import { TICK_HZ } from "./clock.js";
 
-/** Ticks that are kept: five minutes. */
+/** Maximum number of stored ticks: five minutes. */
 export const MAX_ROWS = 300 * TICK_HZ;
 const COLUMNS = 6;
 const BLOCK_ROWS = 10000;
@@ -10,7 +10,7 @@ const BLOCK_ROWS = 10000;
 export class Path {
   #blocks = [];
   rows = 0;
-  /** The surface changed on the way: no one surface has the forces of all rows. */
+  /** True if the surface has changed, so that no single surface has the forces of all rows. */
   isMixed = false;
 
   clear() {
@@ -23,7 +23,7 @@ export class Path {
     return this.rows === MAX_ROWS;
   }
 
-  /** Keeps a tick: the HIP in millimetres, the force in newtons. */
+  /** Stores a tick: the HIP in millimetres, the force in newtons. */
   add(at, force) {
     if (this.isFull) return;
     const row = this.rows % BLOCK_ROWS;
@@ -32,13 +32,13 @@ export class Path {
     this.rows += 1;
   }
 
-  /** A tick's numbers: x, y, z, and the force's x, y, z. */
+  /** Returns a tick's numbers: x, y, z, and the force's x, y, z. */
   row(index) {
     const first = (index % BLOCK_ROWS) * COLUMNS;
     return this.#blocks[Math.floor(index / BLOCK_ROWS)].subarray(first, first + COLUMNS);
   }
 
-  /** All of it as CSV. Numbers are as short as they can be and still have all of their bits. */
+  /** Returns the path as CSV. Numbers are as short as possible without loss of bits. */
   csv() {
     const lines = ["t_s,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n"];
     for (let i = 0; i < this.rows; i++) lines.push(`${i / TICK_HZ},${this.row(i).join(",")}`);
@@ -46,7 +46,7 @@ export class Path {
   }
 }
 
-/** The heights as a NumPy array, millimetres, north row first. */
+/** Returns the heights as a NumPy array, millimetres, north row first. */
 export function npy({ nx, ny, heights }) {
   const words = `{'descr': '<f4', 'fortran_order': False, 'shape': (${ny}, ${nx}), }`;
   const head = `${words.padEnd(117)}\n`;
@@ -61,13 +61,13 @@ export function npy({ nx, ny, heights }) {
   return file;
 }
 
-/** The texture of a surface as a file for the command; none where it has none. */
+/** Returns the texture of a surface as a file for the command, if it has one. */
 export function surfaceFile({ texture, wavelength }) {
   if (!(texture > 0)) return null;
   return `[default]\ntexture = "grain"\ntexture_amplitude = ${texture}\ntexture_wavelength = ${wavelength}\n`;
 }
 
-/** The command that renders the path again, beside the saved files. */
+/** Returns the command that renders the path again, in the folder of the saved files. */
 export function command(terrain, { friction, stiffness, texture }, tipMm) {
   const words = ["hapterra replay terrain.npy path.csv -o felt.csv"];
   words.push(`--scale ${terrain.cellMm}mm/cell --exaggeration 1mm/unit`);

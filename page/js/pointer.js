@@ -2,13 +2,13 @@
 
 /** Newtons for a step of the wheel. */
 const WHEEL_N = 0.2;
-/** What a finger presses, N. */
+/** Force of a finger, N. */
 const FINGER_N = 1;
 /** A stick's speed, mm/s. */
 const STICK_MM_S = 120;
 
 export class Pointer {
-  /** Where it points, 0 to 1 from the left and from the top of the canvas; null: nobody yet. */
+  /** Position, 0 to 1 from the left and from the top of the canvas; null before the first input. */
   at = null;
 
   /** `hand`: `press(newtons)`, `pressN`, `turn(yaw, pitch)`, `zoom(times)`, `move(mm)`. */
@@ -29,7 +29,7 @@ export class Pointer {
   }
 
   #move(canvas, event) {
-    // Any button but none: the view is turned, the hand stays.
+    // Any button turns the view, and the hand does not move.
     if (event.buttons !== 0 && event.pointerType === "mouse") return this.hand.turn(event.movementX * 0.006, event.movementY * 0.005);
     const box = canvas.getBoundingClientRect();
     this.at = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
@@ -49,7 +49,7 @@ export class Pointer {
     if (presses) this.hand.press(this.hand.pressN + presses);
   }
 
-  /** Moves by a gamepad's left stick, turns by its right one, presses by its right trigger. */
+  /** Handles a gamepad: the left stick moves, the right one turns, the right trigger presses. */
   poll(seconds) {
     const pad = navigator.getGamepads?.().find((pad) => pad?.connected);
     if (!pad) return;

@@ -1,6 +1,6 @@
-// The force as sound: the pitch follows its size, and its changes are heard as a rustle.
+// The force as sound: its size is the pitch, and its changes are a rustling noise.
 
-/** Hz without force, and for each newton more. */
+/** Pitch without force, Hz, and its increase for each newton. */
 const BASE_HZ = 85;
 const PER_NEWTON_HZ = 55;
 
@@ -9,12 +9,12 @@ export class Sound {
   #make;
   isOn = false;
 
-  /** `make` makes what it sounds in. */
+  /** `make` creates the audio context. */
   constructor(make = () => new AudioContext()) {
     this.#make = make;
   }
 
-  /** Browsers allow sound only after a click: call it from one. */
+  /** Switches the sound on or off. Called from a click, because browsers allow sound only then. */
   toggle() {
     if (!this.#context) this.#open();
     this.isOn = !this.isOn;
@@ -41,7 +41,7 @@ export class Sound {
     this.rustle.start();
   }
 
-  /** A frame's force, N, and how much it changed from tick to tick, N. */
+  /** Sets a frame's force, N, and its change from tick to tick, N. */
   hear(newtons, changeN) {
     if (!this.isOn) return;
     const soon = this.#context.currentTime;

@@ -1,25 +1,25 @@
 // Terrain in the hand: heights in millimetres, row 0 the southernmost.
 
-/** Samples that a terrain has at most: of a larger one every second, third, … is taken. */
+/** Maximum samples of a terrain: of a larger one every second, third, … is used. */
 export const MAX_SAMPLES = 4_000_000;
-/** Cells whose sides differ by less than this share keep their heights. */
+/** Max difference of a cell's sides, as a share, without interpolation. */
 const SQUARE = 1e-3;
-/** A place this near to a sample, in cells, is on it. */
+/** Max distance of a position from a sample that it is on, in cells. */
 const ON_SAMPLE = 1e-6;
-/** Cells that the radius of a ball has at most. */
+/** Maximum radius of a ball, cells. */
 const MAX_TIP_CELLS = 8;
 /** The longer side in the hand, mm. */
 const SIDE_MM = 240;
-/** Relief that a hand feels well, mm: a flatter terrain is exaggerated up to it. */
+/** Relief that suits a hand, mm: a flatter terrain is exaggerated up to it. */
 const RELIEF_MM = 26;
-/** Relief where nothing is known of the cells, mm. */
+/** Relief if the size of the cells is unknown, mm. */
 const UNKNOWN_RELIEF_MM = 32;
 
 /**
- * Fits heights into the hand. `raw`: `name`, `nx`, `ny`, `heights` (its own unit, south row first,
+ * Scales heights to the hand. `raw`: `name`, `nx`, `ny`, `heights` (its own unit, south row first,
  * NaN where there is none), `cellM` (metres of a cell's side, or of its sides east and north) and `unitM`
- * (metres), both null where the file does not say.
- * Throws where nothing can be touched.
+ * (metres), both null if the file does not state them.
+ * Throws if no part can be touched.
  */
 export function fit(raw) {
   if (raw.nx < 2 || raw.ny < 2) throw new Error(`${raw.name}: ${raw.nx} × ${raw.ny} samples are no surface. Drop a grid of at least 2 × 2 heights.`);
@@ -49,7 +49,7 @@ export function fit(raw) {
   };
 }
 
-/** Lowest and highest of the heights. */
+/** Returns the lowest and the highest height. */
 function range(heights) {
   let [low, high] = [Infinity, -Infinity];
   for (const height of heights) {
@@ -60,8 +60,8 @@ function range(heights) {
 }
 
 /**
- * Square cells over the field: the finer axis keeps its samples, or every n-th of them where there
- * would be too many, and the other is interpolated. Cells as good as square keep their heights.
+ * Returns square cells over the field: the finer axis keeps its samples, or every n-th of them if
+ * there would be too many, and the other is interpolated. Nearly square cells keep their heights.
  */
 function squared(raw) {
   const [east, north = east] = [raw.cellM ?? 1].flat();
@@ -87,19 +87,19 @@ function squared(raw) {
   return { ...raw, nx, ny, heights, cellM, isSquare };
 }
 
-/** The sample before a place and the share of the next one. */
+/** Returns the sample before a position and the weight of the next one. */
 function split(place) {
   const sample = Math.floor(place + ON_SAMPLE);
   return [sample, place - sample];
 }
 
-/** The step between used samples under a ball: a power of two, so that its radius has 8 cells at most. */
+/** Returns the step between samples under a ball: a power of two, for at most 8 cells of radius. */
 export function stepOf(cellMm, tipMm) {
   const times = tipMm / (MAX_TIP_CELLS * cellMm);
   return times > 1 ? 2 ** Math.ceil(Math.log2(times)) : 1;
 }
 
-/** Every `step`-th sample from the south-west. */
+/** Returns every `step`-th sample from the south-west. */
 export function every({ nx, ny, heights, cellMm }, step) {
   if (step === 1) return { nx, ny, heights, cellMm };
   const [columns, rows] = [nx, ny].map((count) => Math.floor((count - 1) / step) + 1);
@@ -110,14 +110,14 @@ export function every({ nx, ny, heights, cellMm }, step) {
   return { nx: columns, ny: rows, heights: kept, cellMm: cellMm * step };
 }
 
-/** Rows in the opposite order: most files begin in the north. */
+/** Returns the rows in the opposite order: most files begin in the north. */
 export function turned(heights, nx, ny) {
   const rows = new Float32Array(nx * ny);
   for (let row = 0; row < ny; row++) rows.set(heights.subarray(row * nx, (row + 1) * nx), (ny - 1 - row) * nx);
   return rows;
 }
 
-/** A mountain range by formula, for a page without a file. The same seed gives the same one. */
+/** Returns a mountain range by formula, for a page without a file; the same for the same seed. */
 export function made(seed, size = 512) {
   const heights = new Float32Array(size * size);
   for (let row = 0; row < size; row++) {
@@ -126,9 +126,9 @@ export function made(seed, size = 512) {
   return { name: "a made mountain range", nx: size, ny: size, heights, cellM: 24, unitM: 1 };
 }
 
-/** Ridges on ridges: high ground is rough, valleys are even. Metres. */
+/** Returns ridges on ridges, metres: high ground is rough, valleys are smooth. */
 function range_m(x, y, seed) {
-  // Bent, so that ridges wind.
+  // Distorted, so that ridges wind.
   const bentX = x + 0.35 * noise(x * 0.9, y * 0.9, seed + 71);
   const bentY = y + 0.35 * noise(x * 0.9, y * 0.9, seed + 72);
   let [sum, weight, scale, reach] = [0, 1, 1, 1];
@@ -142,7 +142,7 @@ function range_m(x, y, seed) {
   return 300 + 640 * sum ** 1.35;
 }
 
-/** Even noise from −1 to 1 (gradients on a grid, Perlin's way). */
+/** Returns smooth noise from −1 to 1 (Perlin's gradients on a grid). */
 function noise(x, y, seed) {
   const [column, row] = [Math.floor(x), Math.floor(y)];
   const [u, v] = [x - column, y - row];

@@ -1,13 +1,13 @@
-// A terrain being touched: kernel, arm and path, a tick at a time.
+// A terrain being touched: kernel, arm and path, one tick at a time.
 
 import { Arm } from "./arm.js";
 import { Path } from "./path.js";
 
-/** How far above the ground a path begins, mm: a point that begins below it has no force. */
+/** Height of a path's beginning above the ground, mm: a point that begins below it has no force. */
 const ABOVE_MM = 0.05;
-/** How far a lifted arm is above the highest ground, mm. */
+/** Height of a lifted arm above the highest ground, mm. */
 const HOVER_MM = 8;
-/** How far the hand keeps from the terrain's edges, mm. */
+/** Minimum distance of the hand from the terrain's edges, mm. */
 const EDGE_MM = 4;
 
 export class Touch {
@@ -36,15 +36,15 @@ export class Touch {
     this.#begin();
   }
 
-  /** Another surface under the same contact: the proxy stays, and the next force is the other's. */
+  /** Changes the surface under the same contact: the proxy stays where it is. */
   setSurface(surface) {
     this.kernel.setSurface(surface);
     this.surface = surface;
     this.path.isMixed = this.path.rows > 0;
   }
 
-  /** Another ball, for which the ground is another: contact and path begin anew where the hand is, and
-   * an arm inside the ground is lifted out. Where it throws all is as before. */
+  /** Changes the ball and thereby the ground: contact and path restart at the hand, and an arm
+   * inside the ground is lifted out. Nothing changes if it throws. */
   setTip(tipMm) {
     try {
       this.kernel.setTerrain(this.terrain, tipMm);
@@ -58,14 +58,14 @@ export class Touch {
     this.#begin();
   }
 
-  /** Puts an arm inside the ground right above it. */
+  /** Lifts an arm inside the ground to just above it. */
   #lift() {
     const [x, y, z] = this.arm.at;
     const above = this.kernel.heightAt(x, y) + ABOVE_MM;
     if (z <= above) this.arm.put([x, y, above]);
   }
 
-  /** Where the ball is above the ground, or the point: the proxy without the radius. */
+  /** Returns the lowest point of the ball, or the point: the proxy without the radius. */
   get foot() {
     const [x, y, z] = this.proxy;
     return [x, y, z - this.tipMm];
@@ -77,7 +77,7 @@ export class Touch {
     this.force = [0, 0, 0];
   }
 
-  /** Moves the pointer to a place, kept from the edges. */
+  /** Moves the pointer to a position, at a distance from the edges. */
   point([x, y]) {
     const inside = (mm, length) => Math.max(EDGE_MM, Math.min(length - EDGE_MM, mm));
     this.arm.pointer = [inside(x, this.terrain.widthMm), inside(y, this.terrain.depthMm)];
@@ -85,14 +85,14 @@ export class Touch {
 
   tick() {
     this.arm.step(this.force);
-    // A step that cannot happen has no force.
+    // A step that is not possible has no force.
     this.force = [0, 0, 0];
     const step = this.kernel.step(this.arm.at);
     this.force = step.force;
     this.proxy = step.proxy;
     this.state = step.state;
     this.path.add(this.arm.at, step.force);
-    // The ground let go: of a ball's proxy that stays behind by more than 15 radii, or at a hole.
+    // Contact was lost: a ball's proxy is more than 15 radii behind, or at no-data.
     if (step.state === "unseeded") this.#lift();
   }
 }

@@ -1,4 +1,4 @@
-// What the page says while it is touched: numbers, captions, cursor.
+// Texts of the page during touch: numbers, captions, cursor.
 
 const element = (id) => document.getElementById(id);
 const set = (id, values) => Object.entries(values).forEach(([name, value]) => element(id).setAttribute(name, value));
@@ -12,7 +12,7 @@ export function show({ friction, stiffness, texture }, pressN, tipMm) {
   element("texture-is").textContent = texture > 0 ? `${texture.toFixed(2)} mm` : "smooth";
 }
 
-/** What is touched, and how large. */
+/** Name and size of the terrain. */
 export function title({ name, nx, ny, of, isSquare, range, exaggeration, metresPerMm }) {
   const samples = !isSquare ? `${nx} × ${ny} square cells out of ${of[0]} × ${of[1]} heights` : nx === of[0] && ny === of[1] ? `${nx} × ${ny} heights` : `${nx} × ${ny} of ${of[0]} × ${of[1]} heights`;
   const unit = metresPerMm === null ? "" : " m";
@@ -31,13 +31,13 @@ export function scale({ widthMm, metresPerMm }) {
   return { mm: round / perMm, text: `${value} ${unit}` };
 }
 
-/** Size of what was loaded besides terrain, kB: page and kernel. */
+/** Returns the loaded size of page and kernel, kB, without the terrain. */
 function loadedKb() {
   const loaded = performance.getEntriesByType("resource").filter(({ name }) => !/terrain\.|geotiff/.test(name));
   return Math.round(loaded.reduce((sum, { decodedBodySize }) => sum + decodedBodySize, 0) / 1000);
 }
 
-/** A frame's numbers, and the cursor that the force holds back. */
+/** Shows a frame's numbers, and the cursor at the proxy. */
 export function facts({ camera, canvas, scaleAt }, { arm, proxy, force, state, path }, clock, bar) {
   const px = (at) => {
     const [left, top] = camera.project(at);

@@ -46,7 +46,7 @@ test("png of 8 bits and hgt are read", async () => {
   assert.deepEqual([...raw.heights], [9, 250, 7, 8]);
   const hgt = await read("N46E007.hgt", Uint8Array.from([0, 1, 0, 2, 128, 0, 1, 4]));
   assert.deepEqual([...hgt.heights], [NaN, 260, 1, 2]);
-  // Of WGS 84 at 46.5° north.
+  // Metres of a degree on WGS 84 at 46.5° north.
   [76_762, 111_161].forEach((metres, axis) => assert.ok(Math.abs(hgt.cellM[axis] - metres) < 5, `${hgt.cellM}`));
 });
 
@@ -88,7 +88,7 @@ test("terrain of too many samples is thinned evenly", () => {
 });
 
 test("cells of degrees become squares of true slopes", () => {
-  // 1 m up for each metre east and 0.5 m for each metre north, with a hole.
+  // 1 m up for each metre east and 0.5 m for each metre north, with a no-data area.
   const [nx, ny, cellM] = [41, 31, [20, 29]];
   const heights = Float32Array.from({ length: nx * ny }, (_, i) => (i % nx) * cellM[0] + 0.5 * Math.floor(i / nx) * cellM[1]);
   heights[15 * nx + 20] = NaN;

@@ -22,16 +22,16 @@ import numpy as np
 import hapterra
 
 REFERENCE = 0.4
-#: Deviation of what the simulated observer perceives of a coefficient of friction. A stated choice.
+#: Standard deviation of the simulated observer's perceived coefficient of friction. An assumption.
 NOISE = 0.03
 #: The first and the largest difference, the factor of a step, and reversals left out of the mean.
 FIRST, LARGEST, STEP, LEFT_OUT = 0.2, 1.0, 1.26, 4
-#: The share of right answers that 2-down-1-up settles at.
+#: The share of right answers to which 2-down-1-up converges.
 SETTLES_AT = 0.5**0.5
 
 
 def staircase(judge, trials, random):
-    """Runs the staircase. ``judge(first, second)`` says which stroke had more friction, 1 or 2.
+    """Runs the staircase. ``judge(first, second)`` returns the stroke with more friction, 1 or 2.
 
     Returns the differences of all trials, and those at which the direction reversed.
     """
@@ -53,24 +53,25 @@ def staircase(judge, trials, random):
 
 
 def jnd_of(reversals):
-    """The JND: the geometric mean of the reversals after the first, as many upper as lower ones."""
+    """Returns the JND: the geometric mean of equally many upper and lower reversals after the
+    first."""
     if len(reversals) < LEFT_OUT + 2:
         raise SystemExit(f"only {len(reversals)} reversals: give more --trials")
     return statistics.geometric_mean(reversals[LEFT_OUT + len(reversals) % 2 :])
 
 
 def own_threshold():
-    """The difference at which the simulated observer is right as often as the staircase settles at."""
+    """Returns the difference at which the simulated observer is right in 70.7 % of the trials."""
     return 2**0.5 * NOISE * statistics.NormalDist().inv_cdf(SETTLES_AT)
 
 
 def level_ground():
-    """Level ground of 100 mm by 100 mm."""
+    """Returns level ground of 100 mm by 100 mm."""
     return hapterra.Terrain(np.zeros((101, 101)), cell_mm=1.0)
 
 
 def simulated(random):
-    """The observer on the virtual arm: the function that judges."""
+    """Returns the function by which the observer on the virtual arm judges."""
     ground, arm = level_ground(), hapterra.VirtualArm(home_mm=(50, 50, 10))
     # From above, down to press with about 1 N, 40 mm eastward, and up again.
     corners = [(30, 50, 5), (30, 50, -5), (70, 50, -5), (70, 50, 5)]
@@ -88,8 +89,8 @@ def simulated(random):
 
 
 def person(device):
-    """A person on an arm that serves level ground: the function that judges. What the person can
-    read, and the marks, do not say which stroke has more friction."""
+    """Returns the function by which a person on an arm with level ground judges. The texts on the
+    screen, and the marks, do not reveal the stroke with more friction."""
 
     def feels(number, friction):
         """Renders a stroke for the person. Returns True if the arm was armed to its end."""

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::{PyResult, Python, pyfunction};
 
-/// Runs the command `hapterra` with these arguments and returns its exit code. `program` is what
-/// starts it again, with the same arguments.
+/// Runs the command `hapterra` with these arguments and returns its exit code. `program` is the
+/// command that starts it again, with the same arguments.
 #[pyfunction]
 pub(crate) fn main(
     py: Python<'_>,

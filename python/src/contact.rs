@@ -15,7 +15,7 @@ use crate::{notes, numbers, refused};
 
 /// Bytes of a row of steps: `STEP` of `package/hapterra/_contact.py`.
 const ROW: usize = 72;
-/// Steps between two looks at whether Ctrl-C was pressed.
+/// Steps between two checks for Ctrl-C.
 pub(crate) const UNINTERRUPTED: usize = 4096;
 
 /// One HIP over a terrain.
@@ -30,7 +30,7 @@ pub(crate) struct Contact {
 /// Force, N, proxy, mm, number of the state, and the surface over a HIP that is below ground, mm.
 type Answer = ((f32, f32, f32), (f64, f64, f64), u8, Option<f64>);
 
-/// Rows of steps, remarks on times, and why the step after the rows has not happened.
+/// Rows of steps, remarks on times, and the reason if a step was not possible.
 pub(crate) type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>);
 
 #[pymethods]
@@ -48,7 +48,7 @@ impl Contact {
         })
     }
 
-    /// One step.
+    /// Makes one step.
     fn step(&self, py: Python<'_>, east_mm: f64, north_mm: f64, up_mm: f64) -> PyResult<Answer> {
         let contact = &mut *self.lock()?;
         let hip_mm = [east_mm, north_mm, up_mm];
@@ -66,7 +66,7 @@ impl Contact {
         Ok((step.force_n.into(), step.proxy_mm.into(), state, surface_mm))
     }
 
-    /// A step for each tick of a path of 3 f8 a row, by times of f8 where there are such.
+    /// Makes a step for each tick of a path of 3 f8 a row, by times of f8 if there are any.
     #[pyo3(signature = (path, t_s=None))]
     fn run<'py>(&self, py: Python<'py>, path: &[u8], t_s: Option<&[u8]>) -> PyResult<Run<'py>> {
         let (ticks, remarks) = self.ticks(py, path, t_s)?;
@@ -94,7 +94,7 @@ impl Contact {
 }
 
 impl Contact {
-    /// An error as Python has it: heights that cannot be read are an `OSError`.
+    /// Returns an error as a Python exception: heights that cannot be read are an `OSError`.
     pub(crate) fn raised(&self, error: StepError) -> PyErr {
         match (&self.opened, error) {
             (Some(opened), StepError::Unread(_)) => opened.unread(),
@@ -102,7 +102,7 @@ impl Contact {
         }
     }
 
-    /// The ticks of a path, and remarks on its times.
+    /// Returns the ticks of a path, and remarks on its times.
     pub(crate) fn ticks(
         &self,
         py: Python<'_>,
@@ -153,7 +153,8 @@ fn write(rows: &mut Vec<u8>, (t_s, hip_mm): &Tick, step: &Step) {
     rows.extend([number(step.state).0, 0, 0, 0]);
 }
 
-/// The number of a state in `hapterra.State`, and the height of the surface over the HIP, mm.
+/// Returns the number of a state in `hapterra.State`, and the height of the surface over the HIP,
+/// mm.
 pub(crate) const fn number(state: State) -> (u8, Option<f64>) {
     match state {
         State::Free => (0, None),

@@ -1,7 +1,7 @@
-//! The part of the Python package `hapterra` that is compiled: `hapterra._native`.
+//! The compiled part of the Python package `hapterra`: `hapterra._native`.
 //!
-//! Arrays cross the border as bytes of the machine's own order, since the stable interface of
-//! CPython 3.9 has no buffers; `package/hapterra/*.py` has numpy on its side. Errors of the library are
+//! Arrays are passed as bytes in the machine's byte order, because the stable interface of CPython
+//! 3.9 has no buffers; `package/hapterra/*.py` converts them with numpy. Errors of the library are
 //! `ValueError`s with its texts.
 
 mod command;
@@ -34,12 +34,12 @@ mod _native {
     use super::virtual_arm::VirtualArm;
 }
 
-/// An error of the library in Python.
+/// Returns an error of the library as a Python exception.
 fn refused(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Numbers of an array that came as bytes.
+/// Converts the bytes of an array to numbers.
 fn numbers<T, const BYTES: usize>(
     bytes: &[u8],
     of_bytes: impl Fn([u8; BYTES]) -> T,

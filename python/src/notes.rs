@@ -1,4 +1,4 @@
-//! Warnings of the library, which the command writes to its log, as warnings of Python.
+//! Warnings of the library, which the command logs, as Python warnings.
 
 use std::ffi::CString;
 use std::io::{Result, Write};
@@ -8,7 +8,7 @@ use pyo3::exceptions::PyUserWarning;
 use pyo3::{PyErr, PyResult, Python};
 use tracing_subscriber::filter::LevelFilter;
 
-/// More at once say nothing new, bytes.
+/// Max bytes of collected warnings.
 const MAX_BYTES: usize = 1 << 14;
 
 static LINES: Mutex<Vec<u8>> = Mutex::new(Vec::new());
@@ -22,7 +22,7 @@ pub(crate) fn listen() {
         .with_level(false)
         .with_target(false)
         .with_writer(|| Lines);
-    // The second time it listens already.
+    // Fails if a logger is already installed.
     let _ = log.try_init();
 }
 
@@ -31,7 +31,7 @@ pub(crate) fn add(line: &str) {
     let _ = writeln!(Lines, "{line}");
 }
 
-/// Warns of what was collected, where the user called the package.
+/// Raises the collected warnings at the user's call of the package.
 pub(crate) fn warn(py: Python<'_>) -> PyResult<()> {
     let bytes = std::mem::take(&mut *lines());
     let text = String::from_utf8_lossy(&bytes);

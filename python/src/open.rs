@@ -1,4 +1,4 @@
-//! Terrains that the command opens: read where they are touched.
+//! Terrains that the command opens, read where they are touched.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ struct Words {
     size: Size,
 }
 
-/// Its size in the hand.
+/// The terrain's size in the hand.
 #[derive(Clone, clap::Args)]
 pub(crate) struct Size {
     #[arg(long)]
@@ -60,12 +60,12 @@ pub(crate) struct Opened {
     first: [u32; 2],
     /// Samples from west to east, and from south to north.
     samples: [u32; 2],
-    /// Number of times that something was not read, and why last.
+    /// Number of failed reads, and the reason of the last one.
     unread: Mutex<(u64, String)>,
 }
 
 impl Opened {
-    /// Opens a file, or several as one, by the command's options, and lays all of it.
+    /// Opens a file, or several as one, by the command's options, with its whole extent.
     pub(crate) fn open(paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Arc<Self>> {
         let Words { reading, size } = parsed(words)?;
         let options = reading.options().map_err(failed)?;
@@ -84,7 +84,8 @@ impl Opened {
         )?))
     }
 
-    /// A window of a size in the hand round a place of the same raster, within its bounds.
+    /// Returns a window of a size in the hand around a position of the same raster, within its
+    /// bounds.
     pub(crate) fn window(
         &self,
         at: ([f64; 2], Coordinates),
@@ -127,11 +128,11 @@ impl Opened {
                 heights: size.heights(),
                 level: Some(0),
             };
-            // What lies where in the reach of an arm does not matter here.
+            // The position in the arm's workspace has no effect here.
             let view = Placement::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options)?;
             Ok::<_, Failure>(view.terrain(grid)?)
         });
-        // What has not come is no hole.
+        // Heights that could not be fetched are not no-data.
         let over = over.map_err(|failure| match read.check_complete() {
             Err(error) => unread(error),
             Ok(()) => failed(failure),
@@ -152,7 +153,7 @@ impl Opened {
         self.over.borrow_dependent()
     }
 
-    /// The same as a terrain that is touched.
+    /// Returns it as a terrain that can be touched.
     pub(crate) fn touched(self: &Arc<Self>) -> PyResult<Touched> {
         let ([columns, rows], terrain) = (self.samples, self.terrain());
         let scale = terrain.scale();
@@ -166,7 +167,8 @@ impl Opened {
         Ok(touched.map_err(refused)?.with_height_step(step))
     }
 
-    /// Millimetres east and north of the south-west sample, of a place that may lie outside.
+    /// Returns the millimetres east and north from the south-west sample to a position, which may
+    /// be outside.
     pub(crate) fn mm_at(&self, at: [f64; 2], coordinates: Coordinates) -> PyResult<[f64; 2]> {
         let terrain = self.terrain();
         let ground = Target::At(at, coordinates).middle(&terrain.raster().georeference());
@@ -176,7 +178,7 @@ impl Opened {
             .map(|axis| (cells[axis] - f64::from(self.first[axis])) * terrain.scale().cell_mm()))
     }
 
-    /// A place in the file's coordinates, or in longitude and latitude.
+    /// Returns a position in the file's coordinates, or in longitude and latitude.
     pub(crate) fn ground_at(&self, mm: [f64; 2], coordinates: Coordinates) -> PyResult<[f64; 2]> {
         let terrain = self.terrain();
         let cell_mm = terrain.scale().cell_mm();
@@ -192,7 +194,7 @@ impl Opened {
         })
     }
 
-    /// Returns the statements of the file about itself.
+    /// Returns the file's own statements about its data.
     pub(crate) fn stated(&self) -> Vec<(&'static str, String)> {
         let raster = self.terrain().raster();
         let crs = raster.reference_system().map(|system| match system.code() {
@@ -228,7 +230,7 @@ impl Opened {
         }
     }
 
-    /// The error of heights that were not read.
+    /// Returns the error of heights that were not read.
     pub(crate) fn unread(&self) -> PyErr {
         PyOSError::new_err(self.lock().1.clone())
     }
@@ -253,7 +255,7 @@ impl Heights for Part {
         if reads.status().is_complete() {
             return Ok(());
         }
-        // A line that is down is not asked each time: the reason stays.
+        // Does not retry a failed connection each time: the reason stays.
         let (count, why) = &mut *opened.lock();
         *count += 1;
         match raster.check_complete() {
@@ -289,18 +291,19 @@ fn parsed(words: Vec<OsString>) -> PyResult<Words> {
     })
 }
 
-/// Returns the failure of the command, as the text of an exception.
+/// Returns a failure of the command as the text of an exception.
 fn text(failure: &Failure) -> String {
     let text = failure.text();
     text.strip_prefix("error: ").unwrap_or(&text).to_owned()
 }
 
-/// A failure of the command as a `ValueError`.
+/// Returns a failure of the command as a `ValueError`.
 pub(crate) fn failed(failure: Failure) -> PyErr {
     refused(text(&failure))
 }
 
-/// A file that cannot be opened: `OSError` where it cannot be read, else `ValueError`.
+/// Returns the error of a file that cannot be opened: `OSError` if it cannot be read, else
+/// `ValueError`.
 fn unread(error: Error) -> PyErr {
     let raised = match error.fault() {
         RasterError::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {

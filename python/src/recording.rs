@@ -11,7 +11,8 @@ use crate::{open, refused};
 /// Name, letter and bytes of numpy's type, numbers, and texts.
 type Column<'py> = (String, &'static str, Bound<'py, PyBytes>, Vec<String>);
 
-/// Settings as JSON, columns, and whether the last row was cut and is left out.
+/// Returns the settings as JSON, the columns, and true if the last row was incomplete and is left
+/// out.
 #[pyfunction]
 pub(crate) fn recording(
     py: Python<'_>,

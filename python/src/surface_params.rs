@@ -19,24 +19,24 @@ const MAX_AMPLITUDE_MM: f32 = 0.2;
 /// ----------
 /// stiffness : N/mm between the haptic interface point (HIP) and the proxy; 0.5.
 /// max_force : N, the limit of the force; 8.5.
-/// friction : Coulomb's coefficient while the proxy slides, 0 to 10; 0, like ice.
+/// friction : Coulomb's coefficient while the proxy slides, 0 to 10; 0, frictionless.
 /// static_friction : the same until it begins to slide; as friction.
-/// viscous_friction : s, 0 to 1; the time by which the proxy trails; 0.
+/// viscous_friction : s, 0 to 1; the delay of the proxy; 0.
 /// damping : N·s/m along the force, 0 to 20; 0.
-/// shading : "none", edges between cells are rendered, or "smooth", the force turns evenly.
+/// shading : "none", with edges between cells, or "smooth", with gradual changes of direction.
 /// texture : "none", "grain" or "grating".
 /// texture_amplitude : mm above and below the surface, at most 2 and an eighth of the wavelength;
 ///     a tenth of the wavelength, at most 0.2.
 /// texture_wavelength : mm from ridge to ridge, 0.25 to 100; 1.
-/// texture_direction : degrees from east to north in which the ridges of a grating follow; 0.
-/// texture_seed : which of the textures that are alike; 0.
+/// texture_direction : direction across the ridges of a grating, degrees from east to north; 0.
+/// texture_seed : selects a variant of the texture; 0.
 /// materials : surfaces for the numbers 1, 2, ... of ``Terrain(materials=)``, 15 at most. Their
 ///     stiffness, friction, damping and texture count; limit and shading are the surface's own.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Names the number that is out of bounds.
+///     With the name of the number that is out of bounds.
 #[pyclass(frozen, eq, module = "hapterra")]
 #[derive(PartialEq)]
 pub(crate) struct Surface {
@@ -54,7 +54,7 @@ impl Surface {
         shading="none", texture="none", texture_amplitude=None, texture_wavelength=WAVELENGTH_MM,
         texture_direction=0.0, texture_seed=0, materials=Vec::new(),
     ))]
-    // One for each word of Python.
+    // One for each keyword of Python.
     #[expect(clippy::too_many_arguments)]
     fn new(
         stiffness: f32,
@@ -107,8 +107,8 @@ impl Surface {
         Ok(Self { surface, others })
     }
 
-    /// The parameters by the names of the constructor, without those of a texture that is not
-    /// there, and how many materials there are.
+    /// Returns the parameters by the names of the constructor, without those of an absent texture,
+    /// and the number of materials.
     fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let params = self.surface.params();
         let dict = PyDict::new(py);

@@ -1,4 +1,4 @@
-//! Terrains of arrays, and of what the command opens.
+//! Terrains from arrays, and from files that the command opens.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 use crate::open::Opened;
 use crate::{notes, numbers, refused};
 
-/// Heights of one of the types that the library keeps, or a terrain that stays where it is.
+/// Heights of one of the library's types, or a terrain that remains in its files.
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct Terrain {
     pub(crate) touched: Touched,
@@ -41,10 +41,10 @@ impl Samples<'_> {
 
 #[pymethods]
 impl Terrain {
-    /// `kind` is numpy's letter and bytes of the samples, as f8; `materials` has a byte each.
+    /// `kind` is numpy's type code of the samples, such as f8; `materials` has a byte for each.
     #[new]
     #[pyo3(signature = (samples, kind, shape, *, cell_mm, height_mm_per_unit, south_first, materials=None))]
-    // One for each word of Python.
+    // One for each keyword of Python.
     #[expect(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -94,14 +94,14 @@ impl Terrain {
         })
     }
 
-    /// The same ground under a ball of a radius.
+    /// Returns the same ground under a ball of a radius.
     fn with_tip(&self, tip_mm: f64) -> PyResult<Self> {
         let touched = self.touched.clone().with_tip(tip_mm).map_err(refused)?;
         let opened = self.opened.clone();
         Ok(Self { touched, opened })
     }
 
-    /// A terrain of files, by the command's options.
+    /// Opens a terrain of files, by the command's options.
     #[staticmethod]
     fn open(py: Python<'_>, paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Self> {
         notes::listen();
@@ -110,7 +110,7 @@ impl Terrain {
         opened
     }
 
-    /// A window of an opened terrain round a place.
+    /// Returns a window of an opened terrain around a position.
     fn window(
         &self,
         py: Python<'_>,
@@ -123,12 +123,12 @@ impl Terrain {
         py.detach(|| Self::of(self.opened()?.window(at, size_mm, words)?))
     }
 
-    /// Millimetres east and north of a place.
+    /// Returns the millimetres east and north to a position.
     fn mm_at(&self, at: [f64; 2], lonlat: bool) -> PyResult<(f64, f64)> {
         Ok(self.opened()?.mm_at(at, coordinates(lonlat))?.into())
     }
 
-    /// The place of millimetres east and north.
+    /// Returns the position at millimetres east and north.
     fn ground_at(&self, mm: [f64; 2], lonlat: bool) -> PyResult<(f64, f64)> {
         Ok(self.opened()?.ground_at(mm, coordinates(lonlat))?.into())
     }
@@ -138,7 +138,8 @@ impl Terrain {
         Ok(self.opened()?.stated())
     }
 
-    /// Heights of some rows, counted from the south, as f8; none beyond the terrain.
+    /// Returns the heights of some rows, counted from the south, as f8, without rows beyond the
+    /// terrain.
     fn rows<'py>(&self, py: Python<'py>, south: u32, count: u32) -> PyResult<Bound<'py, PyBytes>> {
         let [columns, rows] = self.touched.samples();
         let count = count.min(rows.saturating_sub(south));
@@ -161,7 +162,7 @@ impl Terrain {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// The height of the surface, mm; none in a hole and off the terrain.
+    /// Returns the height of the surface, mm; `None` for no-data and outside the terrain.
     fn height_mm(&self, py: Python<'_>, east_mm: f64, north_mm: f64) -> PyResult<Option<f64>> {
         let height = || self.touched.height_mm(east_mm, north_mm);
         let Some(opened) = &self.opened else {
@@ -172,14 +173,14 @@ impl Terrain {
         height_mm
     }
 
-    /// Rows and columns.
+    /// Number of rows and columns.
     #[getter]
     fn shape(&self) -> (u32, u32) {
         let [columns, rows] = self.touched.samples();
         (rows, columns)
     }
 
-    /// Millimetres a cell, and a unit of the heights.
+    /// Millimetres of a cell, and of a unit of the heights.
     #[getter]
     fn scale(&self) -> (f64, f64) {
         let scale = self.touched.scale();

@@ -7,14 +7,14 @@ use hapterra_touch::ticks::{self, Counts, ODD_MOVE_S, Pace, Row, TickError, Time
 /// Time, s, and HIP, mm.
 pub(crate) type Tick = (f64, [f64; 3]);
 
-/// Ticks of a path, and what is odd about its times.
+/// Ticks of a path, and remarks on its times.
 #[derive(Debug)]
 pub(crate) struct Ticks {
     pub(crate) ticks: Vec<Tick>,
     pub(crate) remarks: Vec<String>,
 }
 
-/// Times that cannot be right.
+/// Invalid times.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("t[{row}]: {fault}")]
 pub(crate) struct TimeError {
@@ -23,7 +23,8 @@ pub(crate) struct TimeError {
 }
 
 impl Ticks {
-    /// The ticks at a rate from the first time to the last; without times each place is a tick.
+    /// Returns the ticks at a rate from the first time to the last; without times, each position is
+    /// a tick.
     pub(crate) fn of(path: &[[f64; 3]], t_s: Option<&[f64]>, hz: u32) -> Result<Self, TimeError> {
         let pace = match t_s {
             Some(_) => Pace::ByTime,

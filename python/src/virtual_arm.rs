@@ -14,7 +14,7 @@ use crate::{notes, refused};
 /// Bytes of a row: `ARM_STEP` of `package/hapterra/_virtual_arm.py`.
 const ROW: usize = 104;
 
-/// A Premium 1.5 and who holds it.
+/// A Premium 1.5 and the hand that holds it.
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct VirtualArm {
     hand: HandModel,
@@ -24,8 +24,8 @@ pub(crate) struct VirtualArm {
 
 #[pymethods]
 impl VirtualArm {
-    /// The terrain point at the tip in the arm's home pose, mm, and the hand's `HandModel`: kg, N/m
-    /// and N·s/m towards the target, the same of the grip.
+    /// Takes the terrain point at the tip in the arm's home pose, mm, and the hand's `HandModel`:
+    /// kg, N/m and N·s/m towards the target, the same for the grip.
     #[new]
     fn new(home_mm: [f64; 3], hand: [f64; 5]) -> PyResult<Self> {
         let [
@@ -48,7 +48,7 @@ impl VirtualArm {
         })
     }
 
-    /// A tick for each target, as `Contact.run` takes its path.
+    /// Runs a tick for each target; the path is as in `Contact.run`.
     #[pyo3(signature = (contact, targets, t_s=None))]
     fn run<'py>(
         &self,
@@ -80,7 +80,7 @@ impl VirtualArm {
 }
 
 impl VirtualArm {
-    /// The arm at rest at the first target, and the hand on it; none without targets.
+    /// Returns the arm at rest at the first target, held by the hand; `None` without targets.
     fn held(&self, targets: &[Tick]) -> PyResult<Option<Plant>> {
         let model = PhantomModel::premium_1_5();
         for (_, at_mm) in targets {
@@ -96,7 +96,7 @@ impl VirtualArm {
         Ok(Some(Plant::new(model, q).held_by(self.hand)))
     }
 
-    /// Ticks at the first of these targets, as many as run without a look at Ctrl-C.
+    /// Runs ticks at the first of these targets, up to the next check for Ctrl-C.
     fn touch(
         &self,
         plant: &mut Plant,

@@ -19,7 +19,7 @@ OWN = [sys.executable, "-m", "hapterra"]
 
 @pytest.fixture
 def own(monkeypatch):
-    """The command of the package, also where another is named."""
+    """Selects the package's command, even if the environment names another."""
     monkeypatch.delenv("HAPTERRA", raising=False)
 
 
@@ -76,7 +76,7 @@ def test_command_runs_once_in_a_process():
 
 
 def serving(folder):
-    """Words of a command that serves until it is interrupted, and its recording."""
+    """Returns the arguments of a command that serves until it is interrupted, and its recording."""
     np.save(folder / "flat.npy", np.zeros((50, 50)))
     words = ["run", folder / "flat.npy", "--device", "native", "--out", folder / "felt.csv"]
     return list(map(str, words))
@@ -138,6 +138,6 @@ def test_ctrl_c_ends_the_command_of_a_run(tmp_path, own, monkeypatch):
         run(*serving(tmp_path))
     thread.join()
     [(child, group)] = children
-    # Not in the terminal's group, whose Ctrl-C would be a second one.
+    # Not in the terminal's process group, whose Ctrl-C would be a second signal.
     assert child.returncode == 0 and group == child.pid
     assert (tmp_path / "felt.csv").exists()

@@ -1,4 +1,4 @@
-"""Devices: a native one through the command, and a command that a test plays."""
+"""Devices: a native one through the command, and a command that a test simulates."""
 
 import itertools
 import os
@@ -19,7 +19,7 @@ from hapterra import DeviceError, NotDisarmedError, Surface, Terrain, connect
 from hapterra._session import Buffer, Session, _end_all
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and scripts of POSIX")
-#: A tour of the virtual hand over this takes longer, s.
+#: Less than the duration of the virtual hand's tour, s.
 TOUR_S = 9.0
 STAIRCASE = Path(__file__).parent.parent / "examples" / "friction_jnd.py"
 
@@ -30,7 +30,7 @@ def hills():
 
 
 def rows_of(recording):
-    """The rows of a CSV recording by column."""
+    """Returns the rows of a CSV recording by column."""
     lines = [line for line in recording.read_text("utf-8").splitlines() if line[:1] != "#"]
     rows = [line.split(",") for line in lines[1:]]
     return {name: [row[at] for row in rows] for at, name in enumerate(lines[0].split(","))}
@@ -157,7 +157,7 @@ def test_buffer_keeps_the_newest_and_counts():
     assert list(buffer) == [7, 8, 9] and buffer.dropped == 7
 
 
-# Python that dies.
+# Python processes that are killed.
 
 SCRIPT = """
 import os, sys, time, hapterra, numpy as np
@@ -181,7 +181,7 @@ if __name__ == "__main__":
 
 
 def script(folder, fork=False):
-    """Python that serves a native device, armed; in a process group of its own."""
+    """Starts a Python that serves a native device, armed, in a process group of its own."""
     text = textwrap.dedent(SCRIPT).format(tests=str(Path(__file__).parent), fork=fork)
     words = [sys.executable, "-c", text]
     child = subprocess.Popen(
@@ -192,7 +192,7 @@ def script(folder, fork=False):
 
 
 def ends_early(record):
-    """Waits for a recording to be complete, whose session has not come to the end of its tour."""
+    """Waits until the recording of a session is complete that ended before the end of its tour."""
     until = time.monotonic() + 120
     while not record.exists():
         assert time.monotonic() < until, "the session goes on"
@@ -223,7 +223,7 @@ def test_ctrl_c_leaves_the_arm_disarmed(tmp_path):
     ends_early(tmp_path / "felt.csv")
 
 
-# A command that is played.
+# A simulated command.
 
 PLAYED = """\
 #!{python}
@@ -243,7 +243,7 @@ tell("view", view=0)
 
 @pytest.fixture
 def played(tmp_path, monkeypatch):
-    """Makes the command a script that plays it."""
+    """Replaces the command by a script that simulates it."""
 
     def play(text):
         path = tmp_path / "hapterra"
@@ -380,7 +380,7 @@ def test_staircase_asks_a_person_on_an_arm(played, tmp_path, monkeypatch, capsys
     log = (tmp_path / "log").read_text().splitlines()
     frictions = [float(line.split()[1]) for line in log if line.startswith("friction ")]
     pairs = list(zip(frictions[::2], frictions[1::2]))
-    # The trial in which the dead-man switch was let go is repeated.
+    # The trial in which the dead-man switch was released is repeated.
     assert pairs[0] == pairs.pop(1) and log.count("mark repeated") == 1
     assert len(pairs) == 40 and all(min(pair) == 0.4 < max(pair) <= 1.4 for pair in pairs)
     assert [line for line in log if "answer" in line][:2] == ["mark answer 1", "mark answer 2"]
@@ -417,7 +417,7 @@ def test_samples_that_nobody_takes_are_dropped_and_counted(played):
         assert device.dropped == 4900
 
 
-# Who is asked.
+# Questions to the user.
 
 TERMINAL = """
 import sys, time
@@ -476,7 +476,7 @@ def test_question_is_taken_once_with_all_of_its_lines():
 
 
 def faked(words=("run",), code="pass", **options):
-    """A session of a Python that runs some code."""
+    """Returns a session of a Python that runs some code."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hapterra._session.command", lambda: [sys.executable, "-c", code])
         return Session(words, lambda event: None, **options)
@@ -486,7 +486,7 @@ def line_of(told):
     return f"import sys; print({told!r}, file=sys.stderr)"
 
 
-# What is known.
+# State of the session.
 
 
 @posix
@@ -640,7 +640,7 @@ def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path,
     assert [line for line in log if line[0] == "s"] == ["stiffness 2.0", "stiffness 0.5"]
 
 
-# Who ends it.
+# Ends of a session.
 
 
 @posix
@@ -677,7 +677,7 @@ folder = device._folder
 
 
 def ends(text):
-    """Runs Python that has armed a device that is played. Returns what it prints."""
+    """Runs Python that has armed a simulated device. Returns its output."""
     text = ENDS.format(tests=str(Path(__file__).parent)) + textwrap.dedent(text)
     words = [sys.executable, "-c", text]
     told = subprocess.run(words, capture_output=True, text=True, timeout=60)
@@ -739,7 +739,7 @@ def test_fork_leaves_the_arm_and_its_folder_to_the_parent(played, tmp_path, monk
 @posix
 def test_all_sessions_are_asked_to_end_before_one_is_awaited(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    # Each ends when both were asked to.
+    # Each ends after both have received the request.
     code = """
     import os, sys, time
     sys.stdin.read()

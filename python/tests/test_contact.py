@@ -130,7 +130,7 @@ def test_surface_changes_between_steps():
 
 
 def test_other_threads_run_meanwhile():
-    # With the interpreter's lock held, no call would ever meet the run of the other thread.
+    # With the interpreter's lock held, no call could overlap the run of the other thread.
     path = np.tile(DOWN, (3000, 1))
     contact = Contact(FLAT)
     done = []
@@ -168,5 +168,5 @@ def test_ctrl_c_ends_a_run():
         contact.run(path, [0, 500, 1000, 1000.001])
         ended.append(True)
     thread.join()
-    # From where the path ends the proxy would not follow; from the air it meets the ground half-way.
+    # From the path's end the proxy would not follow; from the air it meets the ground half-way.
     assert contact.step([6, 5, 1]).proxy_mm[0] > 5.3

@@ -1,4 +1,4 @@
-"""Terrains of xarray and rasterio, by their own metadata."""
+"""Terrains from xarray and rasterio, by their own metadata."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def array(heights=HEIGHTS, x=X, y=Y, dims=("y", "x"), units=METRES, **attrs):
 
 
 def same(terrain, heights=HEIGHTS, mm_per_unit=0.5 / 30):
-    """Fails unless the first row of heights lies in the north."""
+    """Fails unless the first row of heights is in the north."""
     assert terrain.height_mm_per_unit == pytest.approx(mm_per_unit)
     found = [[terrain.height_mm(0.5 * c, 0.5 * r) for c in range(5)] for r in (3, 2, 1, 0)]
     assert np.array(found) == pytest.approx(heights * terrain.height_mm_per_unit)

@@ -1,4 +1,4 @@
-"""The notebooks run, and print what is stored in them.
+"""The notebooks run, and print their stored outputs.
 
 After a change: ``jupyter execute --inplace notebooks/NAME.ipynb``, and look at the pictures.
 """
@@ -17,7 +17,7 @@ NAMES = ["friction", "mountain", "stiffness"]
 
 
 def outputs(notebook):
-    """Per cell, what it printed and how many pictures it drew."""
+    """Returns the printed text and the number of pictures of each cell."""
     of_cells = []
     for cell in notebook.cells:
         shown = cell.get("outputs", [])

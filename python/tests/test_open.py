@@ -1,4 +1,4 @@
-"""Terrains of files, read where they are touched."""
+"""Terrains from files, read where they are touched."""
 
 import os
 import subprocess
@@ -12,12 +12,12 @@ from test_replay import CELL_MM, FLAGS, ROUGH, hills, replayed, same, stroke
 from hapterra import Contact, State, Surface, Terrain
 
 UTM = rasterio.Affine(30, 0, 500_000, 0, -30, 4_000_000)
-#: Of a place at 47° north, where a degree of longitude is two thirds of one of latitude.
+#: For a position at 47° north, where a degree of longitude is two thirds of one of latitude.
 DEGREES = rasterio.Affine(1 / 3600, 0, 7.6, 0, -1 / 3600, 47.0)
 
 
 def written(path, heights=None, transform=UTM, crs="EPSG:32633", **how):
-    """A GeoTIFF of heights, m; hills of 180 m where none are given."""
+    """Writes a GeoTIFF of heights, m; hills of 180 m by default."""
     heights = (30 * hills()).astype("f4") if heights is None else heights
     rows, columns = heights.shape
     kind = dict(driver="GTiff", count=1, dtype=heights.dtype, crs=crs, transform=transform)
@@ -28,7 +28,7 @@ def written(path, heights=None, transform=UTM, crs="EPSG:32633", **how):
 
 
 def tiles(folder):
-    """The same hills in two files side by side."""
+    """Writes the same hills to two adjacent files."""
     heights = (30 * hills()).astype("f4")
     west = written(folder / "a.tif", heights[:, :64])
     east = written(folder / "b.tif", heights[:, 64:], rasterio.Affine(30, 0, 501_920, 0, -30, 4_000_000))
@@ -151,12 +151,13 @@ def test_parts_that_have_gone_meanwhile_are_warnings(tmp_path, touch):
         touch(terrain, (1000.5, 1000.5))
 
 
-#: Samples of a side: 20 GB.
+#: Samples along a side: 20 GB.
 SIDE = 100_000
 
 
 def huge(folder):
-    """Raw samples, of which the disk holds 400 × 400 near the south-west corner."""
+    """Creates a sparse file of samples, with only 400 × 400 near the south-west corner on the
+    disk."""
     file = folder / "huge.raw"
     with file.open("wb") as raw:
         raw.truncate(2 * SIDE * SIDE)
@@ -196,7 +197,7 @@ def test_window_is_the_ground_round_a_place(tmp_path):
     finer = whole.place(at, size_mm=(20, 10), scale="15 m/mm", exaggeration=2)
     assert finer.cell_mm == pytest.approx(2, rel=1e-3) and finer.shape == (6, 11)
     assert finer.height_mm_per_unit == pytest.approx(2 / 15, rel=1e-9)
-    # From a window to another, with the size that it has.
+    # From one window to another, with its size.
     assert finer.place(at, size_mm=(6, 6)).height_mm_per_unit == finer.height_mm_per_unit
 
 

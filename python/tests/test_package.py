@@ -1,4 +1,4 @@
-"""The package as it is handed out: stubs, examples, help."""
+"""The published package: stubs, examples, help."""
 
 import ast
 import doctest
@@ -29,7 +29,7 @@ def test_stubs_have_the_compiled_names_and_parameters():
         methods = {node.name: node for node in stated.body if isinstance(node, ast.FunctionDef)}
         found = {it for it in vars(compiled[name]) if not it.startswith("_")}
         assert found == {it for it in methods if not it.startswith("_")}
-        # CPython 3.9 keeps no signatures of such classes.
+        # CPython 3.9 has no signatures of such classes.
         if compiled[name].__text_signature__ is None:
             assert sys.version_info < (3, 10)
             continue

@@ -1,4 +1,4 @@
-"""Recordings: what they say, and what they are again."""
+"""Recordings: their content and their replay."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ LATER = """# [[view]]
 
 @pytest.fixture
 def recorded(tmp_path):
-    """Recordings of the same path over hills, CSV and Parquet."""
+    """Returns recordings of the same path over hills, CSV and Parquet."""
     file = written(tmp_path / "hills.tif")
     path = tmp_path / "path.csv"
     np.savetxt(path, stroke(3_000), delimiter=",", header="x_mm,y_mm,z_mm", comments="", fmt="%.17g")

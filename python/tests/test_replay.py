@@ -1,4 +1,4 @@
-"""Runs against the command ``hapterra replay`` on the same heights: the same bits."""
+"""Runs are equal to those of the command ``hapterra replay`` on the same heights, bit for bit."""
 
 import csv
 import pathlib
@@ -33,7 +33,7 @@ FLAGS = [f"--surface={pathlib.Path(__file__).with_name('rough.toml')}", "--max-f
 
 
 def hills():
-    """Rough hills with holes."""
+    """Returns rough hills with no-data."""
     y, x = np.mgrid[0:97.0, 0:130.0]
     heights = 6 * np.sin(0.21 * x) * np.cos(0.13 * y) + 0.4 * np.sin(2.1 * x + 1.3 * y)
     heights.flat[::997] = np.nan
@@ -41,7 +41,7 @@ def hills():
 
 
 def stroke(rows):
-    """A hand that wanders over the hills and through them."""
+    """Returns the path of a hand over the hills and through them."""
     at = np.arange(rows) * 0.01
     return np.c_[
         45 + 40 * np.sin(0.21 * at), 33 + 30 * np.sin(0.33 * at + 1), 7 - 8 * np.sin(0.05 * at + 5) ** 2
@@ -49,14 +49,14 @@ def stroke(rows):
 
 
 def replayed(folder, heights, path, t=None, words=()):
-    """What the command writes, of an array or a file."""
+    """Returns the command's output for an array or a file."""
     ground = heights
     if isinstance(heights, np.ndarray):
         ground = folder / "hills.npy"
         np.save(ground, heights)
     columns = {} if t is None else {"t_s": t}
     columns |= dict(zip(("x_mm", "y_mm", "z_mm"), path.T))
-    # By the shortest digits that read back to the same value, as the command writes them, too.
+    # With the shortest digits that read back to the same value, as in the command's output.
     rows = zip(*(column.tolist() for column in columns.values()))
     with (folder / "path.csv").open("w", newline="") as file:
         csv.writer(file).writerows([columns, *rows])
@@ -68,7 +68,7 @@ def replayed(folder, heights, path, t=None, words=()):
 
 
 def same(steps, columns):
-    """Fails unless they are the same, bit for bit. Returns how many touch."""
+    """Fails unless they are equal, bit for bit. Returns the number of touching steps."""
     assert len(steps) == len(columns["t_s"])
     assert np.array_equal(steps["t_s"], np.array(columns["t_s"], float))
     touching = steps["state"] == State.TOUCHING
@@ -76,7 +76,7 @@ def same(steps, columns):
         for axis, letter in enumerate("xyz"):
             found = steps[field][:, axis]
             expected = np.array(columns[name.format(letter)], float).astype(found.dtype)
-            # Without contact the file has the HIP in place of the proxy, which is rounded.
+            # Without contact the file has the HIP, rounded, in place of the proxy.
             differ = found != expected if field != "proxy_mm" else touching & (found != expected)
             rows = np.flatnonzero(differ)
             assert not len(rows), f"{field} {letter}: {len(rows)} rows from {rows[0]} on"

@@ -1,4 +1,4 @@
-"""The map of stability, by the program that HAPTERRA_LAB names."""
+"""The map of stability, by the program in HAPTERRA_LAB."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Terrains of arrays."""
+"""Terrains from arrays."""
 
 import numpy as np
 import pytest

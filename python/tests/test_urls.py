@@ -1,4 +1,4 @@
-"""Terrains at URLs, where the package is built with them."""
+"""Terrains at URLs, if the package is built with this feature."""
 
 import threading
 import time
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(
 
 
 class Server(ThreadingHTTPServer):
-    """A file in ranges, or only answers that it cannot."""
+    """A server of a file in ranges, or one that answers every request with an error."""
 
     content = b""
     is_down = False
@@ -72,7 +72,7 @@ def server(tmp_path):
 
 
 def answered(ask):
-    """The answer, once the line is asked again."""
+    """Returns the answer after the connection is retried."""
     while True:
         try:
             return ask()
@@ -85,7 +85,7 @@ def test_heights_that_do_not_come_are_errors_and_no_holes(server, tmp_path):
     url = f"http://127.0.0.1:{server.server_port}/hills.tif"
     here = Terrain.open(tmp_path / "hills.tif", cell_mm=0.5)
     there = Terrain.open(url, cell_mm=0.5, in_memory=0, cache="off")
-    # The last two are in tiles that are not looked into at the start.
+    # The last two are in tiles that are not read at the start.
     places = [(300.3, 300.3), (140.1, 900.7), (700.2, 80.4)]
     assert there.height_mm(*places[0]) == here.height_mm(*places[0])
     contact = Contact(there)
@@ -99,6 +99,6 @@ def test_heights_that_do_not_come_are_errors_and_no_holes(server, tmp_path):
     server.is_down = False
     assert answered(lambda: there.height_mm(*places[1])) == here.height_mm(*places[1])
     answered(lambda: there.height_mm(*places[2]))
-    # The same steps as those of a contact that has met no error.
+    # The same steps as those of a contact without an error.
     path = [(*places[2], 60), (*places[2], 0)]
     assert np.array_equal(contact.run(path), Contact(here).run(path))

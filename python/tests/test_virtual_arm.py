@@ -28,7 +28,8 @@ def test_hand_presses_with_what_its_springs_give():
     assert np.array_equal(steps["tick"], np.arange(1501))
     first, last = steps[0], steps[-1]
     assert np.abs(first["hip_mm"] - STROKE[0]).max() < 0.1 and first["state"] == State.FREE
-    # Springs in a row: surface 0.5, grip 2, arm 0.3 N/mm, and 5 mm; the joints' friction holds a part.
+    # Springs in series: surface 0.5, grip 2, arm 0.3 N/mm, and 5 mm; the joints' friction takes a
+    # part.
     expected = 5 / (1 / 0.5 + 1 / 2 + 1 / 0.3)
     assert last["state"] == State.TOUCHING and abs(last["force_n"][2] - expected) < 0.15
     assert last["hand_mm"][2] < last["hip_mm"][2] < last["proxy_mm"][2] == 0
@@ -82,7 +83,8 @@ def test_staircase_finds_the_observers_own_threshold():
         differences, reversals = jnd["staircase"](jnd["simulated"](random), 60, random)
         assert len(differences) == 60
         found.append(jnd["jnd_of"](reversals))
-    # One staircase of 60 trials is off by up to a factor of 2.6 here; the mean of six by less.
+    # The error of one staircase of 60 trials is up to a factor of 2.6 here; that of the mean of six
+    # is less.
     assert 1 / 1.3 < np.mean(found) / expected < 1.3, (found, expected)
 
 

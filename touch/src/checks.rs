@@ -8,10 +8,10 @@ use hapterra_core::terrain::MAX_STEP_CELLS;
 use crate::scale::ScaleError;
 use crate::tip::TipError;
 
-/// Heights that are no terrain.
+/// Heights or scale that a terrain cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TerrainError {
-    /// Too small or too large.
+    /// The size is too small or too large.
     #[error(
         "a terrain of {columns} × {rows} samples; from 2 × 2 to {MAX_CELL} × {MAX_CELL} can be touched"
     )]
@@ -21,17 +21,17 @@ pub enum TerrainError {
         /// Samples from south to north.
         rows: u32,
     },
-    /// More or fewer samples than the size says.
+    /// The number of samples does not match the size.
     #[error("{given} samples for {columns} columns and {rows} rows: give columns times rows")]
     Count {
-        /// Samples that were given.
+        /// Samples in the array.
         given: usize,
         /// Samples from west to east.
         columns: u32,
         /// Samples from south to north.
         rows: u32,
     },
-    /// More samples than there is memory for.
+    /// There is not enough memory for the samples.
     #[error("no memory for {columns} × {rows} samples: read them tile by tile")]
     Memory {
         /// Samples from west to east.
@@ -39,56 +39,56 @@ pub enum TerrainError {
         /// Samples from south to north.
         rows: u32,
     },
-    /// A row of another length than the first.
+    /// A row has another length than the first.
     #[error("row {row} has {given} samples and row 0 has {first}: make all rows as long")]
     Ragged {
-        /// The row, as they were given.
+        /// The row's index, in the order of the array.
         row: usize,
         /// Its samples.
         given: usize,
         /// Samples of the first row.
         first: usize,
     },
-    /// The millimetres of a cell or of a vertical unit.
+    /// The millimetres of a cell or of a vertical unit are invalid.
     #[error(transparent)]
     Scale(#[from] ScaleError),
-    /// A tip that is no ball over these cells.
+    /// The tip's radius is not possible over these cells.
     #[error(transparent)]
     Tip(#[from] TipError),
-    /// A tip under which the terrain has more cells than positions can count.
+    /// Under this tip the terrain would have more cells than positions can address.
     #[error(
         "a tip of {tip_mm} mm cuts each cell into {parts} along a side, and {columns} × {rows} samples are too many for that: give a larger tip, or fewer samples"
     )]
     TipCells {
         /// The radius, mm.
         tip_mm: f64,
-        /// Haptic cells a cell.
+        /// Haptic cells along the side of a cell.
         parts: u32,
         /// Samples from west to east.
         columns: u32,
         /// Samples from south to north.
         rows: u32,
     },
-    /// Higher or lower than positions can be.
+    /// Heights are beyond the range of positions.
     #[error(
         "heights reach {cells:.4e} cells of {cell_mm} mm; at most ±{MAX_CELL} can be touched: scale the heights down, or make no-data NaN"
     )]
     TooTall {
-        /// The largest height, cells.
+        /// The largest height, in cells.
         cells: f64,
         /// Millimetres a cell.
         cell_mm: f64,
     },
-    /// Too steep.
+    /// Neighbouring samples are too steep.
     #[error(
         "sample {column}, {row}, from the south-west, differs from a neighbour by {cells:.3e} cells; at most {MAX_STEP_CELLS} can be touched: scale the heights down, or make the sample NaN"
     )]
     Step {
-        /// Its column, from the west.
+        /// Column of the sample, from the west.
         column: u32,
-        /// Its row, from the south.
+        /// Row of the sample, from the south.
         row: u32,
-        /// The difference, cells.
+        /// The difference of height, in cells.
         cells: f64,
     },
 }
@@ -113,7 +113,7 @@ pub(crate) fn check_count(columns: u32, rows: u32, given: usize) -> Result<(), T
     }
 }
 
-/// Memory for the samples.
+/// Allocates memory for the samples.
 pub(crate) fn room_for<T>(columns: u32, rows: u32) -> Result<Vec<T>, TerrainError> {
     check_size(columns, rows)?;
     let mut samples = Vec::new();

@@ -17,17 +17,17 @@ use crate::terrain::Terrain;
 use crate::tick_loop::TickLoop;
 use crate::tile_cutter::NoTile;
 
-/// Ticks in which a force comes in again after a change, at most, at every rate.
+/// Maximum number of ticks in which a force ramps up after a change, at every rate.
 const MAX_SETTLING: u32 = 4_096;
 
 /// A haptic interface point (HIP) and its proxy over a terrain: millimetres in, newtons out.
 ///
 /// It runs the device's own loop, fed by points, as `hapterra replay` does: the same path has the
-/// same forces, bit for bit. One step is one tick, so speeds (of damping and viscous friction) are
-/// by the tick rate, 1 kHz unless [`Contact::at_rate`] says otherwise.
+/// same forces, bit for bit. One step is one tick, so speeds (for damping and viscous friction)
+/// depend on the tick rate, 1 kHz unless it is set by [`Contact::at_rate`].
 ///
-/// A contact takes 1.5 MB for its window of tiles, whatever the size of the terrain. It can be sent
-/// to another thread.
+/// A contact uses 1.5 MB for its window of tiles, for any size of terrain. It can be sent to
+/// another thread.
 #[doc(alias = "god object")]
 #[doc(alias = "god-object")]
 #[doc(alias = "virtual proxy")]
@@ -37,16 +37,16 @@ pub struct Contact {
     tick_loop: TickLoop,
     scene: Scene,
     materials: usize,
-    /// Place where the HIP was.
+    /// Position of the HIP in the last step.
     last: Option<GridPoint>,
 }
 
-/// One step's answer.
+/// Result of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// The force on the hand: east, north, up, N.
     pub force_n: [f32; 3],
-    /// The proxy: on the surface while it touches, at the HIP while it is free, mm.
+    /// The proxy, mm: on the surface during contact, else at the HIP.
     pub proxy_mm: [f64; 3],
     /// State of the proxy.
     pub state: State,
@@ -59,39 +59,40 @@ pub enum State {
     Free,
     /// The proxy is on the surface, and the HIP below it.
     Touching,
-    /// The surface that the proxy was on has come to an end, and the last force fades away.
+    /// The surface under the proxy has ended, and the last force ramps down.
     Releasing,
-    /// The HIP is below the surface and has not been above it, so that the side it came from is
-    /// unknown: no force until it has been above `surface_mm`. A path may begin here, or continue here
-    /// from a hole or from outside.
+    /// The HIP is below the surface and has not been above it yet, so its side is unknown: no force
+    /// until it has been above `surface_mm`. A path may begin here, or continue here after a
+    /// no-data area or from outside.
     BelowGround {
         /// The height of the surface over the HIP, mm.
         surface_mm: f64,
     },
-    /// The HIP is in a hole or outside of the terrain and has not been above the surface: no force.
+    /// The HIP is in a no-data area or outside the terrain, and has not been above the surface yet:
+    /// no force.
     Outside,
 }
 
-/// A contact that cannot be made.
+/// Reason why a contact cannot be created.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ContactError {
-    /// The surface on this terrain.
+    /// The surface does not suit this terrain.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-    /// The heights of the terrain.
+    /// The terrain's heights are invalid.
     #[error(transparent)]
     Terrain(#[from] TerrainError),
-    /// The terrain has a material that the surface has not.
+    /// The terrain has a material that the surface does not have.
     #[error(
         "the terrain has material {found}, and the surface only {count}, counted from 0: add materials to the surface"
     )]
     Material {
-        /// The largest of the terrain.
+        /// The largest material of the terrain.
         found: u8,
         /// Materials of the surface.
         count: usize,
     },
-    /// No rate of the loop.
+    /// The loop does not support this tick rate.
     #[error("{0} ticks a second: give 1,000 to 10,000, in whole thousands")]
     Rate(u32),
     /// The loop refuses the scene.
@@ -102,10 +103,10 @@ pub enum ContactError {
 /// Error of a step; the contact is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
-    /// A place that is not a number, or too far away.
+    /// The position is not a number, or too far away.
     #[error("the HIP is at {hip_mm:?} mm: give numbers within {MAX_CELL} cells of {cell_mm} mm")]
     Place {
-        /// The place, mm.
+        /// The position, mm.
         hip_mm: [f64; 3],
         /// Millimetres a cell.
         cell_mm: f64,
@@ -123,34 +124,34 @@ pub enum StepError {
         /// The HIP, mm north.
         north_mm: f64,
     },
-    /// Too far from the last place.
+    /// The position is too far from the last one.
     #[error("the path to {hip_mm:?} mm takes too many ticks: go there in smaller steps")]
     Far {
-        /// The place, mm.
+        /// The position, mm.
         hip_mm: [f64; 3],
     },
 }
 
-/// A step of a path that has not happened, and the steps before it.
+/// A step of a path that was not possible, and the steps before it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("point {} of the path: {why}", done.len())]
 pub struct RunError {
     /// The steps before it.
     pub done: Vec<Step>,
-    /// Its reason.
+    /// The reason.
     pub why: StepError,
 }
 
 impl Contact {
-    /// A contact at 1,000 steps a second. The first place should be above the terrain.
+    /// Creates a contact at 1,000 steps a second. The first position should be above the terrain.
     ///
     /// # Errors
-    /// [`ContactError`] where surface and terrain do not fit each other.
+    /// [`ContactError`] if surface and terrain do not match.
     pub fn new(terrain: Terrain, surface: Surface) -> Result<Self, ContactError> {
         Self::at_rate(terrain, surface, TickRate::DEFAULT.hz())
     }
 
-    /// A contact at another rate, steps a second: 1,000 to 10,000 in whole thousands.
+    /// Creates a contact at another rate, steps a second: 1,000 to 10,000 in whole thousands.
     ///
     /// # Errors
     /// As [`Self::new`], and [`ContactError::Rate`].
@@ -169,10 +170,11 @@ impl Contact {
         })
     }
 
-    /// One step with the HIP at a place: east, north, up from the south-west sample at height zero.
+    /// Makes one step with the HIP at a position: east, north, up from the south-west sample at
+    /// height zero.
     ///
     /// # Errors
-    /// [`StepError`]; the step has not happened then.
+    /// [`StepError`]; the step was not made then.
     pub fn step(&mut self, hip_mm: [f64; 3]) -> Result<Step, StepError> {
         let scale = self.terrain.haptic_scale();
         let hip = scale.to_grid(hip_mm).ok_or(StepError::Place {
@@ -189,10 +191,10 @@ impl Contact {
         Ok(step)
     }
 
-    /// One step for each place of a path.
+    /// Makes one step for each position of a path.
     ///
     /// # Errors
-    /// [`RunError`] at the first step that cannot happen, with those before it.
+    /// [`RunError`] at the first step that is not possible, with the steps before it.
     pub fn run(
         &mut self,
         path_mm: impl IntoIterator<Item = [f64; 3]>,
@@ -207,12 +209,12 @@ impl Contact {
         Ok(done)
     }
 
-    /// Puts another surface in between two steps. A proxy in the air or on the ground stays where it
-    /// is, and the force of the next step is that of the other surface. Friction begins at rest; a
-    /// force that fades ends.
+    /// Changes the surface between two steps. A proxy in the air or on the ground stays where it
+    /// is, and the next step has the force of the new surface. Friction begins at rest; a force
+    /// that ramps down ends.
     ///
     /// # Errors
-    /// As [`Self::new`]; the surface is the one before then.
+    /// As [`Self::new`]; the surface is unchanged then.
     pub fn set_surface(&mut self, surface: Surface) -> Result<(), ContactError> {
         let next = scene(&self.terrain, &surface)?;
         let hip = self.last.unwrap_or_default();
@@ -220,8 +222,8 @@ impl Contact {
         put.map_err(|_| ContactError::Refused)?;
         self.scene = next;
         self.materials = surface.table().map_or(0, |table| table.materials().len());
-        // The loop begins anew: points where the HIP was let it find out that the proxy is in the air,
-        // or let the force come in again. They need no heights that were not read before.
+        // The loop restarts. Points at the HIP's last position either show that the proxy is in the
+        // air or ramp the force up again. They need only heights that were read before.
         for _ in 0..MAX_SETTLING {
             match self.last.map(|hip| self.sample(hip, [0.0; 3])) {
                 Some(Ok(sample)) if sample.limits.contains(Limits::EDGE_FADING) => {}
@@ -231,7 +233,7 @@ impl Contact {
         Ok(())
     }
 
-    /// The terrain.
+    /// Returns the terrain.
     #[must_use]
     pub const fn terrain(&self) -> &Terrain {
         &self.terrain
@@ -261,7 +263,7 @@ impl Contact {
     }
 }
 
-/// A surface on a terrain, as the loop takes it.
+/// Creates the loop's scene for a surface on a terrain.
 fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
     let cell_mm = terrain.haptic_scale().cell_mm() as f32;
     terrain.check_heights()?;

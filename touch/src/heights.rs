@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-/// Which row of an array comes first.
+/// The order of an array's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RowOrder {
     /// The first row is the northernmost: images, GeoTIFF, `.npy` files of the `hapterra` command,
@@ -26,21 +26,21 @@ pub struct Block {
     pub rows: u32,
 }
 
-/// Heights that could not be read, with a number of the source's own.
+/// Heights that could not be read, with an error number of the source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the source of the heights reported error {0}")]
 pub struct Unread(pub u32);
 
 /// A source of heights, read block by block where the terrain is touched.
 ///
-/// A closure is one. What it returns for a sample has to be the same each time: a sample is read
-/// once for each tile that shares it.
+/// A closure can be a source. It has to return the same height for a sample each time: a sample is
+/// read once for each tile that shares it.
 pub trait Heights: Send + Sync {
     /// Writes the heights of a block within the terrain, row by row from the south and each row
-    /// from west to east, in the terrain's vertical unit. NaN is a hole.
+    /// from west to east, in the terrain's vertical unit. NaN is no-data.
     ///
     /// # Errors
-    /// [`Unread`]; the step that needed them has not happened then, and may be tried again.
+    /// [`Unread`]; the step that needed the heights was not made then, and may be repeated.
     fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread>;
 }
 
@@ -50,12 +50,12 @@ impl<F: Fn(Block, &mut [f64]) -> Result<(), Unread> + Send + Sync> Heights for F
     }
 }
 
-/// A number that can be a height: `f64`, `f32`, or an integer of 32 bits at most.
+/// A number type for heights: `f64`, `f32`, or an integer of up to 32 bits.
 pub trait Height: Copy + Into<f64> + Send + Sync + 'static {}
 
 impl<T: Copy + Into<f64> + Send + Sync + 'static> Height for T {}
 
-/// An array in memory, kept as it came.
+/// An array in memory, in its original type and row order.
 pub(crate) struct Array<T> {
     pub(crate) samples: Vec<T>,
     pub(crate) columns: u32,
@@ -64,7 +64,7 @@ pub(crate) struct Array<T> {
 }
 
 impl<T: Copy> Array<T> {
-    /// Samples of a row, counted from the south.
+    /// Returns a row of samples, counted from the south.
     pub(crate) fn row(&self, row: u32) -> &[T] {
         let stored = match self.order {
             RowOrder::SouthFirst => Some(row),
@@ -80,12 +80,12 @@ impl<T: Copy> Array<T> {
 /// A difference of neighbouring heights, and its sample.
 pub(crate) type Steepest = (f64, [u32; 2]);
 
-/// Lowest and highest height, and the largest difference of neighbours with its sample.
+/// Returns the lowest and highest height, and the largest difference of neighbours with its sample.
 pub(crate) fn survey<T: Height>(array: &Array<T>) -> (Option<[f64; 2]>, Option<Steepest>) {
     let (mut range, mut steepest) = (None, None::<Steepest>);
     for row in 0..array.rows {
         let line = array.row(row);
-        // North of the last row there is none.
+        // The last row has no northern neighbour.
         let north = array.row(row + 1);
         for (column, sample) in line.iter().enumerate() {
             let height: f64 = (*sample).into();

@@ -2,10 +2,11 @@
 //!
 //! # Modules
 //!
-//! - `contact`: the public [`Contact`], a HIP on a terrain; `tick_loop`: the device's tick, called
-//!   from it, and the memory of its tiles; [`ticks`]: times of a path as ticks.
-//! - `terrain`, `heights`: a height field and its source; `tile_cutter`, [`tile_heights`]: its tiles;
-//!   [`tip`]: the height field under a ball; `scale`: millimetres and cells; `checks`: of a terrain.
+//! - `contact`: the public [`Contact`], a HIP on a terrain; `tick_loop`: the device's tick, which
+//!   it calls, and the memory of its tiles; [`ticks`]: conversion of a path's times to ticks.
+//! - `terrain`, `heights`: a height field and its source; `tile_cutter`, [`tile_heights`]: its
+//!   tiles; [`tip`]: the height field under a ball; `scale`: millimetres and cells; `checks`: of a
+//!   terrain.
 //! - `surface_params`: the surface.
 #![no_std]
 #![forbid(unsafe_code)]

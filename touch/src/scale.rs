@@ -3,7 +3,7 @@
 use hapterra_core::Vec3;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 
-/// Millimetres a cell, and a vertical unit of the heights.
+/// Millimetres of a cell and of a vertical unit of the heights.
 ///
 /// Frame: x east, y north, z up, origin at the south-west sample at height zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,24 +12,24 @@ pub struct Scale {
     height_mm_per_unit: f64,
 }
 
-/// A number that no terrain can be scaled with.
+/// A number that is no valid scale.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ScaleError {
-    /// A cell that is not longer than nothing.
+    /// The side of a cell is not positive.
     #[error("a cell of {0} mm in the hand: it must be longer than zero, and finite")]
     Cell(f64),
-    /// A height that is not a number.
+    /// The height is not finite.
     #[error("{0} mm in the hand for a vertical unit: it must be finite")]
     Height(f64),
 }
 
 impl Scale {
-    /// `cell_mm` millimetres a cell, `height_mm_per_unit` millimetres a vertical unit of the
-    /// heights. A negative height turns the relief upside down.
+    /// Creates a scale of `cell_mm` millimetres a cell and `height_mm_per_unit` millimetres a
+    /// vertical unit of the heights. A negative height turns the relief upside down.
     ///
     /// # Errors
-    /// [`ScaleError`] for a cell that is not positive, or numbers that are not finite or that single
-    /// precision cannot hold.
+    /// [`ScaleError`] for a cell that is not positive, or numbers that are not finite or that
+    /// single precision cannot represent.
     pub fn new(cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, ScaleError> {
         let as_single = cell_mm as f32;
         if !(as_single.is_normal() && as_single > 0.0) {
@@ -44,20 +44,20 @@ impl Scale {
         })
     }
 
-    /// Millimetres a cell.
+    /// Returns the millimetres of a cell.
     #[must_use]
     pub const fn cell_mm(&self) -> f64 {
         self.cell_mm
     }
 
-    /// Millimetres a vertical unit.
+    /// Returns the millimetres of a vertical unit.
     #[must_use]
     pub const fn height_mm_per_unit(&self) -> f64 {
         self.height_mm_per_unit
     }
 
-    /// The same terrain, equally large in the hand, with every `2^level`-th sample only: its cells are
-    /// that much larger.
+    /// Returns the scale of the same terrain, equally large in the hand, with every `2^level`-th
+    /// sample only: its cells are larger by that factor.
     #[must_use]
     pub fn at_level(&self, level: u8) -> Self {
         Self {
@@ -66,7 +66,8 @@ impl Scale {
         }
     }
 
-    /// The same terrain, equally large in the hand, with cells that are a whole part as large.
+    /// Returns the scale of the same terrain, equally large in the hand, with cells divided into
+    /// `parts`.
     #[must_use]
     pub fn in_parts(&self, parts: u32) -> Self {
         Self {
@@ -75,17 +76,17 @@ impl Scale {
         }
     }
 
-    /// A height in cells.
+    /// Returns a height in cells.
     #[must_use]
     pub fn height_cells(&self, height: f64) -> f64 {
         height * self.height_mm_per_unit / self.cell_mm
     }
 
-    /// A place in millimetres on the grid; `None` when it is not a number or farther than
+    /// Converts a position in millimetres to the grid; `None` if it is not a number or farther than
     /// [`MAX_CELL`] cells from the origin.
     ///
-    /// Worked out in `f64`; the fraction is rounded once, to `f32`. A place that [`Self::to_mm`]
-    /// gives for a whole number of cells returns as that number.
+    /// Computed in `f64`; the fraction is rounded once, to `f32`. If [`Self::to_mm`] computed the
+    /// position from a whole number of cells, the result is that number.
     #[must_use]
     pub fn to_grid(&self, mm: [f64; 3]) -> Option<GridPoint> {
         let cells = mm.map(|mm| {
@@ -109,7 +110,7 @@ impl Scale {
         ))
     }
 
-    /// A place on the grid in millimetres.
+    /// Converts a position on the grid to millimetres.
     #[must_use]
     pub fn to_mm(&self, point: &GridPoint) -> [f64; 3] {
         let frac = point.frac().to_array();
@@ -131,14 +132,14 @@ mod tests {
                 assert!((back - mm).abs() <= 0.25 * 2f64.powi(-24), "{back} {mm}");
             }
         }
-        // Whole cells of lengths that no binary fraction is.
+        // Whole cells of lengths that are not exact in binary.
         let scale = Scale::new(0.7, 1.0).expect("valid");
         for cell in 0..2000 {
             let point = GridPoint::new([cell, -cell, 3], Vec3::ZERO);
             assert_eq!(scale.to_grid(scale.to_mm(&point)), Some(point));
         }
         let scale = Scale::new(0.25, 1.0).expect("valid");
-        // Just below a whole cell rounds up into the next.
+        // A position just below a whole cell rounds up into the next.
         let below = scale.to_grid([-1e-12, 0.0, 0.0]).expect("addressable");
         assert_eq!((below.cell()[0], below.frac().x), (0, 0.0));
     }

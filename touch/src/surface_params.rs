@@ -1,12 +1,12 @@
-//! The one parameter of a surface.
+//! The parameters of a surface, checked and with its materials.
 
 use core::ops::RangeInclusive;
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Texture};
 
-/// Parameters of a surface: stiffness, limit, friction, damping, shading, texture, and materials
-/// where it is not the same everywhere. Checked when it is made; all of it acts in every step.
+/// Parameters of a surface: stiffness, limit, friction, damping, shading, texture, and materials if
+/// it is not the same everywhere. Checked on creation; all parameters act in every step.
 ///
 /// ```
 /// use hapterra_touch::{SurfaceParams, Friction, Shading, Surface};
@@ -27,47 +27,47 @@ use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Text
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     params: SurfaceParams,
-    /// The surface itself first; empty where all is of one material.
+    /// The surface itself first; empty if there is only one material.
     table: MaterialTable,
 }
 
-/// Parameters that no surface can have.
+/// Parameters that a surface cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
-    /// A number out of its bounds.
+    /// A number is out of its bounds.
     #[error("{what} is {value}: give {least} to {most}")]
     Bounds {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// The number.
         value: f32,
-        /// The least that it may be.
+        /// The minimum.
         least: f32,
-        /// The most that it may be.
+        /// The maximum.
         most: f32,
     },
-    /// Less friction at rest than while it slides.
+    /// The static friction is less than the dynamic friction.
     #[error(
         "static friction is {static_mu} and dynamic friction {dynamic_mu}: static friction is never less"
     )]
     Friction {
-        /// Coefficient at rest.
+        /// Coefficient of static friction.
         static_mu: f32,
-        /// Coefficient while the proxy slides.
+        /// Coefficient of dynamic friction.
         dynamic_mu: f32,
     },
-    /// Too many materials.
+    /// There are too many materials.
     #[error("{0} materials besides the surface itself: give at most {most}", most = MaterialTable::MOST - 1)]
     Materials(usize),
-    /// Materials that multiply a stiffness of nothing.
+    /// There are materials, which scale the stiffness, but the stiffness is zero.
     #[error("a surface with materials has a stiffness of 0 N/mm: give more")]
     NoStiffness,
-    /// A texture too fine or too coarse for the terrain's cells.
+    /// The texture is too fine or too coarse for the terrain's cells.
     #[error(
         "a texture of {wavelength_mm} mm on cells of {cell_mm} mm: a wave is a millionth of a cell to a million cells long"
     )]
     Texture {
-        /// From ridge to ridge, mm.
+        /// Distance from ridge to ridge, mm.
         wavelength_mm: f32,
         /// Millimetres a cell.
         cell_mm: f32,
@@ -75,19 +75,19 @@ pub enum SurfaceError {
 }
 
 impl Surface {
-    /// A surface of these parameters, the same everywhere.
+    /// Creates a surface of these parameters, the same everywhere.
     ///
     /// # Errors
-    /// [`SurfaceError`] names the number that is out of bounds.
+    /// [`SurfaceError`] with the name of the number that is out of bounds.
     pub fn new(params: SurfaceParams) -> Result<Self, SurfaceError> {
         let table = MaterialTable::EMPTY;
         check(&params)?;
         Ok(Self { params, table })
     }
 
-    /// The same surface with other materials where the terrain has them
-    /// ([`Terrain::with_materials`](crate::Terrain::with_materials)): the first has the number 1, and 0
-    /// is the surface itself.
+    /// Adds materials to the surface, for a terrain with materials
+    /// ([`Terrain::with_materials`](crate::Terrain::with_materials)): the first has the number 1,
+    /// and 0 is the surface itself.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -104,23 +104,23 @@ impl Surface {
             return Err(SurfaceError::NoStiffness);
         }
         let all = all.get(..=materials.len()).unwrap_or(&all);
-        // From 1 to the most.
+        // The number of materials was checked: one to the maximum.
         let table = MaterialTable::new(all).unwrap_or(MaterialTable::EMPTY);
         Ok(Self { table, ..self })
     }
 
-    /// Its parameters.
+    /// Returns the surface's parameters.
     #[must_use]
     pub const fn params(&self) -> &SurfaceParams {
         &self.params
     }
 
-    /// Its materials, the surface itself first; none where all is of one.
+    /// Returns the surface's materials, the surface itself first; `None` if there is only one.
     pub(crate) fn table(&self) -> Option<&MaterialTable> {
         Some(&self.table).filter(|table| !table.materials().is_empty())
     }
 
-    /// Checks that cells of a size can carry its textures.
+    /// Checks that cells of this size can render the surface's textures.
     pub(crate) fn check_cells(&self, cell_mm: f32) -> Result<(), SurfaceError> {
         let materials = self.table.materials().iter();
         let mut textures = materials
@@ -137,7 +137,7 @@ impl Surface {
 }
 
 impl Default for Surface {
-    /// [`SurfaceParams::PREMIUM`]: 0.5 N/mm, without friction.
+    /// Returns the surface of [`SurfaceParams::PREMIUM`]: 0.5 N/mm, without friction.
     fn default() -> Self {
         Self {
             params: SurfaceParams::PREMIUM,
@@ -146,7 +146,7 @@ impl Default for Surface {
     }
 }
 
-/// Checks what [`SurfaceParams::is_valid`] does, and says what is wrong.
+/// Makes the same checks as [`SurfaceParams::is_valid`], and returns the error.
 fn check(params: &SurfaceParams) -> Result<(), SurfaceError> {
     let SurfaceParams {
         stiffness_n_per_mm,
@@ -199,7 +199,7 @@ fn check(params: &SurfaceParams) -> Result<(), SurfaceError> {
 
 fn within(what: &'static str, value: f32, range: RangeInclusive<f32>) -> Result<(), SurfaceError> {
     let (least, most) = range.into_inner();
-    // Not a number is in no range.
+    // NaN is in no range.
     match (least..=most).contains(&value) {
         true => Ok(()),
         false => Err(SurfaceError::Bounds {

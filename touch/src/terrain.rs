@@ -1,4 +1,4 @@
-//! A height field of any size: where its samples come from.
+//! A height field of any size, and the source of its samples.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -12,10 +12,10 @@ use crate::tip::Ball;
 
 /// A height field: samples on a square grid, bilinear between them.
 ///
-/// Lengths are millimetres: x east, y north, z up, from the south-west sample at height zero.
-/// Sizes are counts of *samples*; four samples make the corners of a cell, and a cell with NaN at
-/// one of them is a hole. Samples stay as they came (`f64`, `f32`, `i16`, ...), and tiles of 32 × 32
-/// cells are cut where the terrain is touched. Clones share the samples.
+/// Lengths are millimetres: x east, y north, z up, from the south-west sample at height zero. Sizes
+/// are counts of *samples*; four samples are the corners of a cell, and a cell with NaN at one of
+/// them is no-data. Samples keep their type (`f64`, `f32`, `i16`, ...), and tiles of 32 × 32 cells
+/// are cut where the terrain is touched. Clones share the samples.
 ///
 /// ```
 /// use hapterra_touch::{RowOrder, Terrain};
@@ -36,23 +36,23 @@ pub struct Terrain {
     pub(crate) heights: Arc<dyn Heights>,
     pub(crate) columns: u32,
     pub(crate) rows: u32,
-    /// Of samples.
+    /// Scale of the samples.
     pub(crate) scale: Scale,
-    /// Lowest and highest height; none of a source that is not in memory.
+    /// Lowest and highest height; `None` for a source that is not in memory.
     pub(crate) range: Option<[f64; 2]>,
     /// Largest difference of neighbouring heights, and the sample.
     pub(crate) step: Option<Steepest>,
     pub(crate) materials: Option<Arc<Array<u8>>>,
-    /// The ball that touches it, if it is no point.
+    /// The ball that touches the terrain; `None` for a point.
     pub(crate) ball: Option<Ball>,
     tip_mm: f64,
-    /// Heights are rounded to multiples of this, cells; 0 where they stay as they are.
+    /// Heights are rounded to multiples of this, cells; 0 for no rounding.
     pub(crate) height_step: f64,
 }
 
 impl Terrain {
-    /// A terrain of a function of a sample's column (eastward) and row (northward), which is called
-    /// once for each, row by row from the south.
+    /// Creates a terrain from a function of a sample's column (eastward) and row (northward), which
+    /// is called once for each, row by row from the south.
     ///
     /// # Errors
     /// [`TerrainError`].
@@ -69,7 +69,8 @@ impl Terrain {
         Self::from_vec(columns, rows, cell_mm, RowOrder::SouthFirst, samples)
     }
 
-    /// A terrain of an array, row by row, each row from west to east. The samples are copied.
+    /// Creates a terrain from an array, row by row, each row from west to east. The samples are
+    /// copied.
     ///
     /// # Errors
     /// [`TerrainError`].
@@ -80,14 +81,14 @@ impl Terrain {
         order: RowOrder,
         heights: &[T],
     ) -> Result<Self, TerrainError> {
-        // Before they are copied.
+        // The check comes before the copy.
         check_count(columns, rows, heights.len())?;
         let mut samples = room_for(columns, rows)?;
         samples.extend_from_slice(heights);
         Self::from_vec(columns, rows, cell_mm, order, samples)
     }
 
-    /// As [`Self::from_slice`], without a copy.
+    /// Creates a terrain as [`Self::from_slice`] does, without a copy.
     ///
     /// # Errors
     /// [`TerrainError`].
@@ -120,7 +121,7 @@ impl Terrain {
         })
     }
 
-    /// A terrain of rows of the same length, each from west to east.
+    /// Creates a terrain from rows of the same length, each from west to east.
     ///
     /// # Errors
     /// [`TerrainError`].
@@ -143,8 +144,8 @@ impl Terrain {
         Self::from_vec(columns, north, cell_mm, order, samples)
     }
 
-    /// A terrain whose heights are read block by block where it is touched, at most 33 × 33 samples
-    /// at a time or 52 × 52 under a tip, and never kept but for a window of 512 × 512 cells.
+    /// Creates a terrain whose heights are read block by block where it is touched, at most 33 × 33
+    /// samples at a time or 52 × 52 under a tip. Only a window of 512 × 512 cells is kept.
     ///
     /// ```
     /// use hapterra_touch::{Block, Terrain, Unread};
@@ -184,7 +185,7 @@ impl Terrain {
         })
     }
 
-    /// The same samples with other millimetres a vertical unit, where heights are not millimetres.
+    /// Sets the millimetres of a vertical unit, for heights in another unit.
     ///
     /// # Errors
     /// [`TerrainError`].
@@ -193,8 +194,8 @@ impl Terrain {
         Ok(Self { scale, ..self })
     }
 
-    /// The same terrain with heights rounded to multiples of a step in cells, 0 for none:
-    /// `hapterra replay` does so where it interpolates between the samples of a file.
+    /// Rounds the heights to multiples of a step in cells, 0 for none, as `hapterra replay` does
+    /// where it interpolates between the samples of a file.
     #[must_use]
     pub fn with_height_step(self, cells: f64) -> Self {
         let height_step = if cells > 0.0 { cells } else { 0.0 };
@@ -204,7 +205,7 @@ impl Terrain {
         }
     }
 
-    /// The same ground with a material for each sample: an index of the surface's table
+    /// Sets a material for each sample: an index of the surface's table
     /// ([`Surface::with_materials`](crate::Surface::with_materials)), 0 for the surface itself.
     ///
     /// # Errors
@@ -224,16 +225,17 @@ impl Terrain {
         })
     }
 
-    /// The same ground under a ball of a radius in millimetres, or under a point for 0.
+    /// Sets the radius of the ball that touches the terrain, mm; 0 for a point.
     ///
-    /// A ball on a height field has its centre on another height field, and a point touches that one.
-    /// **The HIP and the proxy are then the ball's centre**, which over flat ground is one radius above
-    /// it, and so is [`Self::height_mm`]. The centre is within 2 % of the radius of where it belongs.
-    /// Materials are those under the centre. Forces are those of `hapterra replay --tip`, bit for bit.
+    /// The centre of a ball on a height field is on another height field, which is touched by a
+    /// point. **The HIP and the proxy are then the ball's centre**, which over flat ground is one
+    /// radius above it, and so is [`Self::height_mm`]. The error of the centre is at most 2 % of
+    /// the radius. Materials are those under the centre. Forces are equal to those of `hapterra
+    /// replay --tip`, bit for bit.
     ///
-    /// Haptic cells are a 32nd of the radius, and the window of a contact has 512 of them. A proxy that
-    /// stays more than 15 radii behind its HIP, east or north, is let go
-    /// ([`State::Releasing`](crate::State::Releasing)), where a replay may begin anew beside the HIP.
+    /// Haptic cells are a 32nd of the radius, and the window of a contact has 512 of them along a
+    /// side. A proxy more than 15 radii behind its HIP, east or north, is released
+    /// ([`State::Releasing`](crate::State::Releasing)), while a replay may restart beside the HIP.
     ///
     /// ```
     /// use hapterra_touch::Terrain;
@@ -246,8 +248,9 @@ impl Terrain {
     /// ```
     ///
     /// # Errors
-    /// [`TerrainError::Tip`] for a radius below 0, larger than 8 cells or not a number: of larger
-    /// balls take every second sample. [`TerrainError::TipCells`] where the ball makes too many cells.
+    /// [`TerrainError::Tip`] for a radius below 0, larger than 8 cells or not a number: for larger
+    /// balls, use every second sample. [`TerrainError::TipCells`] if there would be too many haptic
+    /// cells.
     pub fn with_tip(self, tip_mm: f64) -> Result<Self, TerrainError> {
         let ball = Ball::new(tip_mm, self.scale.cell_mm())?;
         let parts = ball.as_ref().map_or(1, Ball::parts);
@@ -268,31 +271,31 @@ impl Terrain {
         }
     }
 
-    /// The radius of the ball that touches it, mm; 0 for a point.
+    /// Returns the radius of the ball that touches the terrain, mm; 0 for a point.
     #[must_use]
     pub const fn tip_mm(&self) -> f64 {
         self.tip_mm
     }
 
-    /// Samples from west to east, and from south to north.
+    /// Returns the number of samples from west to east, and from south to north.
     #[must_use]
     pub const fn samples(&self) -> [u32; 2] {
         [self.columns, self.rows]
     }
 
-    /// Extent east and north from the south-west sample, mm.
+    /// Returns the extent east and north from the south-west sample, mm.
     #[must_use]
     pub fn size_mm(&self) -> [f64; 2] {
         [self.columns, self.rows].map(|count| f64::from(count - 1) * self.scale.cell_mm())
     }
 
-    /// Millimetres a cell and a vertical unit.
+    /// Returns the millimetres of a cell and of a vertical unit.
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
     }
 
-    /// Writes the heights of a block as they came, row by row from the south, in the vertical unit.
+    /// Writes the heights of a block, row by row from the south, in the vertical unit.
     ///
     /// # Errors
     /// [`Unread`] of a callback.

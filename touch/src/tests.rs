@@ -1,4 +1,4 @@
-//! Contacts on made-up terrains.
+//! Contacts on synthetic terrains.
 
 use std::string::ToString;
 use std::vec;
@@ -73,7 +73,7 @@ fn rows_lie_where_their_order_says() {
     assert_eq!(height(RowOrder::SouthFirst, 1.0, 1.0), Some(11.0));
     assert_eq!(height(RowOrder::NorthFirst, 1.0, 1.0), Some(1.0));
     assert_eq!(height(RowOrder::NorthFirst, 0.5, 0.5), Some(5.5));
-    // The force follows: the ground rises to the south.
+    // The force shows the order: the ground rises to the south.
     let terrain = Terrain::from_rows(10.0, RowOrder::NorthFirst, &rows).expect("a terrain");
     let mut contact = Contact::new(terrain, Surface::default()).expect("a contact");
     contact.step([5.0, 5.0, 20.0]).expect("a step");
@@ -159,7 +159,7 @@ fn unread_heights_leave_the_contact_as_it_was() {
 fn every_parameter_changes_the_force() {
     let wavy = |x: u32, _| 2.0 * f64::sin(f64::from(x) * 0.5);
     let terrain = Terrain::from_fn(200, 200, 1.0, wavy).expect("a terrain");
-    // Down, a rest on the slope, and along.
+    // Down, then a rest on the slope, then along it.
     let path = (0..2500).map(|n| {
         let t = f64::from(n);
         [
@@ -318,7 +318,7 @@ fn another_surface_keeps_the_contact() {
     let mut contact = Contact::new(flat(2.0), Surface::default()).expect("a contact");
     contact.step([5.0, 5.0, 3.0]).expect("a step");
     let stiff = || Surface::new(params(|it| it.stiffness_n_per_mm = 1.0)).expect("a surface");
-    // In the air, and through the surface in the step after it.
+    // In the air, and through the surface in the next step.
     contact.set_surface(stiff()).expect("fits");
     let step = contact.step([5.0, 5.0, 1.5]).expect("a step");
     assert_eq!(
@@ -361,7 +361,7 @@ fn materials_are_rendered_in_place() {
     assert_eq!((force(3.0), force(17.0)), (0.5, 0.1));
     let error = Contact::new(terrain, Surface::default()).err();
     assert_eq!(error, Some(ContactError::Material { found: 1, count: 1 }));
-    // No materials on the ground: the surface itself.
+    // A terrain without materials: the surface itself.
     let mut contact = Contact::new(flat(1.0), surface).expect("a contact");
     let steps = contact
         .run([[17.0, 5.0, 3.0], [17.0, 5.0, 0.0]])

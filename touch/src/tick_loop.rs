@@ -15,10 +15,9 @@ use self_cell::{MutBorrow, self_cell};
 use crate::terrain::Terrain;
 use crate::tile_cutter::NoTile;
 
-/// Tiles along the side of the window: as many as the `hapterra` command has in memory.
+/// Tiles along the side of the window: the same number as in the `hapterra` command.
 const WINDOW: usize = 16;
-/// Ticks that a step may take, at most: a path over 20,000 cells of rough ground takes about a
-/// hundredth.
+/// Maximum ticks of a step: a path over 20,000 cells of rough ground takes about a hundredth of it.
 const MAX_TICKS: u32 = 1 << 20;
 
 self_cell!(
@@ -34,7 +33,7 @@ struct Running<'t> {
     haptics: Haptics<'t, WINDOW>,
     spare: Option<&'t mut Tile>,
     outcome: Outcome,
-    /// For the samples of a tile.
+    /// Buffer for the samples of a tile.
     room: Vec<f64>,
     seq: u32,
     view: u8,
@@ -46,7 +45,7 @@ pub(crate) struct TickLoop(Cell);
 impl TickLoop {
     pub(crate) fn new(rate: TickRate) -> Self {
         let mut tiles = Vec::new();
-        // One by one: all of them are more than a stack may hold.
+        // One by one: all of them together may exceed a stack.
         tiles.resize_with(WINDOW * WINDOW + 1, || Tile::VACANT);
         let tiles = MutBorrow::new(tiles.into_boxed_slice());
         Self(Cell::new(tiles, |tiles| {
@@ -68,7 +67,7 @@ impl TickLoop {
         })
     }
 
-    /// Puts another surface in, with the HIP where it was.
+    /// Changes the surface, with the HIP at its last position.
     pub(crate) fn change(
         &mut self,
         scene: Scene,
@@ -80,7 +79,7 @@ impl TickLoop {
                 running.haptics.take_materials(table);
             }
             running.view = running.view.wrapping_add(1);
-            // Tiles with materials are other tiles than those without.
+            // Tiles with materials differ from those without.
             let before = running.haptics.scene().and_then(|scene| scene.materials);
             running.accept(Command::SceneChange(SceneChange {
                 number: running.view,
@@ -91,7 +90,7 @@ impl TickLoop {
         })
     }
 
-    /// Renders a point with all the terrain that it needs; none if that takes too many ticks.
+    /// Renders a point with all terrain that it needs; `None` if that takes too many ticks.
     pub(crate) fn step(
         &mut self,
         hip: GridPoint,
@@ -134,7 +133,7 @@ impl<'t> Running<'t> {
     ) -> Result<Option<TickRecord>, NoTile> {
         self.seq = self.seq.wrapping_add(1);
         let seq = self.seq;
-        // A point is never refused, and brings no tile.
+        // A point is never refused, and returns no tile.
         let _ = self.accept(Command::Hip(HipCommand { seq, hip }));
         let sense = GuardInputs::default();
         for _ in 0..MAX_TICKS {
@@ -157,7 +156,7 @@ impl<'t> Running<'t> {
             self.spare = Some(tile);
             return Err(error);
         }
-        // A tile is never refused: the buffer that it replaces returns.
+        // A tile is never refused; the replaced buffer is returned.
         let _ = self.accept(Command::Tile(tile));
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Tiles that are cut from a height field where it is touched.
+//! Cutting of tiles from a height field where it is touched.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -13,7 +13,7 @@ use crate::terrain::Terrain;
 use crate::tile_heights;
 use crate::tip::{self, Ball, Nodes, Samples};
 
-/// A tile that could not be cut.
+/// Reason why a tile could not be cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoTile {
     Unread(Unread),
@@ -21,8 +21,9 @@ pub(crate) enum NoTile {
 }
 
 impl Terrain {
-    /// The height of the surface at a place in millimetres, mm: of the ground, or of a ball's centre
-    /// over it ([`Self::with_tip`]). `None` in a hole, off the terrain, and where it cannot be read.
+    /// Returns the height of the surface at a position, mm: of the ground, or of a ball's centre
+    /// over it ([`Self::with_tip`]). `None` for no-data, outside the terrain, and if it cannot be
+    /// read.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
         let (size, cell_mm) = (self.size(), self.haptic_scale().cell_mm());
@@ -45,29 +46,29 @@ impl Terrain {
         let mm = corners.map(|height| height * self.scale.height_mm_per_unit());
         let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
         let [sw, se, nw, ne] = mm;
-        // Every corner counts: a cell with a hole at one is a hole.
+        // A cell without data at any corner is no-data.
         let hole = mm.iter().any(|height| !height.is_finite());
         (!hole).then(|| mix(mix(sw, se, u), mix(nw, ne, u), v))
     }
 
-    /// Haptic cells a cell of the ground, along a side: 1 for a point.
+    /// Returns the haptic cells along the side of a cell of the ground: 1 for a point.
     fn parts(&self) -> u32 {
         self.ball.as_ref().map_or(1, Ball::parts)
     }
 
-    /// The scale of haptic cells: that of the samples, or a whole part of it under a ball.
+    /// Returns the scale of haptic cells: that of the samples, or a whole part of it under a ball.
     pub(crate) fn haptic_scale(&self) -> Scale {
         self.scale.in_parts(self.parts())
     }
 
-    /// Haptic patches east and north.
+    /// Returns the number of haptic patches east and north.
     pub(crate) fn size(&self) -> [i32; 2] {
         let parts = self.parts() as i32;
-        // Checked: at most MAX_CELL of them.
+        // Checked before: at most MAX_CELL of them.
         [self.columns, self.rows].map(|count| (count as i32 - 1) * parts)
     }
 
-    /// A whole height in haptic cells that no sample exceeds.
+    /// Returns a whole height in haptic cells that no sample exceeds.
     pub(crate) fn top(&self) -> i32 {
         let Some(range) = self.range else {
             return MAX_CELL + 1;
@@ -79,14 +80,14 @@ impl Terrain {
         (tile_heights::top(low, high) + libm::ceil(radius) as i32).min(MAX_CELL + 1)
     }
 
-    /// The largest material that a sample has; none where all are of one.
+    /// Returns the largest material of the samples; `None` if there is only one material.
     pub(crate) fn last_material(&self) -> Option<u8> {
         let materials = self.materials.as_ref()?;
         materials.samples.iter().copied().max()
     }
 
-    /// Checks that the heights can be touched at the scale; those of a callback, and what a ball makes
-    /// of heights, are checked tile by tile.
+    /// Checks that the heights can be touched at this scale. Heights of a callback, and of a ball's
+    /// centre, are checked tile by tile.
     pub(crate) fn check_heights(&self) -> Result<(), TerrainError> {
         let scale = self.haptic_scale();
         let cell_mm = scale.cell_mm();
@@ -106,7 +107,7 @@ impl Terrain {
     }
 
     /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `room` is
-    /// for its samples.
+    /// a buffer for its samples.
     pub(crate) fn cut(
         &self,
         key: TileKey,
@@ -135,15 +136,15 @@ impl Terrain {
                 let at = move |u| line.get(under(column + u) as usize);
                 (0..TILE_SAMPLES as u32).map(move |u| at(u).copied().unwrap_or(0))
             });
-            // Checked when they were put together.
+            // Checked when they were set.
             let set = tile.set_materials(materials, samples);
             set.map_err(|_| NoTile::Step)?;
         }
         Ok(())
     }
 
-    /// Reads the rendered heights of a tile, in haptic cells, row by row: NaN in holes. Returns how many a
-    /// row has.
+    /// Reads the rendered heights of a tile, in haptic cells, row by row: NaN for no-data. Returns
+    /// the number of heights in a row.
     fn read_haptic(&self, first: [u32; 2], room: &mut Vec<f64>) -> Result<usize, Unread> {
         let Some(ball) = &self.ball else {
             let end = [self.columns, self.rows].map(i64::from);
@@ -165,8 +166,8 @@ impl Terrain {
         Ok(TILE_SAMPLES)
     }
 
-    /// Reads the samples that a ball's nodes depend on, `side` of them each way from a rendered sample on,
-    /// in haptic cells: NaN in holes and beside the field.
+    /// Reads the samples on which a ball's nodes depend, for `side` nodes each way from a rendered
+    /// sample, in haptic cells: NaN for no-data and outside the field.
     fn samples_around(
         &self,
         ball: &Ball,
@@ -194,7 +195,7 @@ impl Terrain {
         Ok((samples, nodes))
     }
 
-    /// Reads samples of the field from one to before another, in haptic cells: NaN in holes.
+    /// Reads the samples of the field from `from` to before `to`, in haptic cells: NaN for no-data.
     fn read_cells(
         &self,
         from: [i64; 2],
@@ -220,7 +221,7 @@ impl Terrain {
     }
 }
 
-/// A height in cells; NaN where positions cannot say it.
+/// Returns a height in cells; NaN beyond the range of positions.
 fn within(cells: f64) -> f64 {
     match cells.abs() <= f64::from(MAX_CELL) {
         true => cells,
@@ -228,7 +229,7 @@ fn within(cells: f64) -> f64 {
     }
 }
 
-/// The whole height that a tile counts from; 0 where all is a hole.
+/// Returns the whole height that is the base of a tile; 0 if all is no-data.
 fn base(cells: &[f64]) -> i32 {
     let known = cells.iter().copied().filter(|cells| !cells.is_nan());
     let range = known.fold(None, |range: Option<(f64, f64)>, h| {

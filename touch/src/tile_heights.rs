@@ -1,10 +1,11 @@
-//! Numbers of tiles, for every host that cuts them: with the same ones a path has the same forces.
+//! Rounding of tile heights, shared by all hosts that cut tiles, so that a path has the same forces
+//! on each.
 
 use hapterra_core::grid::MAX_CELL;
 
-/// The whole height, in cells, that a tile counts from, of its lowest and highest sample in cells,
-/// both within ±[`MAX_CELL`]: the lowest, or the middle where single heights would leave what the
-/// contact can address.
+/// Returns the whole height, in cells, that is the base of a tile, from its lowest and highest
+/// sample in cells, both within ±[`MAX_CELL`]: the lowest, or the middle if single heights would
+/// otherwise exceed the contact's range.
 #[must_use]
 pub fn base(low: f64, high: f64) -> i32 {
     let from_low = high - libm::floor(low) <= f64::from(MAX_CELL);
@@ -12,18 +13,18 @@ pub fn base(low: f64, high: f64) -> i32 {
     libm::floor(base) as i32 // both within ±MAX_CELL
 }
 
-/// A height above a tile's base, cells, rounded once.
+/// Returns a height above a tile's base, cells, rounded once.
 #[must_use]
 pub fn above(base: i32, height: f64) -> f32 {
     (height - f64::from(base)) as f32
 }
 
-/// A whole height in cells that no sample of a terrain exceeds, of its lowest and highest sample in
-/// cells.
+/// Returns a whole height in cells that no sample of a terrain exceeds, from its lowest and highest
+/// sample in cells.
 #[must_use]
 pub fn top(low: f64, high: f64) -> i32 {
-    // Rounded to `f32` above the base, a sample reaches the next whole number at most; from 2^23 on, up
-    // to 2^30, by as much as its last place.
+    // Rounded to `f32` above the base, a sample reaches the next whole number at most; from 2^23 to
+    // 2^30, it may be higher by its last place.
     let rounding = if high - low < f64::from(1 << 23) {
         0
     } else {
@@ -32,8 +33,8 @@ pub fn top(low: f64, high: f64) -> i32 {
     (libm::ceil(high) as i32 + rounding).min(MAX_CELL + 1)
 }
 
-/// Returns the index of the patch of a coordinate in cells and the fraction in it; `None` outside the
-/// field.
+/// Returns the index of the patch of a coordinate in cells and the fraction in it; `None` outside
+/// the field.
 #[must_use]
 pub fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
     if !(0.0..=f64::from(patches)).contains(&cells) {

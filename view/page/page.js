@@ -1,11 +1,11 @@
-// The page: starts rerun's viewer and feeds it with the stream of hapterra-view.
+// The page: starts rerun's viewer and sends it the stream of hapterra-view.
 //
-// The stream is read only while somebody can see the page, because a hidden viewer draws
-// nothing and would only pile up what it is told. A page that comes back begins anew: what it
-// missed is told in other pieces than what it has, and the viewer would keep both. A page that
-// is drawn by software takes few entries a second, and asks for what happens a second at a
-// time. The viewer's memory grows with every sample, so from a size on the page begins anew;
-// not at once, though, where what it is told first is larger already.
+// The stream is read only while the page is visible, because a hidden viewer draws nothing and
+// would only accumulate its input. A page that becomes visible again reloads: the history has other
+// pieces than the page has received, and the viewer would keep both. A page that is drawn by
+// software can handle only few entries a second, and requests the events a second at a time. The
+// viewer's memory grows with every sample, so the page reloads at a certain size; but not at once
+// if the history alone is larger.
 "use strict";
 
 const CHANNEL = "hapterra";
@@ -17,11 +17,11 @@ const LOST = 0xfffffffe;
 const said = document.getElementById("said");
 const pageBytes = Number(said.dataset.pageBytes);
 
-// For tests and figures.
+// For tests and statistics.
 const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isLost: false, isStarted: false };
 window.hapterra = state;
 
-// The layout is made for a dark sky: what the browser prefers is not asked.
+// The layout is made for a dark sky: the browser's preference is ignored.
 const media = window.matchMedia.bind(window);
 window.matchMedia = (query) => {
   const scheme = /prefers-color-scheme:\s*(\w+)/.exec(query);
@@ -49,7 +49,7 @@ function whenSeen() {
   });
 }
 
-// Whether the browser draws with the computer's processor alone: by the names of what draws.
+// Returns true if the browser draws with the processor only, by the name of its renderer.
 function isDrawnBySoftware() {
   const context = document.createElement("canvas").getContext("webgl2");
   const unmasked = context?.getExtension("WEBGL_debug_renderer_info");
@@ -57,7 +57,7 @@ function isDrawnBySoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
-// Bytes of a stream, so many at a time.
+// Bytes of a stream, read in blocks of a given size.
 class Bytes {
   constructor(reader) {
     this.reader = reader;
@@ -65,7 +65,7 @@ class Bytes {
     this.length = 0;
   }
 
-  // The next `count` bytes; null where the stream ends before.
+  // Returns the next `count` bytes; null if the stream ends before.
   async take(count) {
     while (this.length < count) {
       const { done, value } = await this.reader.read();
@@ -88,7 +88,7 @@ class Bytes {
   }
 }
 
-// Reads the stream once; true where the session has ended.
+// Reads the stream once; returns true if the session has ended.
 async function read(viewer, memory, feed) {
   const cut = new AbortController();
   const hide = () => seen() || cut.abort();
@@ -148,7 +148,7 @@ async function main() {
   });
   await viewer.start(document.getElementById("view"));
   state.isStarted = true;
-  // The device's second that is shown, once there is one.
+  // The device's second that is shown, if there is one.
   state.shown = () => {
     const recording = viewer.get_active_recording_id();
     return recording ? viewer.get_time_for_timeline(recording, "time") / 1e9 : null;

@@ -1,4 +1,4 @@
-//! Messages of `hapterra` from the pipe, drawn and put into the history.
+//! Messages of `hapterra` from the pipe, drawn and added to the history.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write as _};
@@ -16,10 +16,10 @@ use crate::history::{End, History};
 pub struct RrdFile(Encoder<BufWriter<File>>);
 
 impl RrdFile {
-    /// Begins the file.
+    /// Creates the file.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn create(path: &Path) -> Result<Self> {
         let named = || format!("cannot write {}", path.display());
         let file = File::create(path).with_context(named)?;
@@ -44,17 +44,17 @@ impl RrdFile {
 
 /// End of a stream.
 pub struct Ended {
-    /// The writer ended the stream; without that it was killed.
+    /// True if the writer ended the stream; otherwise it was killed.
     pub is_told: bool,
     /// Error of the file for rerun's own viewer. The page continues without it.
     pub rrd: Result<()>,
 }
 
-/// Reads until the stream ends, and draws all of it. `on_scene` is called once, when the
-/// first scene is there as a whole: of a recording, when everything is.
+/// Reads until the stream ends, and draws all of it. `on_scene` is called once, when the first
+/// scene is complete: for a recording, at the end.
 ///
 /// # Errors
-/// A stream of another version, or one that is no stream.
+/// A stream of another version, or data that is no stream.
 pub fn draw(
     from: impl Read,
     history: &Arc<History>,

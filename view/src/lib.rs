@@ -1,4 +1,4 @@
-//! The page that shows what the hand feels.
+//! The page that shows the contact of the hand with the terrain.
 //!
 //! ```text
 //! hapterra ══ pipe ══▶ feed ─▶ drawing ─▶ history ─▶ server ══ loopback ══▶ page (rerun in a browser)
@@ -7,11 +7,11 @@
 //! - [`feed`]: messages of `hapterra` from the pipe;
 //! - [`drawing`]: each message as rerun's entities, in ground metres, and the layout;
 //! - [`history`]: the entries for a new page, bounded; and the pages' queues;
-//! - [`server`]: the page and its stream, for this machine alone;
-//! - [`options`]: what the command line says.
+//! - [`server`]: the page and its stream, for this machine only;
+//! - [`options`]: the options of the command line.
 //!
-//! Data flows one way. A page only asks for files and for the stream: nothing that it
-//! sends is read beyond the request's head, and nothing goes back to `hapterra`.
+//! Data flows in one direction. A page only requests files and the stream: only the head of a
+//! request is read, and nothing is sent back to `hapterra`.
 #![forbid(unsafe_code)]
 #![warn(missing_docs, unreachable_pub)]
 

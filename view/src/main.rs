@@ -1,4 +1,4 @@
-//! `hapterra-view`: reads what `hapterra` tells on standard input and shows it as a page.
+//! `hapterra-view`: reads the messages of `hapterra` from standard input and shows them as a page.
 
 use std::ffi::OsString;
 use std::io::Write as _;
@@ -14,11 +14,11 @@ use hapterra_view::history::History;
 use hapterra_view::options::{HELP, Options};
 use hapterra_view::server::Server;
 
-/// More options, separated by spaces: `hapterra` starts this program.
+/// Variable with more options, separated by spaces, because `hapterra` starts this program.
 const OPTIONS: &str = "HAPTERRA_VIEW_OPTIONS";
-/// Time for which the page stays after the session's end, once no page is open.
+/// Time for which the page remains after the session's end, when no page is open.
 const LINGER: Duration = Duration::from_secs(15);
-/// Between two checks for an open page.
+/// Time between two checks for an open page.
 const LOOK: Duration = Duration::from_millis(100);
 
 fn main() -> ExitCode {
@@ -81,12 +81,12 @@ fn show(options: &Options) -> Result<()> {
     ended.rrd
 }
 
-/// Watches whether `hapterra` is gone: it holds the pipe open after the stream's end, for as long
-/// as it runs.
+/// Watches for the end of `hapterra`, which keeps the pipe open after the stream's end while it
+/// runs.
 fn watched(has_ended: bool) -> Arc<AtomicBool> {
     let is_gone = Arc::new(AtomicBool::new(!has_ended));
     let told = Arc::clone(&is_gone);
-    // Without a thread it counts as there.
+    // Without a thread, `hapterra` counts as running.
     let _ = std::thread::Builder::new().spawn(move || {
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         told.store(true, Ordering::Release);
@@ -94,7 +94,7 @@ fn watched(has_ended: bool) -> Arc<AtomicBool> {
     is_gone
 }
 
-/// Waits while a page is open, and for a page while `hapterra` waits.
+/// Waits while a page is open, and for a page while `hapterra` runs.
 fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
     let mut alone_since = Instant::now();
     loop {
@@ -102,8 +102,8 @@ fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
         if kept.pages > 0 {
             alone_since = Instant::now();
         }
-        // A reader of pages that got everything is not counted any more, so the
-        // time since it came is what is left to go by.
+        // Pages that received everything are not counted any more, so only the time since they
+        // connected remains as a criterion.
         let patience = linger.unwrap_or(LINGER);
         let may_go = linger.is_some() || kept.came > 0 || is_gone.load(Ordering::Acquire);
         if may_go && kept.pages == 0 && alone_since.elapsed() >= patience {
@@ -113,7 +113,7 @@ fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
     }
 }
 
-/// Opens the page in a browser, where there is a screen to show it on.
+/// Opens the page in a browser, if there is a screen.
 fn open(url: &str) {
     let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"]
         .iter()
@@ -132,11 +132,11 @@ fn open(url: &str) {
         .stdout(null())
         .stderr(null())
         .spawn();
-    // Users without a browser have read where the page is.
+    // If no browser starts, the user has already read the page's address.
     drop(started);
 }
 
-/// Says a line, and continues without a reader.
+/// Prints a line, and ignores a closed output.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

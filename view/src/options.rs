@@ -31,18 +31,18 @@ const PORT: u16 = 8760;
 /// Options of the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The page's port; none for the usual one or a free one.
+    /// The page's port; `None` for the default port or a free one.
     pub port: Option<u16>,
     /// The page's address.
     pub bind: IpAddr,
-    /// True if a browser is opened.
+    /// True if a browser is to be opened.
     pub browser: bool,
     /// Bytes of a live session's history.
     pub history_bytes: usize,
-    /// Bytes of a page's memory from which on it begins anew.
+    /// Memory of a page at which it reloads, bytes.
     pub page_bytes: u64,
-    /// Time for which the page stays after the session's end, once no page is open; none: until
-    /// a page has opened, and then the usual time.
+    /// Time for which the page remains after the session's end, when no page is open; `None`: until
+    /// a page has opened, and then the default time.
     pub linger: Option<Duration>,
     /// A recording for rerun's own viewer.
     pub rrd: Option<PathBuf>,
@@ -63,7 +63,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Ports in the order in which they are tried.
+    /// Returns the ports in the order in which they are tried.
     #[must_use]
     pub fn ports(&self) -> Vec<u16> {
         match self.port {
@@ -72,10 +72,10 @@ impl Options {
         }
     }
 
-    /// Reads words of a command line; none where help is asked for.
+    /// Parses the words of a command line; `None` for a request for help.
     ///
     /// # Errors
-    /// A word that is no option, or a value that is none.
+    /// A word that is no option, or an invalid value.
     pub fn read(words: impl IntoIterator<Item = OsString>) -> Result<Option<Self>> {
         let mut options = Self::default();
         let mut parser = Parser::from_args(words);

@@ -14,24 +14,24 @@ use common::recorded::{Csv, check, entities};
 use common::scene::{batch, greeting, layer, resting, scene, tiles_around, zoomed_scene};
 use common::{HANG, Running, Viewer, emulated, folder, hapterra, memory_of, signal, started_by};
 
-/// The terrain's part of the page, and the plots'.
+/// The areas of the terrain and of the plots in the page.
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
 const PLOTS: [f64; 4] = [0.6, 0.5, 0.4, 0.4];
-/// The colours of the proxy and of the lines around held tiles, and of the force's arrow,
-/// which is there while the hand touches.
+/// The colours of the proxy, of the outlines of stored tiles, and of the force's arrow, which is
+/// shown during contact.
 const MARKS: [[u8; 3]; 3] = [[255, 120, 20], [64, 224, 208], FORCE];
 const FORCE: [u8; 3] = [255, 230, 60];
 
-/// The map's part, and the colour of the square on it that the eye looks at.
+/// The area of the map, and the colour of the square of the visible part.
 const MAP: [f64; 4] = [0.58, 0.05, 0.21, 0.4];
 const WHITE: [u8; 3] = [255, 255, 255];
-/// Pixels of that square's lines that go at least where its sides are a quarter as long.
+/// Minimum decrease of that square's pixels when its sides are a quarter as long.
 const SHORTER: usize = 80;
 
 /// Software draws the pages: one test at a time.
 static ONE: Mutex<()> = Mutex::new(());
 
-/// A live session that continues while the page is looked at.
+/// A live session that continues while a page shows it.
 struct Session {
     viewer: Viewer,
     tick: u64,
@@ -64,7 +64,7 @@ impl Session {
     }
 }
 
-/// Takes pictures until `is_right` of the colours of both parts.
+/// Takes pictures until `is_right` accepts the colours of both areas.
 fn shown(
     browser: &mut Browser,
     page: &Page,
@@ -89,13 +89,14 @@ fn shown(
     }
 }
 
-/// Hundreds of tints of relief, the proxy and outlines of tiles; and curves.
+/// Returns true if there are hundreds of tints of relief, the proxy and outlines of tiles; and
+/// curves.
 fn is_whole(terrain: &Colours, plots: &Colours) -> bool {
     let marks = terrain.near.iter().take(2);
     terrain.count > 400 && { marks }.all(|marks| *marks > 10) && plots.count > 20
 }
 
-/// The browser; none, and a line that reports it, where there is none.
+/// Returns the browser, or `None` with a message if there is none.
 fn browser_in(folder: &Path) -> Option<Browser> {
     let program = program();
     if program.is_none() {
@@ -117,7 +118,7 @@ fn foreign<'b>(browser: &'b Browser, address: &str) -> Vec<&'b String> {
         .collect()
 }
 
-/// Removes a folder in which parts of a killed browser may write for a moment yet.
+/// Removes a folder to which parts of a killed browser may still write for a moment.
 fn remove(folder: &Path) {
     let until = Instant::now() + HANG;
     while let Err(why) = std::fs::remove_dir_all(folder) {
@@ -142,8 +143,8 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
     shown(&mut browser, &page, &mut go_on, |now, plotted| {
         is_whole(now, plotted) && moved(now, &terrain) && moved(plotted, &plots)
     });
-    // A second page hides the first, which begins anew once it is seen again; and the first
-    // one loaded anew.
+    // A second page hides the first, which reloads when it is visible again; then the first one is
+    // reloaded by the browser.
     let began = browser.number(&page, "performance.timeOrigin");
     browser.set_seen(&page, false);
     let second = browser.open(&address);
@@ -167,7 +168,7 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
             .iter()
             .any(|asked| asked.ends_with("/feed?gathered"))
     );
-    // Killing the browser does no harm.
+    // Killing the browser has no effect on the session.
     drop(browser);
     session.go_on(2000);
     assert!(session.viewer.end());
@@ -199,9 +200,9 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
         }
     };
     let first = until(&|_, bytes| bytes > 0.0);
-    // It gets the earlier entries again, and the new ones.
+    // It receives the earlier entries again, and the new ones.
     let again = until(&|began, bytes| began != first && bytes > 0.0);
-    // Not at once: its first entries may be larger already.
+    // Not at once: its first entries may already be larger.
     assert!(again - first > 20_000.0, "after {} ms", again - first);
     drop(browser);
     assert!(session.viewer.end());
@@ -220,7 +221,7 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
         return;
     };
     let live = folder.join("live.rrd");
-    // For as long as it takes a page to be seen on a busy machine: it is ended then.
+    // Long enough for a page on a busy machine; the test ends it.
     demo.args(["demo", "--rounds", "900", "--view"])
         .arg(format!("--device=emulated:{}", image.display()))
         .arg("--out")
@@ -274,7 +275,7 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     }
     let mut tick = 0;
     let mut rest = |viewer: &mut Viewer, scale: f64, east_mm: f64| {
-        // More than the trace is long: nothing of what was before is left in the picture.
+        // Longer than the trace, so that the earlier one is no longer in the picture.
         let ticks = tick..tick + 6000;
         tick = ticks.end;
         let samples = ticks.map(resting(scale, east_mm)).collect::<Vec<_>>();
@@ -286,7 +287,7 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     let page = browser.open(&viewer.address());
     let mut go_on = || rest(&mut viewer, 1.0, 0.0);
     shown(&mut browser, &page, &mut go_on, is_whole);
-    // A picture that is as it should be, and so is the next one.
+    // Waits for a correct picture that is followed by an equal one.
     let mut settled = |is_right: &dyn Fn(&mut Browser, &str) -> bool| {
         let until = Instant::now() + HANG;
         let mut before = browser.picture(&page);
@@ -338,7 +339,7 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
     let mut demo = Running::shown(&mut demo, "");
     let page = browser.open(&demo.address());
     shown(&mut browser, &page, &mut || {}, is_whole);
-    // White on the map until it is as it should be, twice: what passes over lines continues.
+    // White on the map, twice the expected value in a row: the hand continues to cross the lines.
     let mut white = |is_right: &dyn Fn(usize) -> bool| {
         let (until, mut before) = (Instant::now() + HANG, false);
         loop {
@@ -366,7 +367,7 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
     remove(&folder);
 }
 
-/// Who is killed while a page is looked at.
+/// The program that is killed while a page is open.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Killed {
     Hapterra,

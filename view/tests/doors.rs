@@ -1,4 +1,4 @@
-//! Who may ask the viewer for what, and that no page does any harm.
+//! Access to the viewer, and its robustness against any page.
 
 mod common;
 
@@ -10,7 +10,7 @@ use hapterra_view_stream::{Hello, Message};
 use common::scene::{batch, greeting, layer, scene};
 use common::{HANG, Viewer, asked};
 
-/// A viewer that shows the beginning of a live session, and its port.
+/// Starts a viewer that shows the beginning of a live session; returns it and its port.
 fn live(options: &str) -> (Viewer, u16) {
     let mut viewer = Viewer::start(options);
     let mut held = Vec::new();
@@ -63,7 +63,7 @@ fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
     ] {
         assert_eq!(status(&get(port, "/feed", &own, more)), 403, "{more}");
     }
-    // The page comes first: an answer to it ends.
+    // The page is requested first, because its answer ends.
     for (method, path) in ["POST", "PUT", "DELETE", "OPTIONS"]
         .into_iter()
         .flat_map(|method| [(method, "/"), (method, "/feed")])
@@ -75,7 +75,7 @@ fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
     }
 }
 
-/// Opens the stream, and reads so many bytes of it.
+/// Opens the stream, and reads `bytes` bytes of it.
 fn reading(port: u16, bytes: usize) -> TcpStream {
     let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
     line.set_read_timeout(Some(HANG)).expect("a limit");
@@ -90,7 +90,7 @@ fn reading(port: u16, bytes: usize) -> TcpStream {
 fn pages_that_come_go_and_hang_hold_nothing_up() {
     let (mut viewer, port) = live("");
     let mut held = Vec::new();
-    // One hangs without reading; others come and go.
+    // One hangs without reading; others connect and disconnect.
     let hanging = reading(port, 200);
     for round in 1..400u64 {
         if round % 50 == 0 {
@@ -101,7 +101,7 @@ fn pages_that_come_go_and_hang_hold_nothing_up() {
         }
     }
     drop(hanging);
-    // All of a recording's time is there for the last page, and its end.
+    // The last page receives the whole recording, and its end.
     let mut last = reading(port, 1000);
     assert!(viewer.tell(&Message::End));
     let mut rest = Vec::new();
@@ -162,7 +162,7 @@ fn it_ends_by_itself_once_nobody_looks() {
 #[test]
 fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
     let (mut viewer, _) = live("");
-    // No end is sent. Its own time-out is 15 s.
+    // No end is sent. The viewer's own time-out is 15 s.
     viewer.hang_up();
     assert!(viewer.end());
 }

@@ -1,5 +1,5 @@
-//! Gathered messages to a page that is drawn by software, a second at a time, and what a
-//! page missed in larger parts still.
+//! Gathered messages to a page that is drawn by software, a second at a time, and larger pieces for
+//! a page that connects later.
 
 mod common;
 
@@ -16,13 +16,13 @@ use common::scene::{batch, greeting, layer, scene};
 const TICKS: u64 = 10_300;
 const BATCH: u64 = 16;
 
-/// Messages to a page: entries that happened, and their rows by entity and number.
+/// Messages to a page: events, and their rows by entity and number.
 #[derive(Default)]
 struct Told {
     entries: usize,
     most_ns: u64,
     rows: BTreeMap<(String, String), (i64, String)>,
-    /// Standing entries, by entity and part.
+    /// Static entries, by entity and part.
     standing: BTreeMap<(String, BTreeSet<String>), Vec<String>>,
 }
 

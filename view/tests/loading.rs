@@ -1,7 +1,7 @@
-//! Time that it takes until a browser shows the terrain.
+//! Time until a browser shows the terrain.
 //!
 //! `HAPTERRA=PROGRAM TERRAIN=FILE cargo test --release --test loading -- --ignored --nocapture`
-//! measures it; without a file it takes the terrain that the demo has itself.
+//! measures it; without a file it uses the demo's own terrain.
 
 mod common;
 
@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use common::browser::{Browser, program};
 use common::{HANG, Running, folder, hapterra};
 
-/// The terrain's part of the page.
+/// The terrain's area in the page.
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
-/// Tints of relief that are only there where the terrain is.
+/// Minimum number of tints of relief in a picture with the terrain.
 const TINTS: usize = 400;
 
 #[test]
@@ -30,7 +30,7 @@ fn the_time_until_a_browser_shows_the_terrain() {
         .arg("--out")
         .arg(&folder);
     let mut demo = Running::shown(&mut demo, "");
-    // The session with the device begins with this line.
+    // This line begins the session with the device.
     demo.tells("device ");
     let session = Instant::now();
     let address = demo.address();

@@ -1,9 +1,8 @@
-//! Ten minutes of touching with the page open: what it takes, and what harm it may not do.
+//! Ten minutes of touching with the page open: its memory, and its effect on the session.
 //!
 //! `MINUTES=10 HAPTERRA=PROGRAM HAPTERRA_MPS2_ELF=IMAGE cargo test --release --test long --
-//! --ignored --nocapture` takes so many minutes of the clock, on the emulated board; without an
-//! image on the device in memory. With `ALONE=1` one page is open all of that time, and nobody
-//! loads it anew.
+//! --ignored --nocapture` runs for that many minutes on the emulated board; without an image, on
+//! the device in memory. With `ALONE=1` one page is open all the time, and is not reloaded.
 
 mod common;
 
@@ -18,9 +17,9 @@ use common::{Running, emulated, folder, hapterra, memory_of, signal, started_by}
 /// allocator.
 const VIEWER_BYTES: u64 = 300 << 20;
 /// Memory bound of `hapterra`: its terrain, its queue, and the rows of ten minutes that a demo
-/// keeps for its picture.
+/// stores for its picture.
 const HOST_BYTES: u64 = 300 << 20;
-/// Memory bound of a page: from 1 GB on it begins anew, with the next piece that it gets.
+/// Memory bound of a page: at 1 GB it reloads, with the next piece that it receives.
 const PAGE_BYTES: u64 = 5 << 28;
 
 /// Memory of a page, and its messages.
@@ -28,7 +27,7 @@ const PAGE_BYTES: u64 = 5 << 28;
 struct OfPage {
     bytes: u64,
     told: u64,
-    /// Since it began, or began anew.
+    /// Time since it was loaded or reloaded.
     age_s: f64,
     /// The device's second that it shows.
     shown_s: f64,
@@ -44,7 +43,7 @@ fn of_page(browser: &mut Browser, page: &Page) -> OfPage {
     }
 }
 
-/// A demo that continues for longer than it is looked at.
+/// Starts a demo that runs longer than the test.
 fn touching(into: &Path) -> Option<Command> {
     let mut demo = hapterra()?;
     demo.args(["demo", "--rounds", "300", "--view"]);
@@ -56,8 +55,8 @@ fn touching(into: &Path) -> Option<Command> {
     Some(demo)
 }
 
-/// Returns the lines of a session's summary about late ticks, of lost samples, and of tiles that
-/// were asked for and did not come.
+/// Returns the lines of a session's summary about late ticks, lost samples, and tiles that were
+/// requested but not delivered.
 fn harm(told: &str) -> Vec<&str> {
     let good = [
         ("ticks ", " run, 0 late"),
@@ -70,8 +69,8 @@ fn harm(told: &str) -> Vec<&str> {
         .iter()
         .filter(|good| !told.lines().any(|line| is_good(&line, good)))
         .map(|(_, figure)| *figure);
-    // The link has such lines for frames that were not understood, for requests without an
-    // answer and for sessions whose end is not known.
+    // The link reports frames that were not understood, requests without an answer and sessions
+    // with an unknown end.
     let of_link = told.lines().filter(|line| line.starts_with("link "));
     missing.chain(of_link).collect()
 }
@@ -133,7 +132,7 @@ fn ten_minutes_of_history_stay_bounded() {
         println!(
             "{minute} | {host} | {viewer_now} | {page_now}, {age:.0} | {told} | {shown:.1}, {is:.1}"
         );
-        // Once each: loaded anew, opened twice, closed; at last the viewer is killed.
+        // Once each: reloaded, opened twice, closed; at the end the viewer is killed.
         match minutes - minute {
             _ if is_alone => {}
             6 => browser.reload(&page),

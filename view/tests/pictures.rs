@@ -1,4 +1,4 @@
-//! Pictures of the live view for the documentation: of the terrain that the demo has itself.
+//! Pictures of the live view for the documentation, with the demo's own terrain.
 //!
 //! `cargo xtask view --pictures` writes them into `docs/`.
 
@@ -17,7 +17,7 @@ const SIZE: [u32; 2] = [1440, 900];
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
 /// The force's arrow, and the trace of a hand that slides.
 const MARKS: [[u8; 3]; 2] = [[255, 230, 60], [255, 170, 90]];
-/// Pixels of them: arrow and trace are long enough to be seen.
+/// Minimum pixels of these colours: arrow and trace are long enough to be visible.
 const ARROW: usize = 120;
 const TRACE: usize = 400;
 /// Commands for the zoomed picture.
@@ -33,7 +33,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// A demo to which this was typed before a page looked: a page that software draws shows
+    /// Starts a demo and types commands before a page opens: a page that software draws shows
     /// everything in its order, and much later.
     fn start(name: &str, typed: &str) -> Self {
         let folder = folder(name);
@@ -57,12 +57,12 @@ impl Shown {
         }
     }
 
-    /// Keeps the first picture in which the terrain's colours are right.
+    /// Stores the first picture in which the terrain's colours are right.
     fn keep(&mut self, path: &Path, is_right: impl Fn(&Colours) -> bool) {
         loop {
             std::thread::sleep(Duration::from_millis(500));
             let kept = self.browser.photograph(&self.page);
-            // Of the very picture that is kept: a browser takes either form.
+            // Colours of exactly the stored picture: a browser decodes both formats.
             let picture = BASE64_STANDARD.encode(&kept);
             let colours = { &mut self.browser }.colours(&self.page, &picture, TERRAIN, &MARKS);
             if is_right(&colours) {
@@ -94,7 +94,7 @@ fn pictures_at_the_start_while_sliding_and_zoomed() {
     let is_shown = |terrain: &Colours| terrain.count > 400;
     let is_touched = |terrain: &Colours| terrain.near[0] > ARROW && terrain.near[1] > TRACE;
     let mut shown = Shown::start("pictures", "");
-    // Before the hand is on the ground the arm has nothing to say.
+    // Before the hand is on the ground, nothing touches.
     shown.keep(&into.join("view-start.jpg"), |terrain| {
         is_shown(terrain) && terrain.near[0] == 0
     });

@@ -1,4 +1,4 @@
-//! Display of a run, beside the CSV of the same run.
+//! The display of a run, compared with the CSV of the same run.
 
 mod common;
 
@@ -9,7 +9,7 @@ use common::framed::{check_frames, laid};
 use common::recorded::{Csv, check, check_views, entities, scalars};
 use common::{Running, folder, hapterra};
 
-/// Makes a terrain file by formula, with the program that `cargo xtask view --test` names.
+/// Creates a terrain file by formula, with the program that `cargo xtask view --test` sets.
 fn synth(file: &Path, size: &str) {
     let program = std::env::var_os("HAPTERRA_LAB").expect("named beside HAPTERRA");
     let mut synth = Command::new(program);
@@ -18,7 +18,7 @@ fn synth(file: &Path, size: &str) {
     assert!(made.status.success(), "{made:?}");
 }
 
-/// Writes what is shown into a file, too.
+/// Returns the option that also writes the display to a file.
 fn rrd(into: &Path) -> String {
     format!("--rrd {}", into.display())
 }
@@ -86,7 +86,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     assert_eq!(csv.scales.len(), 4, "{:?}", csv.scales);
     let live = entities(&at("live.rrd"));
     check_views(&csv, &live, false);
-    // The bar is shorter on the ground once the view is zoomed.
+    // The bar is shorter on the ground after the zoom.
     let bars = check_frames(&csv, &live);
     let (first, last) = (bars[0], bars[bars.len() - 1]);
     assert!((0.39..0.51).contains(&(last / first)), "{bars:?}");

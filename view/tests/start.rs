@@ -12,14 +12,14 @@ use common::feed::Feed;
 use common::scene::{batch, greeting, layer, scene};
 use common::{Running, Viewer, folder, hapterra};
 
-/// Entities in the order in which a page gets them, whether each stands, and when the last
-/// part of the coarsest level was there.
+/// Entities in the order in which a page receives them, true for static ones, and the time at which
+/// the coarsest level was complete.
 struct Told {
     entities: Vec<(String, bool)>,
     whole: Option<(usize, Duration)>,
 }
 
-/// Reads a page's stream until something happened in time.
+/// Reads a page's stream up to the first event.
 fn told(port: u16) -> Told {
     let began = Instant::now();
     let mut told = Told {
@@ -39,7 +39,7 @@ fn told(port: u16) -> Told {
     told
 }
 
-/// Nothing finer, and nothing that happened, comes before the coarse whole.
+/// Checks that no finer layer and no event precedes the complete coarse level.
 fn check(told: &Told, finer: &[&str]) -> Duration {
     let (last, after) = told.whole.expect("the coarsest level");
     let first = |begin: &str| {
@@ -68,7 +68,7 @@ fn a_page_is_told_the_coarse_whole_before_anything_finer() {
         heights: vec![100.0; 33 * 33],
         ..whole.clone()
     });
-    // Finer things that came before, to a page that comes later.
+    // Finer layers that were sent earlier, to a page that connects later.
     let mut messages = vec![greeting(), scene(true), Message::Layer(whole), finer];
     messages.extend(batch(0, 300, &mut vec![]));
     for message in &messages {
@@ -83,7 +83,7 @@ fn a_page_is_told_the_coarse_whole_before_anything_finer() {
     assert_eq!(blocks.len(), 25);
 }
 
-/// `TERRAIN=FILE cargo test --release --test start -- --nocapture` measures it with a file.
+/// Measures it with a file: `TERRAIN=FILE cargo test --release --test start -- --nocapture`.
 #[test]
 fn page_of_a_demo_is_told_the_coarse_whole_first() {
     let Some(mut demo) = hapterra() else {
@@ -97,7 +97,7 @@ fn page_of_a_demo_is_told_the_coarse_whole_first() {
         .arg(&folder);
     let began = Instant::now();
     let mut demo = Running::shown(&mut demo, "");
-    // The session with the device begins with this line.
+    // This line begins the session with the device.
     demo.tells("device ");
     let (read, session) = (began.elapsed(), Instant::now());
     let port = demo.port();

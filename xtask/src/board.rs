@@ -1,38 +1,37 @@
 //! The boards: one table of their images, memories and budgets.
 
-/// A memory of a board and how much of it an image may take.
+/// A memory of a board, and the part of it that an image may use.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Memory {
-    /// Its name in the table on screen.
+    /// Its name in the printed table.
     pub(crate) name: &'static str,
     /// First address.
     pub(crate) origin: u64,
-    /// Bytes there are.
+    /// Size in bytes.
     pub(crate) length: u64,
-    /// Bytes an image may take. In RAM that is static data; what is left is
-    /// for the stack.
+    /// Maximum bytes of an image. In RAM these are static data; the rest is for the stack.
     pub(crate) budget: u64,
 }
 
 impl Memory {
-    /// Returns true if `address` lies in this memory.
+    /// Returns true if `address` is in this memory.
     pub(crate) fn contains(&self, address: u64) -> bool {
         (self.origin..self.origin + self.length).contains(&address)
     }
 }
 
-/// A call that the panic check lets pass.
+/// A call that the panic check accepts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Exception {
-    /// Parts of the caller's name, all of them in it: compilers write generic
-    /// names in two ways.
+    /// Parts of the caller's name, all of which it contains: compilers write generic names in two
+    /// ways.
     pub(crate) caller: &'static [&'static str],
-    /// Part of the callee's name; of a call through a register, nothing.
+    /// Part of the callee's name; empty for a call through a register.
     pub(crate) callee: &'static str,
-    /// Of a call through a register: parts of the names of what it can lead to. They are
-    /// judged like anything else that an interrupt reaches.
+    /// For a call through a register: parts of the names of its possible callees. They are checked
+    /// like all other functions that an interrupt reaches.
     pub(crate) leads_to: &'static [&'static str],
-    /// Reason for which it is safe.
+    /// Reason why it is safe.
     #[expect(dead_code, reason = "for the reader of the table")]
     pub(crate) because: &'static str,
 }
@@ -40,21 +39,20 @@ pub(crate) struct Exception {
 /// A board that the firmware is built for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Board {
-    /// Name of the binary; its cargo feature is this behind `board-`.
+    /// Name of the binary; its cargo feature is `board-` and this name.
     pub(crate) name: &'static str,
-    /// Name of the chip in probe-rs; none for the emulated board.
+    /// Name of the chip in probe-rs; `None` for the emulated board.
     pub(crate) chip: Option<&'static str>,
-    /// Environment variable that tells tests where the image is.
+    /// Environment variable with the image's path, for tests.
     pub(crate) elf_variable: &'static str,
-    /// Interrupts that run tasks, where panics may be reached. Nothing that another
-    /// interrupt or an exception reaches may panic.
+    /// Interrupts that run tasks, which may reach panics. No function that another interrupt or an
+    /// exception reaches may panic.
     pub(crate) runs_tasks: &'static [&'static str],
-    /// Calls through a register under an interrupt that someone has followed.
+    /// Calls through a register under an interrupt that were followed by hand.
     pub(crate) known_indirect: &'static [Exception],
-    /// Calls to panics, or on the way to one, under an interrupt, that someone
-    /// has proven never to happen.
+    /// Calls to panics, directly or indirectly, under an interrupt that are proven never to happen.
     pub(crate) known_calls: &'static [Exception],
-    /// The interrupt whose code runs from a memory without wait states, where there is one.
+    /// The interrupt whose code runs from a memory without wait states, if there is one.
     pub(crate) fast_interrupt: Option<&'static str>,
     /// Its memories. Bytes outside all of them are an error.
     pub(crate) memories: &'static [Memory],
@@ -66,8 +64,8 @@ const G474_CALLS: &[Exception] = &[queue(&["TIM7_DAC"]), queue(&["HapticLoop"]),
 
 const H743_CALLS: &[Exception] = &[queue(&["TIM7"]), queue(&["HapticLoop"]), TIMER_QUEUE];
 
-/// Exceptions for emulated boards only: serial ports, and a frame to the virtual arm as the last
-/// thing that a failed program sends.
+/// Exceptions for emulated boards only: serial ports, and a failed program's last frame to the
+/// virtual arm.
 const EMULATED_CALLS: &[Exception] = &[
     queue(&["HapticTick"]),
     queue(&["HapticLoop"]),
@@ -94,7 +92,7 @@ const EMULATED_CALLS: &[Exception] = &[
     },
 ];
 
-/// embassy's clock, whose vector is embassy's own and cannot be another.
+/// embassy's clock, whose vector is embassy's own and cannot be replaced.
 const TIMER_QUEUE: Exception = Exception {
     caller: &["TIM5"],
     callee: "panic_already_borrowed",
@@ -107,14 +105,14 @@ const TIMER_QUEUE: Exception = Exception {
 const WAKERS: &[Exception] = &[
     waker(&["TIM6_DAC"]),
     waker(&["TIM5"]),
-    // What the clock's interrupt does, where it is compiled as a function.
+    // The work of the clock's interrupt, if it is compiled as a function.
     waker(&["embassy_time_queue_utils", "next_expiration"]),
     waker(&["USB_LP"]),
     waker(&["OTG_FS"]),
 ];
 
-/// The emulated board's serial ports wake tasks, too. A program there that has failed writes
-/// its last words with `core::fmt`.
+/// The emulated board's serial ports also wake tasks. A failed program writes its report there with
+/// `core::fmt`.
 const EMULATED_WAKERS: &[Exception] = &[
     waker(&["TickDone"]),
     waker(&["LinkSent"]),
@@ -139,13 +137,13 @@ const fn waker(caller: &'static [&'static str]) -> Exception {
 }
 
 const H743_MEMORIES: &[Memory] = &[
-    // A tripwire: there is plenty, and the smaller board is the one that has to be small. The
-    // same program takes 8 % more here than on a Cortex-M4.
+    // A warning limit: there is plenty of flash, but the smaller board is limited. The same program
+    // is 8 % larger here than on a Cortex-M4.
     memory("flash", 0x0800_0000, 2048 * KIB, 280 * KIB),
     memory("AXI RAM", 0x2400_0000, 512 * KIB, 512 * KIB),
-    // The constants, and the stack with 96 KiB at least.
+    // The constants, and at least 96 KiB of stack.
     memory("DTCM", 0x2000_0000, 128 * KIB, 32 * KIB),
-    // The tick's code. The linker script says what stays in flash.
+    // The tick's code. The linker script lists the functions that stay in flash.
     memory("ITCM", 0x0000_0000, 64 * KIB, 64 * KIB),
 ];
 
@@ -161,20 +159,20 @@ const fn queue(caller: &'static [&'static str]) -> Exception {
 /// The board that QEMU emulates.
 pub(crate) static EMULATED: &Board = &BOARDS[0];
 
-/// Every board. Budgets are limits to be argued with, not hopes: raise one in
-/// the commit that needs it, with the reason.
+/// All boards. Budgets are limits to discuss: raise one in the commit that needs it, with the
+/// reason.
 pub(crate) static BOARDS: [Board; 4] = [
     Board {
         name: "mps2-an386",
         chip: None,
         elf_variable: "HAPTERRA_MPS2_ELF",
-        // On this board alone tasks run in an interrupt, the lowest.
+        // Only on this board tasks run in an interrupt, the lowest.
         runs_tasks: &["Executor"],
         known_indirect: EMULATED_WAKERS,
         known_calls: EMULATED_CALLS,
         fast_interrupt: None,
         memories: &[
-            // Zero-wait SRAM in the place of flash: held to what the G474 is held to.
+            // Zero-wait SRAM instead of flash, with the budget of the G474.
             memory("flash", 0x0000_0000, 4096 * KIB, 256 * KIB),
             memory("RAM", 0x2000_0000, 4096 * KIB, 1536 * KIB),
         ],
@@ -188,10 +186,10 @@ pub(crate) static BOARDS: [Board; 4] = [
         known_calls: G474_CALLS,
         fast_interrupt: None,
         memories: &[
-            // Half of the flash. At 192 KiB the image had 116 bytes left, and its size decided
-            // the shape of functions; the other half stays for a second image.
+            // Half of the flash. At 192 KiB the image had 116 bytes left, and its size determined
+            // the shape of functions; the other half is reserved for a second image.
             memory("flash", 0x0800_0000, 512 * KIB, 256 * KIB),
-            // 24 KiB stay for the stack.
+            // 24 KiB remain for the stack.
             memory("RAM", 0x2000_0000, 128 * KIB, 104 * KIB),
         ],
     },
@@ -226,7 +224,7 @@ const fn memory(name: &'static str, origin: u64, length: u64, budget: u64) -> Me
     }
 }
 
-/// The board called `name`.
+/// Returns the board called `name`.
 pub(crate) fn by_name(name: &str) -> anyhow::Result<&'static Board> {
     BOARDS.iter().find(|b| b.name == name).ok_or_else(|| {
         let names: Vec<_> = BOARDS.iter().map(|b| b.name).collect();

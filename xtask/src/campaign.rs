@@ -1,5 +1,4 @@
-//! `cargo xtask campaign`: the closed-loop campaign, or that of link faults, at full
-//! speed.
+//! `cargo xtask campaign`: the closed-loop campaign, or the campaign of link faults, at full speed.
 
 use std::ffi::OsString;
 use std::process::Command;
@@ -37,7 +36,7 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
 fn commit() -> Option<String> {
     let git = |words: &[&str]| output(Command::new("git").args(words).current_dir(root()));
     let commit = git(&["rev-parse", "--short", "HEAD"])?;
-    // The report itself may be there, not committed yet.
+    // The report itself may be changed and not committed yet.
     let tracked = [
         "status",
         "--porcelain",

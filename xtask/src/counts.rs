@@ -1,5 +1,5 @@
 //! `cargo xtask counts` and `cargo xtask cycles`: instructions of a tick on the emulated
-//! Cortex-M4F, and what they take on the boards' chips.
+//! Cortex-M4F, and their cycles on the boards' chips.
 
 use std::path::PathBuf;
 
@@ -9,16 +9,16 @@ use crate::image;
 use crate::run::{cargo, run, timed};
 use crate::setup::{emulator, qemu, toolchain};
 
-/// Counts over all scenes, prints the counts beside their targets, and compares them
-/// with the kept table, or writes that anew. About five minutes on two cores.
+/// Counts over all scenes, prints the counts beside their targets, and compares them with the
+/// stored table, or rewrites it. About five minutes on two cores.
 pub(crate) fn counts(write: bool) -> Result<()> {
     let wanted = if write { "write" } else { "all" };
     replay("hapterra-lab", "instructions_m4f", &["--nocapture"], wanted)
 }
 
-/// Works out the cycles of a tick on the boards' chips, prints them, and compares them with the
-/// kept table, or writes that anew: of the random scenes that the tests count, and of those with the
-/// costliest ticks; or of all of them, which takes half an hour on two cores.
+/// Computes the cycles of a tick on the boards' chips, prints them, and compares them with the
+/// stored table, or rewrites it. Uses the random scenes that the tests count and those with the
+/// costliest ticks; or all scenes, which takes half an hour on two cores.
 pub(crate) fn cycles(wanted: Option<&str>) -> Result<()> {
     emulator::ready()?;
     let words = ["--nocapture", "--ignored"];

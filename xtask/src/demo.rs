@@ -1,4 +1,4 @@
-//! `cargo xtask demo [FILE]`: the main job, from set-up to picture.
+//! `cargo xtask demo [FILE]`: the main use, from set-up to picture.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -15,15 +15,15 @@ use crate::view;
 /// Request of the user.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Request {
-    /// Terrain file; none for one that the demo makes itself.
+    /// Terrain file; `None` for the demo's own terrain.
     pub(crate) file: Option<OsString>,
     /// True if it is shown live.
     pub(crate) view: bool,
-    /// True if it is touched on a page in a browser, without any device.
+    /// True if it is touched on a page in a browser, without a device.
     pub(crate) touch: bool,
-    /// Place where that page is only written to.
+    /// Folder for the page, which is then only written and not served.
     pub(crate) out: Option<PathBuf>,
-    /// Passed on to `hapterra demo` as they are.
+    /// Arguments that are passed to `hapterra demo` unchanged.
     pub(crate) extra: Vec<OsString>,
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Emulation {
     pub(crate) qemu: PathBuf,
 }
 
-/// Builds what is needed and runs `hapterra demo`; gives its exit code.
+/// Builds the programs and runs `hapterra demo`; returns its exit code.
 pub(crate) fn demo(request: &Request) -> Result<i32> {
     let emulation = match request.device().as_deref() {
         None => emulation_or_say_why(),
@@ -60,11 +60,11 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     let status = command
         .status()
         .with_context(|| format!("cannot start `{}`", shown(&command)))?;
-    // None: ended by a signal.
+    // `None`: ended by a signal.
     Ok(status.code().unwrap_or(1))
 }
 
-/// Builds the image; gets QEMU where it can be had.
+/// Builds the image, and installs QEMU if possible.
 pub(crate) fn emulation() -> Result<Emulation> {
     let toolchain = toolchain::ready()?;
     let qemu = qemu::ready()?;
@@ -84,7 +84,7 @@ fn emulation_or_say_why() -> Option<Emulation> {
 }
 
 impl Request {
-    /// The value of `option` among the words for `hapterra demo`.
+    /// Returns the value of `option` in the arguments for `hapterra demo`.
     fn value(&self, option: &str) -> Option<String> {
         let words: Vec<_> = self
             .extra
@@ -115,11 +115,11 @@ impl Request {
         }
     }
 
-    /// The arguments of the `hapterra` command.
+    /// Returns the arguments of the `hapterra` command.
     fn words(&self, is_emulated: bool) -> Vec<OsString> {
         let mut words: Vec<OsString> = vec!["demo".into()];
         words.extend(self.file.clone());
-        // Any file has to come out well without a question: relief that suits the hand.
+        // Any file has to work without a question: relief that suits the hand.
         if self.value("--exaggeration").is_none() {
             words.extend(["--exaggeration", "auto"].map(OsString::from));
         }

@@ -18,21 +18,21 @@ const WORKSPACES: [&str; 4] = [
 /// Result of the check against the database of advisories.
 #[must_use]
 pub(crate) enum Advisories {
-    /// No advisory is about them.
+    /// There is no advisory.
     Checked,
-    /// Reason for which they were not.
+    /// Reason why it was not made.
     NotChecked(String),
 }
 
 impl Advisories {
-    /// Says so where they were not checked.
+    /// Reports dependencies that were not checked.
     pub(crate) fn say(self) {
         if let Some(line) = self.not_checked() {
             say(line);
         }
     }
 
-    /// The line of a summary, where they were not checked.
+    /// Returns the line of a summary if they were not checked.
     pub(crate) fn not_checked(self) -> Option<String> {
         match self {
             Self::Checked => None,
@@ -41,7 +41,7 @@ impl Advisories {
     }
 }
 
-/// Holds the dependencies of all workspaces to deny.toml.
+/// Checks the dependencies of all workspaces against deny.toml.
 pub(crate) fn check_all() -> Result<()> {
     let mut advisories = Advisories::Checked;
     for workspace in WORKSPACES {
@@ -51,7 +51,7 @@ pub(crate) fn check_all() -> Result<()> {
     Ok(())
 }
 
-/// Holds the dependencies of a workspace, named by its manifest, to deny.toml.
+/// Checks the dependencies of a workspace, stated by its manifest, against deny.toml.
 pub(crate) fn check(manifest: &str) -> Result<Advisories> {
     let program = ready()?;
     say(format!("the dependencies of {manifest}"));
@@ -60,7 +60,7 @@ pub(crate) fn check(manifest: &str) -> Result<Advisories> {
         with(&program, &[&of, words].concat())
     };
     run(&mut deny(&["check", "bans", "licenses", "sources"]))?;
-    // This renews the database; one that was fetched before does as well.
+    // This updates the database; an earlier one can also be used.
     match run_quietly(&mut deny(&["fetch", "db"])) {
         Err(why) if !has_database() => Ok(Advisories::NotChecked(format!(
             "their database cannot be fetched: {}",
@@ -73,17 +73,17 @@ pub(crate) fn check(manifest: &str) -> Result<Advisories> {
     }
 }
 
-/// Returns true if cargo-deny has a database of advisories on this machine.
+/// Returns true if this machine has cargo-deny's database of advisories.
 fn has_database() -> bool {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
     let databases = home.and_then(|home| home.join("advisory-dbs").read_dir().ok());
-    // A fetch that failed leaves an empty folder, or a lock.
+    // A failed fetch leaves an empty folder, or a lock.
     let mut entries = databases.into_iter().flatten().flatten();
     entries.any(|entry| entry.path().join("crates").is_dir())
 }
 
-/// Returns the reason for which a program failed: its last line.
+/// Returns the reason of a program's failure: its last line.
 fn last_line(text: &str) -> &str {
     let mut lines = text.lines().rev().map(str::trim);
     lines.find(|line| !line.is_empty()).unwrap_or_default()
@@ -98,7 +98,7 @@ fn with(program: &Path, words: &[&str]) -> Command {
     command
 }
 
-/// The user's cargo-deny, else one of this workspace's own.
+/// Returns the user's cargo-deny, else this workspace's own.
 fn ready() -> Result<PathBuf> {
     if let Some(found) = on_path("cargo-deny") {
         return Ok(found);
@@ -120,7 +120,7 @@ fn ready() -> Result<PathBuf> {
             "--root",
         ])
         .arg(&tools);
-    // It runs for a second: compiling it fast counts for more than its speed.
+    // It runs for only a second, so the time to compile it matters more than its speed.
     for (setting, value) in [
         ("OPT_LEVEL", "0"),
         ("LTO", "off"),

@@ -1,4 +1,4 @@
-//! `cargo xtask docs`: the book beside what it is of.
+//! `cargo xtask docs`: checks the book against the code.
 
 use std::process::Command;
 
@@ -10,10 +10,10 @@ use crate::run::{OF_TESTS, cargo, on_path, root, run, say, timed};
 const TESTS: [&str; 4] = ["--test", "reference_pages", "--test", "docs"];
 
 /// Compares the generated pages with the code, or writes them; checks figures, links and tables of
-/// all pages; builds the book where mdBook is installed. Command lines are run by `cargo xtask test`.
+/// all pages; builds the book if mdBook is installed. `cargo xtask test` runs the command lines.
 ///
 /// # Errors
-/// The difference.
+/// The differences.
 pub(crate) fn docs(write: bool) -> Result<()> {
     let mut tests = cargo();
     tests

@@ -9,7 +9,7 @@ use crate::image;
 use crate::run::{on_path, run, timed};
 use crate::setup::toolchain;
 
-/// Builds, flashes and follows the log of `board` with probe-rs.
+/// Builds the image of `board`, flashes it and follows its log with probe-rs.
 pub(crate) fn flash(board: &Board) -> Result<()> {
     let chip = board
         .chip

@@ -1,5 +1,5 @@
-//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick, packed tiles, the wire, terrain files, and
-//! the other files that are read.
+//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick, packed tiles, the wire, terrain files,
+//! and the other input files.
 
 use anyhow::{Context, Result, bail};
 
@@ -9,14 +9,13 @@ use crate::run::{on_path, output, root, run, target_dir, timed};
 /// The programs in `fuzz/fuzz_targets`.
 const TARGETS: [&str; 5] = ["terrain", "text", "tick", "tile", "wire"];
 
-/// Bytes of an input at most: some hundred ticks or messages, a file with its headers.
+/// Maximum bytes of an input: some hundred ticks or messages, a file with its headers.
 const LONGEST: u32 = 4096;
-/// Seconds after which an input counts as one that hangs.
+/// Seconds after which an input counts as hanging.
 const PATIENCE_S: u32 = 20;
 
-/// Fuzzes `target` for so many minutes, from what earlier runs kept in
-/// `fuzz/corpus`. An input that breaks it ends the run and is kept in
-/// `fuzz/artifacts`.
+/// Fuzzes `target` for `minutes` minutes, from the inputs of earlier runs in `fuzz/corpus`. An
+/// input that fails ends the run and is stored in `fuzz/artifacts`.
 pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
     if !TARGETS.contains(&target) {
         bail!(

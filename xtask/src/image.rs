@@ -8,10 +8,10 @@ use crate::board::{Board, EMULATED};
 use crate::run::run;
 use crate::setup::toolchain::{TARGET, Toolchain};
 
-/// Builds the image of `board` and gives the path of its ELF.
+/// Builds the image of `board` and returns the path of its ELF.
 ///
-/// All boards share a target directory: cargo keeps the same crate with other
-/// features apart, so they do not undo each other's work.
+/// All boards share a target directory: cargo separates builds of a crate with other features, so
+/// they do not overwrite each other.
 pub(crate) fn build(toolchain: Toolchain, board: &Board) -> Result<PathBuf> {
     build_binary(toolchain, board, board.name)
 }
@@ -21,7 +21,7 @@ pub(crate) fn build_counts(toolchain: Toolchain) -> Result<PathBuf> {
     build_binary(toolchain, EMULATED, COUNTS)
 }
 
-/// The binary that counts instructions, and the variable that tells tests where it is.
+/// The binary that counts instructions, and the variable with its path for tests.
 pub(crate) const COUNTS: &str = "mps2-an386-counts";
 pub(crate) const COUNTS_VARIABLE: &str = "HAPTERRA_MPS2_COUNTS_ELF";
 
@@ -33,7 +33,7 @@ fn build_binary(toolchain: Toolchain, board: &Board, binary: &str) -> Result<Pat
     Ok(folder.join(binary))
 }
 
-/// The words that choose a binary of the firmware, built for a board.
+/// Returns the arguments that select a binary of the firmware, built for a board.
 pub(crate) fn package_words(board: &Board, binary: &str) -> [String; 6] {
     [
         "--package".into(),

@@ -9,7 +9,7 @@ use crate::image::{COUNTS, package_words};
 use crate::run::{cargo, run, say, timed};
 use crate::setup::{emulator, toolchain};
 
-/// Runs them all; the first that complains ends it.
+/// Runs all of them; the first failure ends it.
 pub(crate) fn lint() -> Result<()> {
     timed("formatting", || {
         run(cargo().args(["fmt", "--all", "--check"])).context("type: cargo fmt")
@@ -20,7 +20,7 @@ pub(crate) fn lint() -> Result<()> {
             "clippy",
             "--workspace",
             "--all-targets",
-            // What is left out of a usual build is looked at, too.
+            // Features that are off by default are also checked.
             "--features=hapterra/probe",
             "--",
             "-D",
@@ -62,7 +62,8 @@ pub(crate) fn lint() -> Result<()> {
     })
 }
 
-/// Clippy for the library for arrays and its C face, compiled to WebAssembly.
+/// Returns the command of Clippy for the library for arrays and its C interface, compiled to
+/// WebAssembly.
 fn wasm() -> Command {
     let mut command = cargo();
     command

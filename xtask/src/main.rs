@@ -1,7 +1,7 @@
 //! The project's own commands, as `cargo xtask COMMAND`.
 //!
-//! Each finds what it needs, installs it where it may, says what it is doing,
-//! and where it cannot continue says exactly what to type.
+//! Each command finds the programs that it needs, installs them if that is allowed, and reports its
+//! progress. If it cannot continue, it prints the exact command to type.
 
 mod board;
 mod campaign;
@@ -91,7 +91,7 @@ fn main() -> ExitCode {
     match command() {
         Ok(code) => code,
         Err(why) => {
-            // Not anyhow's own listing, which may append a back-trace of xtask.
+            // Not anyhow's own list, which may include a backtrace of xtask.
             let causes: Vec<_> = why.chain().map(ToString::to_string).collect();
             eprintln!("xtask: error: {}", causes.join("\n       caused by: "));
             ExitCode::FAILURE
@@ -193,7 +193,7 @@ fn setup() -> Result<()> {
     Ok(())
 }
 
-/// `[BOARD]`: one board, or all.
+/// Parses `[BOARD]`: one board, or all.
 fn boards(words: &mut lexopt::Parser) -> Result<&'static [board::Board]> {
     match words.next()? {
         None => Ok(&board::BOARDS),
@@ -202,7 +202,7 @@ fn boards(words: &mut lexopt::Parser) -> Result<&'static [board::Board]> {
     }
 }
 
-/// The one of these flags that is given.
+/// Returns the given one of these flags.
 fn flag(words: &mut lexopt::Parser, names: &[&'static str]) -> Result<Option<&'static str>> {
     let mut given = None;
     while let Some(word) = words.next()? {
@@ -215,7 +215,7 @@ fn flag(words: &mut lexopt::Parser, names: &[&'static str]) -> Result<Option<&'s
     Ok(given)
 }
 
-/// `[--quick] [-- ARGS]`: what follows `--` is not looked at here.
+/// Parses `[--quick] [-- ARGS]`: arguments after `--` are passed on unchanged.
 fn test_words(words: &mut lexopt::Parser) -> Result<test::Request> {
     let mut request = test::Request::default();
     loop {
@@ -235,7 +235,8 @@ fn test_words(words: &mut lexopt::Parser) -> Result<test::Request> {
     }
 }
 
-/// `[--view|--touch [--out FOLDER]] [FILE] [-- ARGS]`: what follows `--` is not looked at here.
+/// Parses `[--view|--touch [--out FOLDER]] [FILE] [-- ARGS]`: arguments after `--` are passed on
+/// unchanged.
 fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
     let mut request = demo::Request::default();
     loop {
@@ -268,7 +269,7 @@ fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
     }
 }
 
-/// The exit code of a program, as far as this one can hand it on.
+/// Returns the exit code of a program, as far as this one can return it.
 fn exit_code(code: i32) -> ExitCode {
     u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from)
 }

@@ -1,12 +1,12 @@
-//! `cargo xtask miri`: core's tests under Miri, where it can run.
+//! `cargo xtask miri`: core's tests under Miri, if it is available.
 
 use anyhow::Result;
 
 use crate::nightly;
 use crate::run::{root, run, say, target_dir, timed};
 
-/// Parts of the names of tests that follow an arm for seconds to hours, tick by
-/// tick. The surveys among the others do less under Miri (core's `cases`).
+/// Parts of the names of tests that simulate an arm for seconds to hours, tick by tick. The other
+/// tests use fewer cases under Miri (core's `cases`).
 const LONG: [&str; 6] = [
     "guard::tests",
     "guard::thermal",
@@ -16,7 +16,7 @@ const LONG: [&str; 6] = [
     "tick::tests",
 ];
 
-/// Runs them; says visibly when Miri is not here and cannot be had.
+/// Runs the tests; reports if Miri is not installed and cannot be installed.
 pub(crate) fn miri() -> Result<()> {
     if let Err(why) = nightly::ready(&["miri", "--version"], "miri,rust-src") {
         say(format!("skipped: no Miri: {why:#}"));
@@ -26,7 +26,7 @@ pub(crate) fn miri() -> Result<()> {
         run(
             nightly::cargo(&["miri", "test", "--package", "hapterra-core"])
                 .current_dir(root())
-                // Its square root is inline assembly on x86, which Miri does not know.
+                // On x86 its square root is inline assembly, which Miri does not support.
                 .args(["--features", "libm/force-soft-floats", "--lib", "--"])
                 .args(LONG.iter().flat_map(|name| ["--skip", name]))
                 .env("CARGO_TARGET_DIR", target_dir().join("miri")),

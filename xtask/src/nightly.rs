@@ -1,4 +1,4 @@
-//! The nightly compiler, for what only it can do: sanitizers and Miri.
+//! The nightly compiler, for sanitizers and Miri.
 
 use std::process::Command;
 
@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 
 use crate::run::{output, say, shown};
 
-/// The nightly compiler's cargo, whichever runs this program.
+/// Returns the nightly compiler's cargo, independent of the toolchain that runs this program.
 pub(crate) fn cargo(words: &[&str]) -> Command {
     let mut command = Command::new("cargo");
     command
@@ -17,8 +17,8 @@ pub(crate) fn cargo(words: &[&str]) -> Command {
     command
 }
 
-/// Sees to it that this cargo answers to `words`, by rustup if need be, with these
-/// components (a list with commas).
+/// Ensures that this cargo accepts `words`, by rustup if needed, with these components (separated
+/// by commas).
 pub(crate) fn ready(words: &[&str], components: &str) -> Result<()> {
     let is_here = || output(&mut cargo(words)).is_some();
     if is_here() {

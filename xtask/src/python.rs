@@ -12,21 +12,21 @@ use crate::run::{
 };
 use crate::{demo, deny};
 
-/// Options for the published wheel and the tested one: most crates of the registry are those of the
-/// workspace's tests, since versions, features and profile are the same.
+/// Options for the published wheel and the tested one. With the same versions, features and
+/// profile, most crates of the registry are already built for the workspace's tests.
 const RELEASE: &[&str] = &["--release"];
 const TESTED: &[&str] = &["--profile", "dev", "--features", "remote"];
-/// Names the interpreter to use.
+/// Variable with the interpreter to use.
 const PYTHON: &str = "HAPTERRA_PYTHON";
 /// Prints the version of an interpreter that is new enough, and fails on others.
 const VERSION: &str =
     "import sys; v = sys.version_info; print('%d.%d' % v[:2]); sys.exit(v < (3, 9))";
 
-/// Builds the wheel, and gives the interpreter of its environment and its path; none, and a line,
-/// where there is no Python.
+/// Builds the wheel, and returns the interpreter of its environment and the wheel's path; `None`,
+/// with a message, without Python.
 ///
 /// # Errors
-/// A failure of the environment, which takes a network the first time, or of the build.
+/// A failure of the environment, which needs a network the first time, or of the build.
 pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
     build_by(RELEASE)
 }
@@ -42,11 +42,11 @@ fn build_by(how: &[&str]) -> Result<Option<(PathBuf, PathBuf)>> {
     Ok(Some((python, wheel)))
 }
 
-/// Lints the package's crate, holds its dependencies to `deny.toml`, installs the wheel, and runs
-/// its tests. Without Python it ends well after one line.
+/// Lints the package's crate, checks its dependencies against `deny.toml`, installs the wheel, and
+/// runs its tests. Without Python it succeeds after one message.
 ///
 /// # Errors
-/// As [`build`], and what the tests say.
+/// As [`build`], and failures of the tests.
 pub(crate) fn test() -> Result<()> {
     let Some((python, wheel)) = build_by(TESTED)? else {
         return Ok(());
@@ -54,7 +54,7 @@ pub(crate) fn test() -> Result<()> {
     timed("linting the Python package's crate", lint)?;
     deny::check("python/Cargo.toml")?.say();
     install(&python, &[&format!("{}[test]", wheel.display())])?;
-    // The version stays the same while one works on it.
+    // The version does not change during development.
     let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
     install(&python, &again)?;
     let [_, lab] = tested_programs()?;
@@ -76,7 +76,7 @@ pub(crate) fn test() -> Result<()> {
 /// An interpreter that is new enough.
 struct Python {
     program: PathBuf,
-    /// As 3.11.
+    /// Version, such as 3.11.
     version: String,
 }
 
@@ -92,7 +92,7 @@ impl Python {
     }
 }
 
-/// The interpreter that is asked for, or the first that is new enough.
+/// Returns the requested interpreter, or the first that is new enough.
 fn interpreter() -> Result<Option<Python>> {
     if let Some(given) = std::env::var_os(PYTHON) {
         let given = PathBuf::from(given);
@@ -108,8 +108,8 @@ fn interpreter() -> Result<Option<Python>> {
     Ok(names.iter().find_map(|name| Python::of(Path::new(name))))
 }
 
-/// The package's own environment for a version of Python, made where it is not there or its
-/// interpreter has gone. Gives its interpreter.
+/// Returns the interpreter of the package's own environment for a version of Python. Creates the
+/// environment if it or its interpreter is missing.
 fn environment(python: &Python) -> Result<PathBuf> {
     let home = target_dir().join(format!("python-env-{}", python.version));
     let own = match cfg!(windows) {
@@ -133,7 +133,7 @@ fn install(python: &Path, words: &[&str]) -> Result<()> {
         .context("pip cannot install what the Python package needs: is there a network?")
 }
 
-/// The wheel, alone in its folder.
+/// Returns the wheel, the only file in its folder.
 fn wheel(python: &Path, how: &[&str]) -> Result<PathBuf> {
     let wheels = target_dir().join("wheels");
     if wheels.exists() {
@@ -156,7 +156,7 @@ fn wheel(python: &Path, how: &[&str]) -> Result<PathBuf> {
     Ok(wheel.path())
 }
 
-/// Formatting and clippy of the crate.
+/// Checks formatting of the crate and runs clippy.
 fn lint() -> Result<()> {
     let cargo = |words: &[&str]| {
         let mut command = cargo();
@@ -183,7 +183,7 @@ fn lint() -> Result<()> {
 mod tests {
     use super::*;
 
-    /// Names and versions of a lock file's packages.
+    /// Returns names and versions of a lock file's packages.
     fn locked(path: &str) -> Vec<(String, String)> {
         let text = std::fs::read_to_string(root().join(path)).expect("a lock file");
         let packages = text.split("[[package]]").skip(1);

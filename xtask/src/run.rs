@@ -1,4 +1,4 @@
-//! Running other programs, and saying so.
+//! Running other programs, with messages.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -7,19 +7,19 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-/// One line on what is being done, on stderr so that results stay alone on stdout.
+/// Prints one line of progress to stderr, so that stdout has only results.
 pub(crate) fn say(line: impl AsRef<str>) {
     eprintln!("xtask: {}", line.as_ref());
 }
 
-/// Root of the workspace.
+/// Returns the root of the workspace.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .expect("xtask/ lies in the workspace")
 }
 
-/// Returns the place where cargo puts what it builds for the host.
+/// Returns the place of cargo's build results for the host.
 pub(crate) fn target_dir() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(dir) => std::path::absolute(&dir).unwrap_or_else(|_| dir.into()),
@@ -27,12 +27,12 @@ pub(crate) fn target_dir() -> PathBuf {
     }
 }
 
-/// Variables that cargo sets for a program that it runs, one a line. Build scripts of packages that
-/// read them would run again, and what depends on them would be built again, with each program that
-/// calls cargo.
+/// Variables that cargo sets for a program that it runs, one a line. They differ for each program
+/// that calls cargo. So the build scripts that read them would run again, and their dependents
+/// would be rebuilt.
 const OF_CARGO: &str = include_str!("../../tests/src/cargo_variables.txt");
 
-/// The cargo that runs this program, in the workspace root, building for the host.
+/// Returns the cargo that runs this program, in the workspace root, for a build for the host.
 pub(crate) fn cargo() -> Command {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
@@ -44,16 +44,16 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
-/// Takes away the variables that cargo sets for this program: a build script that reads them would
-/// run again.
+/// Removes the variables that cargo sets for this program: a build script that reads them would run
+/// again.
 pub(crate) fn without_own_variables(command: &mut Command) {
     for variable in OF_CARGO.lines() {
         command.env_remove(variable);
     }
 }
 
-/// The packages and features of all tests: with others cargo would build dependencies anew.
-/// The image tests need probe-rs anyway, and the command is tested with it, too.
+/// The packages and features of all tests: with others, cargo would rebuild dependencies. The image
+/// tests need probe-rs anyway, and the command is also tested with it.
 pub(crate) const OF_TESTS: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
 
 /// Builds `hapterra` for a user, and returns its path.
@@ -80,7 +80,7 @@ pub(crate) fn tested_programs() -> Result<[PathBuf; 2]> {
     let mut build = cargo();
     build.arg("build").args(OF_TESTS);
     build.args(names.map(|name| ["--bin", name]).as_flattened());
-    // With a test among the targets cargo gives dependencies the features that tests need.
+    // If the targets include a test, cargo uses the dependencies' features for tests.
     build.args(["--test", "page"]);
     timed("building the tested programs", || run(&mut build))?;
     Ok(names.map(|name| built("debug", name)))
@@ -92,7 +92,7 @@ pub(crate) fn built(profile: &str, name: &str) -> PathBuf {
     target_dir().join(profile).join(program)
 }
 
-/// Runs `command` to its end; an unhappy end is an error naming the command.
+/// Runs `command` to its end; a failure is an error with the command's name.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let line = shown(command);
     let status = command
@@ -104,7 +104,7 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Like [`run`] for a talkative program: what it says is seen only if it fails.
+/// Runs a verbose program like [`run`], and shows its output only if it fails.
 pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
     let line = shown(command);
     let done = command
@@ -119,7 +119,7 @@ pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs `command` and gives its standard output; none if it cannot be started or fails.
+/// Runs `command` and returns its standard output; `None` if it cannot be started or fails.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let output = command
         .stdin(Stdio::null())
@@ -130,7 +130,7 @@ pub(crate) fn output(command: &mut Command) -> Option<String> {
     output.status.success().then_some(text)
 }
 
-/// Returns the place where `program` is on the PATH.
+/// Returns the path of `program` on the PATH.
 pub(crate) fn on_path(program: &str) -> Option<PathBuf> {
     let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
     let path = std::env::var_os("PATH")?;
@@ -139,7 +139,7 @@ pub(crate) fn on_path(program: &str) -> Option<PathBuf> {
         .find(|file| file.is_file())
 }
 
-/// Does `step`, and says what it is and how long it took.
+/// Runs `step`, and prints its name and duration.
 pub(crate) fn timed<T>(name: &str, step: impl FnOnce() -> Result<T>) -> Result<T> {
     say(name);
     let start = Instant::now();
@@ -151,7 +151,7 @@ pub(crate) fn timed<T>(name: &str, step: impl FnOnce() -> Result<T>) -> Result<T
     Ok(done)
 }
 
-/// A command line as one would type it.
+/// Returns a command line as a user would type it.
 pub(crate) fn shown(command: &Command) -> String {
     let name = Path::new(command.get_program()).file_stem();
     let words = name.into_iter().chain(command.get_args());

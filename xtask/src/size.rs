@@ -1,4 +1,4 @@
-//! Flash and RAM of an image, read from its ELF and held to the budgets.
+//! Flash and RAM of an image, read from its ELF and compared with the budgets.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub(crate) struct Use {
     bytes: u64,
 }
 
-/// Reads the ELF of every board, prints the table, and fails if one is over.
+/// Reads the ELF of every board, prints the table, and fails if one is over its budget.
 pub(crate) fn check<'a>(images: impl Iterator<Item = (&'a Board, &'a Path)>) -> Result<()> {
     let mut over = vec![];
     println!(
@@ -74,9 +74,9 @@ fn measure(elf: &[u8], board: &Board) -> Result<Vec<Use>> {
             continue;
         }
         let (runs, loaded, in_file, in_memory) = addresses(segment);
-        // What has a value at the start is stored where it is loaded from...
+        // Initialised data is stored at its load address...
         add(loaded, in_file)?;
-        // ... and takes its room where it runs, if that is elsewhere.
+        // ... and also needs room at its run address, if that differs.
         let runs_in_place = runs == loaded;
         add(
             runs,
@@ -90,7 +90,7 @@ fn measure(elf: &[u8], board: &Board) -> Result<Vec<Use>> {
     Ok(uses)
 }
 
-/// Run address, load address, bytes in the file, bytes in memory.
+/// Returns run address, load address, bytes in the file, bytes in memory.
 fn addresses(segment: &ProgramHeader32<LittleEndian>) -> (u64, u64, u64, u64) {
     let (runs, loaded) = (segment.p_vaddr(LittleEndian), segment.p_paddr(LittleEndian));
     let (in_file, in_memory) = (
@@ -105,8 +105,8 @@ mod tests {
     use super::*;
     use crate::board::BOARDS;
 
-    /// A 32-bit ARM ELF of nothing but loaded segments: run address, load
-    /// address, bytes in the file, bytes in memory.
+    /// Returns a 32-bit ARM ELF with only loaded segments: run address, load address, bytes in the
+    /// file, bytes in memory.
     fn elf(segments: &[[u32; 4]]) -> Vec<u8> {
         const HEADER: u16 = 52;
         const PROGRAM_HEADER: u16 = 32;

@@ -1,4 +1,4 @@
-//! `cargo xtask soak`: random scenes on all cores, judged tick by tick.
+//! `cargo xtask soak`: the randomised stress test on all cores, checked tick by tick.
 
 use std::ffi::OsString;
 
@@ -6,8 +6,8 @@ use anyhow::{Result, bail};
 
 use crate::run::{cargo, run, shown, target_dir, timed};
 
-/// Builds the soak in its own profile, fast and without the product's slow
-/// linking, and hands `words` on to it.
+/// Builds the stress test in its own profile, fast and without the product's slow linking, and
+/// passes `words` to it.
 pub(crate) fn soak(words: Vec<OsString>) -> Result<()> {
     if words.is_empty() {
         bail!("say for how long: cargo xtask soak MINUTES [--seed N], or --seed N --scene K");

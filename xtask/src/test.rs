@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that must hold, from set-up to verdict.
+//! `cargo xtask test`: all tests, from set-up to result.
 
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader};
@@ -16,7 +16,7 @@ use crate::{counts, deny, image, page, panics, python, size};
 /// A board and the ELF of its image.
 pub(crate) type Image = (&'static Board, PathBuf);
 
-/// `quick` has no images of the real boards, and builds neither what runs them nor servers.
+/// Excluded by `quick`: images of the real boards, and programs that run them or are servers.
 const QUICK: [&str; 5] = [
     "--workspace",
     "--exclude",
@@ -28,20 +28,20 @@ const QUICK: [&str; 5] = [
 /// Request of a test run.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Request {
-    /// Neither the boards that are not emulated nor the dependencies, the page and the Python
-    /// package.
+    /// True to leave out the boards that are not emulated, the dependencies, the page and the
+    /// Python package.
     pub(crate) quick: bool,
-    /// Arguments of `cargo test`, which select programs and tests; all where there are none.
+    /// Arguments of `cargo test`, which select programs and tests; empty for all.
     pub(crate) only: Vec<OsString>,
 }
 
-/// Builds the images, holds them to their budgets, runs every test of the workspace on the host
-/// with QEMU beside it, checks the dependencies, and tests the page and the Python package. Runs each
-/// step and each program to its end.
-/// With [`Request::only`] runs these programs alone.
+/// Builds the images, compares them with their budgets, runs every test of the workspace on the
+/// host with QEMU beside it, checks the dependencies, and tests the page and the Python package.
+/// Runs each step and each program to its end. With [`Request::only`] runs only the selected
+/// programs.
 ///
 /// # Errors
-/// All that failed, with the commands that repeat it.
+/// All failures, with the commands that repeat them.
 pub(crate) fn test(request: &Request) -> Result<()> {
     let qemu = qemu::ready()?;
     gdal::ready_or_say_why();
@@ -88,7 +88,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     })?;
     failures.extend(failed.iter().map(|target| repeat(target, request.quick)));
     if request.only.is_empty() && !request.quick {
-        // The other ways in: each says what it skips where there is no browser or no Python.
+        // The other interfaces: each prints its skipped tests if there is no browser or no Python.
         for (repeat, test) in [
             ("cargo xtask page --test", page::test as fn() -> Result<()>),
             ("cargo xtask python --test", python::test),
@@ -110,15 +110,15 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     )
 }
 
-/// Checks the dependencies of the workspaces that are tested here. Returns what was not checked,
-/// for the end.
+/// Checks the dependencies of the workspaces that are tested here. Returns the parts that were not
+/// checked, for the summary.
 fn dependencies() -> Result<Option<String>> {
     let _of_all = deny::check("Cargo.toml")?;
     deny::check("fuzz/Cargo.toml").map(Advisories::not_checked)
 }
 
-/// The targets of the workspace in two halves, which run side by side: many a test waits for a
-/// program in real time, or is the last of its program, and leaves a core idle.
+/// The targets of the workspace in two halves, which run concurrently: many tests wait for a
+/// program in real time, or are the last of their program, and leave a core idle.
 const HALVES: [&[&str]; 2] = [
     &["--lib", "--bins", "--test", "[a-f]*"],
     &["--test", "[g-z]*"],
@@ -146,7 +146,8 @@ fn failed_of_all(tests: &(dyn Fn() -> Command + Sync)) -> Result<Vec<String>> {
     Ok(failed)
 }
 
-/// Like [`failed_targets`]; prints the lines of each program together, when it has ended.
+/// Returns the same as [`failed_targets`]; prints the lines of each program together, when it has
+/// ended.
 fn by_program(command: Command) -> Result<Vec<String>> {
     let mut lines = String::new();
     let failed = failed_targets(command, |line| {
@@ -160,14 +161,14 @@ fn by_program(command: Command) -> Result<Vec<String>> {
     failed
 }
 
-/// Runs `cargo test`, and shows each line of its output. Returns the targets that failed, as cargo
-/// selects them: `-p PACKAGE --lib`.
+/// Runs `cargo test`, and shows each line of its output. Returns the targets that failed, as
+/// cargo's arguments: `-p PACKAGE --lib`.
 fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
     let line = shown(&command);
     let (from, to) = io::pipe()?;
     command.stdout(to.try_clone()?).stderr(to);
     let child = command.spawn();
-    // The pipe ends with the programs that write into it.
+    // The pipe ends when all programs that write to it have ended.
     drop(command);
     let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
     let mut failed = vec![];
@@ -184,19 +185,19 @@ fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Ve
     Ok(failed)
 }
 
-/// Returns true if cargo says in this line that it runs the next program.
+/// Returns true if this line of cargo's output begins the next program.
 fn begins_program(line: &str) -> bool {
     let line = line.trim_start();
     line.starts_with("Running ") || line.starts_with("Doc-tests ")
 }
 
-/// The target in a line of the list with which `cargo test --no-fail-fast` ends.
+/// Returns the target in a line of the list at the end of `cargo test --no-fail-fast`.
 fn listed_target(line: &str) -> Option<&str> {
     line.strip_prefix("    `")?.strip_suffix('`')
 }
 
-/// The command that runs a target's programs again. Packages are not named: what cargo builds
-/// depends on which are selected, and all have to be to build the same programs.
+/// Returns the command that runs a target's programs again. It names no packages, because the
+/// selected packages determine the build, and only all of them select the same programs.
 fn repeat(target: &str, quick: bool) -> String {
     let of_package = target.strip_prefix("-p ");
     let kind = of_package.and_then(|target| target.split_once(' '));
@@ -216,12 +217,12 @@ pub(crate) fn images(boards: &'static [Board]) -> Result<Vec<Image>> {
     boards.iter().map(build).collect()
 }
 
-/// Prints the table of sizes; an error if an image is over its budget.
+/// Prints the table of sizes; returns an error if an image is over its budget.
 pub(crate) fn check_sizes(images: &[Image]) -> Result<()> {
     size::check(images.iter().map(by_path))
 }
 
-/// An error if an interrupt can panic in one of the images.
+/// Returns an error if an interrupt can panic in one of the images.
 pub(crate) fn check_panics(images: &[Image]) -> Result<()> {
     images
         .iter()

@@ -11,9 +11,9 @@ use crate::deny;
 use crate::run::{built, cargo, on_path, root, run, say, tested_programs, timed};
 use crate::setup::packages::{self, found_or_installed};
 
-/// Names the browser that the page is tested with.
+/// Variable with the browser for the page's tests.
 pub(crate) const BROWSER: &str = "HAPTERRA_BROWSER";
-/// Names of browsers that can be driven.
+/// Names of browsers that can be controlled.
 const BROWSERS: [&str; 5] = [
     "chromium-headless-shell",
     "chromium",
@@ -22,14 +22,14 @@ const BROWSERS: [&str; 5] = [
     "google-chrome-stable",
 ];
 
-/// Cargo in the viewer's workspace. What it builds lies beside `hapterra`.
+/// Returns cargo in the viewer's workspace. Its build results are beside `hapterra`.
 fn viewers(words: &[&str]) -> Command {
     let mut command = cargo();
     command.current_dir(root().join("view")).args(words);
     command
 }
 
-/// Builds the viewer and gives its path. The first time it takes many minutes.
+/// Builds the viewer and returns its path. The first build takes many minutes.
 pub(crate) fn build() -> Result<PathBuf> {
     timed(
         "building the viewer (some ten minutes the first time)",
@@ -38,9 +38,9 @@ pub(crate) fn build() -> Result<PathBuf> {
     Ok(built("release", "hapterra-view"))
 }
 
-/// Lints the viewer, holds its dependencies to `deny.toml`, and runs its tests with
-/// `hapterra` beside them; the page's in a browser where there is one or one can be installed.
-/// All of it is here, so that it is built only for those who use it.
+/// Lints the viewer, checks its dependencies against `deny.toml`, and runs its tests with
+/// `hapterra` beside them; the page's in a browser if there is one or one can be installed. They
+/// are separate from the other tests, so that only users of the viewer build it.
 pub(crate) fn test() -> Result<()> {
     timed("linting the viewer", lint)?;
     timed("checking the viewer's dependencies", || {
@@ -73,7 +73,7 @@ pub(crate) fn pictures() -> Result<()> {
     timed("taking pictures of the live view", || run(&mut tests))
 }
 
-/// The viewer's tests, with `hapterra` and `hapterra-lab` beside them.
+/// Returns the viewer's tests, with `hapterra` and `hapterra-lab` beside them.
 fn tests() -> Result<Command> {
     let mut tests = viewers(&["test", "--release", "--locked"]);
     let [hapterra, lab] = tested_programs()?;
@@ -81,7 +81,7 @@ fn tests() -> Result<Command> {
     Ok(tests)
 }
 
-/// A browser that can be driven; installed where there is none.
+/// Returns a browser that can be controlled; installs one if there is none.
 pub(crate) fn browser() -> Result<PathBuf> {
     if let Some(given) = std::env::var_os(BROWSER) {
         return Ok(given.into());
@@ -93,9 +93,9 @@ pub(crate) fn browser() -> Result<PathBuf> {
     found_or_installed(find, &packages::BROWSER)
 }
 
-/// Formatting and clippy of the viewer. Clippy compiles the viewer's own crate in place of the
-/// compiler: the crates below it are compiled once, for this and for the tests, and not checked for
-/// clippy alone, which takes three minutes.
+/// Checks formatting of the viewer and runs clippy. Clippy compiles only the viewer's own crate in
+/// place of the compiler. The crates below it are compiled once, for this and for the tests; a
+/// check of them for clippy would take three minutes.
 fn lint() -> Result<()> {
     run(&mut viewers(&["fmt", "--check"])).context("type: cd view && cargo fmt")?;
     let mut clippy = viewers(&["test", "--release", "--locked", "--no-run"]);

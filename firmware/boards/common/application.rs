@@ -1,5 +1,5 @@
-//! The application of an image: its memory, and the way of the haptic loop into its
-//! interrupt. What differs between boards is in `chip.rs`.
+//! The application of an image: its memory, and the transfer of the haptic loop to its interrupt.
+//! The differences between boards are in `chip.rs`.
 
 use core::cell::Cell;
 
@@ -20,17 +20,17 @@ pub(crate) type Loop = HapticLoop<'static, Encoders, Amplifiers, Clock, WINDOW>;
 
 static TILES: ConstStaticCell<TileBuffers<WINDOW>> = ConstStaticCell::new(TileBuffers::VACANT);
 static MEMORY: ConstStaticCell<WorkingMemory<'static>> = ConstStaticCell::new(WorkingMemory::new());
-/// Memory of the loop. Not in the interrupt's own variable: what has a value from the
-/// start takes flash, too.
+/// Memory of the loop. It is not the interrupt's own variable, because a variable with an initial
+/// value also takes flash.
 static LOOP: StaticCell<Loop> = StaticCell::new();
-/// Memory of the link. In its task, it would be moved over the stack twice.
+/// Memory of the link. In its task, the link would be copied over the stack twice.
 static LINK: StaticCell<Link<'static, WINDOW>> = StaticCell::new();
-/// Carries the loop to its interrupt: filled once, before that is enabled.
+/// Transfers the loop to its interrupt. Filled once, before the interrupt is enabled.
 static HANDOVER: Mutex<Cell<Option<&'static mut Loop>>> = Mutex::new(Cell::new(None));
-/// Raised, by an interrupt below the haptic one, when a tick has ended.
+/// Raised at the end of each tick by an interrupt of lower priority than the haptic one.
 pub(crate) static TICK_DONE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Assembles the application and leaves its loop for the haptic interrupt.
+/// Assembles the application and leaves its loop for the haptic interrupt to fetch.
 pub(crate) fn assemble(
     hardware: Hardware<Encoders, Amplifiers, Clock>,
     board: &str,
@@ -45,9 +45,9 @@ pub(crate) fn assemble(
     (LINK.init(link), monitor)
 }
 
-/// Runs a tick in the haptic interrupt, whose own variable `slot` is. Returns the loop and
-/// what the amplifiers were left with, but nothing the first time: start-up raises the
-/// interrupt once, before there is a tick to be late for, to fetch the loop.
+/// Runs a tick in the haptic interrupt, which owns `slot`. Returns the loop and the outputs of the
+/// tick, but `None` in the first call: start-up raises the interrupt once, before a tick can be
+/// late, to fetch the loop.
 pub(crate) fn tick<'s>(
     slot: &'s mut Option<&'static mut Loop>,
 ) -> Option<(&'s mut Loop, GuardOutputs)> {

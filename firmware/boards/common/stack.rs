@@ -1,7 +1,7 @@
-//! Largest use of the stack.
+//! Maximum use of the stack.
 //!
-//! cortex-m-rt paints it before `main` (feature `paint-stack`); what still
-//! bears the paint was never used.
+//! cortex-m-rt paints the stack before `main` (feature `paint-stack`). Words that are still painted
+//! were never used.
 
 use core::ptr;
 
@@ -12,14 +12,13 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Returns the size of the stack and its high-water mark, in bytes. Reads the unused
-/// part once, at most all of it.
+/// Returns the size of the stack and its high-water mark, in bytes. Reads the unused part once.
 pub(crate) fn figures() -> (u32, u32) {
     let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
     let mut unused = bottom;
-    // SAFETY: the linker's addresses are those of the stack: whole words in RAM. The
-    // part that is read is below the stack pointer, so only an interrupt may write it
-    // meanwhile, which makes it count as used.
+    // SAFETY: the linker's addresses are those of the stack: whole words in RAM. The part that is
+    // read is below the stack pointer, so only an interrupt can write it meanwhile, and its words
+    // then count as used.
     while unused < top && unsafe { ptr::read_volatile(unused) } == STACK_PAINT_VALUE {
         unused = unused.wrapping_add(1);
     }

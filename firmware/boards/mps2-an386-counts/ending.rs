@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Ends the program and tells why.
+/// Ends the program and reports why.
 pub(crate) fn failed(why: fmt::Arguments<'_>) -> ! {
     semihosting::eprintln!("{why}");
     semihosting::process::exit(1)

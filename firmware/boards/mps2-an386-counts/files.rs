@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use crate::RECORD;
 
-/// Bytes asked of the host at once.
+/// Bytes of one read request to the host.
 const CHUNK: usize = 4096;
 
 /// A file of frames.
@@ -34,10 +34,10 @@ impl Frames {
         }
     }
 
-    /// The next message; `None` at the end of the file.
+    /// Returns the next message; `None` at the end of the file.
     pub(crate) fn next<'a, T: Deserialize<'a>>(&'a mut self) -> Option<T> {
-        // The frame is found by its length first: what `push` gives back cannot
-        // be kept while the loop continues.
+        // The frame is found by its length first: the value that `push` returns cannot be kept
+        // while the loop continues.
         loop {
             if self.from == self.to {
                 self.to = self.file.read(&mut self.chunk).expect("readable");

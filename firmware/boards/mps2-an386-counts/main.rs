@@ -1,8 +1,8 @@
 //! Counts the instructions of single ticks on the emulated Cortex-M4F.
 //!
-//! Not a product, and the only image that needs the host's files; `hapterra` never
-//! starts it. It calls the same core, compiled in the same way, in a loop over
-//! scenes that the host wrote, between two looks at a timer.
+//! Not a product, and the only image that needs the host's files; `hapterra` never starts it. It
+//! calls the same core, compiled in the same way, in a loop over scenes that the host wrote,
+//! between two readings of a timer.
 //!
 //! ```text
 //! qemu-system-arm -M mps2-an386 -nographic -monitor none \
@@ -14,18 +14,17 @@
 //! 40 ns: 25.6 counts for each instruction, so every count of instructions is
 //! exact.
 //!
-//! In its working folder it finds, through semihosting:
-//! - `replay.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and
-//!   points in the order they come. Fed by points, each point is one
-//!   [`Contact::step`] in real time, and another scene may follow. Fed by points on materials, each
-//!   point is one [`Haptics::tick`], and one that is not answered comes again.
-//! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one
-//!   [`Haptics::tick`], count to current, once the arm was armed where the
-//!   first of them is. In `replay.frames` of such a scene a point is a mark: the tiles behind it come
-//!   before the tick that has its number.
+//! It reads from its working folder, through semihosting:
+//! - `replay.frames`: [`ToDevice`] frames as on the link: a scene, then tiles and points in their
+//!   order. In a scene fed by points, each point is one [`Contact::step`] in real time, and another
+//!   scene may follow. With materials, each point is one [`Haptics::tick`], and a point without an
+//!   answer is repeated.
+//! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one [`Haptics::tick`],
+//!   from count to current, after the arm was armed at the first of them. In `replay.frames` of
+//!   such a scene a point is a mark: the tiles after it are stored before the tick with its number.
 //!
-//! and leaves `ticks.bin`: [`RECORD`] little-endian words a tick; of a scene fed by points
-//! `tiles.bin`, too: as many for each tile, which count filling a buffer with it.
+//! and writes `ticks.bin`: [`RECORD`] little-endian words a tick. For a scene fed by points it also
+//! writes `tiles.bin`: as many words for each tile, which count the filling of a buffer.
 #![no_std]
 #![no_main]
 
@@ -62,13 +61,13 @@ use stopwatch::Stopwatch;
 
 /// Tiles along the side of the window, as in the product's image.
 const WINDOW: usize = 16;
-/// Words of a record: timer counts, state, whether settled, work, three of the
-/// stretch or force, three of the proxy's cell, three of its fraction.
+/// Words of a record: timer counts, state, a flag for settled, work, three of the displacement or
+/// force, three of the proxy's cell, three of its fraction.
 pub(crate) const RECORD: usize = 13;
 
 static TILES: ConstStaticCell<[[Tile; WINDOW]; WINDOW]> =
     ConstStaticCell::new([const { [const { Tile::VACANT }; WINDOW] }; WINDOW]);
-/// A fallback keeps two.
+/// A fallback uses two of them.
 static SPARES: ConstStaticCell<[Tile; 3]> = ConstStaticCell::new([const { Tile::VACANT }; 3]);
 static SPARE: ConstStaticCell<Tile> = ConstStaticCell::new(Tile::VACANT);
 
@@ -89,7 +88,7 @@ fn main() -> ! {
     semihosting::process::exit(0)
 }
 
-/// The contact alone, scene after scene: each point is one step.
+/// Runs the contact alone, scene after scene: each point is one step.
 fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
     let mut window = Window::new(TILES.take().each_mut().map(|row| row.each_mut()));
     window.reset(scene.level, scene.size, scene.top);
@@ -115,7 +114,7 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
             }
             ToDevice::Hip(point) => {
                 let hip = black_box(point.hip);
-                // Where they lie is not worked out while the instructions are counted.
+                // Their addresses are computed before the instructions are counted.
                 let (window, contact) = (black_box(&window), black_box(&mut contact));
                 let (cost, output) = stopwatch.counted(|| step(window, contact, hip));
                 records.add(
@@ -134,7 +133,8 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
     }
 }
 
-/// Points on materials, scene after scene: each of them is one tick of the whole loop, in lock-step.
+/// Runs points on materials, scene after scene: each point is one tick of the whole loop, in
+/// lock-step.
 fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
@@ -167,7 +167,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
     }
 }
 
-/// Takes a scene with its table; gives how many materials that has.
+/// Begins a scene with its table and returns the number of its materials.
 fn take_scene(
     haptics: &mut Haptics<'static, WINDOW>,
     scene: &Scene,
@@ -178,25 +178,25 @@ fn take_scene(
     table.materials().len()
 }
 
-/// Fills a buffer with a tile and its materials, of a table of so many.
+/// Fills a buffer with a tile and its materials, from a table of `count`.
 fn fill_material_tile(buffer: &mut Tile, message: &MaterialTile<'_>, count: usize) {
     fill_tile(buffer, &message.tile).expect("the host made it well");
     let filled = message.materials.fill(buffer, count);
     filled.expect("the host made it well");
 }
 
-/// A contact without a step yet.
+/// Creates a contact before its first step.
 fn contact_of(scene: &Scene) -> Contact {
     let settings = ContactSettings {
-        // What a tick has at 10 kHz: there the instructions count.
+        // The work of a tick at 10 kHz, where the instructions matter.
         work_per_tick: work_per_tick(TickRate::new(10_000).unwrap_or_default()),
         ..ContactSettings::AT_1_KHZ
     };
     Contact::new(settings.with_friction(scene.params.friction))
 }
 
-/// A step of the contact in real time. A function of its own, so that its caller is
-/// compiled the same whatever the step is.
+/// Runs a step of the contact in real time. A separate function, so that its caller is compiled the
+/// same for every step.
 #[inline(never)]
 fn step<'c>(
     window: &Window<'_, WINDOW>,
@@ -206,7 +206,7 @@ fn step<'c>(
     contact.step(window, &hip)
 }
 
-/// The whole tick, from encoder counts to motor currents.
+/// Runs the whole tick, from encoder counts to motor currents.
 fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
@@ -251,8 +251,8 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
     }
 }
 
-/// Hands over the tiles up to the next point. Gives the number of the tick before which those after
-/// it come.
+/// Stores the tiles up to the next point. Returns the number of the tick before which the tiles
+/// after that point are stored.
 fn take_tiles(
     haptics: &mut Haptics<'static, WINDOW>,
     spares: &mut [Option<&'static mut Tile>],
@@ -277,7 +277,7 @@ fn take_tiles(
     None
 }
 
-/// Arms as a user does, force fully in.
+/// Arms as a user does, until the force is fully ramped up.
 fn arm(haptics: &mut Haptics<'static, WINDOW>, at: GuardInputs, outcome: &mut Outcome) {
     let _ = haptics.accept(Command::Zero([0; 3]));
     let _ = haptics.accept(Command::Arm);
@@ -290,7 +290,7 @@ fn arm(haptics: &mut Haptics<'static, WINDOW>, at: GuardInputs, outcome: &mut Ou
     }
 }
 
-/// A tick with the watchdog fed. A function of its own, as [`step`] is.
+/// Runs a tick with the watchdog fed. A separate function, like [`step`].
 #[inline(never)]
 fn tick(haptics: &mut Haptics<'static, WINDOW>, sense: &GuardInputs, outcome: &mut Outcome) {
     haptics.tick_into(sense, true, outcome);

@@ -17,7 +17,7 @@ impl Stopwatch {
         Self(timer)
     }
 
-    /// Timer counts that `work` takes, without those of looking at the timer.
+    /// Returns the timer counts of `work`, without those of reading the timer.
     #[inline(always)]
     pub(crate) fn counted<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let empty = self.between(|| black_box(()));
@@ -41,8 +41,8 @@ unsafe extern "C" {
 }
 
 /// The vector table: no interrupt is ever enabled.
-// SAFETY: the section and the name are the ones cortex-m-rt's `device` feature
-// asks for, and the table holds a function only.
+// SAFETY: cortex-m-rt's `device` feature requires this section and this name, and the table
+// contains only a function.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [extern "C" fn(); 1] = [no_handler];

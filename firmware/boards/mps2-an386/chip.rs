@@ -8,6 +8,6 @@ use crate::{plant, time};
 pub(crate) const WINDOW: usize = 16;
 
 pub(crate) type Encoders = plant::PlantEncoders;
-/// The plant gets the currents of a tick through its encoders.
+/// The plant receives the currents of a tick through its encoders.
 pub(crate) type Amplifiers = VirtualAmplifiersOff;
 pub(crate) type Clock = time::Clock;

@@ -1,8 +1,8 @@
-//! The end of the program. The chip resets itself, and QEMU ends there (`-no-reboot`).
-//! A failure is reported on UART2 before; a good end reports nothing.
+//! The end of the program. The chip resets itself, and QEMU ends then (`-no-reboot`). A failure is
+//! reported on UART2 before; a normal end reports nothing.
 //!
-//! Semihosting could end the program, too, with an exit code. It could as well read and
-//! write every file of the host, so QEMU runs without it.
+//! Semihosting could also end the program, with an exit code. But it could read and write every
+//! file of the host, so QEMU runs without it.
 
 use core::fmt::{self, Write};
 
@@ -15,11 +15,11 @@ pub(crate) fn done() -> ! {
     SCB::sys_reset()
 }
 
-/// Ends the program and tells why.
+/// Ends the program and reports why.
 pub(crate) fn failed(why: fmt::Arguments<'_>) -> ! {
     let uart = report_uart();
     uart.enable(Uart::ENABLE);
-    // Without a reader the program ends all the same.
+    // Without a reader the program ends too.
     let _ = writeln!(Report(uart), "{why}");
     SCB::sys_reset()
 }

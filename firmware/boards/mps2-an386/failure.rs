@@ -28,8 +28,8 @@ unsafe fn DefaultHandler(number: i16) -> ! {
     ending::failed(format_args!("interrupt {number} has no handler"))
 }
 
-/// Tells the plant that there is no current, past everything that may be broken: without
-/// interrupt, task or queue.
+/// Reports to the plant that there is no current. Needs no interrupt, task or queue, because any of
+/// them may have failed.
 fn amplifiers_off() {
     static ONCE: AtomicBool = AtomicBool::new(false);
     cortex_m::interrupt::disable();
@@ -44,7 +44,7 @@ fn amplifiers_off() {
     };
     let mut frame = [0; 64];
     let uart = plant_uart();
-    // A zero first, to end the frame that may have been under way.
+    // A zero first, to end a frame that may have been in progress.
     uart.send(0);
     for byte in encode(&off, &mut frame).unwrap_or(&[]) {
         uart.send(*byte);

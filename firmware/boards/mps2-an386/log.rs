@@ -1,5 +1,4 @@
-//! Log lines (defmt) on UART3, for `defmt-print`; QEMU drops them unless it is given a
-//! fourth `-serial`.
+//! Log lines (defmt) on UART3, for `defmt-print`; QEMU drops them without a fourth `-serial`.
 
 use core::convert::Infallible;
 

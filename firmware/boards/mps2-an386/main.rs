@@ -7,15 +7,15 @@
 //!     -serial LINK -serial PLANT -serial REPORT -serial LOG -kernel mps2-an386
 //! ```
 //!
-//! UART0 is the link, UART1 the virtual Phantom's line. Time is emulated time:
-//! see [`time`] for what it is and when it stands still. Ends with a reset when the host
-//! says goodbye; on a panic or a fault UART2 tells which, first ([`ending`]).
+//! UART0 is the link, UART1 the virtual Phantom's line. Time is emulated time, which sometimes
+//! stands still ([`time`]). The program ends with a reset when the host closes the session; a panic
+//! or a fault is first reported on UART2 ([`ending`]).
 //!
 //! Log lines (defmt, on UART3) are written by tasks only, never by the haptic
 //! interrupt.
 #![no_std]
 #![no_main]
-// Interrupt handlers bear the names of the vectors.
+// Interrupt handlers have the names of the vectors.
 #![allow(non_snake_case)]
 
 #[path = "../common/application.rs"]
@@ -63,13 +63,13 @@ static LINK: Serial = Serial::new(registers::link_uart);
 static PLANT: Serial = Serial::new(registers::plant_uart);
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// The haptic tick, above everything else.
+/// Runs the haptic tick, above all other interrupts.
 #[interrupt]
 fn HapticTick() {
     static mut LOOP: Option<&'static mut Loop> = None;
     if let Some((haptic_loop, drive)) = application::tick(LOOP) {
         haptic_loop.encoders_mut().answer(drive);
-        // Waking a task takes a critical section: an interrupt below does it.
+        // Waking a task needs a critical section, so an interrupt of lower priority does it.
         NVIC::pend(Interrupt::TickDone);
     }
 }
@@ -102,7 +102,7 @@ fn PlantSent() {
 
 #[interrupt]
 fn Executor() {
-    // SAFETY: this is the interrupt given to `start`, which is what enables it.
+    // SAFETY: this is the interrupt passed to `start`, which enables it.
     unsafe { EXECUTOR.on_interrupt() };
 }
 
@@ -144,7 +144,7 @@ impl LinkBoard for Emulated {
             defmt::info!("the host said goodbye");
             ending::done();
         }
-        // No watchdog is behind this, but the tick wants to see one fed.
+        // There is no watchdog here, but the tick expects one to be fed.
         let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
         self.measure_stack();
         let drives_arm = link.drives_arm();
@@ -171,15 +171,14 @@ async fn serve_plant(port: PlantPort) {
     port.run(rx, tx).await;
 }
 
-/// Starts the other tasks, which cannot be handed over from outside: what they
-/// hold between two awaits stays on this executor.
+/// Starts the other tasks. Their futures are not `Send`, so they are started from this executor.
 #[embassy_executor::task]
 async fn start(
     link: &'static mut Link<'static, WINDOW>,
     monitor: &'static Monitor,
     port: PlantPort,
 ) {
-    // SAFETY: called from a task of the executor that is meant.
+    // SAFETY: called from a task of this executor.
     let spawner = unsafe { Spawner::for_current_executor().await };
     spawner.spawn(serve_link(link, monitor).expect("started once"));
     spawner.spawn(serve_plant(port).expect("started once"));
@@ -193,7 +192,7 @@ fn main() -> ! {
     }
 }
 
-/// Sets the board up. Not inlined, so that it gives its stack back when it returns.
+/// Sets up the board. Not inlined, so that its stack is free when it returns.
 #[inline(never)]
 fn set_up() {
     log::start();
@@ -206,7 +205,7 @@ fn set_up() {
         latency_us: CURRENT_LOOP_US,
         // There is no memory; the virtual Phantom is a Premium 1.5.
         calibration: Stored::Found(Calibration::PREMIUM_1_5),
-        // They come into being with the board.
+        // The motors start with the board, so they are cold.
         motors: Temperatures::AIR,
         serial: SerialNumber::NONE,
         boot: BootReport::default(),
@@ -218,7 +217,7 @@ fn set_up() {
     defmt::info!("mps2-an386 is up");
 }
 
-/// Enables the haptic tick above the ceiling of critical sections, the rest below.
+/// Enables the haptic tick above the ceiling of critical sections, the others below.
 fn enable_interrupts() {
     let mut core = cortex_m::Peripherals::take().expect("taken once");
     let map = [
@@ -231,8 +230,8 @@ fn enable_interrupts() {
         (Interrupt::Executor, 0xC0),
     ];
     for (interrupt, priority) in map {
-        // SAFETY: no critical section is in force that this could break, and
-        // only the haptic interrupt, which enters none, is above the ceiling.
+        // SAFETY: no critical section is active, and only the haptic interrupt, which enters none,
+        // is above the ceiling.
         unsafe { core.NVIC.set_priority(interrupt, priority) };
     }
     for (interrupt, _) in map.iter().filter(|(i, _)| *i != Interrupt::Executor) {

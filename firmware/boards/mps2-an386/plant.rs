@@ -1,9 +1,9 @@
-//! The virtual Phantom at the other end of UART1: it sends what encoders and switches
-//! read in a tick and gets the currents of that tick.
+//! The virtual Phantom at the other end of UART1: it sends the encoder counts and switches of a
+//! tick and receives the currents of that tick.
 //!
-//! In a scene that is rendered through the encoders every tick waits for its counts:
-//! from the end of one tick until the counts of the next are there, the board's time
-//! stands still. However long the plant computes, its answer is in time.
+//! In a scene that is rendered through the encoders every tick waits for its counts: from the end
+//! of one tick until the counts of the next arrive, the board's time stands still. So the plant's
+//! answer is in time, however long it computes.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -21,14 +21,14 @@ use static_cell::ConstStaticCell;
 use crate::serial::{Receiver, Sender};
 use crate::time::{self, Reason};
 
-/// Longest frame on this line.
+/// Maximum length of a frame on this line.
 const FRAME: usize = 64;
 
 static COUNTS: ConstStaticCell<Queue<Sensed, 4>> = ConstStaticCell::new(Queue::new());
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
 /// True if counts wait for a tick.
 static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
-/// Raised when a tick has left its currents.
+/// Raised when a tick has stored its currents.
 pub(crate) static ANSWERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Connects the interrupt's side of the line with the task's.
@@ -48,8 +48,7 @@ pub(crate) fn open() -> (PlantEncoders, PlantPort) {
     (encoders, port)
 }
 
-/// Takes whether the scene is rendered through the encoders, so that ticks have to wait
-/// for counts.
+/// Sets whether the scene is rendered through the encoders, so that ticks wait for counts.
 pub(crate) fn expect(counts: bool) {
     if counts && !COUNTS_WAIT.load(Ordering::Acquire) {
         time::hold(Reason::Plant);
@@ -63,14 +62,14 @@ pub(crate) struct PlantEncoders {
     counts: Consumer<'static, Sensed>,
     currents: Producer<'static, Currents>,
     latest: GuardInputs,
-    /// The number of the tick whose counts were read and not yet answered.
+    /// The number of the tick whose counts were read but not answered yet.
     unanswered: Option<u32>,
 }
 
 impl Encoders for PlantEncoders {
     fn sense(&mut self) -> GuardInputs {
-        // Looked at in its place: taken out as an option it is copied byte by byte, twice
-        // (150 instructions a tick).
+        // Read in place: taking it out of the queue would copy it byte by byte, twice (150
+        // instructions a tick).
         if let Some(Sensed { tick, sense }) = self.counts.peek() {
             self.latest = *sense;
             self.unanswered = Some(*tick);
@@ -82,13 +81,13 @@ impl Encoders for PlantEncoders {
 }
 
 impl PlantEncoders {
-    /// Answers the counts that were read with the currents of their tick. Time stands
-    /// still until there are counts for the next.
+    /// Answers the counts that were read with the currents of their tick. Time stands still until
+    /// the next counts arrive.
     pub(crate) fn answer(&mut self, drive: GuardOutputs) {
         let Some(tick) = self.unanswered.take() else {
             return;
         };
-        // Full only if the plant sends on without waiting for answers.
+        // Full only if the plant sends without waiting for answers.
         let _ = self.currents.enqueue(Currents {
             tick,
             currents_a: drive.currents_a.to_array(),
@@ -108,7 +107,7 @@ pub(crate) struct PlantPort {
 }
 
 impl PlantPort {
-    /// Serves the line for ever.
+    /// Serves the line forever.
     pub(crate) async fn run(mut self, mut rx: Receiver, mut tx: Sender) {
         let mut reader = FrameReader::<FRAME>::new();
         let mut chunk = [0; FRAME];
@@ -125,7 +124,7 @@ impl PlantPort {
         while !bytes.is_empty() {
             let (taken, frame) = reader.push(bytes);
             if let Some(Ok(counts)) = frame.map(|frame| frame.and_then(decode)) {
-                // A plant that runs ahead of its answers loses counts.
+                // A plant that does not wait for its answers loses counts.
                 let _ = self.counts.enqueue(counts);
                 COUNTS_WAIT.store(true, Ordering::Release);
                 time::release(Reason::Plant);

@@ -1,5 +1,5 @@
-//! Registers of the ARM MPS2 with the AN386 image, as the manual of the CMSDK
-//! (ARM DDI 0479) lays them out: no package ships a register crate for it.
+//! Registers of the ARM MPS2 with the AN386 image, by the manual of the CMSDK (ARM DDI 0479): no
+//! package contains a register crate for it.
 
 use vcell::VolatileCell;
 
@@ -43,17 +43,17 @@ impl Uart {
     pub(crate) const RX_INTERRUPT: u32 = 1 << 3;
     pub(crate) const SENT: u32 = 1 << 0;
     pub(crate) const RECEIVED: u32 = 1 << 1;
-    /// Register reads that a byte may take; then there is no reader.
+    /// Max register reads for a byte; after that, no reader is assumed.
     const PATIENCE: u32 = 1_000_000;
 
-    /// Turns the port on, with what `control` says of halves and interrupts.
+    /// Enables the port; `control` selects its halves and interrupts.
     pub(crate) fn enable(&self, control: u32) {
-        // The smallest divider the part accepts; QEMU sends at once anyway.
+        // The minimum divider of the part; QEMU sends at once anyway.
         self.divider.set(16);
         self.control.set(control);
     }
 
-    /// Sends a byte without any interrupt, or gives up if it is not read.
+    /// Sends a byte without any interrupt, or drops it after a time-out.
     pub(crate) fn send(&self, byte: u8) {
         for _ in 0..Self::PATIENCE {
             if self.state.get() & Self::TX_FULL == 0 {
@@ -63,39 +63,39 @@ impl Uart {
     }
 }
 
-/// TIMER0: the timer of the haptic tick.
+/// Returns TIMER0: the timer of the haptic tick.
 pub(crate) fn tick_timer() -> &'static Timer {
-    // SAFETY: TIMER0 of the memory map, four words, always there and only ever
-    // accessed through volatile cells. `VolatileCell` is not `Sync`, so the
-    // reference itself cannot leave the context that asked for it.
+    // SAFETY: TIMER0 of the memory map, four words, always present and only accessed through
+    // volatile cells. `VolatileCell` is not `Sync`, so the reference cannot leave its caller's
+    // context.
     unsafe { &*(0x4000_0000 as *const Timer) }
 }
 
-/// TIMER1: the free-running timer that measures what a tick costs.
+/// Returns TIMER1: the free-running timer that measures the cost of a tick.
 pub(crate) fn clock_timer() -> &'static Timer {
     // SAFETY: TIMER1 of the memory map; as for `tick_timer`.
     unsafe { &*(0x4000_1000 as *const Timer) }
 }
 
-/// UART0: the link to the host.
+/// Returns UART0: the link to the host.
 pub(crate) fn link_uart() -> &'static Uart {
     // SAFETY: UART0 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_4000 as *const Uart) }
 }
 
-/// UART1: the virtual Phantom, encoder counts in and currents out.
+/// Returns UART1: the virtual Phantom, encoder counts in and currents out.
 pub(crate) fn plant_uart() -> &'static Uart {
     // SAFETY: UART1 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_5000 as *const Uart) }
 }
 
-/// UART2: why the program ended, where it failed.
+/// Returns UART2: the reason of a failure.
 pub(crate) fn report_uart() -> &'static Uart {
     // SAFETY: UART2 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_6000 as *const Uart) }
 }
 
-/// UART3: log lines.
+/// Returns UART3: log lines.
 pub(crate) fn log_uart() -> &'static Uart {
     // SAFETY: UART3 of the memory map, five words; as for `tick_timer`.
     unsafe { &*(0x4000_7000 as *const Uart) }

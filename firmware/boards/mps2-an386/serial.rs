@@ -1,8 +1,8 @@
 //! Interrupt-driven serial ports as `embedded-io-async` streams.
 //!
-//! QEMU gives the next byte only when the one-byte receive register has been
-//! read. With the ring full the byte therefore stays in the register and the
-//! receive interrupt off, and QEMU holds the sender back: nothing is lost.
+//! QEMU delivers the next byte only after the one-byte receive register was read. While the ring is
+//! full, the byte stays in the register and the receive interrupt is off, so QEMU delays the
+//! sender: nothing is lost.
 
 use core::convert::Infallible;
 
@@ -29,14 +29,14 @@ impl Serial {
         }
     }
 
-    /// Turns the port on and gives its two halves.
+    /// Enables the port and returns its two halves.
     pub(crate) fn open(&'static self) -> (Receiver, Sender) {
         let uart = (self.uart)();
         uart.enable(Uart::ENABLE | Uart::TX_INTERRUPT | Uart::RX_INTERRUPT);
         (Receiver(self), Sender(self))
     }
 
-    /// The receive interrupt: takes a byte if there is room for it.
+    /// Handles the receive interrupt: reads the byte if the ring has room.
     pub(crate) fn on_received(&self) {
         let uart = (self.uart)();
         uart.pending.set(Uart::RECEIVED);
@@ -51,7 +51,7 @@ impl Serial {
         }
     }
 
-    /// The transmit interrupt: the register is free again.
+    /// Handles the transmit interrupt: the register is free again.
     pub(crate) fn on_sent(&self) {
         (self.uart)().pending.set(Uart::SENT);
         self.sent.signal(());
@@ -76,7 +76,7 @@ impl Read for Receiver {
     async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
         let n = self.0.received.read(bytes).await;
         critical_section::with(|_| {
-            // A byte may be waiting in the register since the ring was full.
+            // A byte may have waited in the register since the ring was full.
             self.0.on_received();
             self.0.listen(!self.0.received.is_full());
         });

@@ -1,11 +1,10 @@
-//! The emulated board's time, and when it stands still.
+//! The emulated board's time, which can stand still.
 //!
-//! QEMU runs with `-icount shift=3,sleep=off`: an instruction takes 8 ns of
-//! emulated time (125 million a second, what a 168 MHz Cortex-M4F does at 1.34
-//! cycles an instruction), and sleeping costs no real time. The board's two timers are
-//! its only clocks, so stopping both stops its time. That is how lock-step
-//! works: while the host or the virtual Phantom has to answer first, there is a reason
-//! to [`hold`], and the answer takes no time.
+//! QEMU runs with `-icount shift=3,sleep=off`: an instruction takes 8 ns of emulated time (125
+//! million a second, as a 168 MHz Cortex-M4F at 1.34 cycles an instruction), and sleeping costs no
+//! real time. The board's two timers are its only clocks, so stopping both stops its time. This is
+//! lock-step: while the host or the virtual Phantom has to answer first, there is a reason to
+//! [`hold`], and the answer takes no time.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -16,7 +15,7 @@ use crate::registers::{TIMER_HZ, Timer, clock_timer, tick_timer};
 /// Counts between two ticks at 1 kHz.
 const PERIOD: u32 = TIMER_HZ / 1000;
 
-/// Reason for which time stands still, as bits.
+/// Reason for the stop of time, as bits.
 #[derive(Clone, Copy)]
 pub(crate) enum Reason {
     /// Requested by the application: it has nothing to do, or waits for tiles.
@@ -27,7 +26,7 @@ pub(crate) enum Reason {
 
 static REASONS: AtomicU8 = AtomicU8::new(Reason::Link as u8);
 
-/// Sets both timers up, standing still until [`release`].
+/// Sets up both timers, stopped until [`release`].
 pub(crate) fn start() -> Clock {
     clock_timer().reload.set(u32::MAX);
     clock_timer().value.set(u32::MAX);
@@ -36,19 +35,18 @@ pub(crate) fn start() -> Clock {
     Clock
 }
 
-/// Stops the board's time until this reason is gone.
+/// Stops the board's time until this reason is released.
 pub(crate) fn hold(reason: Reason) {
     REASONS.fetch_or(reason as u8, Ordering::AcqRel);
     tick_timer().control.set(Timer::INTERRUPT);
     clock_timer().control.set(0);
 }
 
-/// Takes the reason back; time continues when none is left.
+/// Releases the reason; time continues when no reason remains.
 pub(crate) fn release(reason: Reason) {
     let before = REASONS.fetch_and(!(reason as u8), Ordering::AcqRel);
-    // Only if this reason, and no other, stopped the timers. While they are
-    // stopped the haptic interrupt cannot come and add one; had they been
-    // running, it could, and starting them here would undo that.
+    // Only if no other reason stopped the timers. While they are stopped the haptic interrupt
+    // cannot run and add a reason; while they run it could, and starting them here would undo that.
     if before == reason as u8 {
         clock_timer().control.set(Timer::RUN);
         tick_timer().control.set(Timer::RUN | Timer::INTERRUPT);
@@ -70,8 +68,8 @@ impl TickClock for Clock {
         (PERIOD - 1).saturating_sub(tick_timer().value.get())
     }
 
-    /// The virtual Phantom answers each tick before the next one comes, so no force is held
-    /// while the board's time stands still.
+    /// Returns the time since the last tick. The virtual Phantom answers each tick before the next
+    /// one, so no force persists while the board's time stands still.
     fn since_last_tick(&mut self) -> u32 {
         PERIOD
     }

@@ -2,7 +2,7 @@
 
 use cortex_m::interrupt::InterruptNumber;
 
-/// The interrupts in use. No part raises `Executor` and `TickDone`: software does.
+/// The interrupts in use. Software raises `Executor` and `TickDone`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub(crate) enum Interrupt {
@@ -22,8 +22,8 @@ unsafe impl InterruptNumber for Interrupt {
     }
 }
 
-// SAFETY: they are handlers that `#[interrupt]` and cortex-m-rt define under
-// these names, with this signature, for the vector table to name.
+// SAFETY: they are handlers that `#[interrupt]` and cortex-m-rt define under these names, with this
+// signature, for the vector table.
 unsafe extern "C" {
     safe fn LinkReceived();
     safe fn LinkSent();
@@ -36,8 +36,8 @@ unsafe extern "C" {
 }
 
 /// The vector table behind the core's own sixteen entries.
-// SAFETY: the section and the name are the ones cortex-m-rt's `device` feature
-// asks for, and the table holds functions only.
+// SAFETY: cortex-m-rt's `device` feature requires this section and this name, and the table
+// contains only functions.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [extern "C" fn(); 32] = vectors();

@@ -1,4 +1,4 @@
-//! The STM32G474RE: its clocks, pins and what is particular to it.
+//! The STM32G474RE: its clocks, pins and special features.
 
 use core::arch::global_asm;
 use core::mem::MaybeUninit;
@@ -26,8 +26,8 @@ use crate::stm32::{failure, parts, usb_interrupt};
 
 /// Tiles along the side of the window.
 pub(crate) const WINDOW: usize = 3;
-/// Calibration areas: the last two pages of bank 2, which `memory/nucleo-g474re.x` leaves
-/// out, counted from the beginning of flash.
+/// Calibration areas: the last two pages of bank 2, which `memory/nucleo-g474re.x` excludes,
+/// counted from the beginning of flash.
 pub(crate) const CALIBRATIONS: [u32; 2] = [0x7_F000, 0x7_F800];
 /// Bytes of a calibration area.
 pub(crate) const CALIBRATIONS_SIZE: u32 = 0x800;
@@ -35,15 +35,15 @@ pub(crate) const CALIBRATIONS_SIZE: u32 = 0x800;
 pub(crate) const HAPTIC_INTERRUPT: Interrupt = Interrupt::TIM7_DAC;
 /// The interrupt of the supply's comparator.
 pub(crate) const SUPPLY_INTERRUPT: Interrupt = Interrupt::PVD_PVM;
-/// GPIOB_BSRR and its bit that makes the enable pin low.
+/// GPIOB_BSRR, and its bit that sets the enable pin low.
 pub(crate) const ENABLE_OFF: (u32, u32) = (0x4800_0418, 1 << 16);
 
-/// USB's interrupt, what embassy calls it, and embassy's handler of it.
+/// USB's interrupt, embassy's name of it, and embassy's handler.
 pub(crate) const USB_INTERRUPT: Interrupt = Interrupt::USB_LP;
 pub(crate) type UsbInterrupt = interrupt::typelevel::USB_LP;
 pub(crate) type UsbWork = InterruptHandler<USB>;
 
-/// Says to embassy that its handler is run.
+/// Declares to embassy that its handler is run.
 #[derive(Clone, Copy)]
 struct Irqs;
 
@@ -63,27 +63,26 @@ pub(crate) type UsbDriver = Driver<'static, USB>;
 pub(crate) type WatchdogTimer = IWDG;
 pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer>;
 
-/// Bits that a current monitor's reading has too many: none of 12.
+/// Excess bits of a current monitor's reading: none, it has 12.
 pub(crate) const MONITOR_SHIFT: u32 = 0;
 
-/// Conversions at the beginning of a sequence that are not read: one that follows the one
-/// before it by more than a millisecond is wrong (ES0430), and ticks at 1 kHz are that far
-/// apart.
+/// Conversions at the beginning of a sequence that are not read: a conversion more than a
+/// millisecond after the previous one is wrong (ES0430), and so are those of ticks at 1 kHz.
 pub(crate) const DUMMY_CONVERSIONS: usize = 1;
 
-/// Time that a sequence of these and three more takes, µs.
+/// Time of a sequence of the dummies and three conversions, µs.
 pub(crate) const SEQUENCE_US: u32 = 25;
 
-/// Samples each channel for 247.5 clocks of 42 MHz, 6 µs, so that a monitor may have
-/// tens of kilohms.
+/// Sets 247.5 clocks of 42 MHz, 6 µs, as sampling time of each channel, for monitors with an output
+/// resistance of tens of kilohms.
 pub(crate) fn sample_slowly(_channels: [u8; 3]) {
     pac::ADC1.smpr().write_value(Smpr(0o6_666_666_666));
     pac::ADC1.smpr2().write_value(Smpr2(0o666_666_666));
 }
 
-/// Sets up what comes before the clocks: the flash's prefetch, which is off after a reset
-/// (RM0440, 3.3.4) and which embassy leaves so. It is unsafe only where code jumps from one
-/// bank to the other (ES0430), and all code is in the first.
+/// Enables the flash's prefetch, before the clocks are configured. It is off after a reset (RM0440,
+/// 3.3.4), and embassy does not change that. It is unsafe only where code jumps from one bank to
+/// the other (ES0430), and all code is in the first.
 pub(crate) fn prepare(_core: &mut Core) {
     pac::FLASH.acr().modify(|w| w.set_prften(true));
 }
@@ -91,8 +90,8 @@ pub(crate) fn prepare(_core: &mut Core) {
 pub(crate) fn configuration() -> Config {
     let mut config = Config::default();
     config.bdma_interrupt_priority = OTHERS;
-    // The chip's own 16 MHz (1 % from 0 to 85 °C): no crystal that can break off. The core
-    // may have 170 MHz and no more, so 168 are meant.
+    // The chip's own 16 MHz (1 % from 0 to 85 °C): no crystal that can break off. The core's
+    // maximum is 170 MHz, so it has 168.
     config.rcc.pll = Some(rcc::Pll {
         source: rcc::PllSource::HSI,
         prediv: rcc::PllPreDiv::DIV4,
@@ -111,9 +110,9 @@ pub(crate) fn configuration() -> Config {
     config
 }
 
-/// Sets up the pins and what is behind them.
+/// Sets up the pins and their peripherals.
 pub(crate) fn take(p: Peripherals) -> Parts {
-    // The enable pin first of all.
+    // The enable pin first.
     let enable = Output::new(p.PB0, Level::Low, Speed::Low);
     let read_back = Adc::new(p.ADC2, AdcConfig::default());
     let outputs = outputs::new(p.DAC1, p.PA4, p.PA5, p.DAC2, p.PA6, read_back);
@@ -160,7 +159,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
     }
 }
 
-/// Reads what the chip says about its last reset; then the chip forgets it.
+/// Reads and clears the cause of the chip's last reset.
 pub(crate) fn take_reset_cause() -> ResetCause {
     let ran_before = leave_mark();
     let flags = pac::RCC.csr().read();
@@ -176,19 +175,19 @@ pub(crate) fn take_reset_cause() -> ResetCause {
     }
 }
 
-/// Makes the data cache forget bytes: this chip has none in front of RAM, and embassy
-/// cares for the flash's own.
+/// Writes back the data cache: this chip has none before its RAM, and embassy handles the flash's
+/// own.
 pub(crate) const fn write_back(_address: usize, _bytes: usize) {}
 
-/// Marks the RAM as this program's. Returns whether it was so already: a program ran, and
-/// the supply never fell so far that the RAM lost what it holds.
+/// Marks the RAM as this program's. Returns true if it was marked already: a program ran before,
+/// and the RAM has kept its content since.
 fn leave_mark() -> bool {
     /// "HAP4".
     const OURS: u32 = 0x4841_5034;
     #[unsafe(link_section = ".uninit.mark")]
     static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
     let mark = (&raw mut MARK).cast::<u32>();
-    // SAFETY: nothing else touches it, `main` comes here once, and any bits are a number.
+    // SAFETY: nothing else uses it, `main` calls this once, and any bits are a number.
     unsafe {
         let was_ours = mark.read_volatile() == OURS;
         mark.write_volatile(OURS);
@@ -196,13 +195,13 @@ fn leave_mark() -> bool {
     }
 }
 
-/// Returns true if the flash has two banks, as the chip is sold. With one, its pages are others than
-/// those that the calibrations are kept in.
+/// Returns true if the flash has two banks, as in a new chip. With one bank, the calibrations'
+/// pages would be different ones.
 fn has_two_banks() -> bool {
     pac::FLASH.optr().read().dbank()
 }
 
-/// Has the supply compared with the highest level there is (2.9 V).
+/// Starts the comparison of the supply with the highest available level (2.9 V).
 fn compare_supply() {
     pac::PWR.cr2().modify(|w| {
         w.set_pls(6);
@@ -220,8 +219,8 @@ fn PVD_PVM() {
     failure::supply_low()
 }
 
-/// Reads the supply below which the chip holds itself in reset, millivolts. The firmware
-/// does not program it: a power cut meanwhile could leave the chip locked.
+/// Reads the supply below which the chip holds itself in reset, millivolts. The firmware does not
+/// program this level: a power cut meanwhile could lock the chip.
 pub(crate) fn resets_below_mv() -> u16 {
     match pac::FLASH.optr().read().bor_lev() {
         0 => 1_700,
@@ -232,8 +231,8 @@ pub(crate) fn resets_below_mv() -> u16 {
     }
 }
 
-/// Lets the watchdog and the clock of embassy's time run on while a debugger halts the core,
-/// whatever that asked for: the one resets the chip, the other tells the next tick of the
+/// Lets the watchdog and the clock of embassy's time run while a debugger halts the core, whatever
+/// the debugger has set: the watchdog resets the chip, and by the clock the next tick detects the
 /// halt.
 pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb1lfzr().modify(|w| {
@@ -242,7 +241,7 @@ pub(crate) fn let_a_halt_stop_the_arm() {
     });
 }
 
-/// Sets the mark pin's level, past any driver.
+/// Sets the mark pin's level, without a driver.
 pub(crate) fn set_mark(is_high: bool) {
     pac::GPIOB.bsrr().write(|w| match is_high {
         true => w.set_bs(10, true),
@@ -250,7 +249,7 @@ pub(crate) fn set_mark(is_high: bool) {
     });
 }
 
-/// Changes the heartbeat's level, past any driver.
+/// Toggles the heartbeat, without a driver.
 pub(crate) fn toggle_heartbeat() {
     let is_high = pac::GPIOD.odr().read().odr(2) == Odr::HIGH;
     pac::GPIOD.bsrr().write(|w| match is_high {
@@ -259,20 +258,20 @@ pub(crate) fn toggle_heartbeat() {
     });
 }
 
-/// Returns true if the level at the enable pin is not the one that is put out.
+/// Returns true if the level at the enable pin differs from its output.
 pub(crate) fn enable_pin_differs() -> bool {
     let is_high = pac::GPIOB.idr().read().idr(0) == Idr::HIGH;
     let is_set = pac::GPIOB.odr().read().odr(0) == Odr::HIGH;
     is_high != is_set
 }
 
-/// Sets the enable pin low, past any driver, for a program that failed.
+/// Sets the enable pin low, without a driver, for a program that failed.
 #[inline(always)]
 pub(crate) fn amplifiers_off() {
     pac::GPIOB.bsrr().write(|w| w.set_br(0, true));
 }
 
-// Nothing is copied before the program starts but what the start-up code copies.
+// Copies nothing: on this chip the start-up code alone fills all memories.
 global_asm!(
     ".section .text.hapterra_fill_nothing, \"ax\", %progbits",
     ".thumb",

@@ -1,8 +1,7 @@
-//! Reads flash that may not be readable: a word that was being written when the power
-//! went.
+//! Reads flash that may be unreadable: a word that was being written at a power cut.
 //!
-//! The chip then loads anything and raises its NMI. The calibrations have bank 2 for
-//! themselves, so an NMI about that bank is about them.
+//! The chip then loads a random value and raises its NMI. Bank 2 contains only the calibrations, so
+//! an NMI for that bank belongs to them.
 
 use core::slice;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +14,7 @@ use crate::stm32::failure;
 
 /// True if a word could not be read since this was last cleared.
 static FAILED: AtomicBool = AtomicBool::new(false);
-/// The NMI, as an exception's number.
+/// The exception number of the NMI.
 const NMI: i16 = -14;
 
 #[exception]
@@ -24,19 +23,18 @@ unsafe fn NonMaskableInt() {
     if !(found.eccd() || found.eccd2()) || !found.bk_ecc() {
         failure::unhandled(NMI);
     }
-    // What is set is cleared by writing it.
+    // Flags are cleared by writing ones.
     pac::FLASH.eccr().write_value(found);
     FAILED.store(true, Ordering::SeqCst);
     dsb();
 }
 
-/// Copies `into.len()` bytes of flash from `address` on and returns whether all of them
-/// could be read.
+/// Copies `into.len()` bytes of flash from `address` and returns true if all of them could be read.
 pub(crate) fn read(address: usize, into: &mut [u8]) -> bool {
     FAILED.store(false, Ordering::SeqCst);
-    // SAFETY: the caller names bytes of flash, where any bits are bytes.
+    // SAFETY: the caller passes bytes of flash, where any bits are valid bytes.
     into.copy_from_slice(unsafe { slice::from_raw_parts(address as *const u8, into.len()) });
-    // The NMI of the last load has come.
+    // Waits for the NMI of the last load.
     dsb();
     isb();
     !FAILED.load(Ordering::SeqCst)

@@ -22,7 +22,7 @@
 //! PA5 also drives the board's LED LD2: open its solder bridge.
 #![no_std]
 #![no_main]
-// Interrupt handlers bear the names of the vectors.
+// Interrupt handlers have the names of the vectors.
 #![allow(non_snake_case)]
 
 #[path = "../common/application.rs"]
@@ -36,7 +36,7 @@ mod usb;
 
 use embassy_stm32::interrupt;
 
-/// The haptic tick, above everything else.
+/// Runs the haptic tick, above all other interrupts except the supply's.
 #[interrupt]
 fn TIM7_DAC() {
     static mut LOOP: Option<&'static mut application::Loop> = None;

@@ -14,24 +14,23 @@ use crate::stm32::injected::Injected;
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-g474re";
-/// From the beginning of a tick until the motors have its current, at most, µs: 197 to the
+/// Maximum time from the beginning of a tick until the motors have its current, µs: 197 to the
 /// outputs (docs/reference/hardware.md), 3 until they settle, and the amplifiers' own time.
 pub(crate) const LATENCY_US: u16 = 197 + 3 + CURRENT_LOOP_US;
 
-/// Three converters, buffered, each behind an offset stage: the middle of the range is no
-/// current.
+/// Three converters, buffered, each before an offset stage: the middle of the range is no current.
 pub(crate) struct Outputs {
-    /// Keeps the converter as it was set up.
+    /// Keeps the converter's configuration.
     _read_back: Adc<'static, ADC2>,
 }
 
 /// ADC2's channels at PA4, PA5 and PA6 (data sheet, table of pins).
 const READ_BACK: [u8; 3] = [17, 13, 3];
-/// Difference allowed between a pin's reading and its command, codes: 50 mV, twice the sum of the
+/// Max difference between a pin's reading and its command, codes: 50 mV, twice the sum of the
 /// errors of a buffered output and of the converter, and 3.6 % of full scale.
 const MAX_DIFFERENCE: u16 = 64;
-/// As many ticks in a row a pin has to differ: the conversion of one tick may have met the next
-/// command.
+/// Ticks in a row in which a pin differs until this is a failure: the conversion of one tick may
+/// coincide with the next command.
 const MAX_TICKS: u8 = 3;
 
 /// Ticks in a row in which a pin differed, or was not measured.
@@ -40,12 +39,12 @@ static DIFFERING: AtomicU8 = AtomicU8::new(0);
 /// The sequence that reads the pins. [`new`] sets it up.
 const SEQUENCE: Injected = Injected(pac::ADC2);
 
-/// MCR.HFSEL: how long a channel waits for a bus faster than 160 MHz.
+/// MCR.HFSEL: a channel's wait on a bus faster than 160 MHz.
 const FASTEST_BUS: u8 = 0b10;
 
-/// Takes the converters and their pins, which are analogue since the reset. A channel is
-/// switched on only when it holds the code for no current: it would begin with 0 V, which is
-/// beyond full scale. embassy's own way switches a channel on before it takes a code.
+/// Takes the converters and their pins, which are analogue since the reset. A channel is switched
+/// on only after it has the code for no current: its initial 0 V would be beyond full scale.
+/// embassy's own function switches a channel on before it sets a code.
 pub(crate) fn new(
     _: Peri<'static, DAC1>,
     _: Peri<'static, PA4>,
@@ -68,7 +67,7 @@ pub(crate) fn new(
     outputs
 }
 
-/// Gives channels of a converter to their pins, buffered.
+/// Connects channels of a converter to their pins, buffered.
 fn switch_on(converter: Dac, channels: &[usize]) {
     converter.mcr().write(|w| {
         w.set_hfsel(FASTEST_BUS);
@@ -84,14 +83,14 @@ fn switch_on(converter: Dac, channels: &[usize]) {
 }
 
 impl CurrentOutputs for Outputs {
-    /// Writes the registers: embassy's own way asserts the channel's number at each
-    /// write, and nothing in a tick may panic.
+    /// Writes the registers directly: embassy's own function asserts the channel's number at each
+    /// write, and a tick must not panic.
     fn set(&mut self, fractions: [f32; 3]) {
         let [first, second, third] = fractions.map(offset_code);
         pac::DAC1.dhr12r(0).write(|w| w.set_dhr(first));
         pac::DAC1.dhr12r(1).write(|w| w.set_dhr(second));
         pac::DAC2.dhr12r(0).write(|w| w.set_dhr(third));
-        // The first conversion is not read: by the next one the outputs have settled.
+        // The first conversion is not read; the outputs have settled at the next one.
         SEQUENCE.start();
     }
 }
@@ -115,8 +114,8 @@ pub(crate) const fn failed() -> bool {
     false
 }
 
-/// Returns true if a pin has not read back what was put out in [`MAX_TICKS`] ticks in a row.
-/// Called once in a tick, before the next command.
+/// Returns true if a pin has differed from its command in [`MAX_TICKS`] ticks in a row. Called once
+/// in a tick, before the next command.
 pub(crate) fn not_as_set() -> bool {
     let ticks = match reads_back() {
         true => 0,

@@ -1,5 +1,5 @@
-//! The full-speed USB peripheral: how an endpoint's halt ends; and the USB loader in the
-//! chip's ROM.
+//! The full-speed USB peripheral: the end of an endpoint's halt, and the USB loader in the chip's
+//! ROM.
 
 use core::arch::global_asm;
 
@@ -9,12 +9,12 @@ use embassy_stm32::pac::usb::vals::Stat;
 use embassy_usb::driver::{Bus, EndpointAddress};
 use hapterra_firmware::usb::EndpointHalt;
 
-/// Place where the loader is (AN2606): its vector table.
+/// Address of the loader's vector table (AN2606).
 pub(crate) const LOADER: u32 = 0x1FFF_0000;
-/// RCC_CRRCR, and its bit that switches the oscillator of USB on.
+/// RCC_CRRCR, and its bit that enables USB's oscillator.
 pub(crate) const USB_OSCILLATOR: (u32, u32) = (0x4002_1098, 1 << 0);
 
-// Puts system memory at address 0, as the BOOT0 pin does.
+// Maps system memory to address 0, as the BOOT0 pin does.
 global_asm!(
     ".section .text.hapterra_show_loader, \"ax\", %progbits",
     ".thumb",
@@ -25,7 +25,7 @@ global_asm!(
     "movs r1, #1",
     "ldr r0, =0x40021060", // RCC_APB2ENR: SYSCFGEN
     "str r1, [r0]",
-    "ldr r2, [r0]",        // A clock takes two cycles to come.
+    "ldr r2, [r0]",        // A clock starts after two cycles.
     "ldr r0, =0x40010000", // SYSCFG_MEMRMP: MEM_MODE
     "str r1, [r0]",
     "dsb",
@@ -33,12 +33,12 @@ global_asm!(
     ".ltorg",
 );
 
-/// Ends halts as RM0440 wants it.
+/// Ends halts by the procedure in RM0440.
 pub(crate) struct EndpointHalts;
 
 impl EndpointHalt for EndpointHalts {
-    /// Takes the endpoint out of use first: the peripheral then leaves its register
-    /// alone, so no packet can change the toggle between the read and the write.
+    /// Disables the endpoint first: the peripheral then does not write its register, so no packet
+    /// can change the toggle between the read and the write.
     fn end(bus: &mut impl Bus, address: EndpointAddress) {
         let register = USB.epr(address.index());
         let found = register.read();
@@ -55,9 +55,9 @@ impl EndpointHalt for EndpointHalts {
     }
 }
 
-/// Returns the value to write after `found` was read to put one direction's toggle at DATA0
-/// and change nothing else: of a toggle's bit and of the status, ones invert; of the
-/// flags of completed transfers, zeros clear.
+/// Returns the value to write after `found` was read, to set one direction's toggle to DATA0 and
+/// change nothing else. Ones invert a toggle's bit and the status; zeros clear the flags of
+/// completed transfers.
 fn to_data0(found: Epr, is_in: bool) -> Epr {
     let mut written = found;
     written.set_ctr_rx(true);

@@ -15,35 +15,34 @@ use hapterra_firmware::amplifier::{Ad5754, CURRENT_LOOP_US, FrameBus};
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2-spi";
-/// From the beginning of a tick until the motors have its current, at most, µs: 125 to the
-/// outputs (docs/reference/hardware.md), 15 until the converter has all frames, 10 until it settles, and the
-/// amplifiers' own time.
+/// Maximum time from the beginning of a tick until the motors have its current, µs: 125 to the
+/// outputs (docs/reference/hardware.md), 15 until the converter has all frames, 10 until it
+/// settles, and the amplifiers' own time.
 pub(crate) const LATENCY_US: u16 = 125 + 15 + 10 + CURRENT_LOOP_US;
-/// The bus's 114 MHz make 7.1 MHz of it, of which half a clock is 70 ns. What the converter sends is valid 40 ns after the
-/// rising edge and is read at the falling one, with wires of a hand's length. A frame is
-/// 3.4 µs long.
+/// Requested clock; the bus's 114 MHz divide to 7.1 MHz, half a clock is 70 ns. The converter's
+/// output is valid 40 ns after the rising edge and is read at the falling one, through wires of a
+/// hand's length. A frame is 3.4 µs long.
 const SPI_HZ: u32 = 7_500_000;
-/// A frame's bytes, which is also what the FIFOs surely hold.
+/// A frame's bytes, which the FIFOs can hold.
 const FRAME: usize = 3;
-/// Looks at the status until a frame is sent. Each takes four cycles of the
-/// bus' 114 MHz at least, so this is 35 µs, ten frames.
+/// Max readings of the status until a frame is sent. Each takes at least four cycles of the bus'
+/// 114 MHz, so this is 35 µs, ten frames.
 const PATIENCE: u32 = 1_000;
-/// Cycles of the core in a microsecond.
+/// Core cycles in a microsecond.
 const CYCLES_PER_US: u32 = 456;
-/// Cycles of the core that SYNC stays high at least: 250 ns, of which the pin's own rise
-/// may take some.
+/// Core cycles for which SYNC stays high at least: 250 ns, including the pin's rise time.
 const SYNC_HIGH: u32 = CYCLES_PER_US / 4;
 
-/// Set for good when a frame did not go out: what the converter holds is then unknown,
-/// and the tick switches off.
+/// Set permanently when a frame was not sent: the converter's state is then unknown, and the tick
+/// switches off.
 static FAILED: AtomicBool = AtomicBool::new(false);
-/// True if the converter did not read back as it was set.
+/// True if the converter's registers did not read back as they were set.
 static NOT_AS_SET: AtomicBool = AtomicBool::new(true);
 
 pub(crate) type Outputs = Ad5754<Bus>;
 
-/// Takes what is needed out of the chip's peripherals. A macro, because a function
-/// would have to take all of them.
+/// Takes the outputs' parts from the chip's peripherals. A macro, because a function would need all
+/// of them.
 macro_rules! take_outputs {
     ($p:ident) => {
         crate::outputs::new($p.SPI4, $p.PE12, $p.PE14, $p.PE13, $p.PE11)
@@ -62,7 +61,7 @@ pub(crate) fn new(
     config.mode = MODE_1;
     config.frequency = Hertz(SPI_HZ);
     config.gpio_speed = Speed::High;
-    // A wire that is broken reads as ones, which no register of the converter's holds.
+    // A broken wire reads as ones, a value that no register of the converter has.
     config.miso_pull = Pull::Up;
     let spi = Spi::new_blocking(spi, clock, to_converter, from_converter, config);
     REGISTERS.cr1().modify(|w| w.set_spe(false));
@@ -74,31 +73,31 @@ pub(crate) fn new(
     })
 }
 
-/// Returns true if a frame did not go out.
+/// Returns true if a frame was not sent.
 pub(crate) fn failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
-/// Returns true if the converter does not read back as it was set.
+/// Returns true if the converter's registers do not read back as they were set.
 pub(crate) fn not_as_set() -> bool {
     NOT_AS_SET.load(Ordering::Relaxed)
 }
 
 /// SPI4, frame by frame.
 ///
-/// embassy sets the bus up but does not send, because its waiting has no bound. Here a
-/// frame is sent as the reference manual (RM0433, 50.4.9) has it for a known number of
-/// bytes, and waited for at most [`PATIENCE`] looks.
+/// embassy sets up the bus but does not send, because its waiting has no bound. Here a frame is
+/// sent by the procedure in the reference manual (RM0433, 50.4.9) for a known number of bytes, with
+/// at most [`PATIENCE`] readings of the status.
 pub(crate) struct Bus {
     sync: Output<'static>,
     /// The cycle in which SYNC rose.
     rose: u32,
-    /// Keeps clock and pins as they were set up.
+    /// Keeps the configuration of clock and pins.
     _spi: Spi<'static, Blocking, Master>,
 }
 
-/// Waits until so many cycles have passed since `from`, for at most as many looks: a look
-/// takes a cycle at least.
+/// Waits until `cycles` cycles have passed since `from`, for at most as many readings of the
+/// counter: a reading takes at least a cycle.
 fn wait(from: u32, cycles: u32) {
     let _ = (0..cycles).any(|_| DWT::cycle_count().wrapping_sub(from) >= cycles);
 }

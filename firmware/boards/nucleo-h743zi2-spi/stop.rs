@@ -1,4 +1,4 @@
-//! The emergency stop, an input: the converter has none that would stop it.
+//! The emergency stop, an input: the converter has no input for a stop.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Input, Pull};
@@ -6,7 +6,7 @@ use embassy_stm32::peripherals::PE15;
 
 pub(crate) type EmergencyStop = Input<'static>;
 
-/// Takes the pin out of the chip's peripherals, as `take_outputs` does.
+/// Takes the pin from the chip's peripherals, as `take_outputs` does.
 macro_rules! take_stop {
     ($p:ident) => {
         crate::stop::new($p.PE15)

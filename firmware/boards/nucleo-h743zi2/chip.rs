@@ -1,5 +1,5 @@
-//! The STM32H743ZI: its clocks, pins and what is particular to it. The pins of the
-//! outputs are the image's own ([`crate::outputs`]).
+//! The STM32H743ZI: its clocks, pins and special features. The pins of the outputs are in
+//! [`crate::outputs`].
 
 use core::mem::MaybeUninit;
 
@@ -33,8 +33,8 @@ pub(crate) use crate::tick_memory::fill as fill_memories;
 
 /// Tiles along the side of the window.
 pub(crate) const WINDOW: usize = 8;
-/// Calibration areas: the last two sectors of bank 2, which `memory/nucleo-h743zi2.x`
-/// leaves out, counted from the beginning of flash.
+/// Calibration areas: the last two sectors of bank 2, which `memory/nucleo-h743zi2.x` excludes,
+/// counted from the beginning of flash.
 pub(crate) const CALIBRATIONS: [u32; 2] = [0x1C_0000, 0x1E_0000];
 /// Bytes of a calibration area.
 pub(crate) const CALIBRATIONS_SIZE: u32 = 0x2_0000;
@@ -42,15 +42,15 @@ pub(crate) const CALIBRATIONS_SIZE: u32 = 0x2_0000;
 pub(crate) const HAPTIC_INTERRUPT: Interrupt = Interrupt::TIM7;
 /// The interrupt of the supply's comparator.
 pub(crate) const SUPPLY_INTERRUPT: Interrupt = Interrupt::PVD_AVD;
-/// GPIOF_BSRR and its bit that makes the enable pin low.
+/// GPIOF_BSRR, and its bit that sets the enable pin low.
 pub(crate) const ENABLE_OFF: (u32, u32) = (0x5802_1418, 1 << 19);
 
-/// USB's interrupt, what embassy calls it, and embassy's handler of it.
+/// USB's interrupt, embassy's name of it, and embassy's handler.
 pub(crate) const USB_INTERRUPT: Interrupt = Interrupt::OTG_FS;
 pub(crate) type UsbInterrupt = interrupt::typelevel::OTG_FS;
 pub(crate) type UsbWork = InterruptHandler<USB_OTG_FS>;
 
-/// Says to embassy that its handler is run.
+/// Declares to embassy that its handler is run.
 #[derive(Clone, Copy)]
 struct Irqs;
 
@@ -72,18 +72,18 @@ pub(crate) type Parts = parts::Parts<Outputs, Encoders, UsbDriver, WatchdogTimer
 
 static USB_BUFFER: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 
-/// Bits that a current monitor's reading has too many: it has 16, and 12 are used.
+/// Excess bits of a current monitor's reading: it has 16, and 12 are used.
 pub(crate) const MONITOR_SHIFT: u32 = 4;
 
-/// Conversions at the beginning of a sequence that are not read: this chip has no need of any.
+/// Conversions at the beginning of a sequence that are not read: this chip needs none.
 pub(crate) const DUMMY_CONVERSIONS: usize = 0;
 
-/// Time that a sequence of three conversions takes, µs, on the slower of the chip's revisions.
+/// Time of a sequence of three conversions, µs, on the slower of the chip's revisions.
 pub(crate) const SEQUENCE_US: u32 = 75;
 
-/// Connects these channels and samples each for 387.5 clocks, so that a monitor may have
-/// tens of kilohms: 12 µs at 32 MHz up to revision Y of the chip, 24 µs at 16 MHz from
-/// revision V on, where a fixed divider of two follows the prescaler.
+/// Connects these channels and sets 387.5 clocks as sampling time of each, for monitors with an
+/// output resistance of tens of kilohms: 12 µs at 32 MHz up to revision Y of the chip, 24 µs at 16
+/// MHz from revision V on, where a fixed divider of two follows the prescaler.
 pub(crate) fn sample_slowly(channels: [u8; 3]) {
     let selected = channels.iter().fold(0, |all, channel| all | 1 << channel);
     pac::ADC1.pcsel().write_value(Pcsel(selected));
@@ -92,8 +92,8 @@ pub(crate) fn sample_slowly(channels: [u8; 3]) {
     }
 }
 
-/// Sets up what comes before the clocks: the tick's memory, faults and caches. No DMA is used, so
-/// the data cache needs no care. Does not return on a chip that is too old.
+/// Sets up the tick's memory, faults and caches, before the clocks. No DMA is used, so the data
+/// cache needs no maintenance. Does not return on a chip that is too old.
 pub(crate) fn prepare(core: &mut Core) {
     revision::refuse_older();
     tick_memory::protect(&core.MPU);
@@ -107,9 +107,9 @@ pub(crate) fn configuration() -> Config {
     config.bdma_interrupt_priority = OTHERS;
     config.dma_interrupt_priority = OTHERS;
     config.mdma_interrupt_priority = OTHERS;
-    // The chip's own 64 MHz (1 % from 20 to 105 °C). The board's 8 MHz come from the
-    // ST-LINK, which a user may unplug or reset. The core may have 480 MHz and no more, so
-    // 456 is meant: the next lower clock that divides into every tick rate.
+    // The chip's own 64 MHz (1 % from 20 to 105 °C). The board's 8 MHz come from the ST-LINK, which
+    // a user may unplug or reset. The core's maximum is 480 MHz, so it has 456: the next lower
+    // clock that is a multiple of every tick rate.
     config.rcc.pll1 = Some(rcc::Pll {
         source: rcc::PllSource::HSI,
         prediv: rcc::PllPreDiv::DIV32,
@@ -135,17 +135,17 @@ pub(crate) fn configuration() -> Config {
     config
 }
 
-/// Sets up the pins and what is behind them.
+/// Sets up the pins and their peripherals.
 pub(crate) fn take(p: Peripherals) -> Parts {
-    // The enable pin first of all.
+    // The enable pin first.
     let enable = Output::new(p.PF3, Level::Low, Speed::Low);
     // Before the stop, which may act on the outputs' timer.
     let amplifiers = Off::new(take_outputs!(p), enable, FULL_SCALE_A);
-    // Before the stop, too, which locks the comparator as it is.
+    // Also before the stop, which locks the comparator's settings.
     compare_supply();
     trim_usb_oscillator();
     let mut wiring = usb::Config::default();
-    // The board's power does not come from this connector.
+    // The board's power is not from this connector.
     wiring.vbus_detection = false;
     let buffer = USB_BUFFER.take();
     Parts {
@@ -189,7 +189,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
     }
 }
 
-/// Reads what the chip says about its last reset; then the chip forgets it.
+/// Reads and clears the cause of the chip's last reset.
 pub(crate) fn take_reset_cause() -> ResetCause {
     let flags = pac::RCC.rsr().read();
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
@@ -203,28 +203,28 @@ pub(crate) fn take_reset_cause() -> ResetCause {
     }
 }
 
-/// A line of the data cache that is written after what has to outlive a reset.
+/// A line of the data cache that is written after data that has to survive a reset.
 #[repr(align(32))]
 struct Line(u32);
 
-/// Writes bytes from the data cache to memory, and then a line more: the SRAM keeps the last
-/// word written in a buffer, for its check bits, and a reset loses that (RM0433, 2.4).
+/// Writes bytes from the data cache to memory, and then one more line: the SRAM keeps the last
+/// written word in a buffer, for its check bits, and a reset loses it (RM0433, 2.4).
 pub(crate) fn write_back(address: usize, bytes: usize) {
     #[unsafe(link_section = ".uninit.last_line")]
     static mut LAST: MaybeUninit<Line> = MaybeUninit::uninit();
     let last = (&raw mut LAST).cast::<Line>();
-    // SAFETY: cleaning and invalidating by address keeps what memory is to
-    // hold, and nothing relies on a state of the cache's registers.
+    // SAFETY: cleaning and invalidating by address keeps the memory's content, and nothing depends
+    // on a state of the cache's registers.
     let mut core = unsafe { Core::steal() };
     core.SCB.clean_invalidate_dcache_by_address(address, bytes);
-    // SAFETY: nothing reads it, and no reference to it is made.
+    // SAFETY: nothing reads it, and no reference to it exists.
     unsafe { (&raw mut (*last).0).write_volatile(0) };
     core.SCB
         .clean_invalidate_dcache_by_address(last as usize, size_of::<Line>());
 }
 
-/// Has USB's oscillator follow the start-of-frames of OTG_FS. embassy chooses source 2, which
-/// are those of the other peripheral, OTG_HS: RM0433 and ST's HAL name them USB1 (2) and
+/// Sets the start-of-frames of OTG_FS as the reference of USB's oscillator. embassy chooses source
+/// 2, which belongs to the other peripheral, OTG_HS: RM0433 and ST's HAL name them USB1 (2) and
 /// USB2 (3). The source can be written only while the recovery is off.
 fn trim_usb_oscillator() {
     pac::CRS.cr().modify(|w| w.set_cen(false));
@@ -234,7 +234,7 @@ fn trim_usb_oscillator() {
     pac::CRS.cr().modify(|w| w.set_cen(true));
 }
 
-/// Has the supply compared with the highest level there is (2.85 V).
+/// Starts the comparison of the supply with the highest available level (2.85 V).
 fn compare_supply() {
     pac::PWR.cr1().modify(|w| {
         w.set_pls(6);
@@ -252,8 +252,8 @@ fn PVD_AVD() {
     failure::supply_low()
 }
 
-/// Reads the supply below which the chip holds itself in reset, millivolts. The firmware
-/// does not program it: a power cut meanwhile could leave the chip locked.
+/// Reads the supply below which the chip holds itself in reset, millivolts. The firmware does not
+/// program this level: a power cut meanwhile could lock the chip.
 pub(crate) fn resets_below_mv() -> u16 {
     match pac::FLASH.optsr_cur().read().bor_lev() {
         0 => 1_670,
@@ -263,9 +263,9 @@ pub(crate) fn resets_below_mv() -> u16 {
     }
 }
 
-/// Lets the watchdog and the clock of embassy's time run on while a debugger halts the core,
-/// whatever that asked for: the one resets the chip, the other tells the next tick of the
-/// halt, and so does TIM15, which lets the duty cycles continue. Lets the halt stop TIM1. Its outputs
+/// Lets the watchdog and the clock of embassy's time run while a debugger halts the core, whatever
+/// the debugger has set: the watchdog resets the chip, and by the clock the next tick detects the
+/// halt. TIM15, which lets the duty cycles continue, runs too. TIM1 stops in the halt; its outputs
 /// are then off as by a break (RM0433, 38.3.28).
 pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));
@@ -276,7 +276,7 @@ pub(crate) fn let_a_halt_stop_the_arm() {
     });
 }
 
-/// Sets the mark pin's level, past any driver.
+/// Sets the mark pin's level, without a driver.
 pub(crate) fn set_mark(is_high: bool) {
     pac::GPIOG.bsrr().write(|w| match is_high {
         true => w.set_bs(0, true),
@@ -284,7 +284,7 @@ pub(crate) fn set_mark(is_high: bool) {
     });
 }
 
-/// Changes the heartbeat's level, past any driver.
+/// Toggles the heartbeat, without a driver.
 pub(crate) fn toggle_heartbeat() {
     let is_high = pac::GPIOG.odr().read().odr(1) == Odr::HIGH;
     pac::GPIOG.bsrr().write(|w| match is_high {
@@ -293,14 +293,14 @@ pub(crate) fn toggle_heartbeat() {
     });
 }
 
-/// Returns true if the level at the enable pin is not the one that is put out.
+/// Returns true if the level at the enable pin differs from its output.
 pub(crate) fn enable_pin_differs() -> bool {
     let is_high = pac::GPIOF.idr().read().idr(3) == Idr::HIGH;
     let is_set = pac::GPIOF.odr().read().odr(3) == Odr::HIGH;
     is_high != is_set
 }
 
-/// Sets the enable pin low, past any driver, for a program that failed.
+/// Sets the enable pin low, without a driver, for a program that failed.
 #[inline(always)]
 pub(crate) fn amplifiers_off() {
     pac::GPIOF.bsrr().write(|w| w.set_br(3, true));

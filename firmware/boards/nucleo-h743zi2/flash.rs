@@ -1,8 +1,7 @@
-//! Reads flash that may not be readable: a word that was being written when the power
-//! went.
+//! Reads flash that may be unreadable: a word that was being written at a power cut.
 //!
-//! Loading such a word raises a bus fault. One load may do so: after its fault the
-//! program continues behind it. Any other bus fault becomes a hard fault.
+//! Loading such a word raises a bus fault. Only one load may do so: after its fault the program
+//! continues behind it. Any other bus fault becomes a hard fault.
 
 use core::arch::global_asm;
 
@@ -13,12 +12,11 @@ use embassy_stm32::pac;
 use crate::stm32::priorities::OTHERS;
 
 unsafe extern "C" {
-    /// Loads a word; returns whether that was possible.
+    /// Loads a word; returns true if it could be read.
     fn hapterra_peek(address: *const u32, into: &mut u32) -> bool;
 }
 
-// The exception's frame, which holds the place to go back to, is on the main
-// stack, the only one there is.
+// The exception's frame, with the return address, is on the main stack, the only one.
 global_asm!(
     ".section .text.hapterra_peek, \"ax\", %progbits",
     ".thumb",
@@ -38,13 +36,13 @@ global_asm!(
     ".type BusFault, %function",
     ".thumb_func",
     "BusFault:",
-    "ldr r0, [sp, #24]", // Where it happened.
+    "ldr r0, [sp, #24]", // Address of the fault.
     "adr.w r1, .Lload",
     "cmp r0, r1",
     "bne.w HardFault",
     "adr.w r1, .Lfailed",
     "str r1, [sp, #24]",
-    "movw r1, #0xED28", // CFSR: what is set is cleared by writing it.
+    "movw r1, #0xED28", // CFSR: flags are cleared by writing ones.
     "movt r1, #0xE000",
     "ldr r0, [r1]",
     "str r0, [r1]",
@@ -52,28 +50,28 @@ global_asm!(
     "bx lr",
 );
 
-/// Enables the bus fault's own handler, below the tick: a bus fault in the tick or in a
-/// critical section is a hard fault as before.
+/// Enables the handler of bus faults, below the tick: a bus fault in the tick or in a critical
+/// section remains a hard fault.
 pub(crate) fn tell_bus_faults(core: &mut Peripherals) {
-    // SAFETY: no critical section relies on a fault's priority.
+    // SAFETY: no critical section depends on a fault's priority.
     unsafe {
         core.SCB.set_priority(SystemHandler::BusFault, OTHERS as u8);
     }
     core.SCB.enable(Exception::BusFault);
 }
 
-/// Copies `into.len()` bytes of flash from `address` on, both multiples of four, and
-/// returns whether all of them could be read.
+/// Copies `into.len()` bytes of flash from `address`, both multiples of four, and returns true if
+/// all of them could be read.
 pub(crate) fn read(address: usize, into: &mut [u8]) -> bool {
     let mut words = (address..).step_by(4).zip(into.chunks_exact_mut(4));
     let is_read = words.all(|(at, four)| {
         let mut word = 0;
-        // SAFETY: the caller names words of flash; a fault of the load is handled.
+        // SAFETY: the caller passes words of flash; a fault of the load is handled.
         let is_read = unsafe { hapterra_peek(at as *const u32, &mut word) };
         four.copy_from_slice(&word.to_le_bytes());
         is_read
     });
-    // Left set, these would be taken for a failure of the next write or erase.
+    // Flags that stay set would look like a failure of the next write or erase.
     pac::FLASH.bank(1).ccr().write(|w| {
         w.set_clr_sneccerr(true);
         w.set_clr_dbeccerr(true);

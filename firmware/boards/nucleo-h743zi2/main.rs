@@ -20,7 +20,7 @@
 //! | mark, high for 10 ms | PG0 | |
 #![no_std]
 #![no_main]
-// Interrupt handlers bear the names of the vectors.
+// Interrupt handlers have the names of the vectors.
 #![allow(non_snake_case)]
 
 #[path = "../common/application.rs"]
@@ -37,7 +37,7 @@ mod usb;
 
 use embassy_stm32::interrupt;
 
-/// The haptic tick, above everything else.
+/// Runs the haptic tick, above all other interrupts except the supply's.
 #[interrupt]
 fn TIM7() {
     static mut LOOP: Option<&'static mut application::Loop> = None;

@@ -1,10 +1,9 @@
 //! Commands as duty cycles of TIM1.
 //!
 //! TIM1 counts only while TIM15 does (gated mode, RM0433, 38.3.26), and TIM15 stops by itself two
-//! periods of the tick after the last command. So the duty cycles end without the program, and
-//! what has ended them for so long, as a debugger's halt or a tick that hangs, does not bring them
-//! back: the next command does. Their pins then stand at either level, which an amplifier reads as a
-//! broken wire.
+//! periods of the tick after the last command. So the duty cycles end without the program, for
+//! example when a debugger halts the core or a tick hangs, and only the next command restarts them.
+//! Meanwhile their pins have a constant level, which an amplifier reads as a broken wire.
 
 use embassy_stm32::gpio::OutputType;
 use embassy_stm32::pac::timer::vals::{Mms, Sms};
@@ -19,26 +18,26 @@ use crate::stm32::clock::TICK_HZ;
 
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2";
-/// From the beginning of a tick until the motors have its current, at most, µs: 121 to the
-/// outputs (docs/reference/hardware.md), two periods until an amplifier has read a duty cycle that waits
-/// for the next one, and the amplifiers' own time. The timers of the tick and of the duty cycles
-/// run at an arbitrary phase, so the wait is a whole period.
+/// Maximum time from the beginning of a tick until the motors have its current, µs: 121 to the
+/// outputs (docs/reference/hardware.md), two periods until an amplifier has read a duty cycle that
+/// waits for the next one, and the amplifiers' own time. The timers of the tick and of the duty
+/// cycles run at an arbitrary phase, so the wait is a whole period.
 pub(crate) const LATENCY_US: u16 = 121 + (2_000_000 / DUTY_HZ) as u16 + CURRENT_LOOP_US;
 
-/// Time after the last command until the duty cycles end, µs: two ticks, because the commands of
-/// two ticks may lie almost that far apart.
+/// Time after the last command until the duty cycles end, µs: two ticks, because two consecutive
+/// commands may be almost that far apart.
 const COMMAND_HOLDS_US: u32 = 2_000_000 / TICK_HZ;
 
 /// Three duty cycles: 15 % and 85 % are the ends of the range, 50 % is no current.
 pub(crate) struct Outputs {
-    /// Keeps the channels as they were set up.
+    /// Keeps the channels' configuration.
     _channels: SimplePwmChannels<'static, TIM1>,
     /// Counts of a duty cycle of 100 %.
     max: u16,
 }
 
-/// Takes what is needed out of the chip's peripherals. A macro, because a function
-/// would have to take all of them.
+/// Takes the outputs' parts from the chip's peripherals. A macro, because a function would need all
+/// of them.
 macro_rules! take_outputs {
     ($p:ident) => {
         crate::outputs::new($p.TIM1, $p.TIM15, $p.PE9, $p.PE11, $p.PE13)
@@ -80,17 +79,17 @@ fn close_after_commands(_: Peri<'static, TIM15>) {
     pac::TIM15.psc().write_value((counts_a_us - 1) as u16);
     let last = (COMMAND_HOLDS_US - 1) as u16;
     pac::TIM15.arr().write(|w| w.set_arr(last));
-    // The prescaler counts from now on.
+    // Loads the prescaler.
     pac::TIM15.egr().write(|w| w.set_ug(true));
     pac::TIM15.cr1().modify(|w| w.set_opm(true));
     pac::TIM15.cr2().modify(|w| w.set_mms(Mms::ENABLE));
-    // The trigger is ITR0 after a reset, which is TIM15 (RM0433, 38.4.3).
+    // The trigger after a reset is ITR0, which is TIM15 (RM0433, 38.4.3).
     pac::TIM1.smcr().modify(|w| w.set_sms(Sms::GATED_MODE));
 }
 
 impl CurrentOutputs for Outputs {
-    /// Writes the registers: embassy's own way asserts the duty cycle at each write,
-    /// and nothing in a tick may panic.
+    /// Writes the registers directly: embassy's own function asserts the duty cycle at each write,
+    /// and a tick must not panic.
     fn set(&mut self, fractions: [f32; 3]) {
         let [first, second, third] = fractions.map(|fraction| duty_code(fraction, self.max));
         pac::TIM1.ccr(0).write(|w| w.set_ccr(first));
@@ -101,12 +100,12 @@ impl CurrentOutputs for Outputs {
     }
 }
 
-/// Returns true if the outputs have failed: a timer cannot tell.
+/// Returns true if the outputs have failed: a timer does not report that.
 pub(crate) const fn failed() -> bool {
     false
 }
 
-/// Returns true if the outputs are not as they were set: a timer cannot tell.
+/// Returns true if the outputs are not as they were set: a timer does not report that.
 pub(crate) const fn not_as_set() -> bool {
     false
 }

@@ -1,5 +1,5 @@
-//! Refuses a chip before revision V: the older ones are specified for 400 MHz, and read wrong
-//! data from the AXI SRAM under load (ES0392, 2.2.9), which would be wrong heights.
+//! Refuses a chip before revision V: the older ones are specified for 400 MHz, and read wrong data
+//! from the AXI SRAM under load (ES0392, 2.2.9), which would be wrong heights.
 
 use embassy_stm32::pac::gpio::vals::Moder;
 use embassy_stm32::pac::{DBGMCU, GPIOB, RCC};
@@ -7,19 +7,18 @@ use hapterra_firmware::led::LedPattern;
 
 /// DBGMCU_IDC.REV_ID of revision V.
 const REVISION_V: u16 = 0x2003;
-/// Cycles of a millisecond at the 64 MHz that the core has after a reset; a Cortex-M7 takes
-/// half as long as `delay` says.
+/// Argument of `delay` for a millisecond at the 64 MHz that the core has after a reset; on a
+/// Cortex-M7, `delay` takes half of its nominal time.
 const MS_CYCLES: u32 = 128_000;
 
-/// Returns if the chip is of revision V or newer. Otherwise shows
-/// [`LedPattern::WrongChip`] for ever: no clock is raised, no output driven, and there is no
-/// link.
+/// Returns if the chip is of revision V or newer. Otherwise shows [`LedPattern::WrongChip`]
+/// forever: no clock is raised, no output driven, and there is no link.
 pub(crate) fn refuse_older() {
     if DBGMCU.idc().read().rev_id() >= REVISION_V {
         return;
     }
     RCC.ahb4enr().modify(|w| w.set_gpioben(true));
-    // A clock takes two cycles to come.
+    // A clock starts after two cycles.
     let _ = RCC.ahb4enr().read();
     GPIOB.moder().modify(|w| w.set_moder(0, Moder::OUTPUT));
     let mut ms = 0_u32;

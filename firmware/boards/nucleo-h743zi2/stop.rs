@@ -1,11 +1,10 @@
 //! The emergency stop, which is also the break of TIM1: pressing it ends the duty cycles
 //! in hardware.
 //!
-//! A lockup of the core, a falling supply and memory that cannot be read (a double error of
-//! its check bits) are breaks, too. A break clears
-//! TIM1_BDTR.MOE, and the outputs go to their idle level, which is low (RM0433, 38.3.16).
-//! An amplifier that reads a duty cycle of 0 % as a broken wire is off then, whatever the
-//! program does.
+//! A lockup of the core, a falling supply and memory that cannot be read (a double error of its
+//! check bits) are also breaks. A break clears TIM1_BDTR.MOE, which sets the outputs to their idle
+//! level, low (RM0433, 38.3.16). An amplifier that reads a duty cycle of 0 % as a broken wire is
+//! then off, whatever the program does.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Pull};
@@ -23,11 +22,11 @@ pub(crate) struct EmergencyStop(Flex<'static>);
 
 /// Core cycles for the pull-up and the filter: 10 µs.
 const SETTLE_CYCLES: u32 = 4_800;
-/// SYSCFG_CFGR (RM0433, 12.3.3), counted in words, which metapac does not know.
+/// SYSCFG_CFGR (RM0433, 12.3.3), as an index of words; metapac does not define it.
 const SYSCFG_CFGR: usize = 0x18 / 4;
-/// Its bits PVDL, FLASHL, CM7L, DTCML, ITCML and AXISRAML: the supply's comparator, which is
-/// locked as it is set up, the core's lockup, and double errors of flash and of the memories
-/// in use are breaks.
+/// Its bits PVDL, FLASHL, CM7L, DTCML, ITCML and AXISRAML. They make these events breaks: low
+/// supply (which also locks the comparator's settings), lockup of the core, and double errors of
+/// flash and of the memories in use.
 const BREAKS: u32 = 1 << 2 | 1 << 3 | 1 << 6 | 1 << 13 | 1 << 14 | 1 << 15;
 
 /// Returns true if the enable pin is high.
@@ -35,7 +34,7 @@ fn amplifiers_are_on() -> bool {
     GPIOF.odr().read().odr(3) == Odr::HIGH
 }
 
-/// Takes the pin out of the chip's peripherals, as `take_outputs` does.
+/// Takes the pin from the chip's peripherals, as `take_outputs` does.
 macro_rules! take_stop {
     ($p:ident) => {
         crate::stop::new($p.PE15)
@@ -43,7 +42,7 @@ macro_rules! take_stop {
 }
 pub(crate) use take_stop;
 
-/// Makes the pin the break of TIM1, which has to be set up already.
+/// Makes the pin the break of TIM1, which must be set up already.
 pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
     let function = BreakInputPin::<embassy_stm32::peripherals::TIM1, BkIn1>::af_num(&*pin);
     let mut stop = EmergencyStop(Flex::new(pin));
@@ -60,15 +59,15 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
         w.set_bke(0, true);
     });
     cortex_m::asm::delay(SETTLE_CYCLES);
-    // What came while the pin was being set up was no stop.
+    // A break while the pin was being set up was no stop.
     TIM1.bdtr().modify(|w| w.set_moe(true));
     stop
 }
 
 impl Stop for EmergencyStop {
-    /// Tells a stop that was too short for the tick to see, too. The outputs return
-    /// when the stop is released and the amplifiers are off, which is a tick after it was
-    /// reported at the earliest: the compare registers still hold the last command until then.
+    /// Returns true also for a stop that was too short for the tick to read. The outputs return
+    /// when the stop is released and the amplifiers are off, at the earliest one tick after the
+    /// stop was reported: the compare registers contain the last command until then.
     fn is_pressed(&mut self) -> bool {
         let is_pressed = self.0.is_high();
         let is_broken_off = !TIM1.bdtr().read().moe();

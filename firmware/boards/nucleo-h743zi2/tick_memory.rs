@@ -1,7 +1,7 @@
 //! The memories without wait states: the tick's code in ITCM, the constants in DTCM.
 //!
-//! In flash the tick's code would come through the instruction cache, and the tasks between two
-//! ticks evict it. `memory/nucleo-h743zi2.x` says what lies there.
+//! From flash, the tick's code would be loaded through the instruction cache, where the tasks
+//! between two ticks evict it. `memory/nucleo-h743zi2.x` lists the content of these memories.
 
 use core::arch::global_asm;
 
@@ -14,9 +14,9 @@ const ITCM_BYTES: u32 = 64 * 1024;
 /// MPU_RASR: loads and code but no stores, normal memory, 64 KiB, on.
 const READ_ONLY: u32 = 0b110 << 24 | 1 << 17 | (ITCM_BYTES.ilog2() - 1) << 1 | 1;
 
-// Copies both before any Rust runs: any function may copy memory, and what copies it is among
-// them. The check bits of these memories are over eight bytes (RM0433, 2.4), so eight bytes are
-// written at once. What is left of ITCM is zeroed, too: the core reads ahead of what it executes,
+// Copies both before any Rust code runs: any function may call the copy routine, which is in these
+// memories itself. Their check bits are over eight bytes (RM0433, 2.4), so eight bytes are written
+// at once. The rest of ITCM is set to zero, because the core prefetches beyond the executed code,
 // and a word whose check bits were never written is a double error, which ends the duty cycles.
 global_asm!(
     ".section .text.hapterra_fill_tick_memory, \"ax\", %progbits",
@@ -61,9 +61,9 @@ unsafe extern "C" {
 }
 
 /// Forbids stores to ITCM, which is filled by now: a store through a null pointer is a hard fault
-/// and no change of the tick's code. The memory protection unit is on.
+/// instead of a change of the tick's code. The memory protection unit is on.
 pub(crate) fn protect(mpu: &MPU) {
-    // SAFETY: nothing of the program stores there once `fill` has run, before any Rust.
+    // SAFETY: the program stores nothing there after `fill`, which runs before any Rust code.
     unsafe {
         mpu.rbar.write(REGION);
         mpu.rasr.write(READ_ONLY);

@@ -1,5 +1,5 @@
-//! The OTG peripheral as a full-speed device: how an endpoint's halt ends; and the USB
-//! loader in the chip's ROM.
+//! The OTG peripheral as a full-speed device: the end of an endpoint's halt, and the USB loader in
+//! the chip's ROM.
 
 use core::arch::global_asm;
 
@@ -7,10 +7,10 @@ use embassy_stm32::pac::USB_OTG_FS;
 use embassy_usb::driver::{Bus, EndpointAddress};
 use hapterra_firmware::usb::EndpointHalt;
 
-/// Place where the loader is (AN2606): its vector table.
+/// Address of the loader's vector table (AN2606).
 pub(crate) const LOADER: u32 = 0x1FF0_9800;
 
-/// RCC_CR, and its bit that switches the oscillator of USB on.
+/// RCC_CR, and its bit that enables USB's oscillator.
 pub(crate) const USB_OSCILLATOR: (u32, u32) = (0x5802_4400, 1 << 12);
 
 // Only RAM can be at address 0 on this chip.
@@ -24,14 +24,15 @@ global_asm!(
     "bx lr",
 );
 
-/// Ends halts as RM0433 wants it.
+/// Ends halts by the procedure in RM0433.
 pub(crate) struct EndpointHalts;
 
 impl EndpointHalt for EndpointHalts {
-    /// The endpoint stays in use: to take it out means to wait for the peripheral.
+    /// Ends the halt of an endpoint that stays enabled: to disable it means to wait for the
+    /// peripheral.
     fn end(_bus: &mut impl Bus, address: EndpointAddress) {
         let index = address.index();
-        // The peripheral's interrupt writes these registers, too.
+        // The peripheral's interrupt also writes these registers.
         critical_section::with(|_| match address.is_in() {
             true => USB_OTG_FS.diepctl(index).modify(|w| {
                 w.set_stall(false);

@@ -1,4 +1,4 @@
-//! The driver against a converter that answers, forgets and falls silent.
+//! The driver against a converter that answers, loses its settings or does not answer.
 
 use core::cell::RefCell;
 use std::rc::Rc;
@@ -19,7 +19,7 @@ struct Part {
     data: [u16; 4],
     /// Register that the last frame requested.
     asked: u16,
-    /// Nothing returns.
+    /// The converter does not answer.
     is_silent: bool,
     /// Last reported state.
     as_set: bool,
@@ -77,7 +77,7 @@ fn off() -> (Off<Ad5754<Wires>, Pin>, Wires, Pin) {
     (off, wires, pin)
 }
 
-/// On, after as many ticks at rest as it takes to read everything.
+/// Returns amplifiers that are on, after enough ticks at rest to read all registers.
 fn on() -> (On<Ad5754<Wires>, Pin>, Wires, Pin) {
     let (mut off, wires, pin) = off();
     (0..7).for_each(|_| off.rest([0.0; 3]));
@@ -129,7 +129,7 @@ fn nothing_is_switched_on_before_all_of_it_read_back() {
         wires.take_frames();
         (0..ticks).for_each(|_| off.rest([0.0; 3]));
         let on = off.enable();
-        // Start-up and the enable look at a register, too.
+        // Start-up and the enable also read a register.
         assert_eq!(pin.is_high(), ticks >= 5, "after {ticks} ticks");
         assert_eq!(wires.0.borrow().as_set, pin.is_high());
         let _off = on.disable();

@@ -7,7 +7,7 @@
 //! | a duty cycle of 15 to 85 % | [`duty_code`] |
 //! | a quad converter on SPI, ±10 V ([`Ad5754`]) | [`bipolar_code`] |
 //!
-//! [`monitor_ma`] is the way back: from a current monitor to milliamperes.
+//! [`monitor_ma`] is the inverse: from a current monitor to milliamperes.
 
 mod ad5754;
 mod duty;
@@ -27,36 +27,36 @@ pub const CURRENT_LOOP_US: u16 = 110;
 
 /// The outputs that command the currents of all three axes.
 pub trait CurrentOutputs {
-    /// Makes the outputs ready at start-up, with no current commanded. May take some tens
-    /// of microseconds.
+    /// Prepares the outputs at start-up, with no current commanded. May take some tens of
+    /// microseconds.
     fn prepare(&mut self) {}
 
     /// Keeps the outputs ready in a tick with the power stages off.
     fn maintain(&mut self) {}
 
-    /// Returns true if the outputs are as they were set, as far as they can be asked. The power
-    /// stages are not switched on before that.
+    /// Returns true if the outputs are as they were set, as far as they can be read. The power
+    /// stages are not switched on before.
     fn are_as_set(&self) -> bool {
         true
     }
 
-    /// Commands these fractions of the full-scale current, each in -1..=1.
+    /// Commands fractions of the full-scale current, each in -1..=1.
     fn set(&mut self, fractions: [f32; 3]);
 }
 
-/// Three outputs and the pin that switches the power stages, off.
+/// Three outputs and the enable pin of the power stages, which are off.
 pub struct Off<O, E> {
     outputs: O,
     enable: E,
     full_scale_a: f32,
 }
 
-/// Three outputs and the pin that switches the power stages, on.
+/// Three outputs and the enable pin of the power stages, which are on.
 pub struct On<O, E>(Off<O, E>);
 
 impl<O: CurrentOutputs, E: OutputPin> Off<O, E> {
-    /// Takes the outputs for axes 1 to 3, the enable pin (high: on), and the
-    /// current in amperes that full scale stands for. Switches off first.
+    /// Takes the outputs for axes 1 to 3, the enable pin (high: on), and the current in amperes at
+    /// full scale. Switches off first.
     pub fn new(outputs: O, enable: E, full_scale_a: f32) -> Self {
         let mut off = Self {
             outputs,
@@ -69,7 +69,7 @@ impl<O: CurrentOutputs, E: OutputPin> Off<O, E> {
         off
     }
 
-    /// Commands fractions of full scale, cut to -1..=1; not-a-number commands zero.
+    /// Commands fractions of full scale, clamped to -1..=1; NaN commands zero.
     fn set(&mut self, fractions: [f32; 3]) {
         self.outputs.set(fractions.map(|fraction| {
             if fraction.is_nan() {
@@ -85,7 +85,7 @@ impl<O: CurrentOutputs, E: OutputPin> Off<O, E> {
     }
 
     fn switch_off(&mut self) {
-        // A pin of this chip cannot fail to be written.
+        // Writing a pin of this chip cannot fail.
         let _ = self.enable.set_low();
         self.set([0.0; 3]);
     }

@@ -1,24 +1,24 @@
-//! Commands as voltages of a converter on the chip, and monitors as voltages at one: 12
-//! bits over 0 to 3.3 V, where the middle is no current.
+//! Commands as voltages of a converter on the chip, and monitors as voltages at one: 12 bits over 0
+//! to 3.3 V, where the middle is no current.
 
 /// No current: 1.65 V.
 const MIDDLE: f32 = 2048.0;
-/// Full scale is this many codes from the middle: 1.44 V. The output is then 0.206 to
-/// 3.094 V. The G474's buffered output is specified from 0.2 V to 0.2 V below its supply;
-/// beyond that it clips, which would cut the largest currents. Buffered it drives 5 kΩ, so
-/// an offset stage may have the resistor to the middle that a broken wire needs.
+/// Codes from the middle to full scale: 1.44 V. The output is then 0.206 to 3.094 V. The G474's
+/// buffered output is specified from 0.2 V to 0.2 V below its supply; beyond that it clips, which
+/// would cut the largest currents. Buffered it drives 5 kΩ, so an offset stage can have the
+/// resistor to the middle that detects a broken wire.
 const SPAN: f32 = 1792.0;
 
-/// The 12-bit code for `fraction` of full scale, -1..=1. Rounded to the nearest code, at
-/// most half a code (1.5 mA of 5.5 A) off.
+/// Returns the 12-bit code for `fraction` of full scale, -1..=1. Rounded to the nearest code, with
+/// an error of at most half a code (1.5 mA of 5.5 A).
 #[must_use]
 pub fn offset_code(fraction: f32) -> u16 {
-    // The cast saturates; the half makes truncation into rounding.
+    // The cast saturates; adding a half makes it round.
     (MIDDLE + SPAN * fraction + 0.5) as u16
 }
 
-/// The current in mA that a monitor's 12-bit reading stands for, where full scale is
-/// `full_scale_a` amperes; the inverse of [`offset_code`].
+/// Returns the current in mA for a monitor's 12-bit reading, where full scale is `full_scale_a`
+/// amperes; the inverse of [`offset_code`].
 #[must_use]
 pub fn monitor_ma(code: u16, full_scale_a: f32) -> i16 {
     ((f32::from(code) - MIDDLE) / SPAN * full_scale_a * 1e3) as i16
@@ -28,7 +28,7 @@ pub fn monitor_ma(code: u16, full_scale_a: f32) -> i16 {
 mod tests {
     use super::*;
 
-    /// Volts of a code, and the largest step between two.
+    /// Returns the volts of a code.
     fn volts(code: u16) -> f64 {
         3.3 * f64::from(code) / 4096.0
     }

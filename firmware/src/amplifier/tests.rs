@@ -13,7 +13,7 @@ use super::*;
 /// Writes in order: "on" and "off" for the pin, numbers for duties.
 type Log = Rc<RefCell<Vec<String>>>;
 
-/// An enable pin whose level and writes a test sees.
+/// An enable pin whose level and writes a test can read.
 #[derive(Clone, Default)]
 pub(super) struct Pin {
     level: Rc<Cell<bool>>,

@@ -1,24 +1,24 @@
-//! The board's clutch input, without the bouncing of its switch.
+//! The board's clutch input, debounced.
 //!
-//! A switch that bounces, or a wire with a bad contact, can only open the clutch more often:
-//! whatever comes through here, the clutch opens to the end before the force comes in again,
-//! over half a second.
+//! A bouncing switch, or a wire with a bad contact, can only open the clutch more often: the clutch
+//! always opens completely before the force ramps up again, over half a second.
 
 use hapterra_core::rate::TickRate;
 
-/// The input has to read "held" for so long before it counts, ms.
+/// Time for which the input has to read "held" before it counts, ms.
 const HELD_MS: u32 = 5;
-/// It has to read "let go" for so long before it counts, ms: longer than switches bounce.
+/// Time for which the input has to read "released" before it counts, ms: longer than switches
+/// bounce.
 const LET_GO_MS: u32 = 20;
 
-/// Follows the input, tick by tick.
+/// The debounced input, updated in each tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClutchInput {
-    /// As it counts.
+    /// The debounced state.
     held: bool,
-    /// Ticks in a row that read otherwise.
+    /// Ticks in a row with the other reading.
     otherwise: u16,
-    /// Ticks after which what reads otherwise counts: to be held, to be let go.
+    /// Ticks after which another reading counts: for held, for released.
     enough: [u16; 2],
 }
 
@@ -32,7 +32,7 @@ impl ClutchInput {
         }
     }
 
-    /// Takes what the input reads in a tick. Returns whether it is held, where that changes.
+    /// Updates with the reading of a tick. Returns the new state if it changes.
     #[inline]
     pub(super) fn tick(&mut self, reads: bool) -> Option<bool> {
         if reads == self.held {
@@ -60,7 +60,7 @@ impl ClutchInput {
 mod tests {
     use super::*;
 
-    /// When what was read counts, by tick, at a rate.
+    /// Returns the ticks in which the debounced state changes, with the new state.
     fn counts(khz: u32, reads: impl Fn(u32) -> bool) -> std::vec::Vec<(u32, bool)> {
         let rate = TickRate::new(1_000 * khz).expect("a rate");
         let mut input = ClutchInput::new(rate);

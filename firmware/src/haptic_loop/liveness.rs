@@ -1,20 +1,20 @@
-//! Check that the watchdog is being fed, as the tick sees it.
+//! The tick's check that the watchdog is being fed.
 //!
-//! The watchdog resets a board whose tasks hang. The tick need not wait for that:
-//! it sees that nothing feeds the watchdog and switches off first.
+//! The watchdog resets a board whose tasks hang. The tick detects earlier that the watchdog is not
+//! being fed, and switches off first.
 
 use hapterra_core::rate::TickRate;
 
-/// Longest time between two feedings, ms: less than the 42 ms after which a board's
-/// watchdog resets it at the soonest.
+/// Maximum time between two feedings, ms: less than 42 ms, the minimum time after which a board's
+/// watchdog resets it.
 pub(super) const STALL_MS: u32 = 40;
 
-/// Follows the count of feedings, tick by tick.
+/// The count of feedings, checked in each tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Liveness {
     limit: u32,
     fed: u32,
-    /// Ticks since the count last rose; `None` before it ever has.
+    /// Ticks since the last increase of the count; `None` before the first.
     since: Option<u32>,
 }
 
@@ -27,8 +27,8 @@ impl Liveness {
         }
     }
 
-    /// Takes the count of feedings as of this tick and returns whether the watchdog is
-    /// live.
+    /// Updates with the count of feedings in this tick and returns true if the watchdog is being
+    /// fed.
     pub(super) fn tick(&mut self, fed: u32) -> bool {
         if fed != self.fed {
             self.fed = fed;

@@ -1,18 +1,18 @@
-//! The mark pin's pulse: it begins at the end of the tick that is marked.
+//! The mark pin's pulse: it begins at the end of the marked tick.
 
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{MARK_GAP_MS, MARK_PULSE_MS};
 
 use crate::queues::Marked;
 
-/// One pulse and the gap after it. A mark that comes meanwhile begins the pulse anew; the link
-/// asks for one at a time.
+/// One pulse and the gap after it. A mark in the meantime restarts the pulse; the link requests one
+/// at a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// Ticks of a pulse and its gap, and of the gap alone.
     whole: u32,
     gap: u32,
-    /// Ticks of them that are still to come; 0 while nothing is marked.
+    /// Remaining ticks of both; 0 if nothing is marked.
     left: u32,
     under_way: Marked,
     over: Marked,
@@ -32,7 +32,7 @@ impl Mark {
         }
     }
 
-    /// Marks the tick under way.
+    /// Marks the current tick.
     pub(super) fn begin(&mut self, number: u8) {
         self.under_way.number = number;
         self.left = self.whole;
@@ -57,12 +57,12 @@ impl Mark {
         }
     }
 
-    /// The pin's new level after the latest tick; none where it stays.
+    /// Returns the pin's new level after the latest tick; `None` if it does not change.
     pub(super) const fn edge(&self) -> Option<bool> {
         self.edge
     }
 
-    /// The latest mark whose pulse and gap are over.
+    /// Returns the latest mark whose pulse and gap are over.
     pub(super) const fn latest(&self) -> Marked {
         self.over
     }

@@ -1,14 +1,14 @@
 //! Reports of the loop to the link.
 //!
-//! Samples go out a thousand times a second whatever the tick rate, because a link
-//! that is full of samples has no room for tiles. Where the guard stands goes out
-//! ten times a second, and at once when it changes.
+//! Samples are sent a thousand times a second at any tick rate, because a link that is full of
+//! samples has no room for tiles. The guard's state is sent ten times a second, and at once after a
+//! change.
 
 use hapterra_core::guard::{Fault, Report};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::TickRecord;
 
-/// Time between two reports of where the guard stands, ms.
+/// Time between two reports of the guard's state, ms.
 const REPORT_MS: u32 = 100;
 
 /// Decides which samples and reports are sent.
@@ -17,7 +17,7 @@ pub(super) struct Reporter {
     /// Ticks between two samples.
     sample_every: u32,
     ticks_since_sample: u32,
-    /// Ticks between two reports of which nothing has changed.
+    /// Ticks between two reports if nothing changes.
     report_every: u32,
     ticks_since_report: u32,
     last_report: u64,
@@ -30,7 +30,7 @@ impl Reporter {
             ticks_since_sample: 0,
             report_every: rate.ticks(REPORT_MS),
             ticks_since_report: 0,
-            // No report has this value: there are few modes.
+            // No report packs to this value, because there are only a few modes.
             last_report: u64::MAX,
         }
     }
@@ -46,21 +46,22 @@ impl Reporter {
         self.ticks_since_sample == 0
     }
 
-    /// Returns true if this tick's report is sent; `mark` is the number of the latest mark that is over.
+    /// Returns true if this tick's report is sent; `mark` is the number of the latest mark that is
+    /// over.
     pub(super) fn sends_report(&mut self, report: &Report, mark: u8) -> bool {
         self.ticks_since_report = self.ticks_since_report.saturating_add(1);
         self.ticks_since_report >= self.report_every || self.last_report != packed(report, mark)
     }
 
-    /// This report was sent.
+    /// Records that this report was sent.
     pub(super) fn sent_report(&mut self, report: &Report, mark: u8) {
         self.ticks_since_report = 0;
         self.last_report = packed(report, mark);
     }
 }
 
-/// Packs a report and a mark's number into a number, without the limits: they come and go with
-/// every touch, and each sample has them.
+/// Packs a report and a mark's number into a number, without the limits: these change with every
+/// touch, and each sample contains them.
 fn packed(report: &Report, mark: u8) -> u64 {
     let fault = report.fault.map_or(0, Fault::number);
     u64::from(report.blockers.bits())

@@ -1,4 +1,4 @@
-//! The loop against a link that does not keep up.
+//! The loop with a link that is too slow.
 
 use std::boxed::Box;
 use std::vec::Vec;
@@ -68,7 +68,7 @@ fn samples_that_find_no_room_are_counted() {
     assert_eq!(drain(&mut link_ends).len() as u32 + dropped, 200);
 }
 
-/// Moves the arm by 100 counts a tick; returns where it is.
+/// Moves the arm by 100 counts a tick and returns its position.
 fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
     for n in 1..=ticks {
         haptic_loop.encoders_mut().0.counts = [from + 100 * n; 3];
@@ -86,12 +86,12 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     assert!(link_ends.commands.enqueue(points).is_ok());
     // Between two points.
     let at = wave(&mut haptic_loop, at, 50);
-    // While a point waits for its tile; what it waits for fills the queue.
+    // While a point waits for its tile; tile requests fill the queue.
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
     let point = HipCommand { seq: 9, hip };
     assert!(link_ends.commands.enqueue(Command::Hip(point)).is_ok());
     let at = wave(&mut haptic_loop, at, 50);
-    // While its answer finds no room.
+    // While its answer has no room in the queue.
     let tile = Box::leak(Box::new(Tile::VACANT));
     let key = TileKey::holding(0, Cell::new(100, 100));
     tile.fill(key, 1, |_, _| 0.5).unwrap();
@@ -119,7 +119,7 @@ fn an_answer_that_finds_no_room_is_kept_until_it_does() {
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
     let point = HipCommand { seq: 9, hip };
     assert!(link_ends.commands.enqueue(Command::Hip(point)).is_ok());
-    // Without its tile the point waits, and what it waits for fills the queue.
+    // Without its tile the point waits, and tile requests fill the queue.
     for _ in 0..100 {
         haptic_loop.tick();
     }
@@ -142,7 +142,7 @@ fn an_answer_that_finds_no_room_is_kept_until_it_does() {
     assert_eq!(late, [9], "once, and only once");
 }
 
-/// Amplifiers that leave what was last done to them in a place that a test sees.
+/// Amplifiers that store the last command where a test can read it.
 #[derive(Clone, Default)]
 struct Seen(std::rc::Rc<core::cell::RefCell<(bool, [f32; 3])>>);
 
@@ -188,7 +188,7 @@ fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
         StoppedClock::<1>,
     );
     let held = [0.5, -1.0, 0.25];
-    // Nothing else is needed: no calibration, no scene.
+    // This needs neither a calibration nor a scene.
     for (command, expected) in [(Some(held), held), (None, [0.0; 3])] {
         let command = Command::HoldOutputs(command);
         assert!(link_ends.commands.enqueue(command).is_ok());
@@ -197,7 +197,7 @@ fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
     }
 }
 
-/// Returns the clutch's state in each of some ticks with this reading of the input.
+/// Returns the clutch's state after `ticks` ticks with this reading of the input.
 fn clutched(haptic_loop: &mut Loop, ends: &mut LinkEnds<'_>, ticks: u32, reads: bool) -> Limits {
     for _ in 0..ticks {
         haptic_loop.encoders_mut().0.clutch = reads;
@@ -240,7 +240,7 @@ fn a_refused_scene_leaves_nothing_to_render() {
         for _ in 0..100 {
             assert_eq!(haptic_loop.tick(), GuardOutputs::default());
         }
-        // Loop and guard agree, and the guard refuses to arm for it.
+        // Loop and guard agree, so the guard refuses to arm.
         assert_eq!(haptic_loop.haptics.source(), HipSource::None);
         assert!(drain(&mut link_ends).is_empty());
         let refused = haptic_loop.haptics.report().decision.refused;

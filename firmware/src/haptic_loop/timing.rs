@@ -1,27 +1,27 @@
 //! Cost and lateness of a tick, by the board's own timers.
 //!
-//! A tick that begins late is counted. A gap of more than one and a half periods is a fault:
-//! the timer's own count tells the time within a period only, so it cannot see that whole
-//! periods are missing, and the last force was held meanwhile.
+//! A tick that begins late is counted. A gap of more than one and a half periods is a fault: the
+//! timer's own count covers only one period, so it cannot show that whole periods are missing, and
+//! the last force persisted meanwhile.
 
 use hapterra_core::scene::TickRecord;
 
 use crate::board::TickClock;
 
-/// A tick that begins later than this part of the period is late. Nothing is above
-/// the haptic interrupt, so only masked interrupts could have delayed it.
+/// Part of the period by which a tick begins late. Nothing is above the haptic interrupt, so only
+/// masked interrupts could have delayed it.
 const LATE_PART: u32 = 100;
 
 /// The beginning of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TickStart {
-    /// By the free-running clock.
+    /// Time by the free-running clock.
     at: u32,
-    /// More than one and a half periods have passed since the tick before.
+    /// True if more than one and a half periods have passed since the previous tick.
     pub(super) after_gap: bool,
 }
 
-/// Cost and lateness so far; costs in counts of the board's clock.
+/// Cost and lateness of the ticks up to now; costs in counts of the board's clock.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
     latest_begin: u32,
@@ -42,7 +42,7 @@ impl Timing {
         }
     }
 
-    /// Acknowledges the timer, counts a tick that is late and tells whether ticks are missing.
+    /// Acknowledges the timer, counts a late tick and detects missing ticks.
     pub(super) fn begin<C: TickClock>(&mut self, clock: &mut C) -> TickStart {
         let began = TickStart {
             at: clock.now(),
@@ -55,7 +55,7 @@ impl Timing {
         began
     }
 
-    /// Measures the cost. Returns whether the next tick is already due: an overrun.
+    /// Measures the cost. Returns true if the next tick is already due: an overrun.
     pub(super) fn end<C: TickClock>(&mut self, clock: &C, began: TickStart) -> bool {
         self.cost = clock.now().wrapping_sub(began.at);
         self.worst_cost = self.worst_cost.max(self.cost);
@@ -66,8 +66,8 @@ impl Timing {
         overrun
     }
 
-    /// Writes the figures into a sample. The sample's own tick has not ended, so the
-    /// cost is that of the tick before it.
+    /// Writes the figures into a sample. The sample's own tick has not ended, so the cost is the
+    /// previous tick's.
     pub(super) const fn fill(&self, sample: &mut TickRecord) {
         sample.cost = self.cost;
         sample.worst_cost = self.worst_cost;

@@ -4,21 +4,21 @@ use hapterra_core::tick::Command;
 
 use super::Link;
 
-/// A place in the queue of commands, for one command. What needs two cannot be begun with one,
-/// and a command that has its place is not lost.
+/// A reserved place in the queue of commands, for one command. A reserved command is not lost, and
+/// an operation of two commands cannot begin with one place.
 pub(super) struct CommandRoom(());
 
 impl<'t, const D: usize> Link<'t, D> {
-    /// A place in the queue, if there is one. It has to be used, or dropped, before another one is
-    /// asked for.
+    /// Returns a place in the queue, if there is one. It must be used, or dropped, before the next
+    /// call.
     pub(super) fn room_for_command(&self) -> Option<CommandRoom> {
         self.ends.commands.ready().then_some(CommandRoom(()))
     }
 
-    /// Hands a command to the loop, into the place that was found for it.
+    /// Sends a command to the loop, into its reserved place.
     pub(super) fn command(&mut self, room: CommandRoom, command: Command<'t>) {
         let CommandRoom(()) = room;
-        // Of these none leads to driving; of others that is not known here.
+        // None of these leads to driving; any other command may.
         self.device.may_drive |= !matches!(
             command,
             Command::Scene(_)
@@ -34,7 +34,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 | Command::Trip(_)
         );
         self.commands_taken = false;
-        // There is room: this is the queue's only producer, and each place is found once.
+        // There is room: this is the queue's only producer, and each place is reserved once.
         let taken = self.ends.commands.enqueue(command);
         debug_assert!(taken.is_ok());
     }

@@ -1,5 +1,5 @@
-//! The link's knowledge of the device (its arm, calibration and last start), and
-//! the parts that are not reported yet.
+//! The link's data about the device (its arm, calibration and last start), and the parts that are
+//! not reported yet.
 
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode, Report};
 use hapterra_core::phantom::{Calibration, Kinematics};
@@ -26,47 +26,47 @@ enum Storing {
     Wanted,
 }
 
-/// Knowledge of the arm at the board's start.
+/// Data of the arm at the board's start.
 pub(crate) struct KnownArm {
     /// The calibration in force.
     pub(crate) calibration: Option<Calibration>,
-    /// Its source, or the reason for which there is none.
+    /// Its source, or the reason why there is none.
     pub(crate) source: CalibrationSource,
     /// The current at the ends of the amplifiers' range, A.
     pub(crate) full_scale_a: f32,
-    /// From the beginning of a tick until the motors have its current, µs.
+    /// Time from the beginning of a tick until the motors have its current, µs.
     pub(crate) latency_us: u16,
 }
 
-/// The link's knowledge of the device.
+/// The link's data about the device.
 pub(crate) struct DeviceState {
     hello: DeviceHello,
     pub(super) boot: BootReport,
     pub(super) calibration: Option<Calibration>,
     /// Source of the calibration.
     pub(super) source: CalibrationSource,
-    /// No calibration may ask for more, A.
+    /// Maximum current of a calibration, A.
     full_scale_a: f32,
     /// The loop's latest report.
     pub(super) health: Health,
     /// The last report of the guard to the host.
     told: Option<Report>,
-    /// The loop was given a command that may lead to driving, and has not reported
-    /// since that it is disarmed.
+    /// True if the loop has received a command that may lead to driving, and has not reported since
+    /// that it is disarmed.
     pub(super) may_drive: bool,
-    /// While an arm command is open: the guard's count of decisions before it.
+    /// The guard's count of decisions before the arm command, while one is pending.
     pub(super) arming: Option<u8>,
     /// Number of the latest mark.
     mark: u8,
     /// The host's latest request.
     pub(super) request: LatestRequest,
-    /// The calibration waits for the board to store it.
+    /// Progress of storing the calibration.
     storing: Storing,
 }
 
 impl DeviceState {
-    /// Takes the board's name, cut to what the message holds, its serial number, how the
-    /// board started, and its arm. The window has `D × D` tiles.
+    /// Creates the state from the board's name, cut to the length in the message, its serial
+    /// number, its boot report, and its arm. The window has `D × D` tiles.
     pub(crate) fn new<C: TickClock, const D: usize>(
         (board, serial): (&str, SerialNumber),
         boot: BootReport,
@@ -101,7 +101,7 @@ impl DeviceState {
         }
     }
 
-    /// A session begins: nothing is reported to its host yet.
+    /// Begins a session: nothing is reported to its host yet.
     pub(super) fn session_opened(&mut self) {
         self.told = None;
         self.arming = None;
@@ -109,7 +109,7 @@ impl DeviceState {
         self.forget_press();
     }
 
-    /// Answers the hello of this number, of a host that may return to `scene`.
+    /// Answers the open message with this number, of a host that may return to `scene`.
     pub(super) fn hello(&self, number: u8, scene: Option<Scene>, session: &Session) -> DeviceHello {
         DeviceHello {
             number,
@@ -133,8 +133,8 @@ impl DeviceState {
         self.health.report.mode.drives()
     }
 
-    /// Returns true if nothing is driven, no arm command waits for the loop and nothing for a
-    /// press.
+    /// Returns true if nothing is driven, no arm command waits for the loop and no calibration for
+    /// a press.
     pub(super) fn is_at_rest(&self) -> bool {
         !self.drives() && self.arming.is_none() && !self.waits_for_press()
     }
@@ -144,7 +144,7 @@ impl DeviceState {
         matches!(self.storing, Storing::Waiting(_))
     }
 
-    /// Takes a report of the loop, which came in tick `now`.
+    /// Handles a report of the loop, received in tick `now`.
     pub(super) fn take_health(&mut self, health: Health, now: u32) {
         self.health = health;
         if let Storing::Waiting(wait) = &mut self.storing
@@ -160,7 +160,7 @@ impl DeviceState {
         }
     }
 
-    /// A number for another mark: not 0, which is none.
+    /// Returns the number of the next mark: not 0, which means none.
     pub(super) const fn next_mark(&mut self) -> u8 {
         self.mark = match self.mark.checked_add(1) {
             Some(next) => next,
@@ -169,15 +169,16 @@ impl DeviceState {
         self.mark
     }
 
-    /// The host that wanted a calibration stored is gone: a press is for something else.
+    /// Ends the wait for a press, because its host is gone: a later press would have another
+    /// purpose.
     pub(super) fn forget_press(&mut self) {
         if matches!(self.storing, Storing::Waiting(_)) {
             self.storing = Storing::No;
         }
     }
 
-    /// The host that wanted a calibration stored says nothing any more. It is answered, should
-    /// it return.
+    /// Ends the wait for a press, because its host is silent. The host receives an answer if it
+    /// returns.
     pub(super) fn give_up_press(&mut self) {
         if self.waits_for_press() {
             self.storing = Storing::No;
@@ -185,19 +186,19 @@ impl DeviceState {
         }
     }
 
-    /// Checks a calibration as a whole, against this board, too.
+    /// Checks a calibration as a whole, including this board's limits.
     pub(super) fn checked(&self, calibration: &Calibration) -> Result<Kinematics, Refusal> {
         let fits = calibration.check_board(self.full_scale_a);
         let mechanism = Kinematics::new(calibration).and_then(|arm| fits.map(|()| arm));
         mechanism.map_err(Refusal::Calibration)
     }
 
-    /// Returns true if an arm command is under way that has not switched anything on.
+    /// Returns true if an arm command is pending and the amplifiers are still off.
     pub(super) fn is_being_armed(&self) -> bool {
         self.may_drive && !self.drives()
     }
 
-    /// Settings change only while the arm is disarmed.
+    /// Checks that the arm is disarmed, as every change of settings requires.
     pub(super) fn may_change_settings(&self) -> Result<(), Refusal> {
         match self.health.report.mode {
             Mode::Disarmed => Ok(()),
@@ -205,7 +206,7 @@ impl DeviceState {
         }
     }
 
-    /// Only the fault that was seen is cleared.
+    /// Checks that the fault to clear is the one that the host has seen.
     pub(super) fn may_clear(&self, seen: Option<Fault>) -> Result<(), Refusal> {
         match self.health.report.fault {
             Some(fault) if Some(fault) != seen => Err(Refusal::Blocked(Blockers::FAULT_LATCHED)),
@@ -213,7 +214,7 @@ impl DeviceState {
         }
     }
 
-    /// Outputs are held only while disarmed and without a fault.
+    /// Checks that outputs may be held: only while disarmed and without a fault.
     pub(super) fn may_hold_outputs(&self) -> Result<(), Refusal> {
         self.may_change_settings()?;
         match self.health.report.fault {
@@ -231,8 +232,8 @@ impl DeviceState {
         self.source = CalibrationSource::Session;
     }
 
-    /// In tick `now` begins to wait for the press that storing the calibration in force
-    /// takes.
+    /// Begins to wait, in tick `now`, for the press that is needed to store the current
+    /// calibration.
     pub(super) fn begin_storing(&mut self, now: u32) -> Result<(), Refusal> {
         self.may_change_settings()?;
         if self.calibration.is_none() {
@@ -278,8 +279,8 @@ impl DeviceState {
         });
     }
 
-    /// The guard's report without its limits: they come and go with every touch, and
-    /// each sample has them.
+    /// Returns the guard's report without its limits: these change with every touch, and each
+    /// sample contains them.
     pub(super) fn report(&self) -> Report {
         Report {
             limits: Limits::empty(),

@@ -5,7 +5,7 @@ use hapterra_core::tick::Command;
 use super::{Link, log};
 
 impl<const D: usize> Link<'_, D> {
-    /// Disarms if the host has been silent for its time-out, and ends its session. A wait for a
+    /// Disarms and ends the session if the host has been silent for its time-out. A wait for a
     /// dead-man press ends as soon as the host is absent.
     pub(super) fn watch_host(&mut self) {
         let now = self.ends.monitor.ticks();

@@ -1,4 +1,4 @@
-//! The way into the loader in the chip's ROM, for an update without a debug probe.
+//! The entry into the loader in the chip's ROM, for an update without a debug probe.
 
 use hapterra_core::tick::Command;
 use hapterra_core::wire::request::Refusal;
@@ -14,18 +14,18 @@ pub(super) enum LoaderEntry {
     None,
     /// The board has one.
     Offered,
-    /// The host has asked for it. There is no way back.
+    /// The host has requested it. This is final.
     Wanted,
 }
 
 impl<const D: usize> Link<'_, D> {
-    /// Says that the board enters a loader when [`Self::enters_loader`] reports it.
+    /// Declares that the board enters a loader when [`Self::enters_loader`] returns true.
     pub fn offer_loader(&mut self) {
         self.loader = LoaderEntry::Offered;
     }
 
-    /// Returns true if the board is to enter its loader: the host has asked for it, has been
-    /// answered, the amplifiers are off, and the loop holds no output any more.
+    /// Returns true if the board is to enter its loader: the host has requested it and received the
+    /// answer, the amplifiers are off, and the loop holds no output.
     #[must_use]
     pub fn enters_loader(&self) -> bool {
         let is_wanted = self.loader == LoaderEntry::Wanted;
@@ -35,13 +35,13 @@ impl<const D: usize> Link<'_, D> {
             && self.device.may_change_settings().is_ok()
     }
 
-    /// Returns true if the board is on its way into its loader, where nothing else is done.
+    /// Returns true if the board is about to enter its loader and does nothing else.
     pub(super) fn is_leaving(&self) -> bool {
         self.loader == LoaderEntry::Wanted
     }
 
-    /// Takes the request for the loader: only while the arm is disarmed and nothing is
-    /// under way that would arm it or is to be stored.
+    /// Handles the request for the loader: accepted only while the arm is disarmed, without a
+    /// pending arm command or calibration to store.
     pub(super) fn want_loader(&mut self, room: CommandRoom) -> Result<(), Refusal> {
         if self.loader == LoaderEntry::None {
             return Err(Refusal::NoLoader);
@@ -53,8 +53,8 @@ impl<const D: usize> Link<'_, D> {
         if self.device.is_storing() {
             return Err(Refusal::Busy);
         }
-        // It ends outputs that are held, too: a converter outside of the chip would keep them
-        // through the whole update.
+        // The command also ends held outputs: a converter outside the chip would keep them through
+        // the whole update.
         self.command(room, Command::Disarm);
         self.loader = LoaderEntry::Wanted;
         Ok(())

@@ -1,5 +1,5 @@
-//! The link's log lines, where there is a log: written by the link's task, never by
-//! the haptic interrupt.
+//! The link's log lines, if the board has a log: written by the link's task, never by the haptic
+//! interrupt.
 #![cfg_attr(not(feature = "defmt"), allow(unused_variables))]
 
 use hapterra_core::wire::frame::FrameError;

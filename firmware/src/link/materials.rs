@@ -8,7 +8,7 @@ use hapterra_core::wire::materials::{MaterialScene, TileMaterials};
 use super::Link;
 use super::commands::CommandRoom;
 
-/// Memory of a table that the loop has.
+/// Material table of the loop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KnownTable {
     sum: u32,
@@ -23,7 +23,7 @@ impl<const D: usize> Link<'_, D> {
         scene.materials.is_none_or(is_known)
     }
 
-    /// Takes a scene with its table.
+    /// Handles a scene with its table.
     pub(super) fn take_material_scene(&mut self, message: &MaterialScene<'_>, room: CommandRoom) {
         let scene = message.scene;
         if let Some(table) = message.table()
@@ -44,11 +44,11 @@ impl<const D: usize> Link<'_, D> {
         let _ = self.ends.materials.enqueue(table);
     }
 
-    /// Fills in the materials of a tile, which comes with them or not.
+    /// Fills in the materials of a tile, if it has any.
     ///
     /// # Errors
-    /// When they are not those of the table, or the tile came with some and has none, or the
-    /// other way round.
+    /// If they are not in the table, if the scene has materials and the tile has none, or the
+    /// reverse.
     pub(super) fn fill_materials(
         &self,
         tile: &mut Tile,

@@ -1,5 +1,5 @@
-//! Polling of the link: it reads what the loop did, hands on what
-//! the loop needs, and fills the queue to the host.
+//! Polling of the link: it reads the loop's records, sends commands to the loop, and fills the
+//! queue to the host.
 
 use hapterra_core::guard::Mode;
 use hapterra_core::tick::Command;
@@ -11,8 +11,8 @@ use crate::monitor::Part;
 use crate::queues::LoopReport;
 
 impl<const D: usize> Link<'_, D> {
-    /// Does what is due: reads what the loop left, requests tiles, hands on the
-    /// next point, packs telemetry.
+    /// Does all pending work: reads the loop's records, requests tiles, sends the next point to the
+    /// loop, packs telemetry.
     pub fn poll(&mut self) {
         self.ends.monitor.check_in(Part::Link);
         self.reclaim_buffers();
@@ -26,7 +26,7 @@ impl<const D: usize> Link<'_, D> {
         self.say_goodbye();
     }
 
-    /// Reads what the loop recorded since the last poll.
+    /// Reads the loop's records since the last poll.
     pub(super) fn read_records(&mut self) {
         while self.tx.has_room() {
             let Some(record) = self.ends.records.dequeue() else {
@@ -34,7 +34,7 @@ impl<const D: usize> Link<'_, D> {
             };
             self.nothing_to_request_at = None;
             let ticks_per_ms = self.device.ticks_per_ms();
-            // Samples from before the new placement say nothing about it.
+            // Samples of the previous placement do not apply to the new one.
             if record.sample.view == self.view {
                 self.request_hint = Some(tiles::request_hint(
                     &self.last_record,
@@ -56,10 +56,10 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Reports where the guard stands and what became of requests.
+    /// Reports the guard's state and the outcomes of requests.
     fn report_state(&mut self) {
-        // What is reported from now on follows on every command, if the loop had taken
-        // them all before the reports so far were read.
+        // Later reports are after every command, if the loop had taken all commands before the
+        // reports up to now were read.
         let follows = self.commands_taken;
         self.commands_taken = self.ends.commands.is_empty();
         while let Some(report) = self.ends.health.dequeue() {
@@ -88,7 +88,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Sends the close once nothing is driven and everything else was sent.
+    /// Sends the close when nothing is driven and everything else was sent.
     fn say_goodbye(&mut self) {
         let leaves = self.session.is_leaving();
         let said = self.samples.is_empty() && self.tx.wants_telemetry();
@@ -99,7 +99,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Hands the next point to the loop, which would forget a second one.
+    /// Sends the next point to the loop, which stores only one.
     fn start_next_point(&mut self) {
         if self.replay.under_way.is_none()
             && let Some(room) = self.room_for_command()
@@ -110,7 +110,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Packs the next telemetry message, once the last one has left.
+    /// Packs the next telemetry message when the last one was sent.
     fn pack_telemetry(&mut self) {
         let leaves = self.session.is_leaving();
         let enough = self.samples.len() >= BATCH || leaves;
@@ -135,8 +135,7 @@ impl<const D: usize> Link<'_, D> {
         self.tx.push_telemetry(self.session.number(), &message);
     }
 
-    /// Moves bytes that are sent next into `into` and returns how many. They count
-    /// as sent.
+    /// Moves the next bytes to send into `into` and returns their number. They count as sent.
     pub fn transmit(&mut self, into: &mut [u8]) -> usize {
         let mut n = 0;
         while let Some(rest) = into.get_mut(n..).filter(|rest| !rest.is_empty()) {

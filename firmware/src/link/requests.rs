@@ -1,5 +1,4 @@
-//! Handling of requests: each is done once, whatever is repeated, and
-//! answered when it is done.
+//! Handling of requests: each is done once, even if it is repeated, and answered when it is done.
 
 use hapterra_core::guard::Jog;
 use hapterra_core::phantom::Calibration;
@@ -33,18 +32,18 @@ impl Progress {
     }
 }
 
-/// The latest request of the session. The host sends the next one only when this one
-/// was answered or given up.
+/// The latest request of the session. The host sends the next one only after this one was answered
+/// or given up.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LatestRequest {
     latest: Option<(u8, Progress)>,
-    /// The answer is there and was not sent yet, or was requested again.
+    /// True if the answer is ready and was not sent yet, or was requested again.
     answer_is_due: bool,
 }
 
 impl LatestRequest {
-    /// Returns true if a request of this number is new and to be done. One that was done
-    /// already is answered again; an older one is not heeded any more.
+    /// Returns true if a request with this number is new. A repeated latest request is answered
+    /// again; older ones are ignored.
     fn is_new(&mut self, number: u8) -> bool {
         let Some((latest, progress)) = self.latest else {
             return true;
@@ -61,8 +60,7 @@ impl LatestRequest {
         self.latest = Some((number, progress));
     }
 
-    /// Records the end of what was under way; nothing where the latest request is
-    /// another.
+    /// Records the end of a request; does nothing if the latest request is another.
     fn ended(&mut self, was: Progress, result: Result<(), Refusal>) {
         if let Some((number, progress)) = self.latest.filter(|(_, progress)| *progress == was) {
             debug_assert!(!progress.is_over());
@@ -70,17 +68,17 @@ impl LatestRequest {
         }
     }
 
-    /// The loop has decided about the arm command.
+    /// Records the loop's decision on the arm command.
     pub(super) fn arm_decided(&mut self, result: Result<(), Refusal>) {
         self.ended(Progress::Arming, result);
     }
 
-    /// The board has stored the calibration, or could not.
+    /// Records the result of storing the calibration.
     pub(super) fn stored(&mut self, result: Result<(), Refusal>) {
         self.ended(Progress::Storing, result);
     }
 
-    /// The loop has made a mark.
+    /// Records a mark of the loop.
     pub(super) fn marked(&mut self, mark: Marked) {
         if let Some((number, progress)) = self.latest
             && progress == Progress::Marking(mark.number)
@@ -89,7 +87,7 @@ impl LatestRequest {
         }
     }
 
-    /// The answer that is due, once.
+    /// Returns the pending answer, once.
     pub(super) fn take_answer(&mut self) -> Option<ToHost> {
         let (number, progress) = self.latest?;
         let answer = match progress {
@@ -102,13 +100,13 @@ impl LatestRequest {
 }
 
 impl<const D: usize> Link<'_, D> {
-    /// Takes a request. Asked again, it is answered again and not done again.
+    /// Handles a request. A repeated request is answered again and not done again.
     pub(super) fn take_request(&mut self, number: u8, request: &Request, room: CommandRoom) {
         if self.device.request.is_new(number) {
             let progress = self.begin(request, room);
             self.device.request.began(number, progress);
         }
-        // There is room: no other answer was given to this message.
+        // There is room: this message has no other answer.
         if let Some(answer) = self.device.request.take_answer() {
             self.say(&answer);
         }
@@ -164,14 +162,14 @@ impl<const D: usize> Link<'_, D> {
         })
     }
 
-    /// Hands a command to the loop.
-    #[allow(clippy::unnecessary_wraps)] // It is what came of the request.
+    /// Sends a command to the loop.
+    #[allow(clippy::unnecessary_wraps)] // Returned as the request's result.
     fn obey(&mut self, room: CommandRoom, command: Command<'static>) -> Result<(), Refusal> {
         self.command(room, command);
         Ok(())
     }
 
-    /// Checks a jog and hands it to the loop, which drops the scene.
+    /// Checks a jog and sends it to the loop, which drops the scene.
     fn begin_jog(&mut self, jog: Jog, room: CommandRoom) -> Result<(), Refusal> {
         self.device.may_change_settings()?;
         let record = self.device.calibration.as_ref();
@@ -184,7 +182,7 @@ impl<const D: usize> Link<'_, D> {
         Ok(())
     }
 
-    /// Checks a calibration and hands it to the loop.
+    /// Checks a calibration and sends it to the loop.
     fn set_calibration(&mut self, calibration: &Calibration) -> Result<(), Refusal> {
         self.device.may_change_settings()?;
         let mechanism = self.device.checked(calibration)?;

@@ -1,20 +1,20 @@
-//! Which session is heard, since when its host was silent, and what became of the
-//! session before: the device's table of states in [`hapterra_core::wire`].
+//! The current session, the time since its host's last frame, and the end of the session before:
+//! the device's table of states in [`hapterra_core::wire`].
 
 use hapterra_core::wire::session::{
     LastSession, SILENCE_S, SampleCount, SessionEnd, SessionNumber,
 };
 use heapless::HistoryBuf;
 
-/// Sessions that are over and are known: a hello of one of them, which some buffer has kept
-/// or whose host has heard of no other, opens none.
+/// Number of ended sessions that are stored: a late open message of one of them, from a buffer or a
+/// host without an answer, does not open a session.
 const KNOWN: usize = 8;
 
-/// A host that waits for a press sends something every half second. One that has sent nothing
-/// for so long, ms, is not there to see what the press does.
+/// A host that waits for a press sends something every half second. A host that is silent for this
+/// time, ms, cannot see the result of the press.
 const ABSENT_MS: u32 = 2_000;
 
-/// State of the conversation with a host. [`Session`] alone changes it:
+/// State of the session with a host. Only [`Session`] changes it:
 ///
 /// | from | to | by |
 /// | --- | --- | --- |
@@ -26,30 +26,30 @@ const ABSENT_MS: u32 = 2_000;
 /// | ended by goodbye | gone | [`Session::close`] |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SessionState {
-    /// No host has sent a hello.
+    /// No host has sent an open message.
     Closed,
-    /// A host has sent a hello.
+    /// A host has sent an open message.
     Open,
-    /// The host has sent a close, and was not answered yet.
+    /// The host has sent a close without an answer yet.
     Leaving,
-    /// It was answered, or the host was silent for too long.
+    /// The close was answered, or the host was silent for too long.
     Ended(SessionEnd),
-    /// The host has looked and is gone; the arm is as it was.
+    /// The host has only read the state and detached; the arm is unchanged.
     Detached,
-    /// The host has heard the answer.
+    /// The host has received the answer.
     Gone,
 }
 
-/// Meaning of a hello.
+/// Meaning of an open message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Greeting {
     /// A session begins.
     Opens,
     /// The session is open already: the host has missed the answer.
     Again,
-    /// Its session is over in a way that its host has not asked for.
+    /// The session was ended without a request of its host.
     Over(SessionEnd),
-    /// Its host has closed the session, and gets the answer.
+    /// The host has closed the session, and receives the answer.
     Stale,
 }
 
@@ -57,18 +57,18 @@ pub(super) enum Greeting {
 #[derive(Clone, Debug)]
 pub(super) struct Session {
     state: SessionState,
-    /// The session; any before the first.
+    /// The session's number; arbitrary before the first session.
     number: SessionNumber,
-    /// The number of the hello that opened it.
+    /// The number of the open message.
     pub(super) opened_by: u8,
     last: LastSession,
-    /// The last sessions that are over, the oldest first.
+    /// The last sessions that have ended, the oldest first.
     over: HistoryBuf<SessionNumber, KNOWN>,
-    /// Ticks for which the host may be silent.
+    /// Maximum silence of the host, ticks.
     silence_ticks: u32,
     /// The tick of the last frame of this session.
     heard_at: u32,
-    /// The host's silence was reported.
+    /// True if the host's silence was reported.
     told_absent: bool,
     /// Samples put into telemetry.
     pub(super) packed: u32,
@@ -104,7 +104,7 @@ impl Session {
         self.number
     }
 
-    /// The session before this one that was not detached.
+    /// Returns the end of the last session that was not detached.
     pub(super) const fn last(&self) -> LastSession {
         self.last
     }
@@ -113,27 +113,27 @@ impl Session {
         self.state
     }
 
-    /// The host has closed the session.
+    /// Records that the host has closed the session.
     pub(super) const fn leave(&mut self) {
         self.state = SessionState::Leaving;
     }
 
-    /// The host that leaves was answered.
+    /// Records that the close was answered.
     pub(super) const fn answer_goodbye(&mut self) {
         self.state = SessionState::Ended(SessionEnd::Goodbye);
     }
 
-    /// The host was silent for too long.
+    /// Records that the host was silent for too long.
     pub(super) const fn end_silent(&mut self) {
         self.state = SessionState::Ended(SessionEnd::HostSilent);
     }
 
-    /// The host has looked and is gone.
+    /// Records that the host has detached.
     pub(super) const fn detach(&mut self) {
         self.state = SessionState::Detached;
     }
 
-    /// The host has heard the answer to its goodbye.
+    /// Records that the host has received the answer to its close.
     pub(super) const fn close(&mut self) {
         self.state = SessionState::Gone;
     }
@@ -146,8 +146,7 @@ impl Session {
         self.state == SessionState::Open
     }
 
-    /// Returns true if there is a session of this number. What belongs to another is not
-    /// heard.
+    /// Returns true if the current session has this number. Messages of other sessions are ignored.
     pub(super) fn is_of(&self, session: SessionNumber) -> bool {
         self.state != SessionState::Closed && self.number == session
     }
@@ -162,11 +161,11 @@ impl Session {
         }
     }
 
-    /// Begins a session with the hello of this number. `dropped` samples were dropped since
-    /// the device started.
+    /// Begins a session by the open message of this number. `dropped` is the number of samples
+    /// dropped since the device started.
     pub(super) fn open(&mut self, session: SessionNumber, hello: u8, dropped: u32) {
         let end = match self.state {
-            // Who has only looked leaves no trace.
+            // A detached session leaves no trace.
             SessionState::Closed | SessionState::Detached => SessionEnd::None,
             SessionState::Open | SessionState::Leaving => SessionEnd::Replaced,
             SessionState::Ended(end) => end,
@@ -190,7 +189,7 @@ impl Session {
         self.dropped_before = dropped;
     }
 
-    /// The session's samples, of which some are packed and wait for the line.
+    /// Returns the count of the session's samples; `waiting` ones are packed but not sent yet.
     pub(super) const fn count(&self, waiting: u32, dropped: u32) -> SampleCount {
         SampleCount {
             sent: self.packed.wrapping_sub(waiting),
@@ -198,28 +197,27 @@ impl Session {
         }
     }
 
-    /// A frame of this session came at this tick.
+    /// Records a frame of this session in this tick.
     pub(super) const fn heard(&mut self, tick: u32) {
         self.heard_at = tick;
         self.told_absent = false;
     }
 
-    /// Takes for how long the host may be silent.
+    /// Sets the maximum silence of the host.
     pub(super) fn set_silence(&mut self, seconds: u16, tick_hz: u32) {
         let (least, most) = SILENCE_S;
         self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
     }
 
-    /// Returns true if the host of the open session has been silent for [`ABSENT_MS`]; reported once
-    /// until it is heard again.
+    /// Returns true if the host of the open session has been silent for [`ABSENT_MS`]; reported
+    /// once until its next frame.
     pub(super) fn is_absent(&mut self, tick: u32, ticks_per_ms: u32) -> bool {
         let silent = tick.wrapping_sub(self.heard_at);
         let is_absent = self.is_open() && silent >= ABSENT_MS.saturating_mul(ticks_per_ms);
         is_absent && !core::mem::replace(&mut self.told_absent, true)
     }
 
-    /// Returns true if the host of the session that is open, or was detached, has been silent for
-    /// too long.
+    /// Returns true if the host of the session, open or detached, has been silent for too long.
     pub(super) fn is_forsaken(&self, tick: u32) -> bool {
         let has_begun = matches!(self.state, SessionState::Open | SessionState::Detached);
         has_begun && tick.wrapping_sub(self.heard_at) >= self.silence_ticks

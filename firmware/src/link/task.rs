@@ -17,25 +17,24 @@ const CHUNK: usize = 64;
 
 /// Interface of the board for the link's task.
 pub trait LinkBoard {
-    /// Waits for the next tick to have ended.
+    /// Waits for the end of the next tick.
     fn tick_done(&self) -> impl Future<Output = ()>;
 
-    /// Called after every poll, with the link as it then stands.
+    /// Called after every poll, with the link's state.
     fn after_poll<const D: usize>(&self, link: &Link<'_, D>);
 
-    /// Stores a calibration in the board's memory. The watchdog keeps watching, so
-    /// what takes long has to wait, not to block.
+    /// Stores a calibration in the board's memory. The watchdog stays active, so a long operation
+    /// must await instead of blocking.
     fn store(&self, _calibration: &Calibration) -> impl Future<Output = Result<(), Refusal>> {
         core::future::ready(Err(Refusal::NoMemory))
     }
 }
 
-/// Serves the link for ever.
+/// Serves the link forever.
 ///
-/// Reading and writing continue side by side, so that a host that does not read
-/// cannot keep the device from reading, nor the link from being polled. A reader
-/// that gives no bytes says that the transport was interrupted, and so does a writer
-/// that fails.
+/// Reading and writing run concurrently, so that a host that does not read cannot block the
+/// device's reading or the polling of the link. A reader that returns no bytes means that the
+/// transport was interrupted, and so does a writer that fails.
 pub async fn run<const D: usize>(
     link: &mut Link<'_, D>,
     mut rx: impl Read,
@@ -81,8 +80,8 @@ pub async fn run<const D: usize>(
                     break;
                 }
                 let bytes = chunk.get(..n).unwrap_or(&[]);
-                // A host that does not read, or is gone, holds the writer up
-                // for as long as it likes. The link continues with the loop.
+                // A host that does not read, or is gone, can block the writer for any time. The
+                // link continues with the loop.
                 let polling = async {
                     loop {
                         board.tick_done().await;
@@ -97,7 +96,7 @@ pub async fn run<const D: usize>(
                 }
             }
             let _ = tx.flush().await;
-            // The last byte of a session may have been what ended it.
+            // The last byte of a session may have ended it.
             board.after_poll(&**link.borrow());
         }
     };

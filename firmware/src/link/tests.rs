@@ -1,4 +1,4 @@
-//! The link against a scripted host in memory: every fault byte by byte.
+//! The link against a scripted host in memory, with each fault injected byte by byte.
 
 mod buffers;
 mod commands;

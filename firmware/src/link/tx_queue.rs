@@ -7,12 +7,12 @@ use hapterra_core::wire::version::VersionCheck;
 
 /// Bytes kept for answers and requests.
 const URGENT: usize = 1152;
-/// The longest urgent frame: `Status` with every number at its longest.
+/// Maximum length of an urgent frame: `Status` with every number at its maximum.
 pub(super) const MAX_URGENT: usize = 448;
-/// The longest telemetry frame: eight samples, every number at its longest.
+/// Maximum length of a telemetry frame: eight samples, every number at its maximum.
 const MAX_TELEMETRY: usize = 1280;
 
-/// Bytes of whole frames on their way out.
+/// Bytes of whole frames that wait to be sent.
 struct Frames<const N: usize> {
     bytes: [u8; N],
     sent: usize,
@@ -36,8 +36,8 @@ impl<const N: usize> Frames<N> {
         N - (self.end - self.sent)
     }
 
-    /// Appends a frame that `write` writes, giving its length. Returns false if it
-    /// does not fit.
+    /// Appends a frame that `write` writes; `write` returns its length. Returns false if it does
+    /// not fit.
     fn push(&mut self, write: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
         self.bytes.copy_within(self.sent..self.end, 0);
         (self.sent, self.end) = (0, self.end - self.sent);
@@ -64,11 +64,11 @@ fn in_session(session: SessionNumber, message: &ToHost, free: &mut [u8]) -> Opti
     encode(&InSession { session, message }, free).map(<[u8]>::len)
 }
 
-/// Frames waiting for the writer, in two classes that never mix bytes.
+/// Frames that wait for the writer, in two classes whose bytes never mix.
 pub(super) struct TxQueue {
     urgent: Frames<URGENT>,
     telemetry: Frames<MAX_TELEMETRY>,
-    /// True if a zero goes first, which ends a frame that was cut off before.
+    /// True if a zero is sent first, which ends a frame that was cut off before.
     starts_clean: bool,
 }
 
@@ -91,17 +91,17 @@ impl TxQueue {
         self.urgent.is_empty() && self.telemetry.is_empty() && !self.starts_clean
     }
 
-    /// Returns true if any one answer or request fits for sure.
+    /// Returns true if any answer or request is sure to fit.
     pub(super) fn has_room(&self) -> bool {
         self.urgent.room() >= MAX_URGENT
     }
 
-    /// Returns true if the writer has caught up with telemetry.
+    /// Returns true if the writer has sent all telemetry.
     pub(super) fn wants_telemetry(&self) -> bool {
         self.telemetry.is_empty()
     }
 
-    /// Queues an answer or a request. Returns false if there was no room.
+    /// Queues an answer or a request. Returns false if there is no room.
     pub(super) fn push(&mut self, session: SessionNumber, message: &ToHost) -> bool {
         self.urgent.push(|free| in_session(session, message, free))
     }
@@ -112,7 +112,7 @@ impl TxQueue {
             .push(|free| encode(refusal, free).map(<[u8]>::len))
     }
 
-    /// Queues the one telemetry message there is room for.
+    /// Queues a telemetry message; there is room for one.
     pub(super) fn push_telemetry(&mut self, session: SessionNumber, message: &ToHost) -> bool {
         self.telemetry.is_empty()
             && self
@@ -125,7 +125,7 @@ impl TxQueue {
         !self.telemetry.is_empty() && self.telemetry.sent == 0
     }
 
-    /// Moves the bytes that are sent next into `into` and returns how many.
+    /// Moves the next bytes to send into `into` and returns their number.
     pub(super) fn take(&mut self, into: &mut [u8]) -> usize {
         if self.starts_clean {
             let Some(first) = into.first_mut() else {
@@ -135,8 +135,8 @@ impl TxQueue {
             self.starts_clean = false;
             return 1;
         }
-        // A frame that has begun is finished first. The telemetry holds at most
-        // one, and the urgent frames are always sent to their end.
+        // A frame that has begun is finished first. The telemetry queue has at most one, and the
+        // urgent frames are always sent completely.
         if self.telemetry.sent > 0 && !self.telemetry.is_empty() {
             return self.telemetry.take(into);
         }

@@ -12,7 +12,7 @@ const WARMER: Temperatures = Temperatures {
     housing_k: Vec3::new(11.0, 21.0, 31.0),
 };
 
-/// A RAM after so many ticks of a loop whose motors are at these temperatures.
+/// Returns the RAM after `ticks` ticks of a loop whose motors have these temperatures.
 fn after(ticks: u32, of: impl Fn(u32) -> Temperatures) -> Copies {
     let (_, mut copies) = begin(ResetCause::PowerOn, &[[0xA5A5_A5A5; WORDS]; 2]);
     let mut log = MotorLog::new(TickRate::DEFAULT);
@@ -54,7 +54,7 @@ fn a_power_up_and_a_start_without_a_cause_assume_hot() {
     }
 }
 
-/// A reset in the middle of a write leaves some of its words.
+/// A reset during a write leaves only some of its words.
 #[test]
 fn a_copy_that_is_cut_off_leaves_the_one_before() {
     let (old, new) = (after(100, |_| WARM), after(200, |_| WARMER));
@@ -88,7 +88,7 @@ fn nothing_that_a_ram_holds_by_itself_is_believed() {
         let begun = begun(ResetCause::Watchdog, &[[word; WORDS]; 2]);
         assert_eq!(begun, Temperatures::HOT);
     }
-    // Whole, but nothing that a motor can be.
+    // Whole, but with values that a motor cannot have.
     let nonsense = Temperatures {
         winding_k: Vec3::NAN,
         ..WARM
@@ -107,7 +107,7 @@ fn what_was_taken_once_is_not_found_again() {
         Some(begun(ResetCause::Pin, &copies)),
         Temperatures::HOT.after_reset()
     );
-    // And after its second copy, over the old ones.
+    // After its second copy, which overwrites the old ones.
     let mut log = MotorLog::new(TickRate::DEFAULT);
     let mut copies = copies;
     for _ in 0..200 {

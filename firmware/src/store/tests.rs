@@ -10,16 +10,16 @@ use hapterra_core::phantom::CalibrationField;
 
 use super::*;
 
-/// A flash in memory: bits only fall when written, a word is written once, and
-/// after so many more words and blocks the power is gone.
+/// A flash in memory: writing only clears bits, a word is written once, and the power fails after a
+/// given number of words and blocks.
 #[derive(Clone)]
 struct Flash<const WRITE: usize, const ERASE: usize> {
     bytes: Vec<u8>,
     /// Steps (words written, blocks erased) until the power fails.
     left: usize,
     steps: usize,
-    /// True if a word that was cut off cannot be read, as on chips with a check a
-    /// word, or reads as what there is of it.
+    /// True if a word that was cut off cannot be read, as on chips with a checksum for each word.
+    /// Otherwise it reads as its partial content.
     checks: bool,
     /// Words that cannot be read.
     unreadable: Vec<usize>,
@@ -45,7 +45,7 @@ impl<const WRITE: usize, const ERASE: usize> Flash<WRITE, ERASE> {
         }
     }
 
-    /// Checks that this step is still done, and whether it is the one cut in half.
+    /// Returns an error if the power has failed before this step, else true if it fails during it.
     fn step(&mut self) -> Result<bool, Failed> {
         self.steps += 1;
         match self.left {
@@ -88,7 +88,7 @@ impl<const WRITE: usize, const ERASE: usize> NorFlash for Flash<WRITE, ERASE> {
         assert!((from | to).is_multiple_of(ERASE as u32));
         for block in (from as usize..to as usize).step_by(ERASE) {
             let cut = self.step()?;
-            // Cut off, half of the block is still what it was.
+            // After a cut, half of the block is unchanged.
             let half = if cut { ERASE / 2 } else { ERASE };
             self.bytes[block..block + half].fill(0xFF);
             self.unreadable
@@ -113,7 +113,7 @@ impl<const WRITE: usize, const ERASE: usize> NorFlash for Flash<WRITE, ERASE> {
                 return Err(Failed); // programmed once already: its ECC is set
             }
             for (to, from) in place.iter_mut().zip(word) {
-                // Cut off, some bits have not fallen yet.
+                // After a cut, some bits are not cleared yet.
                 *to &= if cut { from | 0x5A } else { *from };
             }
             if cut && self.checks {
@@ -134,7 +134,7 @@ fn numbered(n: usize) -> Calibration {
     }
 }
 
-/// A store on a flash of this kind, as after a reset.
+/// Returns a store on a flash of this kind, as after a reset.
 fn store<const W: usize, const E: usize>(
     flash: Flash<W, E>,
     size: usize,
@@ -146,7 +146,7 @@ fn store<const W: usize, const E: usize>(
     CalibrationStore::new(flash, [0, size as u32], size as u32)
 }
 
-/// An older firmware may have let it through.
+/// An older firmware may have accepted it.
 #[test]
 fn record_above_a_limit_is_refused_without_falling_back() {
     let mut store = store(Flash::<8, 2048>::new(4096), 2048);
@@ -159,7 +159,7 @@ fn record_above_a_limit_is_refused_without_falling_back() {
     };
     let peak = (CalibrationField::PeakCurrent, Some(2));
     assert_eq!((bad.field, bad.axis), peak);
-    // A good one after it is taken.
+    // A valid one after it is stored.
     store.save(&numbered(2)).expect("stored");
     assert_eq!(store.load(), Stored::Found(numbered(2)));
 }
@@ -201,7 +201,7 @@ fn full<const W: usize, const E: usize>(size: usize, places: usize) {
     assert_eq!(store.load(), Stored::Found(numbered(99)));
 }
 
-/// Cuts the power at each step of each of many savings.
+/// Cuts the power at each step of each of `savings` savings.
 fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize, checks: bool) {
     let mut flash = Flash::<W, E>::new(2 * size);
     flash.checks = checks;
@@ -215,7 +215,7 @@ fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize, c
         for left in 1..=whole.flash.steps {
             let mut failing = store(flash.clone(), size);
             failing.flash.left = left;
-            // The last step may be cut only after all bits were right.
+            // The last step may be cut after all bits were already correct.
             let _ = failing.save(&numbered(n));
             let mut after = store(failing.flash, size);
             let found = after.load();
@@ -225,7 +225,7 @@ fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize, c
             };
             let new = found == Stored::Found(numbered(n));
             assert!(old || new, "saving {n} cut at {left}: {found:?}");
-            // And the store works on from there.
+            // The store continues to work.
             after.prepare().expect("prepared");
             after.save(&numbered(n + 100)).expect("saved");
             assert_eq!(after.load(), Stored::Found(numbered(n + 100)));
@@ -239,14 +239,14 @@ fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize, c
 #[test]
 fn power_lost_at_any_step_leaves_the_old_record_or_the_new() {
     for checks in [false, true] {
-        // As on a G474, an H743 (shortened), and in blocks smaller than a place.
+        // As on a G474, an H743 (shortened), and with blocks smaller than a place.
         cut_everywhere::<8, 2048>(2048, 30, checks);
         cut_everywhere::<32, 8192>(8192, 80, checks);
         cut_everywhere::<4, 256>(512, 10, checks);
     }
 }
 
-/// As above, for the erasing at start-up.
+/// Cuts the power during the erase at start-up.
 #[test]
 fn power_lost_while_erasing_leaves_the_newest_record() {
     let mut full = store(Flash::<4, 256>::new(2 * 1024), 1024);

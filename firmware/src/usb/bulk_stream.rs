@@ -8,7 +8,7 @@ use super::PACKET;
 /// A bulk endpoint as a stream of bytes.
 pub struct BulkStream<E> {
     endpoint: E,
-    /// True if the host uses the interface, as seen from this end.
+    /// True if the host uses the interface, as far as this end knows.
     up: bool,
 }
 
@@ -34,13 +34,13 @@ impl<E> ErrorType for BulkStream<E> {
 }
 
 impl<E: EndpointOut> Read for BulkStream<E> {
-    /// Reads one packet. Returns 0 when the host has gone; the next call waits until
-    /// it is back. A packet longer than `bytes` is an error.
+    /// Reads one packet. Returns 0 when the host has disconnected; the next call waits until it is
+    /// back. A packet longer than `bytes` is an error.
     async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
         self.until_up().await;
         loop {
             match self.endpoint.read(bytes).await {
-                // An empty packet only says that a transfer has ended.
+                // An empty packet only ends a transfer.
                 Ok(0) => {}
                 Ok(n) => return Ok(n),
                 Err(EndpointError::Disabled) => {

@@ -12,7 +12,7 @@ use super::{
     INTERFACE_CLASS, INTERFACE_GUIDS, MSOS_VENDOR_CODE, PACKET, PRODUCT, PRODUCT_ID, VENDOR_ID,
 };
 
-/// Room for the descriptors and for the data of control transfers.
+/// Memory for the descriptors and for the data of control transfers.
 pub struct DescriptorBuffers {
     config: [u8; 64],
     bos: [u8; 64],
@@ -21,7 +21,7 @@ pub struct DescriptorBuffers {
 }
 
 impl DescriptorBuffers {
-    /// Empty room.
+    /// Empty memory.
     pub const EMPTY: Self = Self {
         config: [0; 64],
         bos: [0; 64],
@@ -30,15 +30,14 @@ impl DescriptorBuffers {
     };
 }
 
-/// The USB stack, which its task runs for ever, and the two ends of the link.
+/// The USB stack, which its task runs forever, and the two ends of the link.
 pub type UsbParts<'d, D, H> = (
     UsbDevice<'d, EndpointFilter<D, H>>,
     BulkStream<<D as Driver<'d>>::EndpointOut>,
     BulkStream<<D as Driver<'d>>::EndpointIn>,
 );
 
-/// Describes the device on `driver`, whose endpoints' halts end as `H` says, and returns
-/// its parts.
+/// Describes the device on `driver`, whose endpoints' halts `H` ends, and returns its parts.
 pub fn device<'d, D: Driver<'d>, H: EndpointHalt + 'd>(
     driver: D,
     serial_number: &'d str,

@@ -1,15 +1,14 @@
-//! Keeps from the USB driver what it cannot take, and gives every endpoint that is
-//! put into use the toggle that the host expects.
+//! Blocks requests that the USB driver cannot handle, and sets the toggle that the host expects
+//! when an endpoint is enabled.
 //!
-//! - A host may ask to halt any of 32 endpoints. embassy's stack passes the request on
+//! - A host may request a halt of any of 32 endpoints. embassy's stack passes the request on
 //!   unchecked, and a driver panics at an endpoint number that it does not have.
-//! - A host may end a halt that never was: some do when they open a pipe. embassy-stm32's
-//!   driver of the full-speed peripheral then writes the endpoint's register until it
-//!   reads what is never written (`endpoint_set_stalled` of its `usb/usb.rs`), and the
-//!   executor hangs. So the end of a halt goes to [`EndpointHalt`] instead, which each
-//!   chip's image implements.
-//! - The control endpoint has no halt: the next SETUP ends a refusal there by itself
-//!   (USB 2.0, 8.5.3.4), and its registers belong to a transfer that is under way.
+//! - A host may end a halt that did not exist: some do when they open a pipe. embassy-stm32's
+//!   driver of the full-speed peripheral then writes the endpoint's register until it reads a value
+//!   that is never written (`endpoint_set_stalled` of its `usb/usb.rs`), and the executor hangs. So
+//!   the end of a halt is handled by [`EndpointHalt`] instead, which each chip's image implements.
+//! - The control endpoint has no halt: the next SETUP ends a refusal there by itself (USB 2.0,
+//!   8.5.3.4), and its registers belong to a transfer in progress.
 
 use core::marker::PhantomData;
 
@@ -22,13 +21,13 @@ const LINK: usize = 1;
 
 /// End of an endpoint's halt on a chip's USB peripheral.
 pub trait EndpointHalt {
-    /// Ends the halt of an endpoint, if it has one, and makes DATA0 the toggle of its
-    /// next packet, halt or not (USB 2.0, 9.4.5). An endpoint that is not in use stays
-    /// so. A packet that waits in the endpoint may be lost.
+    /// Ends the halt of an endpoint, if it has one, and sets the toggle of its next packet to DATA0
+    /// in any case (USB 2.0, 9.4.5). An unused endpoint stays unused. A packet that waits in the
+    /// endpoint may be lost.
     fn end(bus: &mut impl Bus, address: EndpointAddress);
 }
 
-/// A driver `D` that gets no request that it cannot take; `H` ends halts for it.
+/// A driver `D` that receives only requests that it can handle; `H` ends halts for it.
 pub struct EndpointFilter<D, H> {
     driver: D,
     halt: PhantomData<fn() -> H>,
@@ -97,8 +96,8 @@ impl<B: Bus, H: EndpointHalt> Bus for FilteredBus<B, H> {
         self.bus.poll().await
     }
 
-    /// A configuration puts every toggle at DATA0 (USB 2.0, 9.1.1.5), also the second
-    /// one without a reset of the bus between, which drivers do not see to.
+    /// Sets the toggle to DATA0, as every configuration does (USB 2.0, 9.1.1.5). Drivers do not do
+    /// that for a second configuration without a bus reset in between.
     fn endpoint_set_enabled(&mut self, address: EndpointAddress, enabled: bool) {
         if address.index() != LINK {
             return;

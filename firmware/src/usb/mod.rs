@@ -1,10 +1,9 @@
-//! USB descriptors of the boards: one vendor-specific interface
-//! with a bulk endpoint in each direction, found by these numbers.
+//! USB descriptors of the boards: one vendor-specific interface with a bulk endpoint in each
+//! direction, identified by these numbers.
 //!
-//! Windows takes it without a driver (WinUSB, by Microsoft OS 2.0 descriptors);
-//! Linux lets users at it by the rule in `host-tools/udev/`. The stack is
-//! embassy-usb's over any driver: the boards' peripherals, or in tests a host
-//! that follows a script.
+//! Windows needs no driver (WinUSB, by Microsoft OS 2.0 descriptors); on Linux, the rule in
+//! `host-tools/udev/` gives users access. The stack is embassy-usb over any driver: the boards'
+//! peripherals, or in tests a scripted host.
 
 #[cfg(feature = "usb")]
 mod bulk_stream;
@@ -30,7 +29,7 @@ pub const PRODUCT: &str = "hapterra";
 pub const INTERFACE_CLASS: u8 = 0xFF;
 /// Bytes in a full-speed bulk packet.
 pub const PACKET: usize = 64;
-/// Request code of the Microsoft OS descriptors; any that is not otherwise used.
+/// Request code of the Microsoft OS descriptors; any unused code.
 pub const MSOS_VENDOR_CODE: u8 = 0x01;
-/// Under which a Windows program finds the interface.
+/// Identifier by which a Windows program finds the interface.
 pub const INTERFACE_GUIDS: [&str; 1] = ["{7B0D3C64-5F6E-4A0B-9C7C-6B1E5A0C2D11}"];

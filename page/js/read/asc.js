@@ -18,7 +18,7 @@ export async function asc(bytes, name) {
     if (Number.isNaN(height) && !/^nan$/i.test(words[i])) throw new Told(`${name}: "${words[i].slice(0, 20)}" in row ${Math.floor(i / nx) + 1} is no number. Mend that row.`);
     heights[i] = height === noData ? NaN : height;
   }
-  // A cell of less than a hundredth is one in degrees.
+  // A cell size below a hundredth is in degrees.
   const south = head.yllcorner ?? head.yllcenter ?? 0;
   const degrees = () => degree(south + (cellsize * ny) / 2).map((metres) => metres * cellsize);
   const cellM = cellsize > 0 ? (cellsize < 0.01 ? degrees() : cellsize) : null;

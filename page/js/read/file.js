@@ -1,7 +1,7 @@
-// Files that were dropped: by what they begin with, else by their names' ends.
+// Dropped files: recognised by their first bytes, else by their extensions.
 //
-// Each reader returns what `fit` of terrain.js takes, and throws an `Error` that says what is wrong,
-// where, and what to do.
+// Each reader returns the argument of `fit` in terrain.js, and throws an `Error` with the fault,
+// its place, and the remedy.
 
 import { asc } from "./asc.js";
 import { hgt } from "./hgt.js";
@@ -12,7 +12,7 @@ import { tiff } from "./tiff.js";
 
 const KINDS = "GeoTIFF, .hgt, Esri ASCII (.asc), grey PNG or NumPy (.npy)";
 
-/** Bytes of a file named `name`, as a terrain. */
+/** Returns the bytes of a file named `name` as a terrain. */
 export async function read(name, bytes) {
   const raw = await reader(name, bytes)(bytes, name).catch((why) => {
     throw why instanceof Told ? why : new Told(`${name}: it cannot be read: ${why.message}. Is the file whole? Try to open it with gdalinfo.`);

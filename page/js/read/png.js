@@ -1,4 +1,4 @@
-// Grey PNG, 8 or 16 bits a sample. The browser's own decoder would keep 8 of 16.
+// Grey PNG, 8 or 16 bits a sample. The browser's own decoder would keep only 8 of 16 bits.
 
 import { turned } from "../terrain.js";
 import { Told } from "./samples.js";

@@ -1,18 +1,18 @@
-// What readers share: errors and samples.
+// Shared by all readers: errors and samples.
 
-/** An error whose words are for the user. */
+/** Throws an error with a message for the user. */
 export class Told extends Error {}
 
-/** Metres of a degree east and north at a latitude, on the ellipsoid of WGS 84 (to 1 part in 10⁵). */
+/** Returns the metres of a degree east and north at a latitude, on WGS 84 (to 1 part in 10⁵). */
 export function degree(latitude) {
   const at = (times) => Math.cos((times * latitude * Math.PI) / 180);
   return [111_412.84 * at(1) - 93.5 * at(3) + 0.118 * at(5), 111_132.954 - 559.822 * at(2) + 1.175 * at(4)];
 }
 
-/** Heights are read in the file's order of bytes, whatever this machine's is. */
+/** Readers by type, in the file's byte order, which may differ from this machine's. */
 const isLittle = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1;
 
-/** Samples of a kind (`f4`, `i2`, …) from `bytes`, as 32-bit floats. */
+/** Returns the samples of a type (`f4`, `i2`, …) in `bytes` as 32-bit floats. */
 export function samples(kind, bytes, isLittleEndian, count) {
   const Kind = { f4: Float32Array, f8: Float64Array, i1: Int8Array, u1: Uint8Array, i2: Int16Array, u2: Uint16Array, i4: Int32Array, u4: Uint32Array }[kind];
   if (!Kind) throw new Told(`samples of type ${kind} are not read here: store them as 32-bit floats (numpy: a.astype("f4"))`);

@@ -28,7 +28,7 @@ export async function tiff(bytes) {
   return { nx, ny, heights: turned(heights, nx, ny), cellM: cell(image, ny), unitM: 1 };
 }
 
-/** Sides of a cell east and north in metres; null where the file does not say. */
+/** Returns the sides of a cell east and north in metres; null if the file does not state them. */
 function cell(image, ny) {
   const hasPlace = image.fileDirectory.hasTag("ModelPixelScale") || image.fileDirectory.hasTag("ModelTransformation");
   if (!hasPlace) return null;

@@ -1,15 +1,16 @@
-// Light on the terrain, worked out once a terrain: slopes, and how much light reaches a place.
+// Light on the terrain, computed once for a terrain: slopes, and the share of light at each
+// position.
 
 import { every } from "../terrain.js";
 
-/** Samples along a side that are drawn, at most: each WebGL 2 has textures of that size. */
+/** Maximum samples along a side of the picture: every WebGL 2 supports textures of that size. */
 const MAX_SIDE = 2048;
 /** Samples along a side of the map of shadows. */
 const SHADOW_SIDE = 384;
-/** Towards the sun: from the north-west, as on maps. */
+/** Direction towards the sun: north-west, as on maps. */
 export const SUN = [-0.6, 0.5, 0.62];
 
-/** Heights and slopes as they are drawn: `nx`, `ny`, `heights`, `texels` (RGBA, see `slopes`). */
+/** Returns heights and slopes to draw: `nx`, `ny`, `heights`, `texels` (RGBA, see `slopes`). */
 export function lit(terrain) {
   const step = Math.ceil((Math.max(terrain.nx, terrain.ny) - 1) / (MAX_SIDE - 1));
   const drawn = every(terrain, step);
@@ -17,13 +18,13 @@ export function lit(terrain) {
   return { ...drawn, texels: slopes(drawn, coarse, shadows(coarse)) };
 }
 
-/** Share of sun and sky at each place, 0 to 1: blocked by higher ground around it. */
+/** Returns the share of sun and sky at each position, 0 to 1, where higher ground may block it. */
 function shadows({ nx, ny, heights, cellMm }) {
   const share = new Float32Array(nx * ny);
   const flat = Math.hypot(SUN[0], SUN[1]);
   const directions = [[SUN[0] / flat, SUN[1] / flat], [1, 0], [0, 1], [-1, 0], [0, -1], [0.7, 0.7], [0.7, -0.7], [-0.7, -0.7]];
   const at = (x, y) => heights[Math.round(y) * nx + Math.round(x)];
-  /** The steepest slope up to higher ground on one side. */
+  /** Returns the steepest slope up to higher ground on one side. */
   const horizon = (column, row, [dx, dy], height) => {
     let steepest = 0;
     for (let reach = 1; reach < 90; reach *= 1.35) {
@@ -45,7 +46,7 @@ function shadows({ nx, ny, heights, cellMm }) {
   return share;
 }
 
-/** A texel a sample: the normal's x and y (0.5 is level), light, and 0 where there is no data. */
+/** Returns a texel a sample: the normal's x and y (0.5 is level), light, and 0 for no-data. */
 function slopes({ nx, ny, heights, cellMm }, coarse, share) {
   const texels = new Uint8Array(4 * nx * ny);
   const [sx, sy] = [(coarse.nx - 1) / (nx - 1), (coarse.ny - 1) / (ny - 1)];
@@ -62,7 +63,7 @@ function slopes({ nx, ny, heights, cellMm }, coarse, share) {
   return texels;
 }
 
-/** A value between four samples. */
+/** Returns an interpolated value between four samples. */
 function mixed({ nx, ny }, values, x, y) {
   const [i, j] = [Math.min(nx - 2, Math.floor(x)), Math.min(ny - 2, Math.floor(y))];
   const [u, v, first] = [x - i, y - j, j * nx + i];

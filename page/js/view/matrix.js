@@ -1,4 +1,4 @@
-// 4 × 4 matrices, column by column as WebGL has them, and vectors of three.
+// 4 × 4 matrices, column by column as in WebGL, and vectors of three.
 
 export const add = (a, b) => a.map((x, i) => x + b[i]);
 export const minus = (a, b) => a.map((x, i) => x - b[i]);
@@ -20,7 +20,7 @@ export function product(a, b) {
 
 export const AS_IS = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
 
-/** Puts a thing along the z axis at `at`, along `axis`, `wide` times as wide and `long` times as long. */
+/** Returns the matrix that moves a shape to `at`, along `axis`, scaled by `wide` and `long`. */
 export function placed(at, axis, wide, long) {
   const z = unit(axis);
   const x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z));
@@ -28,7 +28,7 @@ export function placed(at, axis, wide, long) {
   return new Float32Array([...times(x, wide), 0, ...times(y, wide), 0, ...times(z, long), 0, ...at, 1]);
 }
 
-/** Looks at `centre` from a distance; angles in radians, `yaw` 0 looks north. */
+/** A camera that looks at `centre` from a distance; angles in radians, `yaw` 0 looks north. */
 export class Camera {
   yaw = -0.28;
   pitch = 0.66;
@@ -36,14 +36,14 @@ export class Camera {
   centre = [0, 0, 0];
   #tan = Math.tan(0.3);
 
-  /** Updates what depends on the canvas' shape. */
+  /** Updates the values that depend on the canvas' shape. */
   look(aspect) {
     const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
     this.forward = [sy * cp, cy * cp, -sp];
     this.right = [cy, -sy, 0];
     this.up = cross(this.right, this.forward);
     this.eye = minus(this.centre, times(this.forward, this.distance));
-    // In a narrow window the sides have to be seen, too.
+    // In a narrow window the sides must be visible, too.
     this.tan = this.#tan * Math.max(1, 1.25 / aspect);
     this.aspect = aspect;
     const [near, far] = [this.distance / 20, this.distance * 4];
@@ -58,14 +58,14 @@ export class Camera {
     this.matrix = product(lens, turn);
   }
 
-  /** Where a place is on the canvas: 0 to 1 from the left and from the top. */
+  /** Returns a position on the canvas: 0 to 1 from the left and from the top. */
   project(at) {
     const to = minus(at, this.eye);
     const depth = dot(to, this.forward) * this.tan;
     return [0.5 + dot(to, this.right) / (2 * depth * this.aspect), 0.5 - dot(to, this.up) / (2 * depth)];
   }
 
-  /** The place at height `z` that is seen at a place of the canvas; null beside the sky. */
+  /** Returns the point at height `z` seen at a position of the canvas; null in the sky. */
   pick([left, top], z) {
     const across = times(this.right, (2 * left - 1) * this.tan * this.aspect);
     const ray = add(this.forward, add(across, times(this.up, (1 - 2 * top) * this.tan)));

@@ -5,14 +5,14 @@ import { AS_IS, Camera, add, length, placed, times } from "./matrix.js";
 import { GROUND, THING, TRAIL } from "./shaders.js";
 import { BALL, PEN, POINT, SHAFT, sides } from "./shapes.js";
 
-/** Vertices along a side of the ground's mesh, at most; fewer where the machine is slow. */
+/** Maximum vertices along a side of the ground's mesh; fewer on a slow machine. */
 const MAX_MESH = 320;
 const LEAST_MESH = 80;
-/** After so many frames that took longer than this, ms, the picture is made coarser. */
+/** Duration of a slow frame, ms, and the number of them after which the picture gets coarser. */
 const SLOW_MS = 60;
 const SLOW_FRAMES = 4;
 const LEAST_PIXELS = 0.5;
-/** The block under the lowest sample, mm. */
+/** Height of the block under the lowest sample, mm. */
 const BLOCK_MM = 14;
 /** Length of the arrow for a newton, mm. */
 const ARROW_MM = 14;
@@ -29,7 +29,7 @@ export class Scene {
   #last = 0;
   #slow = 0;
 
-  /** Throws where the browser has no WebGL 2. */
+  /** Throws if the browser has no WebGL 2. */
   constructor(canvas) {
     this.canvas = canvas;
     const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: false });
@@ -79,7 +79,7 @@ export class Scene {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
   }
 
-  /** Draws what is touched: `arm`, `proxy`, `force`, … as in touch.js; `scaleMm`, how long the bar is. */
+  /** Draws the state of touch.js: `arm`, `proxy`, `force`, …; `scaleMm` is the bar's length. */
   draw({ arm, proxy, foot, force, state, tipMm }, scaleMm) {
     const { gl, camera, canvas } = this;
     this.#keepUp();
@@ -122,7 +122,7 @@ export class Scene {
     gl.drawElements(gl.TRIANGLE_STRIP, this.count, gl.UNSIGNED_INT, 0);
   }
 
-  /** The HIP inside the ground and the force as an arrow: in front of all else. */
+  /** Draws the HIP inside the ground and the force as an arrow, in front of everything else. */
   #drawForce(hip, proxy, force) {
     const gl = this.gl;
     const size = length(force);
@@ -137,7 +137,7 @@ export class Scene {
     gl.depthRange(0, 1);
   }
 
-  /** A bar along the front edge. */
+  /** Draws a bar along the front edge. */
   #drawScale(scaleMm) {
     const at = this.scaleAt = [this.terrain.widthMm / 2 - scaleMm / 2, -5, -BLOCK_MM];
     this.#put("SHAFT", placed(at, [1, 0, 0], 2, scaleMm), COLOURS.scale);
@@ -212,7 +212,7 @@ function shape(gl, corners) {
   return { array, count: corners.length / 6 };
 }
 
-/** A strip of triangles a row, ended by the number that WebGL 2 begins a new one at. */
+/** Returns a strip of triangles a row, each ended by the restart index of WebGL 2. */
 function strips(columns, rows) {
   const indices = [];
   for (let row = 0; row + 1 < rows; row++) {

@@ -54,7 +54,7 @@ void main() {
 }`,
 ];
 
-/** Things: one colour, some light. Also the block's sides. */
+/** Shapes of one colour with light, and the block's sides. */
 export const THING = [
   `${HEAD}
 uniform mat4 camera;

@@ -1,6 +1,6 @@
-// Shapes: turned on a lathe around the z axis, and the sides of the terrain's block.
+// Shapes: rotated profiles around the z axis, and the sides of the terrain's block.
 
-/** Corners (place and normal, six numbers each) of a profile of pairs [radius, z], turned around z. */
+/** Returns the corners (position, normal) of a profile of [radius, z], rotated around z. */
 export function lathe(profile, sides = 20) {
   const corners = [];
   const ring = (k, i) => {
@@ -26,7 +26,7 @@ export const POINT = lathe([[0, 0], [1, 0], [0, 1]]);
 /** A pen with its tip at 0. */
 export const PEN = lathe([[0, 0], [0.5, 0.07], [0.75, 0.16], [0.75, 0.97], [0.5, 1], [0, 1]]);
 
-/** The four sides of the block that the ground is the top of, down to `bottom`. */
+/** Returns the four sides of the block under the ground, down to `bottom`. */
 export function sides({ nx, ny, heights, cellMm }, bottom) {
   const corners = [];
   const wall = (count, texel, normal) => {

@@ -1,4 +1,4 @@
-"""The command ``hapterra``: its words, and runs of it in a process of its own."""
+"""The command ``hapterra``: its arguments, and runs of it in a process of its own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any, Union
 
 Word = Union[str, "os.PathLike[str]"]
 
-# In a group of its own: a terminal's Ctrl-C would be a second one, which ends the command at once.
+# In its own process group: a terminal's Ctrl-C would be a second signal, which ends the command at
+# once.
 if sys.platform == "win32":
     _INTERRUPT, _NEW_GROUP = signal.CTRL_BREAK_EVENT, subprocess.CREATE_NEW_PROCESS_GROUP
 else:
@@ -22,9 +23,9 @@ else:
 class CommandError(Exception):
     """The command ``hapterra`` has failed."""
 
-    #: What went wrong, in the command's words.
+    #: The command's error message.
     message: str
-    #: What to do about it; None where the command does not say.
+    #: The command's hint; None if there is none.
     hint: str | None
 
     def __init__(self, message: str, hint: str | None = None) -> None:
@@ -34,18 +35,19 @@ class CommandError(Exception):
 
 
 def command() -> list[str]:
-    """The words that start the command: the environment variable HAPTERRA, else this package."""
+    """Returns the words that start the command: the environment variable HAPTERRA, else this
+    package."""
     named = os.environ.get("HAPTERRA")
     return [named] if named else [sys.executable, "-m", "hapterra"]
 
 
 def lab() -> list[str]:
-    """The words that start ``hapterra-lab``: the environment variable HAPTERRA_LAB, else that of the PATH.
+    """Returns the words that start ``hapterra-lab``: the variable HAPTERRA_LAB, else the PATH's.
 
     Raises
     ------
     CommandError
-        Where there is none.
+        If it is not found.
     """
     named = os.environ.get("HAPTERRA_LAB") or shutil.which("hapterra-lab")
     if not named:
@@ -57,8 +59,8 @@ def lab() -> list[str]:
 
 
 def options(**given: Any) -> list[str]:
-    """Options of the command: ``friction=0.1`` is ``--friction=0.1``, ``[1, 2]`` is ``1,2``, True is a
-    flag, and None or False is none."""
+    """Returns options of the command: ``friction=0.1`` is ``--friction=0.1``, ``[1, 2]`` is
+    ``1,2``, True is a flag, and None or False is omitted."""
     return [
         f"--{name.replace('_', '-')}" + ("" if value is True else f"={_text(value)}")
         for name, value in given.items()
@@ -67,8 +69,8 @@ def options(**given: Any) -> list[str]:
 
 
 def reading_options(cache: Word | None = None, **reading: Any) -> list[str]:
-    """Options of the command on an input: ``no_data=-9999`` is ``--input=no-data=-9999``, and
-    ``gdal={"NAME": "VALUE"}`` is ``--input=gdal:NAME=VALUE``."""
+    """Returns the command's options for an input: ``no_data=-9999`` is ``--input=no-data=-9999``,
+    and ``gdal={"NAME": "VALUE"}`` is ``--input=gdal:NAME=VALUE``."""
     gdal = {f"gdal:{name}": value for name, value in reading.pop("gdal", {}).items()}
     named = {name.replace("_", "-"): value for name, value in reading.items()}
     return options(cache=cache) + [
@@ -87,7 +89,7 @@ def _text(value: Any) -> str:
 def run(*words: Word, program: list[str] | None = None) -> str:
     """Runs the command, or another program, to its end and returns what it prints.
 
-    Ctrl-C ends the command, too, and waits for it.
+    Ctrl-C also ends the command, and waits for its end.
 
     Raises
     ------
@@ -116,19 +118,19 @@ def run(*words: Word, program: list[str] | None = None) -> str:
 
 
 def error(told: str, code: int) -> CommandError:
-    """The error that standard error and exit code of the command tell."""
+    """Returns the error from the command's standard error and exit code."""
     before, found, text = f"\n{told}".rpartition("\nerror: ")
     if not found:
         return CommandError(f"hapterra ended with exit code {code}: {told.strip()}")
     message, _, hint = text.partition("\nhint: ")
-    # A wrong word is followed by how the command is used.
+    # After a wrong word the command prints its usage.
     message = message.partition("\n\nUsage: ")[0]
     return CommandError(message.strip(), hint.strip() or None)
 
 
 def main() -> int:
     """Runs the command with the arguments of this process: ``hapterra`` in a terminal."""
-    # It listens to Ctrl-C by itself, and ends as other programs do until then.
+    # The command handles Ctrl-C itself; until it does, Ctrl-C ends the process as usual.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from . import _native

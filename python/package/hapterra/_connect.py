@@ -24,11 +24,11 @@ from ._terrain import Terrain
 
 _Path = Union[str, "os.PathLike[str]"]
 _Vector = tuple[float, float, float]
-#: For so long a command may take until it is done: the clutch opens and closes in a second.
+#: Time-out of a command, s: the clutch opens and closes in a second.
 _DONE_S = 15.0
-#: Parameters of ``Surface`` that are options of the command; its file has the others.
+#: Parameters of ``Surface`` that are options of the command; the others are in its file.
 _OPTIONS = ("stiffness", "max_force")
-#: Commands that change no view, or the surface of ``params``, and what is there for them.
+#: Commands that do not change the placement, or that change the surface, and their replacements.
 _NOT_HERE = {
     **dict.fromkeys(
         ("surface", "stiffness", "friction", "viscous-friction", "damping", "shading", "texture"),
@@ -55,7 +55,7 @@ def _toml(values: dict[str, Any]) -> list[str]:
 
 
 class Sample(NamedTuple):
-    """What the loop did in a tick. Vectors are east, north, up, in the view's millimetres."""
+    """Record of a tick. Vectors are east, north, up, in the placement's millimetres."""
 
     #: The device's number of the tick.
     tick: int
@@ -63,27 +63,27 @@ class Sample(NamedTuple):
     t_s: float
     #: The haptic interface point, mm: the tip of the arm.
     hip_mm: _Vector
-    #: The proxy, mm; the HIP where nothing is touched.
+    #: The proxy, mm; the HIP without contact.
     proxy_mm: _Vector
     #: Force on the hand, N.
     force_n: _Vector
     #: "free", "touching", "releasing" or "unseeded", as in recordings.
     state: str
-    #: How far arming has come: "disarmed", "requested", "confirming", "ramping", "armed", "fading".
+    #: Progress of arming: "disarmed", "requested", "confirming", "ramping", "armed", "fading".
     mode: str
-    #: The view, counted from 0: each change of the surface or the place makes another.
+    #: Number of the placement, from 0: each change of the surface or the placement increments it.
     view: int
 
 
 class Mark(NamedTuple):
-    """A moment that was marked."""
+    """A marked moment."""
 
     text: str
-    #: The tick that the device marked; its mark pin rose in it.
+    #: The marked tick, in which the device's mark pin rose.
     tick: int
     #: Time of that tick, s, as ``Sample.t_s``.
     t_s: float
-    #: This computer's clock when the mark was asked for, seconds since 1970, as ``time.time()``.
+    #: This computer's clock at the request of the mark, seconds since 1970, as ``time.time()``.
     host_unix_s: float
 
 
@@ -96,7 +96,7 @@ def connect(
     quiet: bool = False,
     **options: Any,
 ) -> Device:
-    """A device, to load a terrain on and arm.
+    """Returns a device, on which a terrain can be loaded and the arm armed.
 
     A person's hand is in an arm: read docs/safety.md first. The device is driven by the command
     ``hapterra`` in a process of its own, so the arm never waits for Python.
@@ -105,17 +105,17 @@ def connect(
     ----------
     device : "usb", "usb:SERIAL", "tcp:HOST:PORT", "native" or "emulated"
         An arm's board; or without hardware the device's own program, compiled for this machine
-        ("native", in real time) or on a board in QEMU ("emulated", as fast as that is), with a
+        ("native", in real time) or on a board in QEMU ("emulated", at QEMU's speed), with a
         virtual arm in a scripted hand that tours the terrain once.
     record : path, optional
         File for the recording: CSV, or Parquet if its name ends in .parquet.
     sample_every : int
-        ``samples()`` has every N-th of the thousand samples a second.
+        ``samples()`` returns every N-th of the thousand samples a second.
     buffer : int
         Size of the queues of samples and of events; if one is full, its oldest item is dropped.
     quiet : bool
-        Pass on only what a person has to do or is warned of, as in an experiment, where a person
-        must not read which surface it is.
+        Pass on only instructions and warnings, for an experiment in which the person must not
+        read which surface it is.
     options
         Options of ``hapterra run`` (``hapterra demo`` for "emulated") with underscores:
         ``silence="10s"``, ``view=True``, ``settings="none"``.
@@ -126,7 +126,7 @@ def connect(
 class Device:
     """A device of ``connect``. Use it with ``with``: its end disarms the arm.
 
-    It belongs to the process that made it: a fork can neither arm nor disarm it.
+    It belongs to the process that created it: a fork can neither arm nor disarm it.
     """
 
     def __init__(
@@ -152,12 +152,12 @@ class Device:
         self._loaded: list[str] | None = None
         self._surface: dict[str, Any] = {}
         self._session: Session | None = None
-        #: The surface that is touched: None is what a change was not confirmed of.
+        #: The touched surface; None for a parameter whose change was not confirmed.
         self._touched: dict[str, Any] = {}
         self._samples: Buffer[Sample] = Buffer(buffer)
         self._events: Buffer[dict[str, Any]] = Buffer(buffer)
         self._confirmed = False
-        #: Why the session before was not confirmed to be disarmed; None since one was.
+        #: Error if the last session was not confirmed to be disarmed, else None.
         self._unconfirmed: str | None = None
         self._ending, self._changing, self._marking = (threading.RLock() for _ in range(3))
         self._pid = os.getpid()
@@ -168,19 +168,20 @@ class Device:
     def load(
         self, terrain: Terrain | _Path, surface: Surface | _Path | None = None, **options: Any
     ) -> None:
-        """Sets what is touched next.
+        """Sets the terrain and the surface of the next session.
 
         Parameters
         ----------
-        terrain : a Terrain, or whatever ``hapterra run`` opens: a file, a folder, a URL. A Terrain
+        terrain : a Terrain, or a source that ``hapterra run`` opens: a file, a folder, a URL. A
+        Terrain
             is written to a file of 8 bytes a sample; give the path of a large one.
         surface : Surface, or one of the command: "ice", "sand", "rock" or a file, optional
             Materials of a surface cannot be loaded: give ``materials=``, a file, and the file of
             its classes as the surface.
         options
             Options of ``hapterra run`` with underscores: ``at=(x, y)``, ``scale="5m/mm"``,
-            ``exaggeration="auto"``, ``tip="2mm"``, ``duration="60s"``. A Terrain has its scale
-            itself. If neither ``tip=`` nor ``Terrain.with_tip`` gives a radius, the tip is the ball
+            ``exaggeration="auto"``, ``tip="2mm"``, ``duration="60s"``. A Terrain has its own
+            scale. If neither ``tip=`` nor ``Terrain.with_tip`` gives a radius, the tip is the ball
             that ``hapterra run`` chooses, while ``Contact`` has a point.
         """
         if self._session is not None:
@@ -213,20 +214,20 @@ class Device:
         self._loaded = [file, *options_of(**words)]
 
     def arm(self, timeout: float = 120.0, ask: Callable[[str], bool] | None = None) -> None:
-        """Serves the terrain and arms the arm. A person presses the dead-man switch: what there
-        is to do is said on standard error. Returns when the force is in.
+        """Serves the terrain and arms the arm. The user presses the dead-man switch: instructions
+        are on standard error. Returns when the force is fully ramped up.
 
         Parameters
         ----------
-        timeout : seconds, from the last answer on.
-        ask : called with what the person has to do or to look at before the arm is zeroed, or
-            before a fault is cleared. True goes on. Without it, Enter at the terminal does, if it
-            was pressed after the question was shown and nothing was typed before it.
+        timeout : seconds, from the last answer.
+        ask : called with the user's task or check before the arm is zeroed, or before a fault is
+            cleared. True continues. Without ``ask``, Enter at the terminal continues, if it was
+            pressed after the question was shown and nothing was typed before it.
 
         Raises
         ------
         DeviceError
-            Why it is not armed. The session is over then, and the board disarmed.
+            With the reason why it is not armed. The session is then over, and the board disarmed.
         """
         if self._loaded is None:
             raise DeviceError("there is nothing to touch: load() a terrain first")
@@ -268,7 +269,7 @@ class Device:
         self._samples, self._events = Buffer(self._buffer), Buffer(self._buffer)
         take = functools.partial(_take, self._samples, self._events)
         self._touched = dict(self._surface)
-        # A device that nobody has any more, as one that a notebook has replaced, ends its session.
+        # A device without references, such as one that a notebook has replaced, ends its session.
         self._session = session = Session(words, take, self._quiet)
         self._abandon = weakref.finalize(self, session.close_input).detach
         return session
@@ -279,9 +280,9 @@ class Device:
         Raises
         ------
         NotDisarmedError
-            It has not: switch the amplifiers off.
+            The board has not confirmed it: switch the amplifiers off.
         DeviceError
-            The board is disarmed, and something else went wrong, as with the recording.
+            The board is disarmed, and there was another failure, for example of the recording.
         """
         self._end(None)
 
@@ -295,7 +296,7 @@ class Device:
 
     def _end_session(self, session: Session, why: BaseException | None) -> None:
         error: DeviceError | None = None
-        # What is raised otherwise, as by Ctrl-C, leaves the session to be ended again.
+        # After any other exception, such as by Ctrl-C, the session can be ended again.
         try:
             session.end()
         except DeviceError as raised:
@@ -316,7 +317,7 @@ class Device:
 
     @property
     def is_armed(self) -> bool:
-        """Returns True if the arm is armed, as far as is known."""
+        """Returns True if the arm is armed by the last report."""
         own(self._pid)
         session = self._session
         return session is not None and not session.is_over and session.mode == "armed"
@@ -344,30 +345,31 @@ class Device:
         return self._samples.dropped
 
     def samples(self) -> Iterator[Sample]:
-        """The samples as they arrive, until the session is over; the oldest in the queue first."""
+        """Iterates over the samples as they arrive, until the session is over, the oldest first."""
         return iter(self._samples)
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """Events as they arrive, except samples: contact, place, material, limits, as
-        docs/how-to/events.md has them."""
+        """Iterates over all events except samples, as they arrive: contact, place, material,
+        limits; see docs/how-to/events.md."""
         return iter(self._events)
 
     def command(self, line: str) -> None:
-        """Gives a command of ``hapterra run`` that changes the view, as "zoom 2" or "pan 5 0", and
-        waits until that is in force. Raises DeviceError where it is refused. "reset" puts
-        ``params`` back to what was loaded; commands of the surface are refused."""
+        """Sends a command of ``hapterra run`` that changes the placement, such as "zoom 2" or
+        "pan 5 0", and waits until it is done. Raises DeviceError if it is refused. "reset" sets
+        ``params`` to the loaded values; commands of the surface are refused."""
         first = [*line.partition("#")[0].split(), ""][0]
         if first in _NOT_HERE:
             raise DeviceError(f"{line!r} is not given as a command: {_NOT_HERE[first]}")
         self._change(line, self._surface if first == "reset" else {})
 
     def _change(self, line: str, changed: dict[str, Any]) -> None:
-        """Gives a command, and notes what it changes of the surface once it is in force."""
+        """Sends a command, and stores its changes of the surface when it is done."""
         session = self._serving()
         with self._changing:
             before, surface = dict(self._touched), self._touched
             view, refused = session.view, len(session.refused)
-            # Where it is not known whether it is done, it may still come.
+            # Until the command is confirmed, the parameter is unknown: the change may still be
+            # made.
             surface.update(dict.fromkeys(changed))
             try:
                 session.send(line)
@@ -387,10 +389,10 @@ class Device:
             surface.update(changed)
 
     def mark(self, text: str) -> Mark:
-        """Marks this moment, in the recording and on the board's mark pin.
+        """Marks the current moment, in the recording and on the board's mark pin.
 
-        ``text`` has 1 to 200 characters, no control characters. Returns once the device has said
-        which tick it marked.
+        ``text`` has 1 to 200 characters, no control characters. Returns when the device has
+        reported the marked tick.
         """
         session = self._serving()
         text = text.strip()
@@ -434,7 +436,7 @@ class Device:
 
 
 def _take(samples: Buffer[Sample], events: Buffer[dict[str, Any]], event: dict[str, Any]) -> None:
-    """Puts an event where it is taken from. Knows no device, so one may be forgotten."""
+    """Adds an event to its queue. Has no reference to the device, so that it can be collected."""
     kind = event["event"]
     if kind == "over":
         samples.close()

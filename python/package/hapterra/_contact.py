@@ -37,11 +37,11 @@ class State(enum.IntEnum):
     FREE = 0
     #: The proxy is on the surface, and the HIP below it.
     TOUCHING = 1
-    #: The surface that the proxy was on has come to an end, and the last force fades away.
+    #: The surface under the proxy has ended, and the last force ramps down.
     RELEASING = 2
-    #: The HIP is below the surface and has not been above it: no force until it has.
+    #: The HIP is below the surface and has not been above it yet: no force until then.
     BELOW_GROUND = 3
-    #: The HIP is in a no-data area or outside, and was not above the surface yet: no force.
+    #: The HIP is in a no-data area or outside, and has not been above the surface yet: no force.
     OUTSIDE = 4
 
 
@@ -53,9 +53,9 @@ class Step(NamedTuple):
 
     #: The force on the hand, N: east, north, up.
     force_n: tuple[float, float, float]
-    #: The proxy, mm: on the surface while it touches, at the HIP while it is free.
+    #: The proxy, mm: on the surface during contact, else at the HIP.
     proxy_mm: tuple[float, float, float]
-    #: What the proxy is doing.
+    #: State of the proxy.
     state: State
     #: The height of the surface over the HIP, mm, while the state is BELOW_GROUND.
     surface_mm: float | None
@@ -73,7 +73,7 @@ class StepError(ValueError):
 
 
 def arguments(path_mm: npt.ArrayLike, t: npt.ArrayLike | None) -> tuple[bytes, bytes | None]:
-    """A path and its times as they are taken by what is compiled."""
+    """Returns a path and its times as arguments of the compiled part."""
     path = np.asarray(path_mm, "=f8")
     if path.ndim != 2 or path.shape[1] != 3:
         raise ValueError(f"the path has the shape {path.shape}: give (N, 3), east, north, up")
@@ -94,9 +94,9 @@ class Contact:
     rate : int
         Steps a second, 1000 to 10000 in whole thousands; damping and viscous friction use it.
 
-    The first place should be above the terrain: a path that begins below it has the state
-    BELOW_GROUND, and no force until the HIP was above. A contact is one hand's: give each thread
-    its own. A terrain may be shared.
+    The first position should be above the terrain: a path that begins below it has the state
+    BELOW_GROUND, and no force until the HIP has been above. A contact belongs to one hand: give
+    each thread its own. A terrain may be shared.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class Contact:
         self.rate = rate
 
     def step(self, hip_mm: Iterable[float]) -> Step:
-        """One step with the HIP at a place: east, north, up, mm.
+        """Makes one step with the HIP at a position: east, north, up, mm.
 
         Raises ValueError for an impossible position; the contact is then unchanged.
         """
@@ -118,7 +118,7 @@ class Contact:
         return Step(force, proxy, _STATES[state], surface)
 
     def run(self, path_mm: npt.ArrayLike, t: npt.ArrayLike | None = None) -> npt.NDArray[np.void]:
-        """A step for each tick of a path, without the interpreter's lock.
+        """Makes a step for each tick of a path, without the interpreter's lock.
 
         Parameters
         ----------
@@ -127,8 +127,8 @@ class Contact:
         t : array of shape (N,), seconds, optional
             Without it each row is a tick. With it the path is sampled at ``rate``, by the rule of
             ``hapterra replay``: ticks begin at ``t[0]``; a row within a hundredth of a tick is the
-            tick, bit for bit; elsewhere the HIP lies on the straight line between two rows. Times
-            that cannot be right are a ValueError, odd ones a warning.
+            tick, bit for bit; elsewhere the HIP is interpolated linearly between two rows. Invalid
+            times are a ValueError, odd ones a warning.
 
         Returns
         -------
@@ -138,7 +138,7 @@ class Contact:
         Raises
         ------
         StepError
-            At the first step that is not possible, with those before it.
+            At the first step that is not possible, with the steps before it.
         """
         rows, remarks, error = self._native.run(*arguments(path_mm, t))
         for remark in remarks:
@@ -157,8 +157,8 @@ class Contact:
 
 
 def to_dataframe(steps: npt.NDArray[np.void]) -> pandas.DataFrame:
-    """The steps of ``Contact.run`` as a DataFrame, columns named as in ``hapterra replay``'s CSV
-    but for ``state``, which has the names of ``State``."""
+    """Returns the steps of ``Contact.run`` as a DataFrame. Columns are named as in
+    ``hapterra replay``'s CSV, except ``state``, which has the names of ``State``."""
     import pandas
 
     columns = {"t_s": steps["t_s"]}

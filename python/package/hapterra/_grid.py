@@ -1,4 +1,4 @@
-"""Heights with what their own metadata states: row order, no-data, cell size and units."""
+"""Heights with the properties in their metadata: row order, no-data, cell size and units."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NAMES = {
     "us survey foot": "us-ft",
 }
 _DEGREES = "degree"
-#: Names and standard names of coordinates, where no axis is stated.
+#: Names and standard names of coordinates, used if no axis is stated.
 _X = {"x", "lon", "longitude", "easting", "projection_x_coordinate"}
 _Y = {"y", "lat", "latitude", "northing", "projection_y_coordinate"}
 
@@ -30,16 +30,16 @@ class Metres(NamedTuple):
 
 @dataclass
 class Grid:
-    """Heights as they lie: rows from west to east."""
+    """Heights in their original row order: rows from west to east."""
 
     heights: npt.NDArray[Any]
     origin: str
-    #: From a sample to the next, east and north, in the unit of the ground.
+    #: Distance of neighbouring samples, east and north, in the unit of the ground.
     cell: tuple[float, float]
     ground_unit: str | None
     height_unit: str | None
     nodata: float | None
-    #: Where the south-west sample lies, in the unit of the ground.
+    #: Position of the south-west sample, in the unit of the ground.
     corner: tuple[float, float]
 
     def source(self) -> dict[str, Any]:
@@ -54,7 +54,8 @@ class Grid:
         }
 
     def metres(self, ground_unit: str | None, height_unit: str | None) -> Metres:
-        """The size of a cell and of a unit of the heights, by what was given or else stated."""
+        """Returns the size of a cell and of a unit of the heights: the given one, else the stated
+        one."""
         ground_unit = ground_unit or self.ground_unit
         if ground_unit == _DEGREES:
             raise ValueError(
@@ -85,7 +86,7 @@ def _metres(word: str, what: str, unit: str | None) -> float:
 
 
 def _unit(name: Any) -> str | None:
-    """One spelling of a unit."""
+    """Returns a unit's canonical spelling."""
     if not name:
         return None
     text = str(name).strip().lower()
@@ -93,7 +94,7 @@ def _unit(name: Any) -> str | None:
 
 
 def of_xarray(da: Any, x: Any, y: Any) -> Grid:
-    """The grid of a DataArray."""
+    """Returns the grid of a DataArray."""
     if da.ndim != 2:
         raise ValueError(
             f"the array has the dimensions {da.dims}: choose two, as da.isel(time=0) or da.squeeze()"
@@ -104,7 +105,7 @@ def of_xarray(da: Any, x: Any, y: Any) -> Grid:
     da = da.transpose(y, x)
     stored = np.asarray(da.values)
     heights = _floats(stored)
-    # What xarray has decoded is NaN already.
+    # No-data that xarray has decoded is already NaN.
     nodata = da.attrs.get("_FillValue", da.attrs.get("missing_value"))
     if nodata is not None:
         heights = np.where(stored == nodata, np.nan, heights)
@@ -122,7 +123,7 @@ def of_xarray(da: Any, x: Any, y: Any) -> Grid:
 
 
 def _floats(stored: Any) -> Any:
-    """Samples of a type that has NaN."""
+    """Returns the samples in a type that has NaN."""
     return stored if stored.dtype.kind == "f" else stored.astype("f8")
 
 
@@ -143,7 +144,7 @@ def _dimension(da: Any, word: str, axis: str, names: set[str]) -> Any:
 
 
 def _spacing(da: Any, name: str) -> tuple[float, int]:
-    """The distance of even coordinates, and 1 where they rise or -1 where they fall."""
+    """Returns the spacing of regular coordinates, and 1 if they rise or -1 if they fall."""
     if name not in da.coords:
         raise ValueError(
             f"the dimension {name} has no coordinates: give them with assign_coords, or use"
@@ -160,7 +161,7 @@ def _spacing(da: Any, name: str) -> tuple[float, int]:
 
 
 def of_rasterio(ds: Any, band: int) -> Grid:
-    """The grid of a band of a dataset."""
+    """Returns the grid of a band of a dataset."""
     if not 1 <= band <= ds.count:
         raise ValueError(f"band is {band}, and the dataset has {ds.count}, from 1 on")
     to_ground = ds.transform

@@ -1,4 +1,4 @@
-"""What is compiled. Use the names of `hapterra`."""
+"""The compiled part. Use the names of `hapterra`."""
 
 from collections.abc import Sequence
 from typing import Any, Literal, final
@@ -12,11 +12,12 @@ def main(arguments: Sequence[str], program: Sequence[str]) -> int:
 def recording(
     path: str,
 ) -> tuple[str | None, list[tuple[str, str, bytes, list[str]]], bool]:
-    """Settings as JSON, columns as name, type, bytes and texts, and whether the last row was cut."""
+    """Returns settings as JSON, columns as name, type, bytes and texts, and if the last row was
+    cut."""
 
 @final
 class Surface:
-    """How a surface is rendered; `help(hapterra.Surface)` has units and bounds."""
+    """The parameters of a surface; `help(hapterra.Surface)` has units and bounds."""
 
     def __new__(
         cls,
@@ -36,8 +37,8 @@ class Surface:
         materials: Sequence[Surface] = ...,
     ) -> Surface: ...
     def params(self) -> dict[str, Any]:
-        """The parameters by their names, without those of a texture that is not there; of
-        `materials`, how many there are."""
+        """Returns the parameters by their names, without those of an absent texture; for
+        `materials`, their number."""
 
 @final
 class Terrain:

@@ -55,7 +55,7 @@ class Params:
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in type(self).__annotations__:
             raise AttributeError(f"{name} cannot be set while it is touched: load() it")
-        # What is set by its ratio must not change meanwhile.
+        # A parameter that is set by a ratio must not change meanwhile.
         with self.__dict__["_changing"]:
             self._set(name, value)
 

@@ -1,4 +1,4 @@
-"""Places of terrains that know where they lie: windows round a place, and coordinates."""
+"""Positions in georeferenced terrains: windows around a position, and coordinates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SCALE = re.compile(r"\s*([0-9.eE+-]+)\s*(m|km)\s*/\s*mm\s*")
 
 
 def ground_m_per_mm(scale: str | float | None) -> float | None:
-    """Ground metres a millimetre of the hand, of "100 m/mm" or the number itself."""
+    """Returns the ground metres in a device millimetre, from "100 m/mm" or the number itself."""
     if scale is None or isinstance(scale, (int, float)):
         return scale
     found = _SCALE.fullmatch(scale)
@@ -32,14 +32,14 @@ def ground_m_per_mm(scale: str | float | None) -> float | None:
 
 
 def files(source: Path | Iterable[Path]) -> list[str]:
-    """The files of one source or of several."""
+    """Returns the files of one source or of several."""
     if isinstance(source, (str, os.PathLike)):
         return [os.fspath(source)]
     return [os.fspath(path) for path in source]
 
 
 def pair(name: str, values: Pair) -> tuple[float, float]:
-    """Two numbers."""
+    """Returns two numbers."""
     numbers = tuple(map(float, values))
     if len(numbers) != 2:
         raise ValueError(f"{name} has {len(numbers)} numbers: give 2")
@@ -47,7 +47,7 @@ def pair(name: str, values: Pair) -> tuple[float, float]:
 
 
 def is_lonlat(crs: str | None) -> bool:
-    """Whether coordinates are longitude and latitude, and not the terrain's own."""
+    """Returns True if coordinates are longitude and latitude, and not the terrain's own."""
     if crs not in (None, "lonlat"):
         raise ValueError(f'crs is {crs!r}: give "lonlat", or leave it out for the terrain\'s own')
     return crs == "lonlat"
@@ -59,14 +59,14 @@ def resized(
     scale: str | float | None,
     exaggeration: float | str | None,
 ) -> dict[str, Any]:
-    """Size of an opened terrain, with what is given in place of its own."""
+    """Returns the size of an opened terrain, with the given values instead of its own."""
     if not (cell_mm is None and scale is None):
         how = {**how, "cell_mm": cell_mm, "scale": scale}
     return how if exaggeration is None else {**how, "exaggeration": exaggeration}
 
 
 class Laid(NamedTuple):
-    """How the terrain of a grid is made."""
+    """The scale of a grid's terrain."""
 
     cell_mm: float
     exaggeration: float
@@ -76,20 +76,20 @@ class Laid(NamedTuple):
 
 
 class Ground:
-    """Where the terrain of an array lies, in the coordinates of its data."""
+    """The position of an array's terrain, in the coordinates of its data."""
 
     def __init__(self, grid: Grid, laid: Laid) -> None:
         self._grid, self._laid = grid, laid
 
     def mm_at(self, at: tuple[float, float], lonlat: bool) -> tuple[float, float]:
-        """Millimetres east and north of a place."""
+        """Returns the millimetres east and north to a position."""
         _check_own(lonlat)
         (west, south), (east, north) = self._grid.corner, self._grid.cell
         cell_mm = self._laid.cell_mm
         return (at[0] - west) / east * cell_mm, (at[1] - south) / north * cell_mm
 
     def ground_at(self, mm: tuple[float, float], lonlat: bool) -> tuple[float, float]:
-        """The place of millimetres east and north."""
+        """Returns the position at millimetres east and north."""
         _check_own(lonlat)
         (west, south), (east, north) = self._grid.corner, self._grid.cell
         cell_mm = self._laid.cell_mm
@@ -104,7 +104,7 @@ class Ground:
         scale: str | float | None,
         exaggeration: float | str | None,
     ) -> tuple[Grid, Laid]:
-        """The samples round a place, and how a terrain is made of them."""
+        """Returns the samples around a position, and the scale of their terrain."""
         grid, laid = self._grid, self._laid
         metres = ground_m_per_mm(scale)
         if metres is not None:
@@ -131,7 +131,7 @@ class Ground:
 def _span(
     at: tuple[float, float], middle: float, cells: float, last: int
 ) -> tuple[int, int]:
-    """The first and the last sample of a window."""
+    """Returns the first and the last sample of a window."""
     if not 0 <= middle <= last:
         raise ValueError(f"{at} is outside of the terrain")
     if not 1 <= cells < 2**31:

@@ -1,4 +1,4 @@
-"""Recordings, and rendering them again."""
+"""Recordings, and their replay."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 class Recording:
-    """What ``hapterra run``, ``demo`` and ``replay`` have recorded, in memory."""
+    """A recording of ``hapterra run``, ``demo`` or ``replay``, in memory."""
 
     #: The file.
     path: str
-    #: What is recorded of terrain, place, scale, surface and device; empty where nothing is.
+    #: Recorded settings of terrain, placement, scale, surface and device; empty if there are none.
     #: Names are those of docs/reference/recordings.md, with the unit at their end.
     settings: dict[str, Any]
     #: A row a tick, with all columns: ``t_s`` (s), ``x_mm``, ``y_mm``, ``z_mm`` (the HIP, mm: east,
@@ -37,7 +37,7 @@ class Recording:
 
     @property
     def marks(self) -> list[dict[str, Any]]:
-        """The moments that were marked: ``tick``, ``t_s``, ``host_unix_s``, ``text``."""
+        """The marked moments: ``tick``, ``t_s``, ``host_unix_s``, ``text``."""
         return list(self.settings.get("mark", []))
 
     @property
@@ -46,7 +46,7 @@ class Recording:
         return list(self.settings.get("view", []))
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The steps as a DataFrame, whose ``attrs`` are the settings."""
+        """Returns the steps as a DataFrame, whose ``attrs`` are the settings."""
         import pandas
 
         frame = pandas.DataFrame(self.steps)

@@ -27,19 +27,18 @@ from typing import Any, Generic, TypeVar
 from ._command import _INTERRUPT, _NEW_GROUP, CommandError, command, error
 
 _T = TypeVar("_T")
-#: The command says so where it cannot know that the board is disarmed, and where its guardian has
-#: disarmed the board.
+#: Messages of the command: the board may not be disarmed; its guardian has disarmed the board.
 _NOT_CONFIRMED = "switch the amplifiers off"
 _CONFIRMED = "the board has confirmed that it is disarmed"
-#: For so long a board may take to confirm that it is disarmed, s; then once more with a signal.
+#: Time-out for the board to confirm that it is disarmed, s; used again after a signal.
 _CONFIRMS_S = 20.0
-#: For so long its last lines are waited for where it is known to be disarmed, s: a viewer that goes
-#: on keeps standard error open.
+#: Time-out for the command's last lines after the board is disarmed, s: a viewer that still runs
+#: keeps standard error open.
 _TOLD_S = 1.0
 #: Lines of the command that an error may quote.
 _KEPT = 200
 #: Lines that are never passed on, and those that a quiet session does not pass on. A recording that
-#: was cut is named.
+#: was cut is reported.
 _FIGURES = re.compile(r"\s*\d")
 _NEWS = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
 
@@ -49,12 +48,12 @@ class DeviceError(CommandError):
 
 
 class NotDisarmedError(DeviceError):
-    """A session has ended, and the board has not confirmed that it is disarmed: switch the
+    """The session has ended, and the board has not confirmed that it is disarmed: switch the
     amplifiers off."""
 
 
 def own(pid: int) -> None:
-    """Refuses what a fork asks of a session of its parent, of which it can know nothing."""
+    """Refuses a fork's request to a session of its parent, whose state the fork cannot know."""
     if os.getpid() != pid:
         raise DeviceError(
             "this process is a fork, and the arm is driven by the process that made it: disarm() there"
@@ -62,7 +61,7 @@ def own(pid: int) -> None:
 
 
 class Buffer(Generic[_T]):
-    """The newest items, dropping the oldest where nobody takes them."""
+    """A queue of the newest items; drops the oldest if they are not read."""
 
     def __init__(self, size: int) -> None:
         self._items: collections.deque[_T] = collections.deque(maxlen=size)
@@ -71,14 +70,14 @@ class Buffer(Generic[_T]):
         self.dropped = 0
 
     def put(self, item: _T) -> None:
-        """Adds an item. Never waits for who takes them."""
+        """Adds an item. Never waits for a reader."""
         with self._changed:
             self.dropped += len(self._items) == self._items.maxlen
             self._items.append(item)
             self._changed.notify()
 
     def close(self) -> None:
-        """Lets readers come to their end."""
+        """Ends the iteration of readers after the last item."""
         with self._changed:
             self._open = False
             self._changed.notify_all()
@@ -95,7 +94,7 @@ class Buffer(Generic[_T]):
 
 
 class Session:
-    """The process, and what it has told so far.
+    """The process, and its reported state.
 
     Parameters
     ----------
@@ -118,9 +117,9 @@ class Session:
         #: As the column ``mode`` of a recording.
         self.mode = "disarmed"
         self.fault: int | None = None
-        #: The view in force, counted from 0.
+        #: The current placement, counted from 0.
         self.view = -1
-        #: Number of the question that was asked last, its lines, and whether it is to be answered.
+        #: Number of the last question, its lines, and True while it needs an answer.
         self._asked: int | None = None
         self._question: list[str] = []
         self.asks = False
@@ -154,7 +153,8 @@ class Session:
             self._on_event({"event": "over"})
 
     def _pass_on(self) -> None:
-        """Passes on what the command says, to its end: it must not wait for its reader."""
+        """Passes on the command's lines to its end, so that the command never waits for a
+        reader."""
         assert self._child.stderr
         for raw in self._child.stderr:
             line = raw.decode("utf-8", "replace").rstrip()
@@ -163,10 +163,10 @@ class Session:
                 try:
                     stream = socket.create_connection((host, int(port)))
                 except (ConnectionError, ValueError):
-                    # It has ended already, and says why, or how many lines were dropped.
+                    # The command has ended already; its other lines report why.
                     continue
                 except OSError:
-                    # A session that nobody listens to must not arm.
+                    # A session without a reader of its events must not arm.
                     self.close_input()
                     continue
                 self._events = threading.Thread(target=self._read, args=(stream,), daemon=True)
@@ -175,12 +175,12 @@ class Session:
             self._told.append(line)
             self._disarmed = self._disarmed or line.endswith(_CONFIRMED)
             if not (_FIGURES.match(line) or self._is_quiet and _NEWS.match(line)):
-                # What stands there for standard error may raise anything.
+                # A replacement of standard error may raise any exception.
                 with contextlib.suppress(Exception):
                     print(f"hapterra: {line}", file=sys.stderr)
 
     def _read(self, stream: socket.socket) -> None:
-        # A process that is killed resets the line; its end is seen otherwise.
+        # A killed process resets the connection; its end is detected elsewhere.
         with contextlib.suppress(OSError), stream, stream.makefile("rb") as lines:
             for line in lines:
                 # Its last line may be cut.
@@ -197,7 +197,7 @@ class Session:
             return
         with self._changed:
             if kind == "sample":
-                # The lines that told of a change may have been dropped.
+                # Lines that reported a change may have been dropped.
                 self.mode, self.view = event["mode"], event["view"]
             elif kind == "limits":
                 self.mode, self.fault = event["mode"], event["fault"]
@@ -223,7 +223,7 @@ class Session:
             self._changed.notify_all()
 
     def take_question(self) -> tuple[int, str] | None:
-        """The number and the lines of the question that is open, once."""
+        """Returns the number and the lines of the open question, once."""
         with self._changed:
             if not self.asks or self._asked is None:
                 return None
@@ -232,18 +232,19 @@ class Session:
 
     @property
     def is_disarmed(self) -> bool:
-        """Whether the board has confirmed, at the end, that it is disarmed."""
-        # No exit code says so: it is 0 for a child that another has waited for, too.
+        """Returns True if the board has confirmed, at the end, that it is disarmed."""
+        # The exit code does not show it: it is also 0 for a child that other code has waited for.
         own(self._pid)
         return self._disarmed
 
     @property
     def is_over(self) -> bool:
-        """Whether the command has ended, or is about to, and all of its events have been taken."""
+        """Returns True if the command has ended, or is about to, and all its events were
+        handled."""
         return not self._stderr.is_alive()
 
     def send(self, line: str) -> None:
-        """Gives a command. Raises ValueError for what is not one line."""
+        """Sends a command. Raises ValueError if it is not one line."""
         if not line.isprintable():
             raise ValueError(f"{line!r} has characters that no command can have")
         own(self._pid)
@@ -254,22 +255,23 @@ class Session:
             raise self.error("the session is over") from None
 
     def close_input(self) -> None:
-        """Asks for the end, as Ctrl-C does, and waits for nothing."""
+        """Requests the end, as Ctrl-C does, without a wait."""
         if self._child.stdin:
             self._child.stdin.close()
 
     def wait(self, is_it: Callable[[], bool], timeout: float) -> bool:
-        """Waits until something is so, the session is over, or for so many seconds. Returns
-        whether it is so."""
+        """Waits until ``is_it`` is true, the session is over, or ``timeout`` seconds have passed.
+        Returns True if ``is_it`` is true."""
         until = time.monotonic() + timeout
         with self._changed:
             while not is_it() and not self.is_over and time.monotonic() < until:
-                # The end of the thread that notifies is not notified.
+                # The end of the notifying thread itself sends no notification.
                 self._changed.wait(min(0.1, until - time.monotonic()))
             return is_it()
 
     def error(self, message: str) -> DeviceError:
-        """An error with what the command said of it: its own error, where it has ended with one."""
+        """Returns an error with the command's lines, or the command's own error if it ended with
+        one."""
         told = list(self._told)
         has_ended = self.is_over or self._child.returncode is not None
         if has_ended and any(line.startswith("error: ") for line in told):
@@ -306,7 +308,7 @@ class Session:
         _SESSIONS.discard(self)
         if not self.is_disarmed:
             told = "\n".join(self._told)
-            # Where nothing was opened, nothing was armed.
+            # If nothing was opened, nothing was armed.
             if self.view >= 0 or _NOT_CONFIRMED in told:
                 message = "the board did not confirm that it is disarmed: " + _NOT_CONFIRMED
                 raise NotDisarmedError(f"{message}\n{told}")
@@ -314,9 +316,9 @@ class Session:
             raise self.error(f"hapterra ended with exit code {code}")
 
 
-#: Those that have not ended.
+#: Sessions that have not ended.
 _SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
-#: The process whose main thread is waited for.
+#: The process in which a thread waits for the end of the main thread.
 _waits_in: int | None = None
 
 
@@ -326,8 +328,8 @@ def _close_inputs() -> None:
 
 
 def _end_with_main_thread() -> None:
-    """Asks for the end of all sessions when the main thread is over: Python waits for its other
-    threads, which may read samples, before it calls what is registered by atexit."""
+    """Requests the end of all sessions when the main thread ends: Python waits for its other
+    threads, which may read samples, before it calls the functions registered by atexit."""
     global _waits_in
 
     def wait() -> None:
@@ -350,7 +352,7 @@ def _end_all() -> None:
 
 
 def _leave_to_parent() -> None:
-    """A fork must not keep the input of a session open whose Python is killed."""
+    """Closes the sessions' inputs in a fork, which would keep them open if the parent is killed."""
     _close_inputs()
     _SESSIONS.clear()
 

@@ -1,4 +1,4 @@
-"""How stiff a surface may be, by trials on the virtual arm."""
+"""The maximum stiffness of a surface, by trials on the virtual arm."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def stability(
     arm_friction: _Numbers | None = None,
     **more: Any,
 ) -> pandas.DataFrame:
-    """Tries on a virtual arm, by ``hapterra-lab stability``, how stiff a surface may be before it is
+    """Tests on a virtual arm, by ``hapterra-lab stability``, which stiffness of a surface is
     unstable; docs/explanation/stability.md describes the trials. The program ``hapterra-lab`` is not
     part of this package: in a clone, ``cargo install --path bench --bin hapterra-lab``.
 

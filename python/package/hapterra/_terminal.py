@@ -1,4 +1,4 @@
-"""A question to a person at the terminal."""
+"""A question to the user at the terminal."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 
 def at_the_terminal(said: str) -> bool:
-    """Shows a question and waits for Enter, alone on its line and pressed after that; nobody is
-    asked where there is no terminal."""
+    """Shows a question and waits for Enter, alone on its line and pressed after the question.
+    Without a terminal there is no question."""
     shown = next(filter(_is_terminal, (sys.stderr, sys.stdout)), None)
     if shown is None or not _is_terminal(sys.stdin):
         return False
     _forget_typed()
     print(said, file=shown, flush=True)
-    # Past the buffer of Python, which may hold what was typed before.
+    # Without Python's buffer, which may contain earlier input.
     return os.read(sys.stdin.fileno(), 1024) in (b"\n", b"\r", b"\r\n")
 
 

@@ -35,14 +35,14 @@ class Terrain:
     Parameters
     ----------
     heights : array of shape (rows, columns)
-        Any real type and memory order. Rows lie from west to east. NaN, or a masked sample, is a
+        Any real type and memory order. Rows are from west to east. NaN, or a masked sample, is
         no-data: there is no surface and no force. The samples are copied.
     cell_mm : float
         Device millimetres from a sample to the next.
     height_mm_per_unit : float
         Device millimetres for one unit of the heights.
     origin : "upper" or "lower"
-        The end at which the first row lies, as in matplotlib's imshow: "upper" is north, as in images
+        The side of the first row, as in matplotlib's imshow: "upper" is north, as in images
         and GeoTIFF, "lower" is south.
     materials : array of integers of the same shape, optional
         A material for each sample: 0 is the surface itself, 1 the first of
@@ -51,11 +51,11 @@ class Terrain:
     Raises
     ------
     ValueError, TypeError
-        For an array that is no terrain. Heights too tall or too steep at this scale are refused
+        For an invalid array. Heights too tall or too steep at this scale are refused
         by ``Contact``.
     """
 
-    #: Whether samples have numbers of materials.
+    #: True if samples have numbers of materials.
     _has_materials = False
 
     def __init__(
@@ -88,7 +88,7 @@ class Terrain:
         #: Device millimetres for one unit of the heights.
         self.height_mm_per_unit = float(height_mm_per_unit)
         self._has_materials = materials is not None
-        #: What the data stated about itself; none of a plain array.
+        #: The data's statements about itself; none for a plain array.
         self.source: dict[str, Any] | None = None
         #: Radius of the ball that touches it, mm; 0 for a point.
         self.tip_mm = 0.0
@@ -105,8 +105,8 @@ class Terrain:
         exaggeration: float | str | None = None,
         **reading: Any,
     ) -> Terrain:
-        """A terrain of anything that the command ``hapterra`` opens, of any size: what is touched
-        is read, and nothing is copied.
+        """Opens a terrain of any size and of any format that the command ``hapterra`` opens. Only
+        the touched part is read, and nothing is copied.
 
         Parameters
         ----------
@@ -119,11 +119,11 @@ class Terrain:
         scale : "100 m/mm", or metres as a number
             Ground for a device millimetre, in place of ``cell_mm``.
         exaggeration : float or "auto"
-            Times true to scale. A unit of heights is a millimetre times this where the file does
-            not know how large its cells are.
+            Factor on true to scale. If the file does not state the size of its cells, a unit of
+            heights is a millimetre times this factor.
         **reading
-            What the file does not state, by the keys of the command's ``--input``: ``band=2``,
-            ``no_data=-9999``, ``height_unit="ft"``, ``gdal={"NAME": "VALUE"}``, ...
+            Properties that the file does not state, by the keys of the command's ``--input``:
+            ``band=2``, ``no_data=-9999``, ``height_unit="ft"``, ``gdal={"NAME": "VALUE"}``, ...
             (``hapterra info --help``); and ``cache=``, a folder or "off".
 
         Raises
@@ -131,8 +131,8 @@ class Terrain:
         ValueError, OSError
             With the command's text and hint.
 
-        A step waits for what has to be fetched. If that fails, the step is an OSError and may be
-        tried again. Damaged parts of a file are no-data, with a warning.
+        A step waits for data that has to be fetched. If that fails, the step raises an OSError and
+        may be repeated. Damaged parts of a file are no-data, with a warning.
         """
         how = {"cell_mm": cell_mm, "scale": scale, "exaggeration": exaggeration}
         paths = files(source)
@@ -158,14 +158,16 @@ class Terrain:
         scale: str | float | None = None,
         exaggeration: float | str | None = None,
     ) -> Terrain:
-        """A terrain of the window round a place; its origin is the window's south-west sample.
+        """Returns the terrain of a window around a position, with its origin at the window's
+        south-west sample.
 
         ``at`` is (x, y) in the terrain's own coordinates, or with ``crs="lonlat"`` in degrees.
         ``size_mm`` is the extent east and north in the hand, mm, to the nearest cell, within the
-        terrain. ``cell_mm``, ``scale`` and ``exaggeration`` are as of ``open``, and this terrain's own
-        where they are left out; cells are true to scale at the place.
+        terrain. ``cell_mm``, ``scale`` and ``exaggeration`` are as in ``open``; by default they are
+        this terrain's own. Cells are true to scale at the position.
 
-        Raises ValueError for a place outside or without data, and for a terrain without coordinates.
+        Raises ValueError for a position outside or without data, and for a terrain without
+        coordinates.
         """
         place, lonlat, size = pair("at", at), is_lonlat(crs), pair("size_mm", size_mm)
         lies = self._lies()
@@ -178,19 +180,20 @@ class Terrain:
         return window.with_tip(self.tip_mm) if self.tip_mm else window
 
     def mm_at(self, x: float, y: float, crs: str | None = None) -> tuple[float, float]:
-        """Millimetres east and north of the south-west sample, of a place in the terrain's own
-        coordinates, or with ``crs="lonlat"`` in degrees. It may lie outside of the terrain."""
+        """Returns the millimetres east and north from the south-west sample to a position in the
+        terrain's own coordinates, or with ``crs="lonlat"`` in degrees. It may be outside the
+        terrain."""
         return self._lies().mm_at((x, y), is_lonlat(crs))
 
     def ground_at(
         self, east_mm: float, north_mm: float, crs: str | None = None
     ) -> tuple[float, float]:
-        """The place in the terrain's own coordinates, or with ``crs="lonlat"`` in degrees, of
-        millimetres east and north of the south-west sample."""
+        """Returns the position in the terrain's own coordinates, or with ``crs="lonlat"`` in
+        degrees, at millimetres east and north of the south-west sample."""
         return self._lies().ground_at((east_mm, north_mm), is_lonlat(crs))
 
     def _lies(self) -> Ground | _native.Terrain:
-        """What knows where it lies."""
+        """Returns the georeference of the terrain."""
         if self._opened is not None:
             return self._native
         if self._ground is None:
@@ -213,11 +216,12 @@ class Terrain:
         x: str | None = None,
         y: str | None = None,
     ) -> Terrain:
-        """A terrain of a DataArray of two dimensions, true to scale times ``exaggeration``.
+        """Creates a terrain from a DataArray of two dimensions, true to scale times
+        ``exaggeration``.
 
         Row order and cell size are those of its coordinates, units those of ``attrs["units"]``,
-        and ``attrs["_FillValue"]`` marks no-data. ``source`` of the result reports them. What is not
-        stated has to be given: ``x`` and ``y`` name the dimensions, ``ground_unit`` and
+        and ``attrs["_FillValue"]`` marks no-data. ``source`` of the result reports them. Properties
+        that are not stated must be given: ``x`` and ``y`` name the dimensions, ``ground_unit`` and
         ``height_unit`` are "m", "km", "ft" and the like, and ``height_mm_per_unit`` takes the place
         of both units and of the exaggeration.
         """
@@ -236,7 +240,8 @@ class Terrain:
         ground_unit: str | None = None,
         height_unit: str | None = None,
     ) -> Terrain:
-        """A terrain of a band of an open rasterio dataset, true to scale times ``exaggeration``.
+        """Creates a terrain from a band of an open rasterio dataset, true to scale times
+        ``exaggeration``.
 
         Row order and cell size are those of its transform, the units those of its reference system
         and of the band; its no-data value or mask marks no-data, and its scale and offset are
@@ -262,11 +267,11 @@ class Terrain:
         return terrain
 
     def with_tip(self, mm: float) -> Terrain:
-        """The same ground touched by a ball of a radius in place of a point; 0 is the point.
+        """Returns the same ground, touched by a ball of this radius; 0 for a point.
 
         The HIP and the proxy are then the ball's centre, one radius above flat ground, and so is
         ``height_mm``. Forces are those of ``hapterra replay --tip``, bit for bit. The radius is at
-        most 8 cells; of larger balls take every second sample.
+        most 8 cells; for larger balls, use every second sample.
         """
         terrain = copy.copy(self)
         terrain._native = self._native.with_tip(mm)
@@ -279,12 +284,13 @@ class Terrain:
         return self._native.size_mm
 
     def height_mm(self, east_mm: float, north_mm: float) -> float | None:
-        """The height of the surface at a place, mm, or of the ball's centre; None without data and off
-        the terrain."""
+        """Returns the height of the surface at a position, mm, or of the ball's centre; None for
+        no-data and outside the terrain."""
         return self._native.height_mm(east_mm, north_mm)
 
     def _write(self, path: pathlib.Path) -> tuple[str, dict[str, Any]]:
-        """Writes the heights as a file of the command. Returns it, and the options of its scale."""
+        """Writes the heights to a file for the command. Returns the file and the options of its
+        scale."""
         if self._has_materials:
             raise ValueError(
                 "materials of a Terrain cannot be loaded: give materials=, a file, and surface=, a file of its classes"
@@ -340,6 +346,6 @@ def _materials(materials: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[
 
 
 def _size(how: dict[str, Any]) -> dict[str, Any]:
-    """Size in the hand, by the command's names."""
+    """Returns the size in the hand, by the command's names."""
     scale = ground_m_per_mm(how["scale"])
     return {"cell_mm": how["cell_mm"], "ground_m_per_mm": scale, "exaggeration": how["exaggeration"]}

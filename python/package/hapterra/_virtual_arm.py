@@ -36,8 +36,8 @@ class VirtualArm:
     The arm is that of ``hapterra-lab stability``: rigid links, joints with friction, motors with
     the lag of their amplifiers, encoder counts. Each tick reads the encoders, makes a
     step of the contact, and sets the motors to its force and the arm's weight, by the boards'
-    own kinematics and without a delay. What a board adds is not there: its guard, arming and
-    latency; ``connect("native")`` has them.
+    own kinematics and without a delay. It has no guard, arming and latency of a board;
+    ``connect("native")`` has them.
 
     Parameters
     ----------
@@ -72,31 +72,32 @@ class VirtualArm:
     def run(
         self, contact: Contact, targets_mm: npt.ArrayLike, t: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.void]:
-        """Lets the hand follow targets over the terrain of a contact, without the interpreter's
-        lock. The same arguments give the same bits.
+        """Moves the hand along targets over the terrain of a contact, without the interpreter's
+        lock. The same arguments return the same bits.
 
         Parameters
         ----------
         contact : Contact
-            At its rate. It goes on from where it was; the arm begins at rest at the first target.
+            Used at its rate. It continues from its state; the arm begins at rest at the first
+            target.
         targets_mm : array of shape (N, 3)
-            Where the hand wants to be, east, north, up, mm. To press, aim below the surface:
-            a hand of 300 N/m presses with 0.3 N a millimetre, less what surface and grip give.
+            The hand's target, east, north, up, mm. To press, use a target below the surface: a hand
+            of 300 N/m presses with 0.3 N a millimetre, less the compliance of surface and grip.
         t : array of shape (N,), seconds, optional
             As in ``Contact.run``.
 
         Returns
         -------
         array of ``ARM_STEP``
-            A row for each tick: what the encoders read at its beginning (``hip_mm``), where the
-            hand was (``hand_mm``), what the contact made of it.
+            A row for each tick: the position by the encoders at its beginning (``hip_mm``), the
+            hand's position (``hand_mm``), and the result of the contact.
 
         Raises
         ------
         ValueError
             A target that the arm cannot reach.
         StepError
-            At the first step that is not possible, with those before it.
+            At the first step that is not possible, with the steps before it.
         """
         rows, remarks, error = self._native.run(contact._native, *arguments(targets_mm, t))
         for remark in remarks:

@@ -1,13 +1,12 @@
-//! Ticks by the times of rows, and which times cannot be right.
+//! Conversion of rows to ticks by their times, with checks of the times.
 
 use super::counts::Untimed;
 use super::fault::{TickError, TimeFault};
 use super::{ON_TICK, Pace, Row, Tick, Ticks};
 
-/// The HIP may move on one straight line for so long, s: what is seen less often than every 2 s
-/// is not a hand's path.
+/// Max duration of a move on one straight line, s: rows more than 2 s apart are not a hand's path.
 const MAX_MOVE_S: f64 = 2.0;
-/// The HIP may rest between two rows for so long, s: beyond, another clock is likelier.
+/// Max duration of a rest between two rows, s: a longer one is probably another unit of time.
 const MAX_REST_S: f64 = 600.0;
 
 /// A row with a time.
@@ -15,17 +14,17 @@ const MAX_REST_S: f64 = 600.0;
 pub(super) struct Timed {
     row: Row,
     t_s: f64,
-    /// True if a tick was at it or next to it.
+    /// True if a tick was at the row or next to it.
     is_rendered: bool,
 }
 
-/// Continuation after a row.
+/// Next state after a row.
 enum Next {
     /// A later row.
     Row(Timed),
-    /// A row with which ticks begin anew.
+    /// A row at which the ticks restart.
     Anew(Timed),
-    /// All rows so far have the same time: they state none.
+    /// All rows up to now have the same time, which is therefore unused.
     Untimed,
     /// The last row was read.
     End,
@@ -35,7 +34,7 @@ impl<R, E> Ticks<R>
 where
     R: Iterator<Item = Result<Row, E>>,
 {
-    /// The next tick by the rows' own times.
+    /// Returns the next tick by the rows' own times.
     pub(super) fn next_by_time(&mut self) -> Result<Option<Tick>, TickError<E>> {
         let Some(mut before) = self.before else {
             return self.first();
@@ -83,7 +82,7 @@ where
         }
     }
 
-    /// Tick 0, at a row.
+    /// Returns tick 0, at a row.
     fn begin(&mut self, row: Timed) -> Result<Tick, TickError<E>> {
         if self.due.is_coarse_at(row.t_s) {
             return Err(self.mistimed(TimeFault::TooLarge(row.t_s)));
@@ -94,7 +93,7 @@ where
         Ok(self.tick_at(&row.row))
     }
 
-    /// The next tick, on the straight line between two rows.
+    /// Returns the next tick, on the straight line between two rows.
     fn between(&mut self, before: &Timed, ahead: &Timed) -> Tick {
         let t_s = self.due.s();
         let share = (t_s - before.t_s) / (ahead.t_s - before.t_s);
@@ -112,10 +111,10 @@ where
         }
     }
 
-    /// Reads the next row that is later than another.
+    /// Reads the next row that is later than `before`.
     fn follow(&mut self, before: &Timed) -> Result<Next, TickError<E>> {
         let mut repeated = 0;
-        // Rows at one time alone may be those of a file whose times say nothing.
+        // If all rows have one time, the times may have no meaning.
         let is_begin = self.counts.rows == 1 && self.pace == Pace::ByTime;
         loop {
             let row = self.read()?;
@@ -141,7 +140,8 @@ where
         }
     }
 
-    /// Takes rows as ticks from now on: the first row was rendered, and those after it have its time.
+    /// Uses rows as ticks from now on: the first row was rendered, and the repeated rows have its
+    /// time.
     fn without_times(&mut self, first: &Timed, repeated: u64, row: Option<Row>) -> Next {
         self.counts.untimed = Some(Untimed::Same(first.t_s));
         self.pace = Pace::RowByRow;
@@ -150,7 +150,7 @@ where
         Next::Untimed
     }
 
-    /// A row at another time than the one before it, if that can be right.
+    /// Checks a row at another time than the one before it.
     fn later(&mut self, before: &Timed, row: Timed, is_still: bool) -> Result<Next, TickError<E>> {
         let (from, to) = (before.t_s, row.t_s);
         let step = to - from;
@@ -176,7 +176,7 @@ where
         Ok(Next::Row(row))
     }
 
-    /// Returns the fault that contradicts the rate of a recording, if any.
+    /// Returns the fault if a time contradicts the rate of a recording.
     fn off_tick(&self, from: f64, to: f64) -> Option<TimeFault> {
         let late = self.due.late(to);
         let is_tick = late >= -ON_TICK && (late - libm::round(late)).abs() <= ON_TICK;

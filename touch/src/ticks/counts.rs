@@ -1,36 +1,36 @@
 //! Relation of rows to ticks, in numbers.
 
-/// The HIP may move on one straight line for so long before that is odd, s: a hand turns ten times
-/// a second at most.
+/// Duration of a move on one straight line from which it is counted as odd, s: a hand changes
+/// direction at most ten times a second.
 pub const ODD_MOVE_S: f64 = 0.05;
 
-/// Reason for which the times of rows are not used.
+/// Reason why the times of rows are not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Untimed {
     /// There are none.
     Missing,
-    /// All are this one, s.
+    /// All times are equal, s.
     Same(f64),
-    /// So it was asked for.
+    /// The caller has requested it.
     Asked,
 }
 
 /// Counts of a path that is read tick by tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// Reason for which the times of rows are not used, if any.
+    /// Reason why the times of rows are not used, if any.
     pub untimed: Option<Untimed>,
     /// Rows read.
     pub rows: u64,
     /// Ticks.
     pub ticks: u64,
-    /// Ticks that are at no row.
+    /// Ticks that are not at a row.
     pub filled_in: u64,
-    /// Rows that no tick was at or next to.
+    /// Rows without a tick at or next to them.
     pub passed_over: u64,
-    /// Rows with time and place of the row before.
+    /// Rows with the time and position of the row before.
     pub repeated: u64,
-    /// Gaps in a recording in which nothing was filled in.
+    /// Gaps in a recording that were not filled.
     pub gaps: u64,
     /// Moves on straight lines that took longer than [`ODD_MOVE_S`].
     pub odd_moves: u64,

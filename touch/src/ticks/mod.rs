@@ -1,14 +1,14 @@
-//! A path at the ticks of a device.
+//! Conversion of a path to the ticks of a device.
 //!
 //! Tick `n` is at `t_s` of the first row plus `n` divided by the tick rate; the last one is not
-//! later than the last row. The HIP of a tick is that of the row at its time, bit for bit, if there
-//! is one within a hundredth of a tick; else it lies on the straight line between the rows before and after
-//! it, passed at a constant speed. Rows between two ticks are not rendered, as an arm's encoders are
-//! not read between them.
+//! later than the last row. The HIP of a tick is that of the row at its time, bit for bit, if a row
+//! is within a hundredth of a tick; else it is interpolated linearly between the rows before and
+//! after it. Rows between two ticks are not rendered, because an arm's encoders are not read
+//! between ticks either.
 //!
-//! So a path whose rows are a tick apart is rendered row by row. The rows of a recording are whole
-//! ticks apart, mostly one: a device sends a sample a millisecond, and some may be lost on the
-//! link.
+//! So a path whose rows are a tick apart is rendered row by row. The rows of a recording are a
+//! whole number of ticks apart, mostly one: a device sends a sample a millisecond, and some may be
+//! lost on the link.
 
 mod by_time;
 mod counts;
@@ -20,45 +20,45 @@ use by_time::Timed;
 pub use counts::{Counts, ODD_MOVE_S, Untimed};
 pub use fault::{TickError, TimeFault};
 
-/// A row that is as near to a tick is at it, ticks: times are written with six digits, or in
-/// single precision.
+/// Maximum distance of a row from a tick that it is at, in ticks: times are written with six
+/// digits, or in single precision.
 const ON_TICK: f64 = 0.01;
 
-/// Rule by which rows become ticks.
+/// Rule that converts rows to ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// By the rows' own times. A file without times has one row a tick.
     ByTime,
-    /// By the rows' own times, which are whole ticks: those of a recording that is rendered with its
-    /// settings. Nothing is filled in between two views and in gaps of more than 2 s.
+    /// By the rows' own times, which are whole ticks: for a recording that is rendered with its
+    /// settings. Nothing is interpolated between two placements and in gaps of more than 2 s.
     Recorded,
-    /// One row a tick, whatever times they have.
+    /// One row a tick, whatever their times are.
     RowByRow,
 }
 
 /// A row of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Time, s; none where the path has no times.
+    /// Time, s; `None` if the path has no times.
     pub t_s: Option<f64>,
     /// Position of the HIP, mm: east, north, up.
     pub hip_mm: [f64; 3],
-    /// The view that it was rendered in; 0 for the view of the beginning, or where there is no other.
+    /// The placement in which the row was rendered; 0 for the first or only placement.
     pub view: u32,
 }
 
 /// The HIP in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
-    /// Time of the tick, s: that of its row to the bit, if it has one.
+    /// Time of the tick, s: equal to that of its row, if it has one.
     pub t_s: f64,
     /// Position of the HIP, mm: east, north, up.
     pub hip_mm: [f64; 3],
-    /// The view of its row, or of the rows between which it lies.
+    /// The placement of its row, or of the rows around it.
     pub view: u32,
 }
 
-/// A path that is read tick by tick, from rows that are read one by one. The first error ends it.
+/// An iterator over the ticks of a path, which reads the rows one by one. The first error ends it.
 ///
 /// ```
 /// use core::convert::Infallible;
@@ -75,17 +75,17 @@ pub struct Ticks<R> {
     rows: R,
     pace: Pace,
     due: Due,
-    /// The last row whose time is not later than that of the latest tick.
+    /// The last row whose time is not later than the latest tick's.
     before: Option<Timed>,
     /// The row after it, if it was read already.
     ahead: Option<Timed>,
-    /// Rows that were read, and how many times each stands there: a tick each.
+    /// Rows that were read, and the number of repeats of each: a tick each.
     held: VecDeque<(Row, u64)>,
     counts: Counts,
 }
 
 impl<R> Ticks<R> {
-    /// The ticks of a device with `tick_hz` ticks a second, 1 at least.
+    /// Creates the ticks of a device with `tick_hz` ticks a second, at least 1.
     #[must_use]
     pub fn new(rows: R, pace: Pace, tick_hz: u32) -> Self {
         let untimed = (pace == Pace::RowByRow).then_some(Untimed::Asked);
@@ -103,12 +103,12 @@ impl<R> Ticks<R> {
         }
     }
 
-    /// The rows, of which the latest is the one that the latest tick is at or before.
+    /// Returns the rows; the last one read is at or after the latest tick.
     pub const fn rows(&mut self) -> &mut R {
         &mut self.rows
     }
 
-    /// Returns the relation of rows to ticks so far, and what is odd about their times.
+    /// Returns the counts of rows and ticks up to now, including odd times.
     #[must_use]
     pub const fn counts(&self) -> &Counts {
         &self.counts
@@ -135,7 +135,7 @@ impl<R, E> Ticks<R>
 where
     R: Iterator<Item = Result<Row, E>>,
 {
-    /// The next row as the next tick.
+    /// Returns the next row as the next tick.
     fn next_row(&mut self) -> Result<Option<Tick>, TickError<E>> {
         while self.held.front().is_some_and(|(_, times)| *times == 0) {
             self.held.pop_front();
@@ -162,7 +162,7 @@ where
         Ok(Some(self.tick_at(&row)))
     }
 
-    /// The next tick, at a row.
+    /// Returns the next tick, at a row.
     fn tick_at(&mut self, row: &Row) -> Tick {
         let is_there = |t_s: &f64| self.due.late(*t_s).abs() <= ON_TICK;
         let t_s = row.t_s.filter(is_there).unwrap_or(self.due.s());
@@ -185,14 +185,14 @@ where
         }
     }
 
-    /// The latest row cannot follow on the one before it.
+    /// Returns the error of the latest row, whose time cannot follow the previous one.
     const fn mistimed(&self, fault: TimeFault) -> TickError<E> {
         let row = self.counts.rows.saturating_sub(1);
         TickError::Time { row, fault }
     }
 }
 
-/// When the next tick is due.
+/// Time of the next tick.
 #[derive(Clone, Copy, Debug)]
 struct Due {
     tick_hz: f64,
@@ -211,17 +211,17 @@ impl Due {
         }
     }
 
-    /// Time of the next tick, s.
+    /// Returns the time of the next tick, s.
     fn s(&self) -> f64 {
         self.begin_s + self.next as f64 / self.tick_hz
     }
 
-    /// By how many ticks a time is later than the next tick.
+    /// Returns the ticks by which a time is later than the next tick.
     fn late(&self, t_s: f64) -> f64 {
         (t_s - self.s()) * self.tick_hz
     }
 
-    /// Returns true if numbers near a time are too far apart to tell ticks by them.
+    /// Returns true if numbers near a time are too coarse to distinguish ticks.
     fn is_coarse_at(&self, t_s: f64) -> bool {
         t_s.abs() * f64::EPSILON * self.tick_hz > ON_TICK
     }

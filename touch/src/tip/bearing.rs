@@ -1,34 +1,35 @@
-//! Samples under a ball, and which of them bear it.
+//! Samples under a ball, and which of them support it.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 /// Samples of a rectangle, row by row from the south-west.
 pub struct Samples {
-    /// From west to east.
+    /// Samples from west to east.
     pub columns: usize,
-    /// From south to north.
+    /// Samples from south to north.
     pub rows: usize,
-    /// NaN where there is no data.
+    /// Heights; NaN for no-data.
     pub heights: Vec<f64>,
 }
 
 /// Nodes of a square within a rectangle of samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Nodes {
-    /// The south-western one, from the block's first sample.
+    /// The south-western node, from the block's first sample.
     pub first: [usize; 2],
     /// Nodes along a side.
     pub side: usize,
 }
 
 impl Nodes {
-    /// Those within `reach` of a place along an axis, as the first and the one after the last.
+    /// Returns the nodes within `reach` of a position along an axis, as the first and the one after
+    /// the last.
     pub(super) fn near(&self, axis: usize, place: f64, reach: f64) -> (usize, usize) {
         let (first, side) = (self.first[axis] as f64, self.side as f64);
         let from = (place - reach - first).clamp(0.0, side);
         let to = place + reach - first;
-        // Rounded up, and down: a cast cuts off.
+        // Rounded up, and down: a cast truncates.
         let whole = from as usize;
         let from = whole + usize::from((whole as f64) < from);
         let to = if to < 0.0 { 0 } else { to as usize + 1 };
@@ -36,7 +37,7 @@ impl Nodes {
     }
 }
 
-/// Which way a line runs.
+/// Direction of a line.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axis {
     East,
@@ -44,7 +45,7 @@ pub(super) enum Axis {
 }
 
 impl Axis {
-    /// Samples across lines of this axis, and along them.
+    /// Returns the samples across lines of this axis, and along them.
     pub(super) const fn sizes(self, block: &Samples) -> (usize, usize) {
         match self {
             Self::North => (block.columns, block.rows),
@@ -59,12 +60,12 @@ impl Axis {
         }
     }
 
-    /// The axis of its nodes across lines: 0 east, 1 north.
+    /// Returns the axis of its nodes across lines: 0 east, 1 north.
     pub(super) const fn across(self) -> usize {
         1 - self.along()
     }
 
-    /// The axis of its nodes along lines.
+    /// Returns the axis of its nodes along lines.
     pub(super) const fn along(self) -> usize {
         match self {
             Self::East => 0,
@@ -85,11 +86,12 @@ impl Samples {
         row * self.columns + column
     }
 
-    /// The bilinear height at a node, in parts of a cell from the first sample; NaN in a hole.
+    /// Returns the bilinear height at a node, in parts of a cell from the first sample; NaN for
+    /// no-data.
     pub(super) fn between(&self, node: [usize; 2], parts: usize) -> f64 {
         let [(column, east), (row, north)] = node.map(|node| (node / parts, node % parts));
         let mix = |from: usize, to: usize, share: usize, at: &dyn Fn(usize) -> f64| match share {
-            // The next sample has no weight, also where it is a hole.
+            // The next sample has weight zero, even if it is no-data.
             0 => at(from),
             _ => {
                 let share = share as f64 / parts as f64;
@@ -104,12 +106,12 @@ impl Samples {
     }
 }
 
-/// Part of a block that bears a ball.
+/// Part of a block that supports a ball.
 pub(super) struct Bearing {
     pub(super) columns: usize,
     /// True if the patch north-east of a sample has four samples.
     patches: Vec<bool>,
-    /// Samples of such patches; less than everything where a sample is of none.
+    /// Samples of such patches; negative infinity for a sample of no such patch.
     pub(super) nodes: Vec<f64>,
 }
 
@@ -136,8 +138,8 @@ impl Bearing {
         bearing
     }
 
-    /// Returns true if a ball that touches a sample touches the ground beside it, too: along an axis
-    /// the ground turns up there, or goes straight on.
+    /// Returns true if a ball that touches a sample also touches the ground beside it: along an
+    /// axis the ground rises there, or is straight.
     pub(super) fn is_between_stretches(&self, block: &Samples, at: usize) -> bool {
         let (column, row) = (at % block.columns, at / block.columns);
         [Axis::East, Axis::North].into_iter().any(|axis| {

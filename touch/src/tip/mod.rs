@@ -1,10 +1,10 @@
-//! A tip of finite radius: the ground as a ball's centre feels it.
+//! A tip of finite radius: the surface on which a ball's centre moves.
 //!
-//! A ball that rests on a height field has its centre on another height field: at each place the
-//! highest of the ground under the ball plus the ball's own height there. So a point on this
-//! surface is a ball on the ground, and device and contact stay as they are. It is made on the
-//! host, of a block of samples with a halo of the radius, when a tile is made: in `tile_cutter.rs` for arrays, in
-//! `host-tools/src/terrain/tiler/tile_samples.rs` for files.
+//! The centre of a ball that rests on a height field is on another height field: at each position
+//! the maximum, under the ball, of the ground's height plus the ball's own height there. So a point
+//! on this surface is a ball on the ground, and device and contact need no change. The host
+//! computes it from a block of samples with a halo of the radius, when a tile is cut: in
+//! `tile_cutter.rs` for arrays, in `host-tools/src/terrain/tiler/tile_samples.rs` for files.
 //!
 //! Let `S` be the bilinear surface of the samples and `R` the radius. Then
 //!
@@ -15,13 +15,14 @@
 //! A bilinear patch is straight along its grid lines and along every line parallel to them. Over a
 //! straight line of slope `m` at a distance `δ` the ball is a circle of radius `ρ = sqrt(R² − δ²)`,
 //! which rests on the line at `ρ m / sqrt(1 + m²)` uphill, at the height of the line below `p` plus
-//! `ρ sqrt(1 + m²)`. So the maximum along such a line is exact; that over the surface is taken
-//! along lines of both directions. Between two lines that are `d` apart the ball may rest higher, by
-//! at most `d² / 4R` on a plane; `d` is chosen so that this is at most 0.5 % of the radius.
+//! `ρ sqrt(1 + m²)`. So the maximum along such a line is exact; the maximum over the surface is
+//! computed along lines of both directions. Between two lines that are `d` apart the ball may rest
+//! higher, by at most `d² / 4R` on a plane; `d` is chosen so that this is at most 0.5 % of the
+//! radius.
 //!
-//! Between two nodes the centre's surface is interpolated, and wrong where it bends. So a ball has
-//! nodes that are a fraction of its radius apart, whatever the samples are: **haptic cells**, of which
-//! a whole number makes a cell of the ground. Lengths below are in haptic cells.
+//! Between two nodes the centre's surface is interpolated, with an error where it bends. So the
+//! distance of a ball's nodes is a fraction of its radius, whatever the samples are: **haptic
+//! cells**, a whole number of which is a cell of the ground. Lengths below are in haptic cells.
 
 mod bearing;
 
@@ -32,19 +33,19 @@ use alloc::vec::Vec;
 use bearing::{Axis, Bearing};
 pub use bearing::{Nodes, Samples};
 
-/// Largest radius, cells of the ground.
+/// Maximum radius, cells of the ground.
 pub const MAX_CELLS: f64 = 8.0;
-/// Haptic cells in a radius, at least.
+/// Minimum number of haptic cells in a radius.
 pub const CELLS_IN_RADIUS: f64 = 32.0;
-/// A haptic cell is not made smaller than this, device millimetres: half an encoder's count.
+/// Minimum side of a haptic cell, device millimetres: half an encoder's count.
 pub const FINEST_MM: f64 = 1.0 / 64.0;
-/// Heights of the centre are rounded to multiples of this, haptic cells: slopes stay true to a
-/// thousandth, and tiles take half the bytes.
+/// Step to which heights of the centre are rounded, haptic cells: slopes have an error of at most a
+/// thousandth, and tiles have half the bytes.
 pub const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
-/// Largest sag of the ball for want of a line, as a part of its radius.
+/// Max error of the ball's height from the distance of its lines, as a part of its radius.
 const SAG: f64 = 5e-3;
 
-/// A radius that no ball over cells of a size has.
+/// A radius that a ball over cells of this size cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "a tip of {tip_mm} mm: {cells:.1} cells of {cell_mm} mm, where 0 to {MAX_CELLS} can be rendered"
@@ -63,17 +64,17 @@ pub struct TipError {
 pub struct Ball {
     /// Radius.
     radius: f64,
-    /// Haptic cells a cell of the ground.
+    /// Haptic cells along the side of a cell of the ground.
     parts: u32,
-    /// Samples around a block that its nodes depend on.
+    /// Samples around a block on which its nodes depend.
     halo: usize,
-    /// Lines a cell of the ground.
+    /// Lines in a cell of the ground.
     lines: u32,
-    /// Heights of the ball over the nodes of its square, row by row; less than everything beside it.
+    /// Heights of the ball over the nodes of its square, row by row; negative infinity beside it.
     caps: Arc<[f64]>,
 }
 
-/// A height of the centre, haptic cells, as tiles have it.
+/// Returns a height of the centre, haptic cells, as rounded for tiles.
 #[must_use]
 pub fn rounded(centre: f64) -> f64 {
     libm::round(centre / CENTRE_STEP) * CENTRE_STEP
@@ -83,7 +84,8 @@ pub fn rounded(centre: f64) -> f64 {
 pub const PATCH: usize = 2;
 
 impl Ball {
-    /// A ball of a radius in millimetres over cells of the ground; none for the radius 0, a point.
+    /// Creates a ball of a radius in millimetres over cells of the ground; `None` for the radius 0,
+    /// a point.
     ///
     /// # Errors
     /// [`TipError`] for a radius below 0, above [`MAX_CELLS`] cells, or not a number.
@@ -123,26 +125,27 @@ impl Ball {
         }
     }
 
-    /// Haptic cells a cell of the ground, along a side.
+    /// Returns the haptic cells along the side of a cell of the ground.
     #[must_use]
     pub const fn parts(&self) -> u32 {
         self.parts
     }
 
-    /// Samples around a block that its nodes depend on.
+    /// Returns the number of samples around a block on which its nodes depend.
     #[must_use]
     pub const fn halo(&self) -> usize {
         self.halo
     }
 
-    /// Radius, haptic cells.
+    /// Returns the radius, haptic cells.
     #[must_use]
     pub const fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Returns the samples that `side` × `side` nodes from the node `first` depend on: the first sample,
-    /// which may lie outside the field, the samples along a side, and where the nodes are among them.
+    /// Returns the samples on which `side` × `side` nodes from the node `first` depend: the first
+    /// sample, which may be outside the field, the samples along a side, and the position of the
+    /// nodes in them.
     #[must_use]
     pub fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
         let (parts, halo) = (i64::from(self.parts), self.halo as i64);
@@ -156,8 +159,8 @@ impl Ball {
         (from, cells + 1 + 2 * self.halo, nodes)
     }
 
-    /// The heights of the ball's centre over nodes of a block, row by row. A node on ground without
-    /// data has none, and only patches with four samples bear the ball.
+    /// Returns the heights of the ball's centre over the nodes of a block, row by row: NaN on
+    /// ground without data. Only patches with four samples support the ball.
     #[must_use]
     pub fn centres(&self, block: &Samples, nodes: Nodes) -> Vec<f64> {
         let bearing = Bearing::of(block);
@@ -172,7 +175,7 @@ impl Ball {
                 nodes.first[1] + at / nodes.side,
             ];
             let own = block.between(place, self.parts as usize);
-            // Also where it is NaN.
+            // Also if it is NaN.
             *centre = if own.is_nan() {
                 own
             } else {
@@ -182,7 +185,8 @@ impl Ball {
         centres
     }
 
-    /// The height of the bilinear surface between the four centres of a patch; none in a hole.
+    /// Returns the height of the bilinear surface between the four centres of a patch; `None` for
+    /// no-data.
     #[must_use]
     pub fn between(&self, samples: &Samples, nodes: Nodes, [u, v]: [f64; 2]) -> Option<f64> {
         let corners = self.centres(
@@ -264,7 +268,7 @@ impl Ball {
                         let circle = self.radius * self.radius - apart * apart;
                         let circle = libm::sqrt(circle.max(0.0));
                         let middle = (start as f64 + 0.5) * parts - circle * sine;
-                        // Also where rounding puts a node beside both of its stretches.
+                        // Includes a node that rounding puts beside both of its stretches.
                         let half = 0.5 * parts + 1e-9;
                         let (from, to) = nodes.near(axis.along(), middle, half);
                         for node in from..to {

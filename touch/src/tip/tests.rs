@@ -1,11 +1,12 @@
-//! Centres of balls against a search that shares nothing with them: the bilinear surface and the
-//! ball, place by place, in `f64`.
+//! Centres of balls, compared with a search that shares no code with them: the bilinear surface and
+//! the ball, position by position, in `f64`.
 
 use std::vec::Vec;
 
 use super::*;
 
-/// Returns the height of the bilinear surface of a block at a place; none where a corner has no data.
+/// Returns the height of the bilinear surface of a block at a position; `None` if a corner has no
+/// data.
 fn surface(block: &Samples, [u, v]: [f64; 2]) -> Option<f64> {
     let cell = |at: f64, samples: usize| {
         let inside = (0.0..=(samples - 1) as f64).contains(&at);
@@ -16,19 +17,19 @@ fn surface(block: &Samples, [u, v]: [f64; 2]) -> Option<f64> {
     let at = |dx: usize, dy: usize| block.heights[(y + dy) * block.columns + x + dx];
     let [south, north] = [0, 1].map(|dy| at(0, dy) * (1.0 - s) + at(1, dy) * s);
     let height = south * (1.0 - t) + north * t;
-    // Also where the corner without data has no weight.
+    // Also if the corner without data has weight zero.
     let known = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)]
         .iter()
         .all(|h| !h.is_nan());
     known.then_some(height)
 }
 
-/// The height of a ball's centre over a place: the best of a fine grid, and then of finer ones
-/// around the best places of that.
+/// Returns the height of a ball's centre over a position: the maximum on a fine grid, and then on
+/// finer ones around its best positions.
 fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
     let ball = |place: [f64; 2]| {
         let squared = radius * radius - (place[0] - u).powi(2) - (place[1] - v).powi(2);
-        // On a grid line the patches on either side count.
+        // On a grid line the patches on both sides count.
         let near = [
             [1e-12, 1e-12],
             [-1e-12, 1e-12],
@@ -54,7 +55,7 @@ fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
             places.push((ball(place), place));
         }
     }
-    // Samples and grid lines themselves, too.
+    // Also samples and grid lines themselves.
     for column in 0..block.columns {
         for row in 0..block.rows {
             let at = [column as f64, row as f64];
@@ -89,9 +90,9 @@ fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// A ball over heights by column and row, which is rendered from the node on the sample at zero on.
+/// A ball over heights by column and row, rendered from the node on the sample at zero.
 struct Rest {
-    /// Haptic cells a cell.
+    /// Haptic cells along the side of a cell.
     parts: usize,
     /// Samples around that node.
     halo: usize,
@@ -103,7 +104,7 @@ struct Rest {
 }
 
 impl Rest {
-    /// Of a ball of a radius in cells of a millimetre, over so many cells each way.
+    /// Creates a ball of a radius in cells of a millimetre, over `cells` cells each way.
     fn new(radius: f64, cells: usize, height: impl Fn(i32, i32) -> f64) -> Self {
         let ball = Ball::of(radius, 1.0);
         let parts = ball.parts() as usize;
@@ -128,7 +129,7 @@ impl Rest {
         }
     }
 
-    /// The centre over a node by column and row.
+    /// Returns the centre over a node by column and row.
     fn centre(&self, [column, row]: [usize; 2]) -> f64 {
         self.centres[row * self.side + column]
     }
@@ -138,7 +139,7 @@ impl Rest {
         node.map(|node| node as f64 / self.parts as f64)
     }
 
-    /// The same from the block's first sample.
+    /// Returns the position of a node, in cells from the block's first sample.
     fn in_block(&self, node: [usize; 2]) -> [f64; 2] {
         self.place(node).map(|place| place + self.halo as f64)
     }
@@ -151,7 +152,7 @@ impl Rest {
 
 const RADII: [f64; 7] = [0.3, 1.0, 1.7, 2.5, 4.0, 6.3, 8.0];
 
-/// Random heights in -1 to 1 by column and row.
+/// Returns random heights in -1 to 1 by column and row.
 fn noise(column: i32, row: i32) -> f64 {
     let mut x = (column as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
         ^ (row as u64).wrapping_mul(0xd6e8_feb8_6659_fd93);
@@ -200,7 +201,7 @@ fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
     for radius in [0.3, 1.0, 2.5, 8.0] {
         for (name, shape) in shapes {
             let rest = Rest::new(radius, 2, shape);
-            // On samples and between.
+            // On samples and between them.
             let along = [
                 0,
                 rest.parts / 3,
@@ -210,7 +211,7 @@ fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
             let nodes = along.map(|row| along.map(|column| [column, row]));
             for node in nodes.into_iter().flatten() {
                 let (place, found) = (rest.in_block(node), rest.centre(node));
-                // Not higher than the ball, and nothing is nearer than 1 % less than the radius.
+                // Not higher than the ball, and no ground is nearer than 99 % of the radius.
                 let sought = centre(&rest.block, place, radius);
                 let smaller = centre(&rest.block, place, 0.99 * radius);
                 let is_right = found < sought + 1e-6 * radius && found > smaller;
@@ -233,7 +234,7 @@ fn samples_without_data_stay_without_and_bear_nothing() {
     let rest = Rest::new(2.0, 5, hole);
     for node in rest.nodes() {
         let ([x, y], centre) = (rest.place(node), rest.centre(node));
-        // A patch with such a sample has none, and its border with a whole patch does.
+        // A patch with such a sample has none; its border with a whole patch has one.
         let own = surface(&rest.block, rest.in_block(node));
         let is_border = [x, y].iter().any(|place| place.fract() == 0.0);
         assert!(own.is_none() || !centre.is_nan(), "{x} {y}");
@@ -247,7 +248,7 @@ fn samples_without_data_stay_without_and_bear_nothing() {
             );
         }
     }
-    // A sample of no whole patch bears the ball over itself alone.
+    // A sample without a whole patch supports the ball only over itself.
     let lone = |x: i32, y: i32| match (x, y) {
         (1, 1) => 50.0,
         (0..=2, 0..=2) => f64::NAN,

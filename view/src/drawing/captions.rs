@@ -1,4 +1,4 @@
-//! The text beside the picture: place, scale, and the position of the hand.
+//! The text beside the picture: position, scale, and coordinates of the hand.
 
 use std::fmt::Write as _;
 
@@ -9,12 +9,12 @@ use re_sdk_types::components::MediaType;
 
 use super::log::{Entry, Log};
 
-/// New words in a second.
+/// Updates of the text in a second.
 const RATE_HZ: f64 = 4.0;
-/// The entity.
+/// The entity's path.
 pub(super) const WORDS: &str = "words";
 
-/// The words that stay the same, and when others are due.
+/// The constant part of the text, and the time of the next update.
 pub(super) struct Words {
     facts: String,
     due_s: f64,
@@ -30,9 +30,9 @@ impl Words {
         }
     }
 
-    /// Goes over to another view.
+    /// Changes to another placement.
     pub(super) fn change(&mut self, scene: &Scene) {
-        // For a recording they are sent once.
+        // In a recording they are sent once.
         if !scene.facts.is_empty() {
             self.facts = facts(scene);
         }
@@ -43,7 +43,8 @@ impl Words {
         self.link = Some(*link);
     }
 
-    /// Of a live session the latest words stand; of a recording each has its time.
+    /// Writes the text. In a live session only the latest text is kept; in a recording each has its
+    /// time.
     pub(super) fn take(
         &mut self,
         log: &Log,
@@ -70,7 +71,7 @@ impl Words {
         let unit = &scene.height_unit;
         let [x, y, z] = sample.hip_mm;
         let height = |mm: f64| mm * scene.height_per_mm;
-        // The first row of a table is its header, in this form of text.
+        // In Markdown, the first row of a table is its header.
         let mut text = format!("| {} | |\n|---|---|\n", plain(&scene.title));
         if let Some(place) = coordinates(scene, x, y) {
             let _ = writeln!(text, "| HIP at | {place} |");
@@ -111,7 +112,7 @@ fn facts(scene: &Scene) -> String {
     facts
 }
 
-/// The file's coordinates of a place, mm; none if the file states none.
+/// Returns the file's coordinates of a position, mm; `None` if the file states none.
 pub(super) fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
     let known = scene.coordinates.as_ref()?;
     let at = |axis: usize| {
@@ -122,7 +123,7 @@ pub(super) fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
     Some(format!("{:.decimals$}, {:.decimals$}", at(0)?, at(1)?))
 }
 
-/// Without what ends a cell of a table.
+/// Removes the characters that end a cell of a table.
 fn plain(text: &str) -> String {
     text.replace(['|', '\n', '\r', '<', '>', '*', '`'], " ")
 }

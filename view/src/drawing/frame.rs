@@ -1,9 +1,9 @@
-//! A frame on the terrain around the hand, as maps have it: its border, the coordinates of
-//! its corners, and a scale bar of a round length.
+//! A frame on the terrain around the hand, as on maps: its border, the coordinates of its corners,
+//! and a scale bar of a round length.
 //!
-//! The frame is as large as what the eye sees, cut at the terrain's border. It is laid anew
-//! where the hand leaves its middle, and in another view. Of a live session the latest stands;
-//! of a recording each has its time.
+//! The frame is as large as the visible part, cut at the terrain's border. It is redrawn when the
+//! hand leaves its middle, and after a change of the placement. In a live session only the latest
+//! frame is kept; in a recording each has its time.
 
 use anyhow::Result;
 use hapterra_view_stream::{Sample, Scene};
@@ -19,21 +19,21 @@ use super::log::{Entry, Log};
 use super::map::Map;
 use super::shade::Rgb;
 
-/// The bar is at most so long, in shares of half of what the eye sees.
+/// Maximum length of the bar, as a share of half of the visible size.
 const BAR: f64 = 0.5;
-/// The hand leaves the middle of the frame where it is closer to its border than this share
-/// of its side. A new frame has it 0.25 or more away.
+/// Distance of the hand from the frame's border at which it leaves the middle, as a share of the
+/// side. In a new frame the distance is 0.25 or more.
 const MARGIN: f64 = 0.2;
 /// Points along a side.
 const POINTS: usize = 96;
 /// Parts of the bar, light and dark.
 const PARTS: usize = 4;
-/// Height of border and bar over the surface, in shares of half of what the eye sees.
+/// Height of border and bar over the surface, as a share of half of the visible size.
 const FLOAT: f64 = 0.008;
 const LIGHT: Rgb = [255, 255, 255];
 const DARK: Rgb = [20, 22, 28];
 
-/// The frame that was laid.
+/// The current frame.
 #[derive(Default)]
 pub(super) struct Frame {
     laid: Option<Square>,
@@ -48,7 +48,8 @@ struct Square {
 }
 
 impl Square {
-    /// Around a place; its side is some bars long, so that it begins at a round distance.
+    /// Creates the square around a position. Its side is a whole number of bars, so that it begins
+    /// at a round distance.
     fn around(place: [f64; 2], near: f64) -> Option<Self> {
         let bar = round_below(BAR * near)?;
         let side = bar * (near / bar).round();
@@ -56,7 +57,7 @@ impl Square {
         Some(Self { low, side, bar })
     }
 
-    /// Returns true if a place is in its middle.
+    /// Returns true if a position is in its middle.
     fn is_around(&self, place: [f64; 2]) -> bool {
         let inner = MARGIN * self.side..=(1.0 - MARGIN) * self.side;
         { place.iter().zip(self.low) }.all(|(at, low)| inner.contains(&(at - low)))
@@ -64,13 +65,13 @@ impl Square {
 }
 
 impl Frame {
-    /// Forgets what was laid, because the terrain or the view is another one.
+    /// Drops the frame, because the terrain or the placement has changed.
     pub(super) fn change(&mut self) {
         self.laid = None;
     }
 
-    /// Lays the frame anew where the hand has left its middle. `ground` is of the view in
-    /// force, `terrain` the one that is drawn.
+    /// Redraws the frame if the hand has left its middle. `ground` is of the current placement,
+    /// `terrain` the one that is drawn.
     pub(super) fn take(
         &mut self,
         log: &Log,
@@ -87,7 +88,7 @@ impl Frame {
         if { self.laid.as_ref() }.is_some_and(|laid| laid.is_around(place)) {
             return Ok(Vec::new());
         }
-        // Before the first layer there is nothing to lie on.
+        // Before the first layer there is no surface.
         let (Some(square), Some(extent)) = (Square::around(place, terrain.near), layers.extent())
         else {
             return Ok(Vec::new());
@@ -121,7 +122,8 @@ impl Frame {
 }
 
 impl Square {
-    /// West, south, east and north side within others; none where nothing is left.
+    /// Returns the square's west, south, east and north side within others; `None` if nothing is
+    /// left.
     fn cut(&self, [west, south, east, north]: [f64; 4]) -> Option<[f64; 4]> {
         let [x, y] = self.low;
         let cut = [
@@ -149,14 +151,14 @@ impl Picture<'_> {
         (FLOAT * self.terrain.near) as f32
     }
 
-    /// A place of the surface in the picture; none in a hole.
+    /// Returns a position of the surface in the picture; `None` for no-data.
     fn at(&self, place: [f64; 2]) -> Option<[f32; 3]> {
         let cell = self.terrain.cells(place);
         let up = self.layers.up_at(self.terrain, cell)?;
         Some(self.terrain.sample(cell, up + self.float()))
     }
 
-    /// The four sides on the surface, broken at holes.
+    /// Returns the four sides on the surface, broken at no-data.
     fn border(&self) -> LineStrips3D {
         let mut strips = Vec::new();
         if let Some([west, south, east, north]) = self.sides {
@@ -176,7 +178,8 @@ impl Picture<'_> {
             .with_radii([Radius::new_ui_points(0.8)])
     }
 
-    /// South-west and north-east corner with their coordinates, and which side is north.
+    /// Returns the south-west and north-east corner with their coordinates, and a label of the
+    /// north side.
     fn corners(&self) -> Points3D {
         let mut points = Vec::new();
         if let Some([west, south, east, north]) = self.sides {
@@ -194,7 +197,7 @@ impl Picture<'_> {
             .with_show_labels(true)
     }
 
-    /// A place in the file's coordinates, or how far it is from the south-west sample.
+    /// Returns a position in the file's coordinates, or its distance from the south-west sample.
     fn coordinates(&self, place: [f64; 2]) -> String {
         let [x, y] = place.map(|at| at / self.ground.per_mm);
         captions::coordinates(self.scene, x, y)
@@ -205,12 +208,12 @@ impl Picture<'_> {
         self.scene.ground_m_per_mm.is_some()
     }
 
-    /// A level bar over the middle of the south side, light and dark in turns.
+    /// Returns a level bar over the middle of the south side, alternately light and dark.
     fn bar(&self, longest: f64) -> LineStrips3D {
         let mut strips = Vec::new();
         let mut length = 0.0;
         if let Some([west, south, east, _]) = self.sides {
-            // What is left of the side may be shorter.
+            // The side may be shorter after the cut.
             length = round_below(longest.min(east - west)).unwrap_or(longest);
             let middle = 0.5 * (west + east);
             let (from, to) = (
@@ -237,7 +240,7 @@ impl Picture<'_> {
     }
 }
 
-/// Places from one to another.
+/// Returns positions from one to another.
 fn between(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     (0..=POINTS).map(move |i| {
         let share = i as f64 / POINTS as f64;

@@ -1,20 +1,20 @@
-//! From millimetres of the tip to the picture's metres.
+//! Conversion of the tip's millimetres to the picture's metres.
 
 use hapterra_view_stream::{Layer, Scene, TILE_CELLS};
 
-/// Coordinates of the picture: metres on the ground, or millimetres of the tip in the first view
-/// where the terrain does not know its size. The origin is at the home position of the first view,
-/// at height zero, so that single precision is finest where the hand is.
+/// Coordinates of the picture: metres on the ground, or millimetres of the tip in the first
+/// placement if the terrain's size is unknown. The origin is at the home position of the first
+/// placement, at height zero, so that single precision is finest near the hand.
 ///
-/// Another view of the terrain has other millimetres. In the picture the terrain stays where
-/// it is, and data in those millimetres is placed on it. Heights are drawn as
-/// they are rendered, exaggerated or not.
+/// Another placement of the terrain has other millimetres. In the picture the terrain stays where
+/// it is, and data in those millimetres is converted to it. Heights are drawn as they are rendered,
+/// with their exaggeration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ground {
     /// The picture's origin, from the south-west sample.
     origin: [f64; 2],
     home_mm: [f64; 3],
-    /// Level of detail that is rendered.
+    /// The rendered level.
     level: u8,
     /// Side of a cell of level 0.
     cell: f64,
@@ -22,31 +22,30 @@ pub(super) struct Ground {
     relief: f64,
     /// Radius of the ball at the tip; 0 for a point.
     pub(super) ball: f64,
-    /// Size of a millimetre of the tip, level and upright.
+    /// Size of a device millimetre, horizontal and vertical.
     pub(super) per_mm: f64,
     up_per_mm: f64,
-    /// Half the side of what is laid in front of the arm and near the hand: how far away the
-    /// eye is.
+    /// Half the side of the area in front of the arm and near the hand. It determines the distance
+    /// of the eye.
     pub(super) near: f64,
 }
 
-/// As much of the terrain as is looked at from the beginning, mm: a palm's width around
-/// the tip.
+/// Extent of the terrain that is visible at first, mm: a palm's width around the tip.
 const NEAR_MM: f64 = 70.0;
-/// Two views whose heights differ by less than this share have the same terrain.
+/// Max difference of the heights of two placements with the same terrain, as a share.
 const SAME: f64 = 1e-6;
 
 impl Ground {
-    /// Of the first view.
+    /// Creates the ground of the first placement.
     pub(super) fn new(scene: &Scene) -> Self {
         let per_mm = scene.ground_m_per_mm.unwrap_or(1.0);
         let [x, y, _] = scene.home_mm;
         Self::laid(scene, per_mm, [x * per_mm, y * per_mm])
     }
 
-    /// Of another view, after this one.
+    /// Creates the ground of another placement, after this one.
     pub(super) fn after(&self, scene: &Scene) -> Self {
-        // Millimetres of the first view, where nothing is known of the ground.
+        // Millimetres of the first placement, if the ground's size is unknown.
         let per_mm = scene.ground_m_per_mm.unwrap_or(self.cell / scene.cell_mm);
         Self::laid(scene, per_mm, self.origin)
     }
@@ -67,7 +66,7 @@ impl Ground {
         }
     }
 
-    /// The same view over the terrain of another one, as high as it is there: of a recording,
+    /// Returns this placement over the terrain of another one, with its heights: for a recording,
     /// whose terrain is drawn once.
     pub(super) fn over(self, terrain: &Self) -> Self {
         let stretched = terrain.relief / self.relief;
@@ -78,19 +77,19 @@ impl Ground {
         Self { up_per_mm, ..self }
     }
 
-    /// Returns true if the terrain of another view is as high in the picture.
+    /// Returns true if the terrain has the same heights in the picture in both placements.
     pub(super) fn is_as_high_as(&self, other: &Self) -> bool {
         (self.relief - other.relief).abs() <= SAME * self.relief.abs()
     }
 
-    /// A place in the picture.
+    /// Returns a position in the picture.
     pub(super) fn at(&self, [x, y, z]: [f64; 3]) -> [f32; 3] {
         let [east, north] = self.origin;
         let place = [x * self.per_mm - east, y * self.per_mm - north];
         [place[0], place[1], z * self.up_per_mm].map(|units| units as f32)
     }
 
-    /// A sample in the picture; `cell` counts in cells of level 0, `up` in the picture's
+    /// Returns a sample in the picture; `cell` counts in cells of level 0, `up` in the picture's
     /// units.
     pub(super) fn sample(&self, cell: [f64; 2], up: f32) -> [f32; 3] {
         let [east, north] = self.origin;
@@ -98,13 +97,12 @@ impl Ground {
         [(x - east) as f32, (y - north) as f32, up]
     }
 
-    /// The home position at the height of the tip.
+    /// Returns the home position at the height of the tip.
     pub(super) fn home(&self) -> [f32; 3] {
         self.at(self.home_mm)
     }
 
-    /// Returns the position of a place of the picture, in cells of level 0 from the south-west
-    /// sample.
+    /// Returns a position of the picture in cells of level 0 from the south-west sample.
     pub(super) fn cells(&self, place: [f64; 2]) -> [f64; 2] {
         place.map(|at| at / self.step(1))
     }
@@ -114,33 +112,33 @@ impl Ground {
         f64::from(cells) * self.cell
     }
 
-    /// Heights in vertical units of the file.
+    /// Converts heights in vertical units of the file.
     pub(super) fn heights_of(&self, units: &[f32]) -> Vec<f32> {
         units.iter().map(|unit| unit * self.relief as f32).collect()
     }
 
-    /// Heights in millimetres.
+    /// Converts heights in millimetres.
     pub(super) fn heights_of_mm(&self, mm: &[f32]) -> Vec<f32> {
         mm.iter().map(|mm| mm * self.up_per_mm as f32).collect()
     }
 
-    /// Cells of level 0 in a rendered cell, along a side.
+    /// Returns the cells of level 0 in a rendered cell, along a side.
     pub(super) fn haptic_cell(&self) -> i32 {
         1_i32.checked_shl(self.level.into()).unwrap_or(i32::MAX)
     }
 
-    /// Cells of level 0 in a tile, along a side.
+    /// Returns the cells of level 0 in a tile, along a side.
     pub(super) fn tile_cells(&self) -> i32 {
         TILE_CELLS.saturating_mul(self.haptic_cell())
     }
 
-    /// The south-west cell of a tile, of level 0.
+    /// Returns the south-west cell of a tile, of level 0.
     pub(super) fn first_cell(&self, index: [i32; 2]) -> [i32; 2] {
         index.map(|index| index.saturating_mul(self.tile_cells()))
     }
 }
 
-/// The cell in which a column and row of a layer's samples are.
+/// Returns the cell at a column and row of a layer's samples.
 pub(super) fn cell_of(layer: &Layer, column: usize, row: usize) -> [i32; 2] {
     let [x, y] = layer.first;
     [
@@ -173,7 +171,7 @@ pub(super) mod tests {
         }
     }
 
-    /// The same place of the terrain, in a view with twice the scale and level 1.
+    /// Returns the same position of the terrain, in a placement with twice the scale and level 1.
     fn zoomed(ground_m_per_mm: Option<f64>) -> (Scene, Scene) {
         let scene = Scene {
             ground_m_per_mm,
@@ -204,8 +202,8 @@ pub(super) mod tests {
                 after.sample([7.0, 9.0], 1.0)
             );
             assert!(after.is_as_high_as(&before));
-            // Haptic cells are of another level; the eye comes nearer, or stays where it was
-            // because the palm is still smaller than what is laid.
+            // Haptic cells are of another level; the eye moves nearer, or stays if the palm is
+            // still smaller than the area.
             assert_eq!((before.tile_cells(), after.tile_cells()), (32, 64));
             assert!(after.near < before.near + 1e-9);
         }
@@ -243,7 +241,7 @@ pub(super) mod tests {
         assert!(!after.is_as_high_as(&before));
         let [now, then] = [after, before].map(|ground| ground.heights_of(&[1.0])[0]);
         assert!((now - 3.0 * then).abs() < 1e-5);
-        // The hand of a recording comes to lie on the terrain of the beginning.
+        // The hand of a recording is on the terrain of the beginning.
         let [_, _, up] = after.over(&before).at([40.0, 30.0, 9.0]);
         assert!((up - before.at([40.0, 30.0, 3.0])[2]).abs() < 1e-3);
         let level = Scene {

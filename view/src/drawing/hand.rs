@@ -11,16 +11,16 @@ use super::ground::Ground;
 use super::log::{Entry, Log};
 use super::shade::Rgb;
 
-/// Pictures of the hand in a second.
+/// Updates of the hand in a second.
 const RATE_HZ: f64 = 60.0;
-/// New traces in a second.
+/// Updates of the trace in a second.
 const TRACES_HZ: f64 = 10.0;
 /// Length of the trace, s, and its points in a second.
 const TRACE_S: f64 = 4.0;
 const TRACE_HZ: f64 = 30.0;
-/// Length of the arrow for a newton, mm of the tip.
+/// Length of the arrow for a newton, device mm.
 const ARROW_MM_PER_N: f64 = 14.0;
-/// Height of the trace over the surface, mm of the tip.
+/// Height of the trace over the surface, device mm.
 const FLOAT_MM: f64 = 0.15;
 /// Colours.
 const PROXY: Rgb = [255, 120, 20];
@@ -32,7 +32,7 @@ const TRACE: Rgb = [255, 170, 90];
 /// Last state of the hand.
 #[derive(Default)]
 pub(super) struct Hand {
-    /// When the next picture and the next trace are due, s.
+    /// Times of the next update of hand and trace, s.
     due_s: f64,
     trace_due_s: f64,
     point_due_s: f64,
@@ -55,7 +55,7 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
         log.standing(entity, "looks", &looks)
     };
     let proxy = match ground.ball > 0.0 {
-        // Its radius comes with its places: views differ in it.
+        // Its radius is sent with its positions, because it depends on the placement.
         true => {
             let looks = Points3D::update_fields().with_colors([PROXY]);
             log.standing("hand/proxy", "looks", &looks)?
@@ -65,7 +65,7 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
     let arrow = Arrows3D::update_fields()
         .with_colors([FORCE])
         .with_radii([Radius::new_scene_units((0.7 * ground.per_mm) as f32)]);
-    // The surface hides a HIP below it, and not its name.
+    // The surface hides a HIP below it, but not its name.
     let name = Points3D::update_fields()
         .with_labels(["HIP"])
         .with_show_labels(true);
@@ -84,7 +84,7 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
 struct Rows {
     times_s: Vec<f64>,
     proxies: Vec<[f32; 3]>,
-    /// Of the ball at the tip, where it is no point.
+    /// Radii of the ball at the tip, if it is no point.
     radii: Vec<Radius>,
     hips: Vec<[f32; 3]>,
     rays: Vec<[[f32; 3]; 2]>,
@@ -92,7 +92,7 @@ struct Rows {
 }
 
 impl Hand {
-    /// Goes over to another view: the hand is elsewhere in the terrain at once.
+    /// Changes to another placement: the hand's position in the terrain jumps.
     pub(super) fn leap(&mut self) {
         self.before = None;
         self.trace.clear();
@@ -161,7 +161,7 @@ impl Rows {
             self.radii.push(radius);
         }
         self.hips.push(hip);
-        // The loop looks for the surface between the proxy of the tick before and the HIP.
+        // The loop searches for the surface between the proxy of the previous tick and the HIP.
         let from = before.map_or(hip, |before| ground.at(before.proxy_mm));
         self.rays.push([from, hip]);
         let length = (ARROW_MM_PER_N * ground.per_mm) as f32;
@@ -198,7 +198,7 @@ mod tests {
     use super::super::ground::tests::scene;
     use super::*;
 
-    /// As large on the ground as it is in the hand, in each view.
+    /// On the ground the ball is as large as in the hand, in each placement.
     #[test]
     fn a_ball_is_drawn_in_its_size_and_a_point_as_a_dot() {
         let sample = Sample {

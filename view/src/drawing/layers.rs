@@ -1,8 +1,8 @@
 //! The terrain at coarse levels: meshes in blocks, with the relief as texture.
 //!
-//! A mesh takes every m-th sample of its layer, its texture all of them. Where a finer
-//! layer or a tile is shown the mesh has no triangles; only these are logged anew when
-//! tiles come and go.
+//! A mesh uses every m-th sample of its layer, its texture all of them. Where a finer layer or a
+//! tile is shown, the mesh has no triangles; only the triangles are logged again when tiles are
+//! shown or removed.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use super::ground::{Ground, cell_of};
 use super::log::{Entry, Log};
 use super::shade::{Heights, Shade};
 
-/// Meshes have at most so many cells along a side.
+/// Max cells of a mesh along a side.
 const MESH_CELLS: usize = 320;
 /// Cells of a mesh along a block's side.
 const BLOCK_CELLS: usize = 32;
@@ -22,15 +22,15 @@ const BLOCK_CELLS: usize = 32;
 /// The layers of a terrain.
 #[derive(Default)]
 pub(super) struct Layers {
-    /// As they were received, for a placement with other heights.
+    /// The layers as received, to draw them for a placement with other heights.
     told: Vec<Layer>,
     layers: Vec<Shown>,
-    /// Colours, by the coarsest layer: it shows the whole.
+    /// Colours, from the coarsest layer, which covers the whole terrain.
     shade: Option<Shade>,
     cut: Cut,
 }
 
-/// Part that tiles show: their south-west cells of level 0, and cells along their sides.
+/// Area of the shown tiles: their south-west cells of level 0, and cells along their sides.
 #[derive(Clone, Default, PartialEq, Eq)]
 struct Cut {
     side: i32,
@@ -45,8 +45,8 @@ struct Shown {
 /// Part of a mesh.
 struct Block {
     entity: String,
-    /// Its cells with a surface: their extent in cells of level 0 (west, south,
-    /// east, north) and their corners' numbers.
+    /// Its cells with a surface: their extent in cells of level 0 (west, south, east, north) and
+    /// the indices of their corners.
     cells: Vec<([i32; 4], [u32; 4])>,
     extent: [i32; 4],
 }
@@ -56,12 +56,12 @@ const MESH: &str = "mesh";
 const TRIANGLES: &str = "triangles";
 
 impl Layers {
-    /// Shows a layer. Where it takes the place of another, the finer ones go as well, and the
-    /// layer below is whole for a moment: there is never nothing.
+    /// Shows a layer. If it replaces another one, the finer ones are removed as well, and the layer
+    /// below is drawn completely until then, so that there is no gap.
     pub(super) fn put(&mut self, log: &Log, ground: &Ground, layer: Layer) -> Result<Vec<Entry>> {
         let number = layer.number as usize;
         if number > self.told.len() {
-            // For a terrain without a coarser layer.
+            // A finer layer without a coarser one.
             return Ok(Vec::new());
         }
         let gone = self.layers.split_off(number);
@@ -90,7 +90,7 @@ impl Layers {
         blocks.any(|block| block.entity == entity)
     }
 
-    /// Shows all layers anew, as high as they are in another view.
+    /// Shows all layers again, with the heights of another placement.
     pub(super) fn redraw(&mut self, log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
         let told = std::mem::take(&mut self.told);
         (self.shade, self.layers) = (None, Vec::new());
@@ -140,8 +140,8 @@ impl Layers {
         Ok(entries)
     }
 
-    /// Returns the visible triangles of a layer: without the parts that the next finer one or tiles
-    /// show.
+    /// Returns the visible triangles of a layer: without the parts that the next finer layer or
+    /// tiles show.
     fn triangles(&self, log: &Log, number: Option<usize>) -> Result<Vec<Entry>> {
         let Some(layer) = number.and_then(|number| self.layers.get(number)) else {
             return Ok(Vec::new());
@@ -160,8 +160,8 @@ impl Layers {
         Some(extent(finer))
     }
 
-    /// Cells of level 0 along the side of a cell of the finest mesh; none before the first
-    /// layer are as good as one.
+    /// Returns the cells of level 0 along the side of a cell of the finest mesh; 1 before the first
+    /// layer.
     pub(super) fn mesh_cell(&self) -> i32 {
         let of = |layer: &Layer| {
             let every = mesh_step(layer.columns.max(layer.rows) as usize);
@@ -170,25 +170,25 @@ impl Layers {
         self.told.last().map_or(1, of).max(1)
     }
 
-    /// West, south, east and north of the whole, in cells of level 0; none before the first
-    /// layer.
+    /// Returns west, south, east and north of the terrain, in cells of level 0; `None` before the
+    /// first layer.
     pub(super) fn extent(&self) -> Option<[i32; 4]> {
         self.told.first().map(extent)
     }
 
-    /// The surface at a place (cells of level 0) in the picture's units, by the finest layer
-    /// there; none in a hole and outside.
+    /// Returns the surface at a position (cells of level 0) in the picture's units, from the finest
+    /// layer there; `None` for no-data and outside.
     pub(super) fn up_at(&self, ground: &Ground, place: [f64; 2]) -> Option<f32> {
         let unit = { self.told.iter().rev() }.find_map(|layer| height_at(layer, place))?;
         ground.heights_of(&[unit]).first().copied()
     }
 
-    /// Colours of this terrain; none before the first layer.
+    /// Returns the colours of this terrain; `None` before the first layer.
     pub(super) fn shade(&self) -> Option<Shade> {
         self.shade
     }
 
-    /// Leaves the tiles out that are shown themselves.
+    /// Removes the area of the shown tiles.
     pub(super) fn cut(
         &mut self,
         log: &Log,
@@ -213,20 +213,20 @@ impl Layers {
     }
 }
 
-/// West, south, east and north of a layer, in cells of level 0.
+/// Returns west, south, east and north of a layer, in cells of level 0.
 fn extent(layer: &Layer) -> [i32; 4] {
     let last = |count: u32| count.saturating_sub(1) as usize;
     let [east, north] = cell_of(layer, last(layer.columns), last(layer.rows));
     [layer.first[0], layer.first[1], east, north]
 }
 
-/// A layer's height at a place (cells of level 0), between its samples; none in a hole and
-/// outside. In vertical units of the file.
+/// Returns a layer's interpolated height at a position (cells of level 0), in vertical units of the
+/// file; `None` for no-data and outside.
 fn height_at(layer: &Layer, place: [f64; 2]) -> Option<f32> {
     let step = f64::from(layer.step.max(1));
     let [x, y] = [0, 1].map(|axis| (place[axis] - f64::from(layer.first[axis])) / step);
     let ([columns, rows], inside) = ([layer.columns, layer.rows], |at: f64, count: u32| {
-        // A place on the border may be rounded to the wrong side of it.
+        // A position on the border may be rounded to the wrong side.
         let last = f64::from(count.saturating_sub(1));
         (-1e-6..=last + 1e-6)
             .contains(&at)
@@ -245,7 +245,7 @@ fn height_at(layer: &Layer, place: [f64; 2]) -> Option<f32> {
     Some(mean(south, north, y - row)).filter(|height| height.is_finite())
 }
 
-/// Every how many samples a mesh takes one.
+/// Returns the step between the samples of a mesh.
 fn mesh_step(samples: usize) -> usize {
     let mut step = 1;
     while samples.saturating_sub(1) / step > MESH_CELLS {
@@ -254,7 +254,7 @@ fn mesh_step(samples: usize) -> usize {
     step
 }
 
-/// The samples along a side that a mesh takes: with the last one, too.
+/// Returns the samples along a side that a mesh uses, including the last one.
 fn lines(samples: usize, every: usize) -> Vec<usize> {
     let last = samples.saturating_sub(1);
     let mut lines: Vec<_> = (0..last).step_by(every).collect();
@@ -271,7 +271,7 @@ fn slice(lines: &[usize], first: usize) -> &[usize] {
 struct Part<'p> {
     layer: &'p Layer,
     heights: &'p Heights<'p>,
-    /// Columns and rows of the layer that it takes.
+    /// Columns and rows of the layer that it uses.
     columns: &'p [usize],
     rows: &'p [usize],
 }
@@ -286,8 +286,8 @@ impl Part<'_> {
         ])
     }
 
-    /// A corner's height; in a hole the mean around it, as far as the next corners. Such a
-    /// hole is seen in the texture, at its true size.
+    /// Returns a corner's height; for no-data the mean around it, up to the next corners. The
+    /// texture shows such no-data at its true size.
     fn height(&self, column: usize, row: usize) -> Option<f32> {
         if let Some(height) = self.heights.at(column, row) {
             return Some(height);
@@ -297,7 +297,7 @@ impl Part<'_> {
         let around = near(row).flat_map(|row| near(column).map(move |column| (column, row)));
         let known = around.filter_map(|(column, row)| self.heights.at(column, row));
         let (sum, count) = known.fold((0.0, 0), |(sum, count), height| (sum + height, count + 1));
-        // With one sample between corners a hole is a hole.
+        // Without samples between the corners, the mesh has a gap for no-data.
         (every > 1 && count > 0).then(|| sum / count as f32)
     }
 
@@ -369,7 +369,7 @@ impl Part<'_> {
 }
 
 impl Block {
-    /// Returns true if a square lies in it, or part of one: its first cell and its side.
+    /// Returns true if it contains a square or part of one, stated by its first cell and its side.
     fn has(&self, ([x, y], side): ([i32; 2], i32)) -> bool {
         let [west, south, east, north] = self.extent;
         let ends = |first: i32| first.saturating_add(side);
@@ -393,14 +393,14 @@ impl Block {
         }
     }
 
-    /// No triangles. A mesh that has none at all is taken for one whose vertices are
+    /// Returns the entry without triangles. The viewer would draw the vertices of an empty mesh as
     /// triangles.
     fn nothing(&self, log: &Log) -> Result<Entry> {
         let mesh = Mesh3D::update_fields().with_triangle_indices([[0, 0, 0]]);
         log.standing(&self.entity, TRIANGLES, &mesh)
     }
 
-    /// No samples, where there are no triangles any more.
+    /// Returns the entry without samples, for a block without triangles.
     fn forgotten(&self, log: &Log) -> Result<Entry> {
         let mesh = Mesh3D::update_fields()
             .with_vertex_positions([[0.0; 3]])
@@ -416,8 +416,8 @@ fn contains(outer: [i32; 4], [west, south, east, north]: [i32; 4]) -> bool {
 }
 
 impl Cut {
-    /// Returns true if a cell of a mesh lies in one tile that is shown. Cells of the finest layer
-    /// are not larger than a tile; a larger one is never under a single tile, and stays.
+    /// Returns true if a cell of a mesh is within a shown tile. Cells of the finest layer are not
+    /// larger than a tile; a larger one is never under a single tile, and stays.
     fn hides(&self, [west, south, east, north]: [i32; 4]) -> bool {
         let side = self.side.max(1);
         let first = |cell: i32| cell.div_euclid(side).saturating_mul(side);
@@ -425,7 +425,7 @@ impl Cut {
         low == [east - 1, north - 1].map(first) && self.tiles.contains(&low)
     }
 
-    /// The squares that one of two hides and not the other.
+    /// Returns the squares that only one of the two hides.
     fn changes_to(&self, other: &Self) -> Vec<([i32; 2], i32)> {
         let squares = |cut: &Self| -> BTreeSet<_> {
             let side = cut.side;
@@ -484,7 +484,7 @@ mod tests {
         assert!(block.has(changed[0]) && !block.has(changed[1]));
     }
 
-    /// A layer with samples at every so many cells, from a cell on.
+    /// Creates a layer with a sample every `step` cells, from cell `first`.
     fn layer(number: u32, first: i32, step: i32, posts: u32) -> Layer {
         Layer {
             number,
@@ -510,7 +510,7 @@ mod tests {
     #[test]
     fn a_place_has_the_height_of_the_finest_layer_there() {
         let ground = Ground::new(&super::super::ground::tests::scene());
-        // Heights that say where they are, and of which layer.
+        // Heights that encode their position and layer.
         let told = |number: u32, first: i32, step: i32, posts: i32| Layer {
             heights: (0..posts * posts)
                 .map(|i| (first + step * (i % posts)) as f32 + 1000.0 * number as f32)
@@ -538,7 +538,7 @@ mod tests {
         for outside in [[-0.1, 5.0], [64.1, 5.0], [5.0, 70.0]] {
             assert_eq!(up(&layers, outside[0], outside[1]), None);
         }
-        // A hole, and what is beside it.
+        // No-data, and the cells beside it.
         layers.told.truncate(1);
         layers.told[0].heights[0] = f32::NAN;
         assert_eq!(up(&layers, 3.0, 3.0), None);
@@ -556,12 +556,12 @@ mod tests {
         };
         put(&mut layers, layer(0, 0, 16, 65));
         assert_eq!(taken(&layers), [64 * 64]);
-        // 512 cells in the place of 32 × 32 coarse ones, in several blocks.
+        // 512 cells replace 32 × 32 coarse ones, in several blocks.
         put(&mut layers, layer(1, 0, 8, 65));
         assert_eq!(taken(&layers), [64 * 64 - 32 * 32, 64 * 64]);
         let blocks = layers.layers[1].blocks.len();
         assert_eq!(blocks, 4);
-        // Smaller, and elsewhere: what was cut there is cut no more.
+        // Smaller, and elsewhere: the area of the previous one is drawn again.
         let keys = put(&mut layers, layer(1, 512, 8, 33));
         assert_eq!(taken(&layers), [64 * 64 - 16 * 16, 32 * 32]);
         let [whole, cut] = ["terrain/layer0/0 triangles"; 2];
@@ -574,9 +574,9 @@ mod tests {
             let without = without.expect("taken out");
             assert!(whole < without && without < mesh && mesh < cut, "{keys:?}");
         }
-        // Of a number that is not the next one nothing is known.
+        // A layer that does not follow the last number is ignored.
         assert!(put(&mut layers, layer(3, 0, 2, 33)).is_empty());
-        // The coarsest anew: the finer ones are of another terrain.
+        // The coarsest again: the finer ones belong to another terrain.
         put(&mut layers, layer(0, 0, 16, 65));
         assert_eq!(taken(&layers), [64 * 64]);
     }

@@ -1,4 +1,4 @@
-//! The layout: terrain and hand at the left, map, words and plots at the right.
+//! The layout: terrain and hand on the left; map, text and plots on the right.
 
 use anyhow::Result;
 use hapterra_view_stream::Scene;
@@ -27,12 +27,11 @@ use super::{captions, plots};
 const PLOT_S: f64 = 6.0;
 /// The sky.
 const SKY: Rgb = [17, 24, 36];
-/// Position of the eye relative to the hand, in shares of the visible size: south-south-west of it,
+/// Position of the eye relative to the hand, as shares of the visible size: south-south-west of it,
 /// and above.
 const EYE: [f64; 3] = [-0.5, -1.2, 0.8];
 
-/// The same for the contact alone: from the south, a little above, so many millimetres of the
-/// tip away.
+/// The same for the contact alone: from the south, a little above, in device millimetres.
 const BESIDE: [f64; 3] = [-0.3, -1.0, 0.25];
 const BESIDE_MM: f64 = 22.0;
 
@@ -40,11 +39,11 @@ const BESIDE_MM: f64 = 22.0;
 struct Layout {
     store: StoreId,
     entries: Vec<LogMsg>,
-    /// Views and containers so far, for their names.
+    /// Number of views and containers up to now, for their names.
     count: u8,
 }
 
-/// The layout of a scene, as entries that stand.
+/// Returns the layout of a scene, as static entries.
 pub(super) fn entries(scene: &Scene, ground: &Ground) -> Result<Vec<Entry>> {
     let store = StoreId::random(StoreKind::Blueprint, APPLICATION);
     let mut layout = Layout {
@@ -68,7 +67,7 @@ pub(super) fn entries(scene: &Scene, ground: &Ground) -> Result<Vec<Entry>> {
         .collect())
 }
 
-/// A view or a container, and its share of what it is in.
+/// A view or a container, and its share of its parent.
 struct Part {
     path: String,
     id: Uuid,
@@ -124,21 +123,21 @@ impl Layout {
         self.log("time_panel", &time)
     }
 
-    /// Terrain and hand, with an eye that goes along with the hand.
+    /// Adds terrain and hand, with an eye that follows the hand.
     fn terrain(&mut self, ground: &Ground) -> Result<Part> {
         let contents = ["+ /terrain/**", "+ /hand/**", "+ /frame/**"];
         let eye = (EYE, ground.near);
         self.space("Terrain and hand", ground, eye, (0.58, &contents))
     }
 
-    /// The hand alone, from beside it: proxy, HIP, ray and force, which the terrain hides.
+    /// Adds the hand alone, from beside it: proxy, HIP, ray and force, which the terrain hides.
     fn contact(&mut self, ground: &Ground) -> Result<Part> {
         let contents = ["+ /hand/**"];
         let eye = (BESIDE, BESIDE_MM * ground.per_mm);
         self.space("Contact", ground, eye, (1.0, &contents))
     }
 
-    /// A part of the scene, with an eye at a distance and in a direction.
+    /// Adds a part of the scene, with an eye at a distance and in a direction.
     fn space(
         &mut self,
         name: &str,
@@ -230,13 +229,13 @@ impl Layout {
 
     fn part(&mut self, kind: &str, share: f32) -> Part {
         self.count += 1;
-        // Any will do that differs from the others'; the same each time, so that a page
-        // that returns finds its own.
+        // Any bytes that differ from the others'; the same each time, so that a page that
+        // reconnects finds its own.
         let mut bytes = *b"hapterra-view\0\0\0";
         if let Some(last) = bytes.last_mut() {
             *last = self.count;
         }
-        // What a random one says of itself, by RFC 9562.
+        // The marks of a random identifier, by RFC 9562.
         bytes[6] = (bytes[6] & 0x0f) | 0x40;
         bytes[8] = (bytes[8] & 0x3f) | 0x80;
         let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -261,7 +260,7 @@ impl Layout {
     }
 }
 
-/// The last seconds before the time that is shown.
+/// Returns the last seconds before the shown time.
 fn last_seconds() -> TimeRange {
     let relative = |s: f64| TimeRangeBoundary::CursorRelative(log::nanoseconds(s).into());
     TimeRange {

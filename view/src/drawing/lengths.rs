@@ -1,19 +1,20 @@
-//! Round lengths for scale bars, and how they are written.
+//! Round lengths for scale bars, and their texts.
 
-/// The largest of 1, 2 and 5 times a power of ten that is not above a limit; none where the
-/// limit is no positive number.
+/// Returns the largest of 1, 2 and 5 times a power of ten up to a limit; `None` if the limit is no
+/// positive number.
 pub(super) fn round_below(limit: f64) -> Option<f64> {
     if !limit.is_finite() || limit <= 0.0 {
         return None;
     }
-    // The logarithm of a power of ten may be rounded to the wrong side of it.
+    // The logarithm of a power of ten may be rounded to the wrong side.
     let limit = limit * (1.0 + 1e-9);
     let power = 10_f64.powf(limit.log10().floor());
     let mut lengths = [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power);
     lengths.find(|length| *length <= limit)
 }
 
-/// A length in the picture's units: metres on the ground, or millimetres of the tip.
+/// Returns the text of a length in the picture's units: metres on the ground, or millimetres of the
+/// tip.
 pub(super) fn written(length: f64, is_on_ground: bool) -> String {
     let (value, unit) = match is_on_ground {
         false => (length, "mm"),
@@ -21,15 +22,15 @@ pub(super) fn written(length: f64, is_on_ground: bool) -> String {
         true if length < 1.0 => (100.0 * length, "cm"),
         true => (length, "m"),
     };
-    // Digits beyond these are of the division alone.
+    // Further digits are errors of the division.
     format!("{} {unit}", (value * 1e6).round() / 1e6)
 }
 
-/// Returns the distance of a place to the east and the north of another one, in the picture's
-/// units.
+/// Returns the text of the distances from another position to the east and the north, in the
+/// picture's units.
 pub(super) fn distances(place: [f64; 2], is_on_ground: bool) -> String {
     let unit = if is_on_ground { "m" } else { "mm" };
-    // Nothing is written as 0 and not as -0.
+    // Zero is written as 0 and not as -0.
     let [east, north] = place.map(|at| (at * 1e3).round() / 1e3 + 0.0);
     format!("{east}, {north} {unit}")
 }

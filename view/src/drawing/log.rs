@@ -15,7 +15,7 @@ pub const TIMELINE: &str = "time";
 
 /// An entry of the log.
 pub struct Entry {
-    /// Key of entries that replace each other; none for what happened.
+    /// Key of entries that replace each other; `None` for events.
     pub key: Option<String>,
     /// The entry.
     pub message: LogMsg,
@@ -33,16 +33,16 @@ impl Log {
         }
     }
 
-    /// The recording's first entry.
+    /// Returns the recording's first entry.
     pub(super) fn opened(&self) -> Entry {
         Entry {
-            // Before all others, for a page that comes later.
+            // Sorts before all others, for a page that connects later.
             key: Some(" opened".into()),
             message: opened(&self.store),
         }
     }
 
-    /// `what` an entity is, until the same `part` of it is sent again.
+    /// Returns a static state of an entity, valid until the same `part` of it is sent again.
     pub(super) fn standing(
         &self,
         entity: &str,
@@ -56,7 +56,7 @@ impl Log {
         })
     }
 
-    /// `what` an entity is from a time on, s.
+    /// Returns a state of an entity from a time on, s.
     pub(super) fn at(&self, entity: &str, t_s: f64, what: &dyn AsComponents) -> Result<Entry> {
         let time = TimeInt::new_temporal(nanoseconds(t_s));
         let at = TimePoint::default().with(Timeline::new_duration(TIMELINE), time);
@@ -86,12 +86,12 @@ impl Log {
     }
 }
 
-/// Time in the viewer's unit.
+/// Converts a time to the viewer's unit.
 pub(super) fn nanoseconds(t_s: f64) -> i64 {
     (t_s * 1e9).round() as i64
 }
 
-/// The first entry of a store.
+/// Returns the first entry of a store.
 pub(super) fn opened(store: &StoreId) -> LogMsg {
     let source = StoreSource::Other("hapterra-view".into());
     LogMsg::SetStoreInfo(SetStoreInfo {
@@ -100,7 +100,7 @@ pub(super) fn opened(store: &StoreId) -> LogMsg {
     })
 }
 
-/// One row of an entity.
+/// Returns one row of an entity.
 pub(super) fn one(
     store: &StoreId,
     entity: &str,

@@ -1,6 +1,6 @@
-//! The terrain from above: its relief as a picture, and on it the hand and the tiles.
+//! The terrain from above: its relief as a picture, with the hand and the tiles.
 //!
-//! Places are pixels of the relief, which is the coarsest layer, north up.
+//! Positions are pixels of the relief, which is the coarsest layer, north up.
 
 use anyhow::Result;
 use hapterra_view_stream::{Layer, Sample, Scene, Tiles};
@@ -14,17 +14,17 @@ use super::lengths::{distances, round_below, written};
 use super::log::{Entry, Log};
 use super::shade::{Heights, Rgb, Shade};
 
-/// Pixels along the longer side of the relief at most.
+/// Max pixels along the longer side of the relief.
 const LARGEST: usize = 512;
-/// Pictures of the hand in a second.
+/// Updates of the hand in a second.
 const RATE_HZ: f64 = 20.0;
 const HELD: Rgb = [64, 224, 208];
 const LAID: Rgb = [190, 200, 210];
 const WHITE: Rgb = [255, 255, 255];
-/// The scale bar is at most as long as this share of the relief is wide.
+/// Maximum length of the scale bar, as a share of the relief's width.
 const BAR: f64 = 0.4;
-/// Room above and below the relief for coordinates and the bar, and beside it, in shares of
-/// its longer side.
+/// Margin beside the relief, and above and below it for coordinates and the bar, as shares of its
+/// longer side.
 const ROOM: [f32; 2] = [0.02, 0.14];
 
 /// The map.
@@ -34,7 +34,7 @@ pub(super) struct Map {
     due_s: f64,
 }
 
-/// From cells to pixels.
+/// Conversion of cells to pixels.
 #[derive(Clone, Copy)]
 struct Frame {
     first: [f64; 2],
@@ -50,7 +50,7 @@ impl Frame {
         [east as f32 + 0.5, (self.rows - 0.5 - north) as f32]
     }
 
-    /// A box: its middle and half its size.
+    /// Returns a box: its middle and half its size.
     fn square(&self, low: [f64; 2], high: [f64; 2]) -> ([f32; 2], [f32; 2]) {
         let ([west, south], [east, north]) = (self.pixel(low), self.pixel(high));
         let middle = [0.5 * (west + east), 0.5 * (south + north)];
@@ -59,7 +59,7 @@ impl Frame {
 }
 
 impl Frame {
-    /// A scale bar below the relief, and coordinates of its south-west and north-east sample.
+    /// Draws a scale bar below the relief, and coordinates of its south-west and north-east sample.
     fn scale(
         &self,
         log: &Log,
@@ -70,7 +70,7 @@ impl Frame {
         let size = size.map(|pixels| pixels as f32);
         let [width, height] = size;
         let room = ROOM.map(|share| share * width.max(height));
-        // The view is as large as this: labels count for nothing there.
+        // This box sets the size of the view, which ignores labels.
         let whole = Boxes2D::from_mins_and_sizes(
             [room.map(|room| -room)],
             [[width + 2.0 * room[0], height + 2.0 * room[1]]],
@@ -89,7 +89,7 @@ impl Frame {
         Ok(entries)
     }
 
-    /// A bar of a round length below the eastern half of the relief.
+    /// Returns a bar of a round length below the eastern half of the relief.
     fn bar(
         &self,
         scene: &Scene,
@@ -111,7 +111,7 @@ impl Frame {
         )
     }
 
-    /// The outermost samples' coordinates, below and above the relief, where there is room.
+    /// Returns the outermost samples' coordinates, below and above the relief, if there is room.
     fn corners(
         &self,
         scene: &Scene,
@@ -145,8 +145,8 @@ impl Frame {
 }
 
 impl Map {
-    /// The coarsest layer is the relief; the others are parts of it. One that comes again is
-    /// of other cells.
+    /// Draws the coarsest layer as the relief; the others are parts of it. If it is sent again, its
+    /// cells differ.
     pub(super) fn layer(
         &mut self,
         log: &Log,
@@ -198,7 +198,7 @@ impl Map {
         Ok(entries)
     }
 
-    /// Returns the terrain in front of the arm.
+    /// Returns the outline of the terrain in front of the arm.
     pub(super) fn laid(&self, log: &Log, scene: &Scene) -> Result<Option<Entry>> {
         let Some(frame) = self.frame else {
             return Ok(None);
@@ -211,8 +211,8 @@ impl Map {
         log.standing("map/laid", "", &reach).map(Some)
     }
 
-    /// The square that the eye looks at, as the frame on the terrain: its south-west and
-    /// north-east corner in cells of level 0; nothing where that is none.
+    /// Returns the square of the visible part, as the frame on the terrain, by its south-west and
+    /// north-east corner in cells of level 0; `None` without a frame.
     pub(super) fn looked_at(&self, corners: Option<[[f64; 2]; 2]>) -> Option<Boxes2D> {
         let frame = self.frame?;
         let squares = corners.map(|[low, high]| frame.square(low, high));
@@ -224,7 +224,7 @@ impl Map {
         )
     }
 
-    /// The tiles that the device holds.
+    /// Draws the tiles that the device stores.
     pub(super) fn tiles(&self, log: &Log, ground: &Ground, tiles: &Tiles) -> Result<Vec<Entry>> {
         let Some(frame) = self.frame else {
             return Ok(Vec::new());
@@ -240,7 +240,7 @@ impl Map {
         Ok(vec![log.standing("map/held", "", &boxes)?])
     }
 
-    /// The HIP.
+    /// Draws the HIP.
     pub(super) fn samples(
         &mut self,
         log: &Log,

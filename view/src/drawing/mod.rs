@@ -1,22 +1,22 @@
-//! Messages as rerun's entities: the terrain, the hand and what is plotted, in ground
-//! metres around the home position.
+//! Messages as rerun's entities: the terrain, the hand and the plots, in ground metres around the
+//! home position.
 //!
-//! | entity | what it is | when |
+//! | entity | content | when |
 //! | --- | --- | --- |
-//! | `/terrain/LAYER/BLOCK` | a block of a coarse layer, with its relief as texture | stands; its triangles change where tiles are shown |
-//! | `/terrain/tiles/SLOT` | a tile as it is rendered | stands until another takes its slot |
-//! | `/terrain/held/SLOT`, `/terrain/awaited` | outlines of the tiles that the device holds and lacks | stands until they are others |
+//! | `/terrain/LAYER/BLOCK` | a block of a coarse layer, with its relief as texture | static; its triangles change where tiles are shown |
+//! | `/terrain/tiles/SLOT` | a tile as it is rendered | static until another tile uses its slot |
+//! | `/terrain/held/SLOT`, `/terrain/awaited` | outlines of the tiles that the device stores and waits for | static until these tiles change |
 //! | `/hand/proxy`, `hip`, `ray`, `force`, `trace` | the hand | 60 a second |
-//! | `/frame/border`, `corners`, `bar` | a frame around the hand, its coordinates, a scale bar | stands until the hand leaves it |
+//! | `/frame/border`, `corners`, `bar` | a frame around the hand, its coordinates, a scale bar | static until the hand leaves it |
 //! | `/map/…` | the same from above, in pixels of the relief | |
 //! | `/plot/…` | a thousand samples a second | |
-//! | `/words` | place, scale and coordinates | four a second |
+//! | `/words` | position, scale and coordinates | four a second |
 //!
-//! Another view of the terrain while it is touched comes as another scene: the terrain stays
-//! where it is on the ground, the eye comes nearer or goes away, and plots and time continue.
+//! Another placement of the terrain while it is touched is another scene: the terrain stays where
+//! it is on the ground, the eye moves nearer or farther, and plots and time continue.
 //!
-//! Entries without a time are logged as static, and the latest replaces the one before, in the history
-//! as in the page: a session of hours grows by its samples alone.
+//! Entries without a time are logged as static, and the latest replaces the one before, in the
+//! history as in the page: a session of hours grows only by its samples.
 
 mod captions;
 mod frame;
@@ -52,9 +52,9 @@ use tiles::Tiles;
 pub struct Drawing {
     log: Log,
     scene: Scene,
-    /// Ground under the hand, in the placement in force.
+    /// Ground under the hand, in the current placement.
     ground: Ground,
-    /// Place where the terrain is: of a recording as in its first view.
+    /// Ground of the drawn terrain; in a recording that of its first placement.
     terrain: Ground,
     layers: Layers,
     tiles: Tiles,
@@ -66,10 +66,10 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// Draws a message. `drawing` is none before the first scene.
+    /// Draws a message. `drawing` is `None` before the first scene.
     ///
     /// # Errors
-    /// An entry that rerun's format cannot hold; this should not happen.
+    /// An entry that rerun's format cannot encode; this should not happen.
     pub fn take(drawing: &mut Option<Self>, message: Message) -> Result<Vec<Entry>> {
         if let Message::Scene(scene) = message {
             let mut entries = Vec::new();
@@ -81,12 +81,12 @@ impl Drawing {
         }
         match drawing {
             Some(drawing) => drawing.go_on(message),
-            // Of no scene.
+            // Message before any scene.
             None => Ok(Vec::new()),
         }
     }
 
-    /// Draws what still waits, at the end of the stream.
+    /// Draws the waiting samples, at the end of the stream.
     ///
     /// # Errors
     /// As [`Drawing::take`].
@@ -94,7 +94,7 @@ impl Drawing {
         self.plots.finish(&self.log)
     }
 
-    /// Returns true if samples come as they are rendered.
+    /// Returns true if samples arrive as they are rendered.
     #[must_use]
     pub fn is_live(&self) -> bool {
         self.scene.is_live
@@ -122,7 +122,7 @@ impl Drawing {
         })
     }
 
-    /// Goes over to another view of the same terrain. Earlier samples stay.
+    /// Changes to another placement of the same terrain. Earlier samples stay.
     fn change(&mut self, scene: Scene, entries: &mut Vec<Entry>) -> Result<()> {
         let log = &self.log;
         let ground = self.ground.after(&scene);
@@ -135,18 +135,18 @@ impl Drawing {
                 self.look_at(&scene, &ground, entries)?;
                 self.ground = ground;
             }
-            // Its terrain stands for all of its time.
+            // The terrain of a recording is the same for all of its time.
             false => self.ground = ground.over(&self.terrain),
         }
         self.scene = scene;
         Ok(())
     }
 
-    /// The terrain as it is rendered from now on, and the eye as near as it is large.
+    /// Draws the terrain as it is rendered from now on, and sets the eye's distance by its size.
     fn look_at(&mut self, scene: &Scene, ground: &Ground, entries: &mut Vec<Entry>) -> Result<()> {
         let log = &self.log;
         if !scene.keeps_tiles {
-            // First what lies under the tiles, so that there is never nothing.
+            // First the layers under the tiles, so that there is no gap.
             entries.extend(self.layers.cut(log, ground, &BTreeSet::new())?);
             entries.extend(self.tiles.clear(log)?);
         }
@@ -216,7 +216,7 @@ pub(crate) mod tests {
     use hapterra_view_stream::{Layer, Sample, TILE_POSTS, Tile};
     use re_sdk_types::archetypes::Points3D;
 
-    /// Something that stands under a key, or that happened.
+    /// Returns a static entry with a key, or an event.
     pub(crate) fn entry(key: Option<&str>) -> Entry {
         let log = Log::new();
         let points = Points3D::new((0..100).map(|i| [i as f32, 0.0, 1.0]));
@@ -230,7 +230,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Something that happened at a time, s.
+    /// Returns an event at a time, s.
     pub(crate) fn at(t_s: f64) -> Entry {
         let point = Points3D::new([[1.0, 2.0, 3.0]]);
         Log::new().at("it", t_s, &point).expect("encodes")
@@ -261,7 +261,7 @@ pub(crate) mod tests {
         })
     }
 
-    /// Keys of what a message draws anew.
+    /// Returns the keys of the entries that a message draws again.
     fn keys(drawing: &mut Option<Drawing>, message: Message) -> BTreeSet<String> {
         let entries = Drawing::take(drawing, message).expect("it is drawn");
         entries.into_iter().filter_map(|entry| entry.key).collect()
@@ -278,14 +278,14 @@ pub(crate) mod tests {
         for message in [scene(|_| {}), layer(), tile()] {
             all.extend(keys(&mut drawing, message));
         }
-        // Panned: the tiles stay, and so does the eye.
+        // Panned: the tiles and the eye stay.
         let panned = scene(|scene| {
             scene.keeps_tiles = true;
             scene.home_mm = [50.0, 30.0, 12.0];
         });
         let drawn = keys(&mut drawing, panned);
         assert_eq!(drawn, BTreeSet::from(["map/laid ".to_owned()]));
-        // Zoomed: the eye comes nearer.
+        // Zoomed: the eye moves nearer.
         let zoom = |scene: &mut Scene| {
             scene.cell_mm *= 2.0;
             scene.mm_per_unit *= 2.0;
@@ -301,14 +301,14 @@ pub(crate) mod tests {
             has(&drawn, " opened, layout") && !has(&drawn, "terrain/"),
             "{drawn:?}"
         );
-        // Steeper: the terrain is another one, and the tiles have yet to come.
+        // Steeper: the terrain is another one, and its tiles have not arrived yet.
         let steeper = scene(|scene| {
             zoom(scene);
             scene.mm_per_unit *= 1.5;
         });
         let drawn = keys(&mut drawing, steeper);
         assert!(has(&drawn, "terrain/layer0/0 mesh") && has(&drawn, "terrain/tiles/2 mesh"));
-        // Whatever it draws takes the place of what was there.
+        // All entries that it draws replace earlier ones.
         assert!(drawn.is_subset(&all), "{drawn:?}");
         assert!(keys(&mut drawing, tile()).is_subset(&all));
     }
@@ -354,7 +354,7 @@ pub(crate) mod tests {
             scene.laid_mm = scene.laid_mm.map(|mm| 2.0 * mm);
             scene.ground_m_per_mm = scene.ground_m_per_mm.map(|metres| 0.5 * metres);
         }));
-        // At the same place of the ground.
+        // At the same position of the ground.
         assert!(is_laid(samples(40.0, 2.0)));
     }
 

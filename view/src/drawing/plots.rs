@@ -8,7 +8,7 @@ use re_sdk_types::components::Name;
 use super::log::{Entry, Log};
 use super::shade::Rgb;
 
-/// Series that share an entity, and so a plot: entity, then names and colours.
+/// Series that share an entity, and therefore a plot: entity, then names and colours.
 struct Plot {
     entity: &'static str,
     series: &'static [(&'static str, Rgb)],
@@ -27,7 +27,7 @@ pub(super) const HEIGHT: &str = "plot/height";
 pub(super) const FORCE: &str = "plot/force";
 /// Distance from HIP to proxy, mm.
 pub(super) const PENETRATION: &str = "plot/penetration";
-/// Energy in the spring, and given to the hand since the beginning; mJ.
+/// Energy in the spring, and energy transferred to the hand since the beginning; mJ.
 pub(super) const ENERGY: &str = "plot/energy";
 /// Cost of a tick, and its bound.
 pub(super) const TICK: &str = "plot/tick";
@@ -73,16 +73,16 @@ pub(super) fn looks(log: &Log) -> Result<Vec<Entry>> {
     looks.collect()
 }
 
-/// Samples that are plotted at a time.
+/// Number of samples that are plotted at once.
 const AT_A_TIME: usize = 200;
 
 /// Last plotted values.
 pub(super) struct Plots {
     height_per_mm: f64,
     tick: Option<TickCost>,
-    /// Given to the hand since the beginning, mJ.
+    /// Energy transferred to the hand since the beginning, mJ.
     given_mj: f64,
-    /// Not plotted yet.
+    /// Samples that are not plotted yet.
     waiting: Vec<Sample>,
     before: Option<Sample>,
     link: Option<Link>,
@@ -100,20 +100,19 @@ impl Plots {
         }
     }
 
-    /// Goes over to another view, with what waits of the one before.
+    /// Changes to another placement, and plots the waiting samples of the previous one.
     ///
     /// # Errors
     /// As [`Self::finish`].
     pub(super) fn change(&mut self, log: &Log, scene: &Scene) -> Result<Vec<Entry>> {
         let rest = self.finish(log)?;
         self.height_per_mm = scene.height_per_mm;
-        // The hand leapt over the terrain, and not under a force.
+        // The hand's jump over the terrain was not under a force.
         self.before = None;
         Ok(rest)
     }
 
-    /// Plots every sample, some at a time: each entry takes a page as much as a hundred
-    /// samples do.
+    /// Plots every sample, several at a time: one entry costs a page as much as a hundred samples.
     pub(super) fn take(&mut self, log: &Log, samples: &[Sample]) -> Result<Vec<Entry>> {
         self.waiting.extend(samples);
         match self.waiting.len() < AT_A_TIME {
@@ -122,7 +121,7 @@ impl Plots {
         }
     }
 
-    /// Plots what waits.
+    /// Plots the waiting samples.
     pub(super) fn finish(&mut self, log: &Log) -> Result<Vec<Entry>> {
         let samples = std::mem::take(&mut self.waiting);
         if samples.is_empty() {
@@ -169,7 +168,7 @@ impl Plots {
         Ok(vec![series(log, LINK, &[link.t_s], &[row])?])
     }
 
-    /// Returns the energy of the spring and to the hand, mJ, which is N·mm.
+    /// Returns the energy in the spring and the energy transferred to the hand, mJ, which is N·mm.
     fn energy(&mut self, sample: &Sample) -> Vec<f64> {
         let force = sample.force_n.map(f64::from);
         let held = 0.5 * length(force) * penetration(sample);
@@ -182,7 +181,7 @@ impl Plots {
     }
 }
 
-/// Distance from HIP to proxy, mm.
+/// Returns the distance from HIP to proxy, mm.
 fn penetration(sample: &Sample) -> f64 {
     let mut depth = sample.proxy_mm;
     for (depth, hip) in depth.iter_mut().zip(sample.hip_mm) {
@@ -195,7 +194,7 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Rows of equally many values.
+/// Returns rows of equally many values.
 fn series(log: &Log, entity: &str, times_s: &[f64], rows: &[Vec<f64>]) -> Result<Entry> {
     let lengths: Vec<usize> = rows.iter().map(Vec::len).collect();
     let scalars = Scalars::new(rows.iter().flatten().copied());

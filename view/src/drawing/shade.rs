@@ -1,9 +1,9 @@
-//! Hypsometric tint under lights from the north-west, as maps have it.
+//! Hypsometric tint under lights from the north-west, as on maps.
 
 /// Red, green and blue.
 pub(super) type Rgb = [u8; 3];
 
-/// Colours from low to high, and at which share of the heights each stands.
+/// Colours from low to high, each with its share of the heights.
 const TINTS: [(f32, [f32; 3]); 7] = [
     (0.0, [66.0, 122.0, 88.0]),
     (0.2, [110.0, 152.0, 96.0]),
@@ -25,10 +25,10 @@ const LIGHT: [f32; 3] = [255.0, 252.0, 244.0];
 /// Slopes are exaggerated until this share of them is below 45°, within limits.
 const BELOW_45_SHARE: f64 = 0.88;
 const EXAGGERATION: (f64, f64) = (0.3, 30.0);
-/// Ground of a hole.
+/// Colour of no-data.
 pub(super) const HOLE: Rgb = [60, 64, 72];
 
-/// Colours of heights: the same for all levels of detail of a terrain.
+/// Colours of heights: the same for all layers of a terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shade {
     low: f32,
@@ -36,17 +36,17 @@ pub(super) struct Shade {
     exaggeration: f32,
 }
 
-/// Heights row by row from the south, NaN in a hole.
+/// Heights row by row from the south, NaN for no-data.
 pub(super) struct Heights<'h> {
     pub(super) columns: usize,
     pub(super) rows: usize,
-    /// Between samples, in the unit of the heights.
+    /// Distance between samples, in the unit of the heights.
     pub(super) step: f64,
     pub(super) up: &'h [f32],
 }
 
 impl Heights<'_> {
-    /// A height; none in a hole and outside.
+    /// Returns a height; `None` for no-data and outside.
     pub(super) fn at(&self, column: usize, row: usize) -> Option<f32> {
         let inside = column < self.columns && row < self.rows;
         let index = row.checked_mul(self.columns)?.checked_add(column)?;
@@ -54,7 +54,7 @@ impl Heights<'_> {
         height.filter(|height| height.is_finite())
     }
 
-    /// Rise towards the east and the north, from the neighbours there are.
+    /// Returns the slope towards the east and the north, from the available neighbours.
     fn slope(&self, column: usize, row: usize) -> [f32; 2] {
         let here = self.at(column, row);
         let step = self.step as f32;
@@ -79,8 +79,8 @@ impl Heights<'_> {
 }
 
 impl Shade {
-    /// Fits the colours to heights: nearly all of them lie between the first and the last
-    /// tint, so that one spike does not make the rest one colour.
+    /// Fits the colours to heights: nearly all of them are between the first and the last tint, so
+    /// that one spike does not reduce the rest to one colour.
     pub(super) fn of(heights: &Heights<'_>) -> Self {
         let known = || heights.up.iter().copied().filter(|h| h.is_finite());
         let mut sorted: Vec<f32> = known().step_by(1 + heights.up.len() / 200_000).collect();
@@ -107,7 +107,7 @@ impl Shade {
         }
     }
 
-    /// The colour of a sample.
+    /// Returns the colour of a sample.
     pub(super) fn colour(&self, heights: &Heights<'_>, column: usize, row: usize) -> Rgb {
         let Some(height) = heights.at(column, row) else {
             return HOLE;
@@ -133,7 +133,7 @@ fn tint(share: f32) -> [f32; 3] {
     }
 }
 
-/// A tint under the lights; a level surface keeps it.
+/// Returns a tint under the lights; a level surface has the tint itself.
 fn lit(tint: [f32; 3], [east, north]: [f32; 2]) -> [f32; 3] {
     let length = (east * east + north * north + 1.0).sqrt();
     let (mut light, mut level) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Tiles as they are rendered, and outlines of those that the device holds and lacks.
+//! Tiles as they are rendered, and outlines of the tiles that the device stores and waits for.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,13 +25,13 @@ const AWAITED: Rgb = [255, 176, 32];
 /// The tiles that are shown.
 #[derive(Default)]
 pub(super) struct Tiles {
-    /// Tile in each slot.
+    /// The tile in each slot.
     slots: BTreeMap<u32, [i32; 2]>,
-    /// The same by column and row, with the colours around each.
+    /// The tiles by column and row, with the colours around each.
     tiles: BTreeMap<[i32; 2], (Lifted, Vec<Rgb>)>,
-    /// Lines around each tile that is shown.
+    /// Outline of each shown tile.
     outlines: BTreeMap<[i32; 2], Vec<Vec<[f32; 3]>>>,
-    /// The tile in each slot around which there are lines in the picture.
+    /// The outlined tile in each slot of the picture.
     outlined: BTreeMap<u32, [i32; 2]>,
 }
 
@@ -85,7 +85,7 @@ impl Tiles {
             first: ground.first_cell(tile.index),
         };
         self.outlines.insert(tile.index, posts.outline());
-        // They may be as high as they were not before.
+        // Their heights may have changed.
         self.outlined.remove(&tile.slot);
         let colour = |column: usize, row: usize| {
             let shade = layers.shade();
@@ -99,13 +99,13 @@ impl Tiles {
         Ok(entries)
     }
 
-    /// The sides of all tiles, where the mesh around them has become another one.
+    /// Draws the sides of all tiles, after the mesh around them has changed.
     pub(super) fn close(&self, log: &Log, ground: &Ground, layers: &Layers) -> Result<Vec<Entry>> {
         let all: Vec<_> = self.tiles.keys().copied().collect();
         self.skirts(log, ground, layers, &all)
     }
 
-    /// The sides of changed tiles and of those beside them: only where no tile is beside.
+    /// Draws the sides of changed tiles and of their neighbours: only sides without a neighbour.
     fn skirts(
         &self,
         log: &Log,
@@ -126,7 +126,7 @@ impl Tiles {
                 ground,
                 first: ground.first_cell(tile.index),
             };
-            // In the order in which a ring goes around.
+            // In the order of the ring.
             let open = [[0, -1], [1, 0], [0, 1], [-1, 0]]
                 .map(|step| !self.tiles.contains_key(&beside(tile.index, step)));
             let mesh = posts.skirt(colours, open, every as usize);
@@ -135,7 +135,7 @@ impl Tiles {
         entries.collect()
     }
 
-    /// Takes all tiles out of the picture: another view has none of them.
+    /// Removes all tiles from the picture: another placement has none of them.
     pub(super) fn clear(&mut self, log: &Log) -> Result<Vec<Entry>> {
         let Self {
             slots, outlined, ..
@@ -152,13 +152,13 @@ impl Tiles {
         Ok(entries)
     }
 
-    /// By column and row.
+    /// Returns the shown tiles, by column and row.
     pub(super) fn shown(&self) -> BTreeSet<[i32; 2]> {
         self.slots.values().copied().collect()
     }
 
-    /// Draws around the tiles that the device holds and lacks. Lines around a tile are sent
-    /// when it comes, and not with every other one again: a window has hundreds.
+    /// Draws the outlines of the tiles that the device stores and waits for. An outline is sent
+    /// when its tile arrives, and not again with every other one: a window has hundreds.
     pub(super) fn outline(
         &mut self,
         log: &Log,
@@ -198,7 +198,7 @@ impl Tiles {
     }
 }
 
-/// Lines in a colour.
+/// Returns lines in a colour.
 fn drawn(log: &Log, entity: &str, lines: Vec<Vec<[f32; 3]>>, colour: Rgb) -> Result<Entry> {
     let width = if colour == AWAITED { 2.0 } else { 0.9 };
     let strips = LineStrips3D::new(lines)
@@ -234,12 +234,12 @@ struct Posts<'p> {
 }
 
 impl Posts<'_> {
-    /// A sample's height; the tile's own first is one into what was sent.
+    /// Returns a sample's height; the heights have a margin of one around the tile.
     fn height(&self, column: usize, row: usize) -> Option<f32> {
         self.heights.at(column + 1, row + 1)
     }
 
-    /// A sample's place, at a height.
+    /// Returns a sample's position, at a height.
     fn at(&self, column: usize, row: usize, up: f32) -> [f32; 3] {
         let [x, y] = self.first.map(f64::from);
         let side = f64::from(self.ground.haptic_cell());
@@ -270,8 +270,8 @@ impl Posts<'_> {
             .with_triangle_indices(at_least_one(triangles))
     }
 
-    /// Walls at the tile's open sides, which close the gap to the coarse mesh: that goes
-    /// straight from every `every`-th sample to the next.
+    /// Returns walls at the tile's open sides, which close the gap to the coarse mesh: it is
+    /// straight between every `every`-th sample.
     fn skirt(&self, colours: &[Rgb], open: [bool; 4], every: usize) -> Mesh3D {
         let ring = ring();
         let tops = ring.iter().map(|(x, y)| self.surface(*x, *y));
@@ -295,7 +295,7 @@ impl Posts<'_> {
             .with_triangle_indices(at_least_one(triangles))
     }
 
-    /// Height of the coarse mesh at a place of the ring; none beside a hole.
+    /// Returns the height of the coarse mesh at a position of the ring; `None` beside no-data.
     fn coarse(&self, ring: &[(usize, usize)], i: usize, every: usize) -> Option<f32> {
         let (from, share) = (i - i % every, (i % every) as f32 / every as f32);
         let height = |i: usize| ring.get(i).and_then(|(x, y)| self.height(*x, *y));
@@ -306,7 +306,7 @@ impl Posts<'_> {
         }
     }
 
-    /// Lines around the tile, broken at holes.
+    /// Returns lines around the tile, broken at no-data.
     fn outline(&self) -> Vec<Vec<[f32; 3]>> {
         let float = (FLOAT_CELLS * self.ground.step(self.ground.haptic_cell())) as f32;
         let ring = ring();
@@ -334,17 +334,18 @@ fn skirt(slot: u32) -> String {
     format!("terrain/tiles/{slot}/skirt")
 }
 
-/// Returns the name of the lines around the held tile in a slot.
+/// Returns the name of the outline of the stored tile in a slot.
 fn held_in(slot: u32) -> String {
     format!("terrain/held/{slot}")
 }
 
-/// The tile so many columns and rows farther.
+/// Returns the tile at a distance of columns and rows.
 fn beside([col, row]: [i32; 2], [east, north]: [i32; 2]) -> [i32; 2] {
     [col.saturating_add(east), row.saturating_add(north)]
 }
 
-/// A mesh without triangles is taken for one whose vertices are triangles.
+/// Adds a degenerate triangle if there is none: the viewer would draw the vertices of an empty mesh
+/// as triangles.
 fn at_least_one(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     if triangles.is_empty() {
         triangles.push([0, 0, 0]);
@@ -352,7 +353,7 @@ fn at_least_one(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     triangles
 }
 
-/// Columns and rows around a tile, the first once more at the end.
+/// Returns columns and rows around a tile, the first also at the end.
 fn ring() -> Vec<(usize, usize)> {
     let last = SIDE - 1;
     let south = (0..last).map(|i| (i, 0));
@@ -400,7 +401,7 @@ mod tests {
         for (i, (x, y)) in ring.iter().enumerate() {
             let own = posts.height(*x, *y).expect("no hole");
             let coarse = posts.coarse(&ring, i, 4).expect("no hole");
-            // Where the coarse mesh has a corner there is no gap.
+            // At a corner of the coarse mesh there is no gap.
             assert!(i % 4 != 0 || coarse == own, "{i}");
             let corner = |k: usize| posts.height(ring[k].0, ring[k].1).expect("no hole");
             let ends = [
@@ -465,7 +466,7 @@ mod tests {
         let [third, fourth] = ["terrain/held/3 ", "terrain/held/4 "];
         assert_eq!(told(&mut tiles, &[[1, 2], [2, 2]]), [third, fourth]);
         assert!(told(&mut tiles, &[[1, 2], [2, 2]]).is_empty());
-        // Another in the same slot, and one that is held no more.
+        // Another in the same slot, and one that is no longer stored.
         came(&mut tiles, 3, [9, 2]);
         assert_eq!(told(&mut tiles, &[[9, 2], [2, 2]]), [third]);
         assert_eq!(told(&mut tiles, &[[9, 2]]), [fourth]);

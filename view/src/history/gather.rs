@@ -1,8 +1,7 @@
-//! Gathering of events: some time of an entity as one entry.
+//! Gathering of events: a time span of an entity as one entry.
 //!
-//! The viewer takes about a millisecond for each entry that it gets, however small. A page
-//! that comes late, and one that is drawn by software, get the same rows in far fewer
-//! entries.
+//! The viewer needs about a millisecond for each entry, of any size. A page that connects late, and
+//! one that is drawn by software, receive the same rows in far fewer entries.
 
 use std::collections::BTreeMap;
 
@@ -13,17 +12,17 @@ use re_log_types::{AbsoluteTimeRange, EntityPath, LogMsg, StoreId};
 use super::{Blob, encoded};
 use crate::drawing::TIMELINE;
 
-/// So many entries are put together at most: the device's time may stand still.
+/// Max entries that are joined: the device's time may stand still.
 const MOST: usize = 1000;
 
-/// A piece of what happened.
+/// A piece of the events.
 pub(super) struct Piece {
     pub(super) blob: Blob,
     entries: Vec<LogMsg>,
 }
 
 impl Piece {
-    /// None of nothing.
+    /// Creates a piece; `None` without entries.
     pub(super) fn of(entries: Vec<LogMsg>) -> Result<Option<Self>> {
         if entries.is_empty() {
             return Ok(None);
@@ -33,19 +32,19 @@ impl Piece {
     }
 }
 
-/// Entries that wait for others, and the pieces that they came in.
+/// Entries that wait for others, and the pieces in which they arrived.
 pub(super) struct Gather {
     /// Minimum span of a piece in the device's time, ns.
     least_ns: u64,
     pieces: Vec<Blob>,
     waiting: BTreeMap<EntityPath, Vec<(StoreId, Chunk)>>,
     count: usize,
-    /// From the first to the last of them.
+    /// Time from the first to the last of them.
     span: Option<AbsoluteTimeRange>,
 }
 
 impl Gather {
-    /// Puts together what spans so much of the device's time, s.
+    /// Creates a gatherer for pieces of `span_s` of the device's time.
     pub(super) fn new(span_s: u32) -> Self {
         Self {
             least_ns: u64::from(span_s) * 1_000_000_000,
@@ -56,16 +55,16 @@ impl Gather {
         }
     }
 
-    /// Returns the pieces since the last call.
+    /// Returns the pieces of the waiting entries.
     pub(super) fn pieces(&self) -> &[Blob] {
         &self.pieces
     }
 
-    /// Takes a piece of what happened; gives what is put together now.
+    /// Adds a piece of events; returns the joined piece if one is complete.
     pub(super) fn take(&mut self, piece: &Piece) -> Result<Option<Piece>> {
         self.pieces.push(Blob::clone(&piece.blob));
         for entry in &piece.entries {
-            // What happened is nothing but rows.
+            // Events consist only of rows.
             let LogMsg::ArrowMsg(store, rows) = entry else {
                 continue;
             };
@@ -90,7 +89,7 @@ impl Gather {
         }
     }
 
-    /// Gives all that waits.
+    /// Returns all waiting entries as one piece.
     pub(super) fn rest(&mut self) -> Result<Option<Piece>> {
         (self.count, self.span) = (0, None);
         self.pieces.clear();
@@ -106,7 +105,7 @@ impl Gather {
     }
 }
 
-/// Chunks of one entity, those of the same columns as one.
+/// Joins the chunks of each entity with the same columns.
 fn joined(chunks: Vec<(StoreId, Chunk)>) -> Vec<(StoreId, Chunk)> {
     let mut joined: Vec<(StoreId, Chunk)> = Vec::new();
     for (store, chunk) in chunks {

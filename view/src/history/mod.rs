@@ -1,11 +1,11 @@
 //! History for new pages, and the queues of the present ones.
 //!
-//! Static entries (terrain, tiles, layout) are kept once, by key: a later entry replaces an earlier one.
-//! Entries over time are gathered (`gather`) and kept up to a bound of bytes, the oldest dropped first.
-//! Nothing else grows during a session.
+//! Static entries (terrain, tiles, layout) are kept once, by key: a later entry replaces an earlier
+//! one. Entries over time are gathered (`gather`) and kept up to a bound of bytes, the oldest
+//! dropped first. All other memory is constant during a session.
 //!
-//! A page whose queue is full is cut off, so that neither this program nor another page
-//! waits for it. It reconnects by itself and gets the present state.
+//! A page whose queue is full is cut off, so that neither this program nor another page waits for
+//! it. It reconnects by itself and receives the current state.
 
 mod gather;
 mod page;
@@ -23,26 +23,26 @@ use crate::drawing::Entry;
 use gather::{Gather, Piece};
 pub use page::{Next, Page, Pieces};
 
-/// A piece of a page's stream: a whole little `.rrd`.
+/// A piece of a page's stream: a complete small `.rrd`.
 pub type Blob = Arc<Vec<u8>>;
 
 /// Span of a gathered piece for pages, s.
 const SHORT_S: u32 = 1;
-/// And to pages that missed it, s.
+/// Span of a gathered piece for pages that connect later, s.
 const LONG_S: u32 = 10;
 
-/// Version and options of everything that is encoded here.
+/// Returns version and options of all encoding in this module.
 #[must_use]
 pub fn encoding() -> (CrateVersion, EncodingOptions) {
     (CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED)
 }
 
-/// Messages to pages, now and from now on.
+/// Messages to the present pages and to later ones.
 pub struct History {
-    /// Bytes of what happened in time that are kept of a live session.
+    /// Maximum bytes of a live session's events.
     limit: usize,
     state: Mutex<State>,
-    /// Pages that were cut off.
+    /// Number of pages that were cut off.
     cut: AtomicU64,
 }
 
@@ -58,7 +58,7 @@ struct State {
     is_bounded: bool,
     ended: Option<End>,
     pages: Vec<Arc<Page>>,
-    /// Pages that have come so far.
+    /// Number of pages that have connected up to now.
     came: u64,
 }
 
@@ -67,32 +67,32 @@ struct State {
 pub enum End {
     /// `hapterra` ended the stream.
     Told,
-    /// `hapterra` is gone without saying so: it was killed, or crashed.
+    /// `hapterra` ended without ending the stream: it was killed, or crashed.
     Lost,
 }
 
 /// Figures of a history.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kept {
-    /// Bytes that stand.
+    /// Bytes of static entries.
     pub standing: usize,
-    /// Bytes of what happened in time.
+    /// Bytes of events.
     pub happened: usize,
-    /// Pages that are there.
+    /// Number of connected pages.
     pub pages: usize,
-    /// Pages that have come so far.
+    /// Number of pages that have connected up to now.
     pub came: u64,
     /// Pages that were cut off because they were too slow.
     pub cut: u64,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A panicked thread held no half-made state: every change is one assignment or push.
+    // A thread that panicked left a consistent state: every change is one assignment or push.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl History {
-    /// An empty history that keeps `limit` bytes of what happens in a live session.
+    /// Creates an empty history that keeps `limit` bytes of a live session's events.
     #[must_use]
     pub fn new(limit: usize) -> Arc<Self> {
         Arc::new(Self {
@@ -112,8 +112,7 @@ impl History {
         })
     }
 
-    /// A scene begins: what was kept of the one before is forgotten. A recording is kept
-    /// as a whole.
+    /// Begins a scene and drops the history of the previous one. A recording is kept completely.
     pub fn begin(&self, is_live: bool) {
         let mut state = locked(&self.state);
         state.standing.clear();
@@ -127,7 +126,7 @@ impl History {
         }
     }
 
-    /// Keeps entries and tells them to the pages.
+    /// Stores entries and sends them to the pages.
     ///
     /// # Errors
     /// An entry that cannot be encoded.
@@ -155,7 +154,7 @@ impl History {
         Ok(())
     }
 
-    /// Nothing comes any more.
+    /// Ends the session: no entries follow.
     ///
     /// # Errors
     /// An entry that cannot be encoded.
@@ -170,7 +169,7 @@ impl History {
         Ok(())
     }
 
-    /// A page comes: its queue, which begins with all that is kept.
+    /// Adds a page and returns its queue, which begins with the whole history.
     #[must_use]
     pub fn come(&self, pieces: Pieces) -> Arc<Page> {
         let mut state = locked(&self.state);
@@ -188,7 +187,7 @@ impl History {
         page
     }
 
-    /// A page has gone.
+    /// Removes a page that has disconnected.
     pub fn gone(&self, page: &Arc<Page>) {
         let mut state = locked(&self.state);
         state.pages.retain(|other| !Arc::ptr_eq(other, page));
@@ -209,14 +208,14 @@ impl History {
 }
 
 impl State {
-    /// Sends the gathered entries to the pages that take such pieces.
+    /// Sends the gathered entries to the pages that receive such pieces.
     fn tell(&self, pieces: Pieces, blob: &Blob) {
         for page in self.pages.iter().filter(|page| page.pieces() == pieces) {
             page.offer(None, blob);
         }
     }
 
-    /// Tells what was put together, and puts it together with more.
+    /// Sends a joined piece, and joins it with more.
     fn gather(&mut self, together: Option<Piece>, limit: usize) -> Result<()> {
         if let Some(piece) = together {
             self.tell(Pieces::Gathered, &piece.blob);
@@ -226,7 +225,7 @@ impl State {
         Ok(())
     }
 
-    /// Keeps what happened, and forgets the oldest.
+    /// Stores events, and drops the oldest.
     fn keep(&mut self, together: Option<Piece>, limit: usize) {
         let Some(Piece { blob, .. }) = together else {
             return;
@@ -246,7 +245,7 @@ fn encoded<'m>(messages: impl IntoIterator<Item = &'m LogMsg>) -> Result<Blob> {
     let (version, options) = encoding();
     let mut encoder =
         Encoder::new_eager(version, options, Vec::new()).context("encoding for the page")?;
-    // An index of the file's end, which no reader needs in a piece of a stream.
+    // An index for the file's end, which readers of a stream do not need.
     encoder.do_not_emit_footer();
     for message in messages {
         encoder.append(message).context("encoding for the page")?;
@@ -295,7 +294,7 @@ mod tests {
             "{kept:?}, {standing} before"
         );
         assert!(kept.happened <= 20_000 && kept.happened + 2_000 > happened);
-        // Three places, and what is left of the rest.
+        // Three entries, and the rest of the limit.
         let page = history.come(Pieces::Fine);
         assert!(told(&page) < 100);
     }
@@ -344,7 +343,7 @@ mod tests {
             _ => None,
         });
         assert_eq!(fills.collect::<Vec<_>>(), [2, 4]);
-        // Nothing waits: three more have their place, and a fourth has not.
+        // The queue is empty: three more fit, and a fourth does not.
         for fill in 0..3 {
             page.offer(None, &of(fill));
         }

@@ -7,16 +7,16 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use super::{Blob, End, locked};
 
-/// Bytes that may wait for one page, beside those that it gets first.
+/// Max waiting bytes of a page, besides its first entries.
 pub(super) const QUEUE_BYTES: usize = 32 << 20;
 
-/// Sizes of the pieces in which a page gets the entries.
+/// Sizes of the pieces in which a page receives the entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pieces {
-    /// As it happens.
+    /// Each entry as it occurs.
     Fine,
-    /// A second at a time: for a page that is drawn by software, a few pictures a second,
-    /// and takes no more than a few dozen entries with each.
+    /// A second at a time: for a page that is drawn by software at a few pictures a second, and
+    /// that handles only a few dozen entries with each.
     Gathered,
 }
 
@@ -28,11 +28,11 @@ pub struct Page {
 }
 
 struct Queue {
-    /// By their keys; what happened has none.
+    /// Waiting entries with their keys; events have no key.
     blobs: VecDeque<(Option<String>, Blob)>,
     bytes: usize,
     limit: usize,
-    /// It was too slow, or is gone.
+    /// True if it was too slow, or has disconnected.
     is_cut: bool,
     ended: Option<End>,
 }
@@ -40,13 +40,13 @@ struct Queue {
 /// Next message to a page.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Next {
-    /// This.
+    /// A piece of the stream.
     Blob(Blob),
-    /// Nothing for now.
+    /// None for now.
     Nothing,
-    /// There is no more: the session has ended.
+    /// None any more: the session has ended.
     Over(End),
-    /// It was too slow, and has to come again.
+    /// The page was too slow, and must reconnect.
     Cut,
 }
 
@@ -72,19 +72,19 @@ impl Page {
         })
     }
 
-    /// Sizes of the pieces in which it gets the entries.
+    /// Returns the size of its pieces.
     #[must_use]
     pub fn pieces(&self) -> Pieces {
         self.pieces
     }
 
-    /// Returns true if nothing waits for it.
+    /// Returns true if its queue is empty.
     #[must_use]
     pub fn is_told_all(&self) -> bool {
         locked(&self.queue).blobs.is_empty()
     }
 
-    /// Returns the next message to the page, waiting for at most `wait`.
+    /// Returns the next message to the page, after a wait of at most `wait`.
     #[must_use]
     pub fn next(&self, wait: std::time::Duration) -> Next {
         let queue = locked(&self.queue);

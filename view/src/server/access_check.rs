@@ -1,9 +1,9 @@
 //! Check of the origin and the path of a request.
 //!
-//! A page of another site can make this machine's browser ask a server on the loopback
-//! address, and can have its own name point there (DNS rebinding). So the name in `Host`
-//! has to be an address or `localhost`, which no such page can have, and requests that
-//! say they come from elsewhere are refused. There is nothing but reading.
+//! A page of another site can make this machine's browser send requests to a server on the loopback
+//! address, and can make its own name point there (DNS rebinding). So the name in `Host` must be an
+//! address or `localhost`, which no such page can have, and requests with another origin are
+//! refused. All requests only read.
 
 use std::net::IpAddr;
 
@@ -23,10 +23,10 @@ pub struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// Checks that it is answered, by a server on `port`.
+    /// Checks that a server on `port` may answer the request.
     ///
     /// # Errors
-    /// The status with which it is refused.
+    /// The status of the refusal.
     pub fn check(&self, port: u16) -> Result<(), u16> {
         if !matches!(self.method, "GET" | "HEAD") {
             return Err(405);
@@ -35,8 +35,7 @@ impl Asked<'_> {
         if !is_own(host, port) {
             return Err(421);
         }
-        // A link to the page may stand anywhere; what the page is made of is asked for by
-        // the page alone.
+        // A link to the page may be anywhere; only the page itself requests its files.
         let is_page = self.path == "/";
         let is_foreign = match self.site {
             Some(site) => !matches!(site, "same-origin" | "none") && !is_page,
@@ -51,7 +50,7 @@ impl Asked<'_> {
     }
 }
 
-/// Returns true if `Host` names an address, or `localhost`, and the server's port.
+/// Returns true if `Host` is an address or `localhost`, with the server's port.
 fn is_own(host: &str, port: u16) -> bool {
     let (name, said) = match host.rsplit_once(':') {
         Some((name, said)) if !said.ends_with(']') => (name, said.parse().ok()),

@@ -1,10 +1,10 @@
-//! The files that the page is made of.
+//! The files of the page.
 
 use anyhow::{Context as _, Result};
 use re_web_viewer_server::WebViewerData;
 
-/// Sources that a page may load: from here alone. Without it rerun's viewer asks other machines,
-/// for fonts and to count its users.
+/// Sources from which a page may load: only this server. Without this policy, rerun's viewer sends
+/// requests to other machines, for fonts and to count its users.
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
     style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; \
     connect-src 'self'; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; \
@@ -21,7 +21,7 @@ pub(super) struct File {
 pub(super) struct Files(Vec<File>);
 
 impl Files {
-    /// `page_bytes`: from which memory on a page begins anew.
+    /// Loads the files. `page_bytes` is the memory at which a page reloads.
     pub(super) fn load(page_bytes: u64) -> Result<Self> {
         let viewer = WebViewerData::load(None).context("rerun's viewer is not in this program")?;
         let page = include_str!("../../page/index.html");
@@ -60,7 +60,7 @@ impl File {
             ("Referrer-Policy", "no-referrer".into()),
             ("Cross-Origin-Resource-Policy", "same-origin".into()),
             ("Cross-Origin-Opener-Policy", "same-origin".into()),
-            // Another version of this program may be on the same port tomorrow.
+            // Another version of this program may later use the same port.
             ("Cache-Control", "no-cache".into()),
         ]
     }

@@ -1,6 +1,6 @@
-//! The page and its stream over HTTP, for this machine alone by default.
+//! The page and its stream over HTTP, for this machine only by default.
 //!
-//! [`access_check`] refuses requests of other origins; there are only files and the stream.
+//! [`access_check`] refuses requests of other origins; the server has only files and the stream.
 
 pub mod access_check;
 mod files;
@@ -18,7 +18,7 @@ use crate::history::{History, Pieces};
 use access_check::Asked;
 use files::Files;
 
-/// Pages and files under way at the same time, at most.
+/// Max number of pages and files in transfer at the same time.
 const MOST: usize = 24;
 
 /// A server that runs until the program ends.
@@ -35,10 +35,10 @@ struct Shared {
 }
 
 impl Server {
-    /// Serves on the first of `ports` that is free.
+    /// Serves on the first free one of `ports`.
     ///
     /// # Errors
-    /// When none is.
+    /// If none is free.
     pub fn start(
         bind: IpAddr,
         ports: &[u16],
@@ -78,7 +78,7 @@ impl Server {
         format!("http://{address}/")
     }
 
-    /// Returns true if other machines can ask for it.
+    /// Returns true if other machines can reach it.
     #[must_use]
     pub fn is_open(&self) -> bool {
         !self.address.ip().is_loopback()
@@ -93,8 +93,8 @@ fn serve(server: &tiny_http::Server, shared: &Arc<Shared>) {
             continue;
         }
         let shared = Arc::clone(shared);
-        // A slow page holds up its own thread alone. Where there is no thread to be had,
-        // the request is dropped, and so is its connection.
+        // A slow page blocks only its own thread. If no thread can be started, the request and its
+        // connection are dropped.
         let _ = std::thread::Builder::new().spawn(move || {
             answer(request, &shared);
             shared.under_way.fetch_sub(1, Ordering::AcqRel);
@@ -131,7 +131,7 @@ fn answer(request: Request, shared: &Shared) {
         "/feed" if !is_head => {
             let page = shared.history.come(pieces);
             let mut to = request.into_writer();
-            // Whether it ended, was cut off or has gone away: the page comes again.
+            // In all cases (end, cut off, disconnected) the page reconnects.
             let _ = stream::run(&mut to, &page);
             let _ = to.flush();
             shared.history.gone(&page);
@@ -155,7 +155,7 @@ fn refuse(request: Request, status: u16) {
 
 fn header_of(name: &str, value: &str) -> Header {
     Header::from_bytes(name, value).unwrap_or_else(|()| {
-        // Only names and values of this program come here, and all of them are ASCII.
+        // Names and values are this program's own, and all of them are ASCII.
         Header {
             field: "X-Unnamed".parse().unwrap_or_else(|()| unreachable!()),
             value: Default::default(),

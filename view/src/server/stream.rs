@@ -1,21 +1,20 @@
-//! The stream of one page: pieces of a recording, each behind its length.
+//! The stream of one page: pieces of a recording, each after its length.
 //!
-//! A length is four bytes, least significant first. Zero says that the session has ended
-//! and that nothing follows, [`LOST`] that it ended because `hapterra` is gone; a stream that
-//! ends without either was cut off.
+//! A length is four bytes, least significant first. Zero means that the session has ended and
+//! nothing follows; [`LOST`] means that it ended because `hapterra` is gone. A stream that ends
+//! without either was cut off.
 
 use std::io::{self, Write};
 use std::time::Duration;
 
 use crate::history::{End, Next, Page, Pieces};
 
-/// Time for which nothing may come before the page gets a sign of life, by a
-/// length that no piece has.
+/// Time without a piece after which the page receives a sign of life, a length that no piece has.
 const SIGN_EVERY: Duration = Duration::from_secs(2);
 const SIGN: u32 = u32::MAX;
-/// Time for which entries are gathered, for a page that gets gathered entries.
+/// Time for which entries are gathered, for a page that receives gathered entries.
 const GATHERED: Duration = Duration::from_secs(1);
-/// Says that `hapterra` is gone and did not say why: another length that no piece has.
+/// Length that reports the end of `hapterra` without a reason: no piece has it.
 const LOST: u32 = u32::MAX - 1;
 
 const HEAD: &str = "HTTP/1.1 200 OK\r\n\
@@ -25,11 +24,11 @@ const HEAD: &str = "HTTP/1.1 200 OK\r\n\
     Cache-Control: no-store\r\n\
     Connection: close\r\n\r\n";
 
-/// Tells a page all that is kept and all that comes, until the session ends or the page
-/// goes away or is cut off.
+/// Sends the history and all new entries to a page, until the session ends, or the page disconnects
+/// or is cut off.
 ///
 /// # Errors
-/// When the page has gone away.
+/// If the page has disconnected.
 pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
     to.write_all(HEAD.as_bytes())?;
     loop {

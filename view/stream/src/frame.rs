@@ -4,29 +4,29 @@ use std::io::{self, ErrorKind, Read, Write};
 
 use crate::Message;
 
-/// Bytes of a frame's body at most: a layer of the largest size, and room.
+/// Max bytes of a frame's body: a layer of the maximum size, and a margin.
 pub const MAX_BODY: usize = 16 << 20;
 
-/// Reason for which there is no message.
+/// Reason why there is no message.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// The pipe.
+    /// The pipe failed.
     #[error("the stream cannot be read or written: {0}")]
     Io(#[from] io::Error),
-    /// A length that no frame has.
+    /// The length exceeds [`MAX_BODY`].
     #[error("a frame of {0} bytes, where at most {MAX_BODY} are allowed")]
     TooLong(usize),
-    /// A body that is no message.
+    /// The body is no message.
     #[error("a frame is no message of this version: {0}")]
     Body(#[from] postcard::Error),
 }
 
-/// Writes a message as one frame, and returns how many bytes that were.
+/// Writes a message as one frame, and returns its number of bytes.
 ///
 /// # Errors
-/// [`FrameError`]; after one the stream cannot be gone on with.
+/// [`FrameError`]; the stream cannot be continued after an error.
 pub fn write(to: &mut dyn Write, message: &Message) -> Result<usize, FrameError> {
-    // The length stands in front, so that the frame is written at once.
+    // The length is at the beginning, so that the frame is written at once.
     let mut frame = postcard::to_extend(message, vec![0; 4])?;
     let length = frame.len() - 4;
     if length > MAX_BODY {
@@ -39,8 +39,8 @@ pub fn write(to: &mut dyn Write, message: &Message) -> Result<usize, FrameError>
     Ok(frame.len())
 }
 
-/// Reads the next message; `None` where the stream ends between two frames or within one,
-/// as it does when its writer is killed.
+/// Reads the next message; `None` if the stream ends between two frames or within one, as it does
+/// when its writer is killed.
 ///
 /// # Errors
 /// [`FrameError`].

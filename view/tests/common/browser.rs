@@ -1,4 +1,4 @@
-//! Chromium without a screen, driven over its debugging pipe.
+//! Chromium without a screen, controlled over its debugging pipe.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
@@ -23,7 +23,7 @@ const LOADING: [&str; 4] = [
 /// The page's size, px.
 const SIZE: [u32; 2] = [900, 600];
 
-/// The browser that is used: the one that is named, else one on the `PATH`.
+/// Returns the browser: the one named by the variable, else one on the `PATH`.
 pub fn program() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("HAPTERRA_BROWSER") {
         return Some(named.into());
@@ -60,7 +60,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// The session by which the browser is called for it.
+    /// Returns the session that identifies the page to the browser.
     pub fn session(&self) -> &str {
         &self.session
     }
@@ -71,14 +71,14 @@ impl Page {
 pub struct Colours {
     /// Their number.
     pub count: usize,
-    /// Pixels near each that was asked for.
+    /// Pixels near each requested colour.
     pub near: Vec<usize>,
-    /// A number that differs where pictures do.
+    /// A hash of the picture.
     pub hash: u64,
 }
 
 impl Browser {
-    /// Starts one; `folder` is for what it keeps.
+    /// Starts a browser; `folder` is for its data.
     pub fn start(program: &Path, folder: &Path) -> Self {
         let pipes = ["in", "out"].map(|name| folder.join(name));
         let made = Command::new("mkfifo")
@@ -86,7 +86,7 @@ impl Browser {
             .status()
             .expect("mkfifo");
         assert!(made.success());
-        // Its pipes are the third and fourth file, which only a shell gives it.
+        // Its pipes are files 3 and 4, which only a shell can pass to it.
         let line = "exec \"$0\" \"$@\" 3<\"$PIPE_IN\" 4>\"$PIPE_OUT\"";
         let child = Command::new("sh")
             .args(["-c", line])
@@ -172,7 +172,7 @@ impl Browser {
         self.open_sized(address, SIZE)
     }
 
-    /// Opens a page of so many pixels.
+    /// Opens a page with a size in pixels.
     pub fn open_sized(&mut self, address: &str, [width, height]: [u32; 2]) -> Page {
         let target = self.call("Target.createTarget", json!({ "url": "about:blank" }), None);
         let target = target["targetId"].as_str().expect("a page").to_owned();
@@ -198,7 +198,7 @@ impl Browser {
         page
     }
 
-    /// Loads a page anew.
+    /// Reloads a page.
     pub fn reload(&mut self, page: &Page) {
         self.call("Page.reload", json!({}), Some(&page.session));
     }
@@ -212,8 +212,8 @@ impl Browser {
         );
     }
 
-    /// Makes a page hidden, or visible again. A Chromium without a
-    /// window may take every page to be seen, whichever is in front.
+    /// Makes a page hidden, or visible again. A Chromium without a window may treat every page as
+    /// visible, whichever is in front.
     pub fn set_seen(&mut self, page: &Page, is_seen: bool) {
         let state = if is_seen { "visible" } else { "hidden" };
         let told = format!(
@@ -223,14 +223,14 @@ impl Browser {
         self.value(page, &told);
     }
 
-    /// The value of an expression in a page.
+    /// Returns the value of an expression in a page.
     pub fn value(&mut self, page: &Page, expression: &str) -> Value {
         let what = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let answer = self.call("Runtime.evaluate", what, Some(&page.session));
         answer["result"]["value"].clone()
     }
 
-    /// The number that an expression is in a page; none while the page is loaded anew.
+    /// Returns the number that an expression has in a page; `None` while the page reloads.
     pub fn number(&mut self, page: &Page, expression: &str) -> Option<f64> {
         let what = json!({ "expression": expression, "returnByValue": true });
         let answer = self.ask("Runtime.evaluate", what, Some(&page.session));
@@ -247,7 +247,7 @@ impl Browser {
         shot["data"].as_str().expect("a picture").to_owned()
     }
 
-    /// The same in a form that takes less room: JPEG.
+    /// Takes a picture in a smaller format: JPEG.
     pub fn photograph(&mut self, page: &Page) -> Vec<u8> {
         let shot = self.call(
             "Page.captureScreenshot",
@@ -259,7 +259,7 @@ impl Browser {
     }
 
     /// Returns the result of a script on a part of pictures: `parts` are their pixels, with their
-    /// widths. The page itself takes the pictures apart.
+    /// widths. The page itself decodes the pictures.
     fn of_parts(&mut self, page: &Page, pictures: &[&str], part: [f64; 4], script: &str) -> Value {
         let expression = format!(
             "(async () => {{
@@ -293,7 +293,7 @@ impl Browser {
         value.as_f64().expect("a number")
     }
 
-    /// The colours of a part of a picture: its place and size in shares of the whole.
+    /// Returns the colours of a part of a picture: its position and size as shares of the whole.
     pub fn colours(
         &mut self,
         page: &Page,

@@ -9,15 +9,15 @@ use re_log_types::LogMsg;
 
 use super::HANG;
 
-/// Lengths that no piece has: the session has ended, nothing came for a while.
+/// Lengths that no piece has: the session has ended; no piece for a while.
 const END: u32 = 0;
 const SIGN: u32 = u32::MAX;
 
-/// The recording's entries, those of a piece at a time.
+/// The recording's entries, one piece at a time.
 pub struct Feed(BufReader<TcpStream>);
 
 impl Feed {
-    /// Opens the stream of an address' path.
+    /// Opens the stream at a path.
     pub fn open(port: u16, path: &str) -> Self {
         let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
         line.set_read_timeout(Some(HANG)).expect("a limit");

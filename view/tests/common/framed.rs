@@ -1,4 +1,4 @@
-//! Scale bars and coordinates of a recording beside the CSV of the same run.
+//! Scale bars and coordinates of a recording, compared with the CSV of the same run.
 
 use std::collections::BTreeMap;
 
@@ -15,8 +15,8 @@ type Shown = BTreeMap<String, Vec<Chunk>>;
 const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 /// Tolerance of single precision, m.
 const OFF: f64 = 0.02;
-/// Coordinates of a file are checked to the metre here, and a metre of a map is one on the ground
-/// up to this share.
+/// Tolerance of coordinates of a file, which are checked to the metre, m; and the share by which a
+/// metre of a map may differ from one on the ground.
 const ROUNDED: f64 = 0.51;
 const MAP_METRE: f64 = 5e-4;
 
@@ -32,7 +32,7 @@ fn texts(chunk: &Chunk, component: &'static str) -> Vec<String> {
     texts.map(|text| text.0.as_str().to_owned()).collect()
 }
 
-/// The length that a label says, m.
+/// Returns the length in a label, m.
 fn metres(label: &str) -> f64 {
     let (value, unit) = label.split_once(' ').expect("a unit");
     let metres = match unit {
@@ -44,7 +44,7 @@ fn metres(label: &str) -> f64 {
     metres * value.parse::<f64>().expect("a number")
 }
 
-/// The place that a label says, m: in the file's coordinates, or from its south-west sample.
+/// Returns the position in a label, m: in the file's coordinates, or from its south-west sample.
 fn place(label: &str) -> [f64; 2] {
     let label = label.trim_start_matches(|c: char| c.is_ascii_uppercase() || c == ' ');
     let label = label.strip_suffix(" m").unwrap_or(label);
@@ -71,8 +71,8 @@ fn on_ground(csv: &Csv) -> BTreeMap<i64, [f64; 2]> {
     .collect()
 }
 
-/// Scale bars are as long on the ground as their labels say, and round; corners are where
-/// theirs say. Gives the lengths of the bars on the terrain, in their order, m.
+/// Checks that scale bars have the length of their labels, which is round, and corners the position
+/// of their labels. Returns the lengths of the bars on the terrain, in their order, m.
 pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
     let ground = on_ground(csv);
     let (time, hip) = places(&shown["/hand/hip"]).swap_remove(0);
@@ -108,8 +108,8 @@ pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
     lengths
 }
 
-/// Positions of the map's pixels: metres a pixel, and a pixel with its place, m from the south-west
-/// sample.
+/// Positions of the map's pixels: metres a pixel, and a pixel with its position, m from the
+/// south-west sample.
 struct OnMap {
     of_pixel: f64,
     pixel: [f64; 2],
@@ -117,7 +117,7 @@ struct OnMap {
 }
 
 impl OnMap {
-    /// By where the hand is on the map, and was by the CSV.
+    /// Creates it from the hand's positions on the map and in the CSV.
     fn new(shown: &Shown, ground: &BTreeMap<i64, [f64; 2]>) -> Self {
         let mut pixels = Vec::new();
         for chunk in shown["/map/hip"].iter().filter(|chunk| !chunk.is_static()) {
@@ -139,14 +139,14 @@ impl OnMap {
         }
     }
 
-    /// Pixels go to the east and to the south.
+    /// Pixels count to the east and to the south.
     fn place(&self, pixel: [f64; 2]) -> [f64; 2] {
         let [right, down] = [0, 1].map(|axis| self.of_pixel * (pixel[axis] - self.pixel[axis]));
         [self.place[0] + right, self.place[1] - down]
     }
 }
 
-/// West, south, east and north of what the map says to be laid in front of the arm, m from the
+/// Returns west, south, east and north of the outline in front of the arm on the map, m from the
 /// south-west sample.
 pub fn laid(csv: &Csv, shown: &Shown) -> [f64; 4] {
     let map = OnMap::new(shown, &on_ground(csv));
@@ -172,7 +172,7 @@ fn check_map(shown: &Shown, ground: &BTreeMap<i64, [f64; 2]>) {
         (length / label - 1.0).abs() < 1e-3 && is_round(label),
         "{label}: {length}"
     );
-    // The first box on the map is where the first frame is on the terrain.
+    // The first box on the map is at the position of the first frame on the terrain.
     let labels = texts(&shown["/frame/corners"][0], "Points3D:labels");
     let [from, to] = [place(&labels[0]), place(&labels[1])];
     let half = read::<HalfSize2D>(&shown["/map/frame"][0], "Boxes2D:half_sizes");

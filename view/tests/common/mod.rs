@@ -16,13 +16,13 @@ use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Message, write};
 
-/// Time after which a page hangs: pages that software draws on a busy machine take minutes.
+/// Time-out of a page: pages that software draws on a busy machine take minutes.
 pub const HANG: Duration = Duration::from_secs(900);
 
 /// Options of a viewer without a browser, on any free port.
 const UNSEEN: &str = "--no-browser --port 0";
 
-/// A program that runs while a test looks at it. It is killed where it has not ended by itself.
+/// A program under observation by a test. It is killed if it has not ended by itself.
 pub struct Running {
     child: Child,
     told: Receiver<String>,
@@ -30,7 +30,7 @@ pub struct Running {
 }
 
 impl Running {
-    /// Starts a program, and gives its viewer options, separated by spaces.
+    /// Starts a program with options for its viewer, separated by spaces.
     pub fn start(command: &mut Command, options: &str) -> Self {
         let mut child = command
             .env("HAPTERRA_VIEW_OPTIONS", format!("{UNSEEN} {options}"))
@@ -50,7 +50,7 @@ impl Running {
         Self::start(command, &format!("--linger 0 {options}"))
     }
 
-    /// Lets `hapterra` run to its end with such a viewer; all that both say.
+    /// Runs `hapterra` with such a viewer to its end and returns the output of both.
     pub fn whole(command: &mut Command, options: &str) -> String {
         let mut running = Self::shown(command, options);
         let ended_well = running.end();
@@ -63,17 +63,17 @@ impl Running {
         self.child.id()
     }
 
-    /// The next line that it says on standard error.
+    /// Returns the next line on standard error.
     pub fn line(&self) -> String {
         self.said.recv_timeout(HANG).expect("it says a line")
     }
 
-    /// Waits for a line on standard output that begins so.
+    /// Waits for a line on standard output with this beginning.
     pub fn tells(&self, beginning: &str) {
         while !{ self.told.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {}
     }
 
-    /// The port of its viewer's page, as one of the lines says.
+    /// Returns the port of its viewer's page, from one of the lines.
     pub fn port(&self) -> u16 {
         loop {
             let line = self.line();
@@ -90,23 +90,23 @@ impl Running {
         format!("http://127.0.0.1:{}/", self.port())
     }
 
-    /// Returns true if it continues.
+    /// Returns true if it still runs.
     pub fn goes_on(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }
 
-    /// Types lines for it, where its standard input is a pipe.
+    /// Writes lines to its standard input, if this is a pipe.
     pub fn type_lines(&mut self, lines: &str) {
         let to = self.child.stdin.as_mut().expect("a pipe");
         to.write_all(lines.as_bytes()).expect("it reads");
     }
 
-    /// Asks it to end, as Ctrl-C does.
+    /// Interrupts it, as Ctrl-C does.
     pub fn interrupt(&self) {
         signal("-INT", self.id());
     }
 
-    /// Waits for its end; whether it ended well.
+    /// Waits for its end and returns true if it was successful.
     pub fn end(&mut self) -> bool {
         let until = Instant::now() + HANG;
         while self.goes_on() {
@@ -148,7 +148,7 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// Starts one with options, separated by spaces.
+    /// Starts a viewer with options, separated by spaces.
     pub fn start(options: &str) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hapterra-view"));
         let mut running = Running::start(command.stdin(Stdio::piped()), options);
@@ -158,7 +158,7 @@ impl Viewer {
         }
     }
 
-    /// Tells it something; whether it reads.
+    /// Sends a message to it and returns true if it reads.
     pub fn tell(&mut self, message: &Message) -> bool {
         let to = self.to.as_mut().expect("the stream is open");
         write(to, message).is_ok() && to.flush().is_ok()
@@ -169,12 +169,12 @@ impl Viewer {
         self.to = None;
     }
 
-    /// The next line that it says.
+    /// Returns the next line that it prints.
     pub fn line(&self) -> String {
         self.running.line()
     }
 
-    /// The port of its page.
+    /// Returns the port of its page.
     pub fn port(&self) -> u16 {
         self.running.port()
     }
@@ -184,14 +184,14 @@ impl Viewer {
         self.running.address()
     }
 
-    /// Waits for its end; whether it ended well.
+    /// Waits for its end and returns true if it was successful.
     pub fn end(mut self) -> bool {
         self.to = None;
         self.running.end()
     }
 }
 
-/// Memory that a process takes, bytes.
+/// Returns the memory of a process, bytes.
 pub fn memory_of(process: u32) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{process}/status"));
     let status = status.unwrap_or_default();
@@ -200,7 +200,7 @@ pub fn memory_of(process: u32) -> u64 {
     1024 * kilobytes.unwrap_or(0u64)
 }
 
-/// The process of a program that another process started; none where it has started none.
+/// Returns the process of a program that another process started; `None` if there is none.
 pub fn started_by(process: u32, program: &str) -> Option<u32> {
     let children = format!("/proc/{process}/task/{process}/children");
     let children = std::fs::read_to_string(children).ok()?;
@@ -215,7 +215,7 @@ pub fn started_by(process: u32, program: &str) -> Option<u32> {
     })
 }
 
-/// Lines of a stream, as they come.
+/// Returns the lines of a stream, as they arrive.
 fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
     let (say, said) = channel();
     std::thread::spawn(move || {
@@ -225,7 +225,7 @@ fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
     said
 }
 
-/// A request, head and all, and the whole answer.
+/// Sends a complete request and returns the whole answer.
 pub fn asked(port: u16, request: &str) -> String {
     let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
     line.set_read_timeout(Some(HANG)).expect("a limit");
@@ -235,7 +235,7 @@ pub fn asked(port: u16, request: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// A folder for one test, empty.
+/// Creates an empty folder for one test.
 pub fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("hapterra-view-{}-{name}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
@@ -243,7 +243,7 @@ pub fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// `hapterra`, as `cargo xtask view --test` names it; none without it.
+/// Returns `hapterra`, as set by `cargo xtask view --test`; `None` if it is not set.
 pub fn hapterra() -> Option<Command> {
     let program = std::env::var_os("HAPTERRA")?;
     let mut command = Command::new(program);
@@ -253,7 +253,8 @@ pub fn hapterra() -> Option<Command> {
     Some(command)
 }
 
-/// The emulated board's image, as `cargo xtask view --test` names it; none without it.
+/// Returns the emulated board's image, as set by `cargo xtask view --test`; `None` if it is not
+/// set.
 pub fn emulated() -> Option<std::ffi::OsString> {
     std::env::var_os("HAPTERRA_MPS2_ELF").filter(|image| !image.is_empty())
 }

@@ -1,4 +1,4 @@
-//! A recording for rerun's own viewer beside the CSV of the same run.
+//! A recording for rerun's own viewer, compared with the CSV of the same run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +9,7 @@ use re_log_types::LogMsg;
 use re_sdk_types::Loggable as _;
 use re_sdk_types::components::{Position3D, Scalar};
 
-/// Entities of an `.rrd`, with all chunks of each.
+/// Returns the entities of an `.rrd`, with all chunks of each.
 pub fn entities(path: &Path) -> BTreeMap<String, Vec<Chunk>> {
     let file = std::io::BufReader::new(std::fs::File::open(path).expect("a file"));
     let mut entities = BTreeMap::<String, Vec<Chunk>>::new();
@@ -25,7 +25,7 @@ pub fn entities(path: &Path) -> BTreeMap<String, Vec<Chunk>> {
     entities
 }
 
-/// Rows of an entity's only component over time: time in ns, and values.
+/// Returns the rows of an entity's only component over time: time in ns, and values.
 fn rows_of<T>(
     chunks: &[Chunk],
     read: &dyn Fn(&dyn re_chunk::external::arrow::array::Array) -> Vec<T>,
@@ -63,9 +63,9 @@ pub fn places(chunks: &[Chunk]) -> Vec<(i64, Vec<[f32; 3]>)> {
 pub struct Csv {
     names: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// Device millimetres of a cell of level 0 and of a vertical unit, by view.
+    /// Device millimetres of a cell of level 0 and of a vertical unit, by placement.
     pub scales: Vec<[f64; 2]>,
-    /// The picture's units in a cell of level 0: metres, or millimetres in the first view.
+    /// The picture's units in a cell of level 0: metres, or millimetres in the first placement.
     pub units: f64,
 }
 
@@ -100,7 +100,7 @@ impl Csv {
             .expect("a number")
     }
 
-    /// Rows by their time, ns.
+    /// Returns the rows by their time, ns.
     fn rows_by_time(&self) -> BTreeMap<i64, usize> {
         let time = |row| (self.number(row, "t_s") * 1e9).round() as i64;
         (0..self.rows.len()).map(|row| (time(row), row)).collect()
@@ -111,7 +111,7 @@ impl Csv {
     }
 }
 
-/// Numbers that the remarks of a recording say under a name, in their order.
+/// Returns the numbers with this name in the remarks of a recording, in their order.
 pub fn said(text: &str, name: &str) -> Vec<f64> {
     let lines = text.lines().filter_map(|line| line.strip_prefix("# "));
     let pairs = lines.filter_map(|line| line.split_once(" = "));
@@ -125,7 +125,7 @@ const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 const PROXY: [&str; 3] = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"];
 const FORCE: [&str; 3] = ["force_x_n", "force_y_n", "force_z_n"];
 
-/// Every row of the CSV is there, with its time and its values.
+/// Checks that every row of the CSV is present, with its time and its values.
 pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
     let count = csv.rows.len();
     let (height, force) = (
@@ -169,7 +169,7 @@ pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
         }
     }
     assert!(touched > 100, "{touched} rows in contact");
-    // The hand, 60 times a second at most and half of that at least.
+    // The hand, at most 60 times a second and at least half of that.
     let seconds = csv.number(count - 1, "t_s") - csv.number(0, "t_s");
     let proxies = places(&shown["/hand/proxy"]);
     let (least, most) = (30.0 * seconds, 61.0 * seconds + 2.0);
@@ -206,8 +206,8 @@ pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
     }
 }
 
-/// Checks that records of several placements lie at their places on the ground: places and heights of
-/// all of them in one scale, in `stretched` views as high as in the first.
+/// Checks that records of several placements are at their positions on the ground: positions and
+/// heights of all of them in one scale, and in `stretched` placements the heights of the first.
 pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: bool) {
     let drawn = places(&shown["/hand/hip"]);
     let heights = scalars(&shown["/plot/height"]);
@@ -235,7 +235,7 @@ pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: b
         );
     }
     assert!(seen.iter().all(|count: &i32| *count > 10), "{seen:?}");
-    // Heights in the file's unit, whatever the exaggeration.
+    // Heights are in the file's unit, independent of the exaggeration.
     for (time, values) in &heights {
         let row = rows[time];
         let [_, unit] = csv.scales[csv.number(row, "view") as usize];

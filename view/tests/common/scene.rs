@@ -1,4 +1,4 @@
-//! A scene of hills, and a hand that goes over them.
+//! A scene of hills, and a hand that moves over them.
 
 use hapterra_view_stream::{
     Hello, Layer, Link, Message, Sample, Scene, TILE_CELLS, TILE_POSTS, TickCost, Tile, Tiles,
@@ -45,7 +45,7 @@ pub fn scene(is_live: bool) -> Message {
     }))
 }
 
-/// Height of the hills at a place, mm.
+/// Returns the height of the hills at a position, mm.
 pub fn height(x: f64, y: f64) -> f64 {
     let ridge = (x * 0.11).sin() * (y * 0.07).cos();
     let rough = (x * 0.9 + (y * 0.4).sin()).sin() * (y * 0.8).cos();
@@ -84,7 +84,7 @@ fn slot(index: [i32; 2]) -> u32 {
     (index[1].rem_euclid(4) * 4 + index[0].rem_euclid(4)) as u32
 }
 
-/// The hand at a time: it slides along a curve, pressed into the hills.
+/// Returns the sample of the hand at a tick: it slides along a curve, pressed into the hills.
 pub fn sample(tick: u64) -> Sample {
     let t_s = tick as f64 / 1000.0;
     let middle = 0.5 * f64::from(CELLS) * CELL_MM;
@@ -108,8 +108,8 @@ pub fn sample(tick: u64) -> Sample {
     }
 }
 
-/// The first view moved so far to the east, mm of its own, and made so many times larger.
-/// The device keeps its tiles.
+/// Returns the first placement moved to the east by `east_mm`, mm of its own, and enlarged by
+/// `scale`. The device keeps its tiles.
 pub fn zoomed_scene(scale: f64, east_mm: f64) -> Message {
     let Message::Scene(mut scene) = scene(true) else {
         unreachable!()
@@ -119,7 +119,7 @@ pub fn zoomed_scene(scale: f64, east_mm: f64) -> Message {
     scene.cell_mm *= scale;
     scene.mm_per_unit *= scale;
     scene.home_mm = [0.5 * side + east_mm, 0.5 * side, 20.0].map(|mm| scale * mm);
-    // As much in the hand as before.
+    // The same size in the hand as before.
     let [x, y, _] = scene.home_mm;
     let half = 0.5 * side;
     scene.laid_mm = [x - half, y - half, x + half, y + half];
@@ -128,8 +128,8 @@ pub fn zoomed_scene(scale: f64, east_mm: f64) -> Message {
     Message::Scene(scene)
 }
 
-/// A hand that rests over the surface at the home position of such a view, so that no arrow
-/// hides the proxy.
+/// Returns samples of a hand that rests over the surface at the home position of such a placement,
+/// so that no arrow hides the proxy.
 pub fn resting(scale: f64, east_mm: f64) -> impl Fn(u64) -> Sample {
     let middle = 0.5 * f64::from(CELLS) * CELL_MM;
     let (x, y) = (middle + east_mm, middle);
@@ -146,7 +146,7 @@ pub fn resting(scale: f64, east_mm: f64) -> impl Fn(u64) -> Sample {
     }
 }
 
-/// The tiles around one, and that the device holds them.
+/// Returns the tiles around one, with the message that the device stores them.
 pub fn tiles_around([col, row]: [i32; 2]) -> Vec<Message> {
     let around: Vec<_> = (-1..2)
         .flat_map(|dy| (-1..2).map(move |dx| [col + dx, row + dy]))

@@ -1,4 +1,4 @@
-//! Lines of code, public items, and circles of modules.
+//! Lines of code, public items, and cycles of modules.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,19 +8,19 @@ use anyhow::{Context, Result};
 
 use super::files;
 
-/// Endings of files of code.
+/// Extensions of code files.
 const CODE: [&str; 5] = ["rs", "py", "js", "c", "h"];
 /// Beginnings of public items.
 const ITEMS: [&str; 9] = [
     "fn ", "const ", "struct ", "enum ", "union ", "trait ", "type ", "static ", "mod ",
 ];
 
-/// Sizes of the code in a folder.
+/// Measures of the code in a folder.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Code {
-    /// Lines that are neither empty nor comments, outside of files of tests.
+    /// Lines that are neither empty nor comments, outside test files.
     pub(super) lines: usize,
-    /// The same in files of tests.
+    /// The same in test files.
     pub(super) tests: usize,
     /// Lines in `src/` that make an item public.
     pub(super) public: usize,
@@ -50,7 +50,7 @@ pub(super) fn code(folder: &Path) -> Result<Code> {
     Ok(all)
 }
 
-/// Lines that are neither empty nor comments.
+/// Returns the number of lines that are neither empty nor comments.
 fn lines_of_code(text: &str, kind: &str) -> usize {
     let comment = if kind == "py" { "#" } else { "//" };
     let lines = text.lines().map(str::trim);
@@ -64,8 +64,8 @@ fn is_public(line: &str) -> bool {
     item.is_some_and(|item| ITEMS.iter().any(|kind| item.starts_with(kind)))
 }
 
-/// Circles of modules in a crate's `src/`: files of which each uses the next, and the last the first.
-/// A module and those inside it count as one direction: they are one thing.
+/// Returns the cycles of modules in a crate's `src/`: files of which each uses the next, and the
+/// last the first. A module and its submodules count as one, so uses between them are no cycle.
 pub(super) fn circles(source: &Path) -> Result<Vec<Vec<String>>> {
     let mut texts = BTreeMap::new();
     for path in files(source)? {
@@ -108,7 +108,7 @@ pub(super) fn circles(source: &Path) -> Result<Vec<Vec<String>>> {
     Ok(circles)
 }
 
-/// The modules beside `name` that its `use` lines name, before its tests.
+/// Returns the modules beside `name` that its `use` lines contain, before its tests.
 fn used<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'t str> {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
     let mut found = vec![];
@@ -129,7 +129,7 @@ fn used<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'
     found
 }
 
-/// A path of a `use` from the crate's root; none of other crates.
+/// Returns a path of a `use` from the crate's root; `None` for other crates.
 fn absolute(name: &str, path: &str) -> Option<String> {
     if let Some(path) = path.strip_prefix("crate::") {
         return Some(path.to_owned());
@@ -145,7 +145,7 @@ fn absolute(name: &str, path: &str) -> Option<String> {
     Some(module.join("::"))
 }
 
-/// The innermost module that a path leads through.
+/// Returns the innermost module on a path.
 fn longest<'t>(path: &str, all: &'t BTreeMap<String, String>) -> Option<&'t str> {
     let path = path.split(['{', ' ']).next()?.trim_end_matches("::");
     let ends = path.match_indices("::").map(|(end, _)| end);

@@ -1,5 +1,5 @@
-//! `cargo xtask census`: sizes of pages, command line and code, beside their bounds and the sizes
-//! before.
+//! `cargo xtask census`: sizes of pages, command line and code, compared with their bounds and the
+//! earlier sizes.
 
 mod code;
 mod prose;
@@ -26,10 +26,10 @@ const BOUNDS: [(&str, f64); 12] = [
     ("circles of files in touch", 0.0),
     ("circles of files in host-tools", 0.0),
 ];
-/// Tolerance of the committed table, as a part of each measure.
+/// Tolerance of the committed table, as a share of each measure.
 const MAX_STALE: f64 = 0.02;
 const TABLE: &str = "docs/contributing/census.csv";
-/// Folders that hold code, in the order of the data.
+/// Folders with code, in the order of the data flow.
 const ROOMS: [&str; 14] = [
     "core",
     "firmware",
@@ -46,7 +46,7 @@ const ROOMS: [&str; 14] = [
     "fuzz",
     "xtask",
 ];
-/// Folders of libraries that others use.
+/// Folders of libraries for other programs.
 const LIBRARIES: [&str; 6] = [
     "core",
     "firmware",
@@ -55,16 +55,16 @@ const LIBRARIES: [&str; 6] = [
     "touch",
     "host-tools",
 ];
-/// Folders of what is built.
+/// Folders of build results.
 const BUILT: [&str; 3] = ["target", "node_modules", ".git"];
 
 type Measures = Vec<(String, f64)>;
 
 /// Prints all measures beside those of the committed table, and compares them with it and with
-/// their bounds; `write` brings the table up to date.
+/// their bounds; `write` updates the table.
 ///
 /// # Errors
-/// Which bounds are broken, and where the table is old.
+/// The exceeded bounds, and the outdated parts of the table.
 pub(crate) fn census(write: bool) -> Result<()> {
     let pages = prose::pages(root())?;
     for (path, page) in &pages {
@@ -104,7 +104,7 @@ pub(crate) fn census(write: bool) -> Result<()> {
     }
 }
 
-/// Sentences on the measures above their bounds.
+/// Returns sentences on the measures above their bounds.
 fn broken(measures: &Measures) -> Vec<String> {
     let above = measures.iter().filter_map(|(name, now)| {
         let (_, bound) = BOUNDS.iter().find(|(bounded, _)| bounded == name)?;
@@ -155,7 +155,7 @@ fn measures(root: &Path, pages: &[(PathBuf, prose::Page)]) -> Result<Measures> {
     Ok(measures)
 }
 
-/// The sizes of the command line, from the page that is generated from it.
+/// Returns the sizes of the command line, from its generated page.
 fn command_line(root: &Path) -> Result<Measures> {
     const PAGE: &str = "docs/reference/command-line.md";
     let text = fs::read_to_string(root.join(PAGE)).context(PAGE)?;
@@ -169,7 +169,7 @@ fn command_line(root: &Path) -> Result<Measures> {
     Ok(rows.collect())
 }
 
-/// Rows of a table whose first cells are in quotes.
+/// Returns the rows of a table whose first cells are in quotes.
 fn table(text: &str) -> Vec<[String; 3]> {
     let rows = text.lines().skip(1).filter_map(|line| {
         let (name, values) = line.strip_prefix('"')?.split_once("\",")?;
@@ -179,7 +179,7 @@ fn table(text: &str) -> Vec<[String; 3]> {
     rows.collect()
 }
 
-/// The files in a folder and below it, but for what is built.
+/// Returns the files in a folder and below it, except build results.
 fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = vec![];
     let mut folders = vec![folder.to_owned()];

@@ -7,11 +7,11 @@ use anyhow::{Context, Result};
 
 use super::files;
 
-/// Words of the longest sentence, and characters of the longest line.
+/// Maximum words of a sentence, and maximum characters of a line.
 pub(super) const MAX_SENTENCE: usize = 40;
 pub(super) const MAX_LINE: usize = 120;
 
-/// Sizes of a page.
+/// Measures of a page.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Page {
     pub(super) words: usize,
@@ -22,7 +22,7 @@ pub(super) struct Page {
     pub(super) longest_line: usize,
 }
 
-/// All pages together.
+/// Returns the sums of all pages.
 pub(super) fn total(pages: &[(PathBuf, Page)]) -> Page {
     pages.iter().fold(Page::default(), |all, (_, page)| Page {
         words: all.words + page.words,
@@ -34,7 +34,7 @@ pub(super) fn total(pages: &[(PathBuf, Page)]) -> Page {
     })
 }
 
-/// Sentences and lines that are too long, page by page.
+/// Returns the sentences and lines that are too long, page by page.
 pub(super) fn faults(pages: &[(PathBuf, Page)]) -> Vec<String> {
     let too_long = pages.iter().flat_map(|(path, page)| {
         [
@@ -48,7 +48,7 @@ pub(super) fn faults(pages: &[(PathBuf, Page)]) -> Vec<String> {
     too_long.flatten().collect()
 }
 
-/// The pages of the book, and README.md.
+/// Returns the pages of the book, and README.md.
 pub(super) fn pages(root: &Path) -> Result<Vec<(PathBuf, Page)>> {
     let mut found = vec![];
     for path in files(&root.join("docs"))?
@@ -86,12 +86,12 @@ fn page(text: &str) -> Page {
     page
 }
 
-/// Returns true if a part between spaces is a word, and no dash or mark of a list.
+/// Returns true if a part between spaces is a word, not a dash or list mark.
 fn is_word(part: &str) -> bool {
     part.contains(char::is_alphanumeric)
 }
 
-/// A page without its comments, which no reader sees.
+/// Returns a page without its comments, which readers do not see.
 fn without_comments(text: &str) -> String {
     let (mut shown, mut left) = (String::new(), text);
     while let Some((before, comment)) = left.split_once("<!--") {
@@ -101,7 +101,7 @@ fn without_comments(text: &str) -> String {
     shown + left
 }
 
-/// Words of each sentence of the prose: neither code, tables nor headings.
+/// Returns the words of each sentence of the prose, without code, tables and headings.
 fn sentences(text: &str) -> Vec<usize> {
     let (mut found, mut words, mut is_code) = (vec![], 0, false);
     let mut end = |words: &mut usize| {

@@ -20,14 +20,14 @@ use server::Server;
 
 /// Files of the page, in `page/`.
 const FILES: [&str; 3] = ["index.html", "style.css", "js"];
-/// The reader of GeoTIFF, in npm's folder, and what it is called beside the page.
+/// The reader of GeoTIFF, in npm's folder, and its name beside the page.
 const GEOTIFF: [(&str, &str); 2] = [
     ("dist-browser/geotiff.js", "geotiff.js"),
     ("LICENSE", "geotiff-LICENSE.txt"),
 ];
 
-/// Writes the page, with a terrain file where there is one, into a folder, and serves it
-/// unless the user named that folder. `extra` goes to `hapterra cut`.
+/// Writes the page into a folder, with a terrain file if there is one, and serves it unless the
+/// user named that folder. `extra` is passed to `hapterra cut`.
 pub(crate) fn demo(
     file: Option<&OsString>,
     out: Option<PathBuf>,
@@ -61,8 +61,8 @@ pub(crate) fn demo(
     Ok(())
 }
 
-/// Builds the page and runs its tests: by node, and in a browser where there is one or one can
-/// be installed.
+/// Builds the page and runs its tests: with node, and in a browser if there is one or one can be
+/// installed.
 pub(crate) fn test() -> Result<()> {
     match packages::found_or_installed(node, &packages::NODE) {
         Ok(node) => timed("running the page's unit tests", || {
@@ -105,7 +105,7 @@ fn build(folder: &Path) -> Result<()> {
         copy(&root().join("page").join(name), &folder.join(name))?;
     }
     copy(&kernel()?, &folder.join("kernel.wasm"))?;
-    // Of the last time.
+    // From the previous build.
     let _ = fs::remove_file(folder.join("terrain.npy"));
     write("terrain.json", b"{}\n".to_vec())?;
     if let Err(why) = geotiff(folder) {
@@ -139,7 +139,7 @@ fn kernel() -> Result<PathBuf> {
         .join("release/hapterra_c.wasm"))
 }
 
-/// Copies the reader of GeoTIFF that npm keeps, of the version in `page/package-lock.json`.
+/// Copies npm's reader of GeoTIFF, of the version in `page/package-lock.json`.
 fn geotiff(folder: &Path) -> Result<()> {
     let npm = on_path("npm").context("there is no npm on the PATH")?;
     let kept = target_dir().join("page-npm");
@@ -164,7 +164,7 @@ fn geotiff(folder: &Path) -> Result<()> {
         .try_for_each(|(from, to)| copy(&library.join(from), &folder.join(to)))
 }
 
-/// Copies a file, or a folder with all that is in it.
+/// Copies a file, or a folder with all its content.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     if from.is_dir() {
         fs::create_dir_all(to)?;

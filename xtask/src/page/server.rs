@@ -1,8 +1,8 @@
-//! A server of one folder, for this machine's browser alone.
+//! A server of one folder, only for this machine's browser.
 //!
-//! It listens on the loopback address. The name in `Host` has to be that address or
-//! `localhost`, so that a page of another site whose name points here (DNS rebinding) reads
-//! nothing. There is nothing but reading, and only files that the folder had at the start.
+//! It listens on the loopback address. The name in `Host` must be that address or `localhost`, so
+//! that a page of another site whose name points here (DNS rebinding) cannot read it. Requests only
+//! read, and only files that the folder had at the start.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -10,9 +10,9 @@ use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Tried first, so that the address stays the same from run to run.
+/// The port that is tried first, so that the address stays the same from run to run.
 const PORT: u16 = 8766;
-/// Bytes that the head of a request has at most.
+/// Maximum bytes of a request's head.
 const MAX_HEAD: u64 = 16 << 10;
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -20,7 +20,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 pub(crate) struct Server {
     listener: TcpListener,
     port: u16,
-    /// Paths as they are asked for, and files.
+    /// Files by their requested paths.
     files: BTreeMap<String, PathBuf>,
 }
 
@@ -49,11 +49,11 @@ impl Server {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// Answers until the program ends.
+    /// Answers requests until the program ends.
     pub(crate) fn serve(self) {
         let server: &'static Self = Box::leak(Box::new(self));
         for stream in server.listener.incoming().flatten() {
-            // A browser that goes away is no error of ours.
+            // A browser that disconnects is no error here.
             std::thread::spawn(move || server.answer(&stream));
         }
     }
@@ -100,7 +100,7 @@ impl Server {
     }
 }
 
-/// Collects the files of a folder, by the paths that a browser asks for.
+/// Collects the files of a folder, by the paths that a browser requests.
 fn list(folder: &Path, under: &str, files: &mut BTreeMap<String, PathBuf>) -> io::Result<()> {
     for entry in folder.read_dir()? {
         let entry = entry?;

@@ -1,4 +1,4 @@
-//! The functions of an image, which calls which, and which the vector table names.
+//! The functions of an image, their calls, and the functions in the vector table.
 
 use std::collections::BTreeMap;
 
@@ -14,9 +14,9 @@ pub(crate) struct Function {
     pub(crate) address: u32,
     /// Its readable name.
     pub(crate) name: String,
-    /// All its names in the linker's symbol table: equal functions may be one.
+    /// All its names in the linker's symbol table: identical functions may be merged.
     pub(crate) aliases: Vec<String>,
-    /// Functions it branches to, by index.
+    /// Functions to which it branches, by index.
     pub(crate) callees: Vec<usize>,
     /// True if it branches through a register.
     pub(crate) has_indirect: bool,
@@ -27,8 +27,8 @@ pub(crate) struct Function {
 pub(crate) struct Calls {
     /// In the order of their addresses.
     pub(crate) functions: Vec<Function>,
-    /// Those that the vector table names, by index, once each: exceptions and interrupts,
-    /// without the start of the program.
+    /// The functions in the vector table, by index, once each: exceptions and interrupts, without
+    /// the start of the program.
     pub(crate) vectors: Vec<usize>,
 }
 
@@ -73,8 +73,8 @@ pub(crate) fn read(elf: &[u8]) -> Result<Calls> {
     Ok(calls)
 }
 
-/// The functions that the vector table names, without its first two words: the stack and the
-/// start of the program.
+/// Returns the functions in the vector table, without its first two words: the stack and the start
+/// of the program.
 fn vectors(file: &object::File<'_>, extents: &[Extent]) -> Result<Vec<usize>> {
     let table = file.section_by_name(".vector_table");
     let bytes = table.context("no section .vector_table")?.data()?;
@@ -113,14 +113,14 @@ fn sections<'a>(file: &object::File<'a>) -> Result<Vec<Code<'a>>> {
     Ok(code)
 }
 
-/// Extents by rising address, each with all its names.
+/// Returns the extents by rising address, each with all its names.
 fn functions(file: &object::File<'_>, code: &[Code<'_>]) -> (Vec<Extent>, Vec<Vec<String>>) {
     let mut found: BTreeMap<u32, (u32, Vec<String>)> = BTreeMap::new();
     let texts = file
         .symbols()
         .filter(|s| s.kind() == SymbolKind::Text && s.is_definition());
     for symbol in texts {
-        // Bit 0 of a function's address says Thumb.
+        // Bit 0 of a function's address marks Thumb code.
         let start = symbol.address() as u32 & !1;
         let entry = found.entry(start).or_default();
         entry.0 = entry.0.max(symbol.size() as u32);
@@ -130,7 +130,7 @@ fn functions(file: &object::File<'_>, code: &[Code<'_>]) -> (Vec<Extent>, Vec<Ve
     let mut extents = vec![];
     let mut names = vec![];
     for (i, (start, (size, aliases))) in found.into_iter().enumerate() {
-        // Hand-written assembly may lack a size: it ends where the next begins.
+        // Hand-written assembly may lack a size: it ends at the next function.
         let section_end = code.iter().find_map(|c| c.holds(start).then(|| c.end()));
         let next = starts.get(i + 1).copied().unwrap_or(u32::MAX);
         let limit = next.min(section_end.unwrap_or(start));
@@ -145,20 +145,20 @@ fn functions(file: &object::File<'_>, code: &[Code<'_>]) -> (Vec<Extent>, Vec<Ve
 const BRIDGE: &str = "__Thumbv7ABSLongThunk_";
 
 impl Function {
-    /// Returns true if the linker made it, to lead to another function.
+    /// Returns true if it is a bridge of the linker to another function.
     pub(crate) fn is_bridge(&self) -> bool {
         self.aliases.iter().any(|name| name.starts_with(BRIDGE))
     }
 }
 
-/// The function that a bridge with these names leads to.
+/// Returns the function that is the target of a bridge with these names.
 fn led_to(aliases: &[String], names: &[Vec<String>]) -> Option<usize> {
     let to = aliases.iter().find_map(|name| name.strip_prefix(BRIDGE))?;
     names.iter().position(|n| n.iter().any(|name| name == to))
 }
 
-/// The functions that the one at `extent` branches to, and whether it
-/// branches through a register.
+/// Returns the functions to which the one at `extent` branches, and true if it branches through a
+/// register.
 fn flow_of(extent: Extent, code: &[Code<'_>], extents: &[Extent]) -> (Vec<usize>, bool) {
     let mut callees = vec![];
     let mut has_indirect = false;
@@ -188,7 +188,7 @@ fn flow_of(extent: Extent, code: &[Code<'_>], extents: &[Extent]) -> (Vec<usize>
     (callees, has_indirect)
 }
 
-/// The function that `address` lies in.
+/// Returns the function that contains `address`.
 fn holder(extents: &[Extent], address: u32) -> Option<usize> {
     let after = extents.partition_point(|e| e.start <= address);
     let i = after.checked_sub(1)?;
@@ -220,7 +220,7 @@ impl Code<'_> {
     }
 }
 
-/// The first name, without mangling and without the compiler's hash.
+/// Returns the first name, without mangling and without the compiler's hash.
 fn readable(aliases: &[String]) -> String {
     let name = aliases.first().map_or("?", String::as_str);
     format!("{:#}", rustc_demangle::demangle(name))

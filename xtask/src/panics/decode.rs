@@ -1,22 +1,21 @@
 //! Branch targets of a Thumb-2 instruction besides the next one.
 //!
-//! Only branches are decoded, by their encodings in the ARMv7-M manual
-//! (DDI 0403E, A7.7): for these few lines no disassembler is needed, and the
-//! ones on offer stop at floating-point instructions.
+//! Only branches are decoded, by their encodings in the ARMv7-M manual (DDI 0403E, A7.7). These few
+//! lines need no disassembler, and the available ones fail at floating-point instructions.
 
-/// Effect of an instruction on the flow.
+/// Effect of an instruction on the control flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Flow {
     /// Continues, returns, or stops.
     Next,
-    /// May go to this address: branch or call.
+    /// May branch to or call this address.
     To(u32),
-    /// Goes where a register or a table says.
+    /// Branches to an address from a register or a table.
     Indirect,
 }
 
-/// Length in bytes and flow of the instruction at `address`, from its first
-/// half-word and the one after it.
+/// Returns length in bytes and flow of the instruction at `address`, from its first half-word and
+/// the next one.
 pub(crate) fn instruction(address: u32, first: u16, second: u16) -> (u32, Flow) {
     if first >> 11 >= 0b11101 {
         (4, wide(address, u32::from(first), u32::from(second)))
@@ -52,7 +51,7 @@ fn narrow(address: u32, word: u16) -> Flow {
 fn wide(address: u32, first: u32, second: u32) -> Flow {
     const SP: u32 = 13;
     const PC: u32 = 15;
-    // LDR PC, […], but for POP {PC} in its wide form, which returns.
+    // LDR PC, […], except POP {PC} in its wide form, which returns.
     if first & 0xFF70 == 0xF850 && second >> 12 == PC {
         return if first & 15 == SP {
             Flow::Next
@@ -97,7 +96,7 @@ mod tests {
         instruction(0x1000, first, second).1
     }
 
-    // The encodings are what LLVM assembles for the instructions named.
+    // The encodings are LLVM's for the instructions named.
     #[test]
     fn branches_and_calls_go_where_the_assembler_meant() {
         assert_eq!(flow(0xF000, 0xF87E), Flow::To(0x1100), "bl forward");

@@ -1,7 +1,7 @@
-//! Check that the code of an interrupt lies in the memory without wait states.
+//! Check that the code of an interrupt is in the memory without wait states.
 //!
-//! Its linker script names two areas: that memory, and those functions that are to stay in flash.
-//! A function in neither area is an error.
+//! Its linker script defines two areas: that memory, and the functions that stay in flash. A
+//! function in neither area is an error.
 
 use std::ops::Range;
 
@@ -12,16 +12,16 @@ use super::calls::Calls;
 use super::{reached, short};
 use crate::board::Board;
 
-/// The areas that the linker script names.
+/// The areas that the linker script defines.
 #[derive(Debug, Clone)]
 pub(crate) struct Areas {
-    /// The memory without wait states, as far as code fills it.
+    /// The part of the memory without wait states that contains code.
     fast: Range<u32>,
     /// Functions that stay in flash.
     in_flash: Range<u32>,
 }
 
-/// Reads the areas from an ELF with symbols. All constants have to be out of the flash, too.
+/// Reads the areas from an ELF with symbols. No constants may be in the flash.
 pub(crate) fn areas(elf: &[u8]) -> Result<Areas> {
     let file = object::File::parse(elf).context("not an ELF")?;
     let symbol = |name: &str| {
@@ -39,8 +39,8 @@ pub(crate) fn areas(elf: &[u8]) -> Result<Areas> {
     })
 }
 
-/// A sentence about everything that `interrupt` reaches, if each function of it is in one of the
-/// areas.
+/// Returns a sentence about all functions that `interrupt` reaches, or an error if one of them is
+/// in neither area.
 pub(crate) fn judge(
     calls: &Calls,
     board: &Board,
@@ -111,7 +111,7 @@ mod tests {
     fn what_is_reached_lies_in_one_of_the_areas() {
         let told = judged([0x20, 0x40, 0x0800_0000, 0x80]).expect("all are placed");
         assert!(told.starts_with("2 of the 3 functions"), "{told}");
-        // A bridge may lie anywhere.
+        // A bridge may be anywhere.
         assert!(judged([0x20, 0x0800_2000, 0x0800_0000, 0x80]).is_ok());
     }
 

@@ -1,12 +1,11 @@
 //! Check that no interrupt of an image reaches a panic.
 //!
-//! The finished ELF is judged, not the source: link-time optimisation removes
-//! most bounds checks, and what it left is what runs. Its vector table names what is judged:
-//! every exception and every interrupt, whether it is enabled or not. Every direct branch of
-//! every function that one of them can reach is followed. A call through a
-//! register cannot be followed, so it is an error unless the board's table says
-//! what it is; the walk continues where the table says that it leads. So the walk is complete
-//! without guesses about pointers.
+//! The finished ELF is checked, not the source, because link-time optimisation removes most bounds
+//! checks. The check covers all functions in the vector table: every exception and every interrupt,
+//! enabled or not. It follows every direct branch of every function that one of them can reach. A
+//! call through a register cannot be followed, so it is an error unless it is in the board's table;
+//! the walk then continues at the callees in the table. So the walk is complete without guesses
+//! about pointers.
 
 mod calls;
 mod decode;
@@ -38,10 +37,11 @@ pub(crate) fn check(board: &Board, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The names of all vectors with how many functions each reaches, if none of these panics.
+/// Returns the names of all vectors with the number of functions that each reaches, or an error if
+/// one of these panics.
 fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
     let functions = &calls.functions;
-    // In an image without any panic, the names looked for are not the real ones.
+    // An image without any panic means that the searched names are wrong.
     ensure!(
         functions.iter().any(|f| panics(&f.name)),
         "no panic function in the whole image: was it stripped?"
@@ -67,8 +67,8 @@ fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
     Ok(judged)
 }
 
-/// Everything that a vector reaches. What a panic does in turn says nothing new: the walk ends
-/// there. It does not follow the entries of the table either.
+/// Returns all functions that a vector reaches. The walk ends at a panic, because its callees add
+/// nothing, and at the exceptions of the table.
 fn reached(calls: &Calls, board: &Board, root: usize) -> Reached {
     let functions = &calls.functions;
     reach::from(root, |i| {
@@ -119,7 +119,7 @@ fn wrongs(calls: &Calls, board: &Board, found: &Reached, i: usize) -> Vec<String
     wrong
 }
 
-/// A name without what makes generic ones fill the screen.
+/// Returns a name without the long parts of generic ones.
 fn short(name: &str) -> String {
     const SHOWN: usize = 120;
     match name.char_indices().nth(SHOWN) {
@@ -128,7 +128,7 @@ fn short(name: &str) -> String {
     }
 }
 
-/// The entry of a table of exceptions for this caller and callee, each by part of its name.
+/// Returns the entry for this caller and callee in a table of exceptions, each by part of its name.
 fn known<'t>(table: &'t [Exception], caller: &Function, callee: &str) -> Option<&'t Exception> {
     let is_caller = |parts: &[&str]| {
         let mut names = caller.aliases.iter().chain([&caller.name]);
@@ -139,7 +139,7 @@ fn known<'t>(table: &'t [Exception], caller: &Function, callee: &str) -> Option<
         .find(|e| is_caller(e.caller) && callee.contains(e.callee))
 }
 
-/// Returns true if a function of this name is a panic or what all panics end in.
+/// Returns true if a function of this name is a panic or the common end of all panics.
 fn panics(name: &str) -> bool {
     name.starts_with("core::panicking::")
         || name.ends_with("rust_begin_unwind")
@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// Two vectors: the tick, which calls what is given, and the supply's.
+    /// Returns an image of two vectors: the tick, which makes the given calls, and the supply's.
     fn image(tick_calls: &[usize]) -> Calls {
         let functions = vec![
             function("HapticTick", &[1], false),

@@ -1,11 +1,11 @@
 //! Nodes that can be reached from one node of a graph, and the paths to them.
 
-/// The nodes reached, nearest first, each with the place in this list of the node
-/// that it was first reached from; the root has none.
+/// The reached nodes, nearest first, each with the index in this list of the node from which it was
+/// first reached; the root has none.
 #[derive(Debug)]
 pub(crate) struct Reached(Vec<(usize, Option<usize>)>);
 
-/// Everything reachable from `root`.
+/// Returns all nodes that can be reached from `root`.
 pub(crate) fn from(root: usize, callees: impl Fn(usize) -> Vec<usize>) -> Reached {
     let mut reached = vec![(root, None)];
     let mut place = 0;
@@ -21,13 +21,13 @@ pub(crate) fn from(root: usize, callees: impl Fn(usize) -> Vec<usize>) -> Reache
 }
 
 impl Reached {
-    /// All nodes, nearest first.
+    /// Returns all nodes, nearest first.
     pub(crate) fn all(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         self.0.iter().map(|(node, _)| *node)
     }
 
-    /// The shortest way from the root to `node`, both included; empty where it was
-    /// not reached.
+    /// Returns the shortest path from the root to `node`, including both; empty if it was not
+    /// reached.
     pub(crate) fn chain(&self, node: usize) -> Vec<usize> {
         let last = self.0.iter().position(|(known, _)| *known == node);
         let places = std::iter::successors(last, |place| self.0[*place].1);

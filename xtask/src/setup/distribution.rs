@@ -1,7 +1,7 @@
-//! The distribution's Rust, for where rustup cannot add the boards' target.
+//! The distribution's Rust, if rustup cannot add the boards' target.
 //!
-//! Debian keeps a recent Rust for its browsers. It has no library for the
-//! boards, but the sources to build one, which `-Zbuild-std` does.
+//! Debian contains a recent Rust for its browsers. It has no library for the boards, but the
+//! sources to build one with `-Zbuild-std`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,14 +11,14 @@ use anyhow::{Context, Result, ensure};
 use super::packages::{self, found_or_installed};
 use crate::run::{on_path, output, root};
 
-/// The workspace's `rust-version`, as a compiler would tell it.
+/// The workspace's `rust-version`, in the format of a compiler.
 const NEEDED: &str = concat!("rustc ", env!("CARGO_PKG_RUST_VERSION"));
 
 const RUSTC: &str = "/usr/bin/rustc";
 const CARGO: &str = "/usr/bin/cargo";
 const CLIPPY: &str = "/usr/bin/clippy-driver";
 
-/// Its cargo, set up to build its own core library.
+/// Returns its cargo, configured to build its own core library.
 pub(crate) fn cargo() -> Command {
     let mut command = Command::new(CARGO);
     command
@@ -27,10 +27,10 @@ pub(crate) fn cargo() -> Command {
         .env("RUSTC_BOOTSTRAP", "1")
         .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld")
         .env_remove("CARGO_BUILD_TARGET")
-        // Of the toolchain that runs this program; they would mix the two.
+        // Set by the toolchain that runs this program; it would mix the two.
         .env_remove("LD_LIBRARY_PATH")
         .env_remove("RUSTUP_TOOLCHAIN");
-    // rustup's cargo-clippy must not be found before this one's.
+    // This toolchain's cargo-clippy must be found before rustup's.
     let path = std::env::var_os("PATH").unwrap_or_default();
     let first = std::iter::once(PathBuf::from("/usr/bin"));
     if let Ok(path) = std::env::join_paths(first.chain(std::env::split_paths(&path))) {
@@ -39,12 +39,12 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
-/// Sees to it that it is there, whole and recent enough.
+/// Ensures that it is installed, complete and recent enough.
 pub(crate) fn ready() -> Result<()> {
     found_or_installed(is_whole, &packages::RUST).context("the distribution's Rust")
 }
 
-/// Sees to it that its clippy is there.
+/// Ensures that its clippy is installed.
 pub(crate) fn with_clippy() -> Result<()> {
     let is_here = || {
         ensure!(Path::new(CLIPPY).is_file(), "no {CLIPPY}");
@@ -53,7 +53,7 @@ pub(crate) fn with_clippy() -> Result<()> {
     found_or_installed(is_here, &packages::CLIPPY)
 }
 
-/// Fails with what is missing.
+/// Fails if it is incomplete, with the missing part.
 pub(crate) fn is_whole() -> Result<()> {
     let version = output(Command::new(RUSTC).arg("--version"));
     let version = version.with_context(|| format!("no {RUSTC}"))?;
@@ -71,7 +71,7 @@ pub(crate) fn is_whole() -> Result<()> {
     Ok(())
 }
 
-/// The 96 in `rustc 1.96.0 (…)`.
+/// Returns the 96 in `rustc 1.96.0 (…)`.
 fn minor(version: &str) -> Option<u32> {
     version.split(' ').nth(1)?.split('.').nth(1)?.parse().ok()
 }

@@ -1,5 +1,5 @@
-//! Tools that build the emulated core of the image tests: cmake for its C
-//! code, libclang for its bindings.
+//! Tools that build the emulated core of the image tests: cmake for its C code, libclang for its
+//! bindings.
 
 use anyhow::{Context, Error, Result};
 
@@ -14,6 +14,6 @@ pub(crate) fn ready() -> Result<()> {
 
 fn is_whole() -> Result<()> {
     on_path("cmake").context("no cmake on the PATH")?;
-    // Where bindgen looks for it, by what bindgen looks with.
+    // Searches as bindgen does.
     clang_sys::load().map_err(Error::msg)
 }

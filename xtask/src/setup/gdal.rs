@@ -1,4 +1,4 @@
-//! The library of GDAL, which reads terrain files of formats that nothing here reads.
+//! The library of GDAL, which reads other formats of terrain files.
 
 use std::path::Path;
 
@@ -13,8 +13,8 @@ const OWN: [&str; 12] = [
     "tif", "tiff", "hgt", "npy", "asc", "png", "flt", "bil", "bip", "bsq", "hdr", "raw",
 ];
 
-/// Sees to it that there is a libgdal, or says why not: without one, files of other formats are
-/// refused with what to install, and their tests are skipped.
+/// Ensures that there is a libgdal, or prints why not: without it, files of other formats are
+/// refused with the package to install, and their tests are skipped.
 pub(crate) fn ready_or_say_why() {
     if let Err(why) = found_or_installed(find, &packages::GDAL) {
         say(format!(
@@ -23,7 +23,7 @@ pub(crate) fn ready_or_say_why() {
     }
 }
 
-/// Returns true if a terrain's name says that GDAL reads it.
+/// Returns true if GDAL is needed for a terrain, by its name.
 pub(crate) fn is_wanted_for(file: &Path) -> bool {
     let extension = file
         .extension()

@@ -1,4 +1,4 @@
-//! Finding what the commands need, and installing it where that is allowed.
+//! Finding the programs that the commands need, and installing them if that is allowed.
 
 mod distribution;
 pub(crate) mod emulator;

@@ -1,5 +1,4 @@
-//! System packages of the commands: their names in the package
-//! managers, and one way to install it.
+//! System packages for the commands: their names in the package managers, and their installation.
 
 use std::process::Command;
 
@@ -10,8 +9,8 @@ use crate::run::{on_path, output, run_quietly, say, shown};
 /// Name of a package for each of the [`MANAGERS`]; empty where it has no package.
 pub(crate) type Packages = [&'static str; MANAGERS.len()];
 
-/// The package managers of Debian, Fedora, Arch and macOS: the command that installs,
-/// and the options that keep it from asking and from installing what is not needed.
+/// The package managers of Debian, Fedora, Arch and macOS: the command that installs, and the
+/// options against questions and against optional packages.
 const MANAGERS: [(&str, &str); 4] = [
     ("apt-get install", "-y --no-install-recommends"),
     ("dnf install", "-y"),
@@ -25,7 +24,7 @@ pub(crate) const QEMU: Packages = [
     "qemu-system-arm",
     "qemu",
 ];
-/// The programs bring the library, whose own name has a number in it.
+/// The programs' packages include the library, whose own package has a number in its name.
 pub(crate) const GDAL: Packages = ["gdal-bin", "gdal-libs", "gdal", "gdal"];
 /// For the page's own test.
 pub(crate) const BROWSER: Packages = [
@@ -45,7 +44,7 @@ pub(crate) const CMAKE_AND_LIBCLANG: Packages = [
 pub(crate) const RUST: Packages = ["rustc-web cargo-web rust-web-src lld", "", "", ""];
 pub(crate) const CLIPPY: Packages = ["rust-web-clippy", "", "", ""];
 
-/// Returns the result of `find`; if there is none, `packages` are installed, and it is tried again.
+/// Returns the result of `find`; if there is none, installs `packages` and tries again.
 pub(crate) fn found_or_installed<T>(
     find: impl Fn() -> Result<T>,
     packages: &Packages,
@@ -59,7 +58,7 @@ pub(crate) fn found_or_installed<T>(
 
 /// Installs `wanted` with the first package manager found.
 ///
-/// The error says what to type, where there is something to type.
+/// The error contains the command to type, if there is one.
 fn install(wanted: &Packages) -> Result<()> {
     let mut managers = MANAGERS.iter().zip(wanted);
     let here = managers.find(|((install, _), _)| on_path(program(install)).is_some());
@@ -79,7 +78,7 @@ fn install(wanted: &Packages) -> Result<()> {
             return Err(why);
         }
         say("refreshing apt's package lists, then once more");
-        // A failing list of some third party must not stop the one needed here.
+        // A failing package list of a third party must not prevent this installation.
         let _ = run_quietly(&mut with_rights("apt-get update")?);
         attempt()
     });
@@ -90,19 +89,19 @@ fn program(line: &str) -> &str {
     line.split(' ').next().unwrap_or(line)
 }
 
-/// All managers but brew install for the whole system.
+/// Returns true for all managers except brew, because they install for the whole system.
 fn needs_root(line: &str) -> bool {
     program(line) != "brew"
 }
 
-/// Returns the command for a person to type.
+/// Returns the command for a user to type.
 fn typed(install: &str, names: &str) -> String {
     let sudo = if needs_root(install) { "sudo " } else { "" };
     format!("{sudo}{install} {names}")
 }
 
-/// The command of a line of plain words, with `sudo -n` before it where it needs root
-/// and this is not root.
+/// Returns the command of a line of plain words, with `sudo -n` before it if it needs root and the
+/// user is not root.
 fn with_rights(line: &str) -> Result<Command> {
     let is_root = output(Command::new("id").arg("-u")).is_some_and(|id| id.trim() == "0");
     if is_root || !needs_root(line) {
@@ -110,7 +109,7 @@ fn with_rights(line: &str) -> Result<Command> {
         command.args(line.split_whitespace().skip(1));
         return Ok(command);
     }
-    // -n: never ask for a password in the middle of someone's build.
+    // -n: never ask for a password during a build.
     let mut command = Command::new("sudo");
     let may = output(Command::new("sudo").args(["-n", "true"])).is_some();
     ensure!(may, "not root here, and sudo would ask for a password");

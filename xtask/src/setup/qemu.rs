@@ -11,8 +11,8 @@ use crate::run::{on_path, output};
 const PROGRAM: &str = "qemu-system-arm";
 const MACHINE: &str = "mps2-an386";
 
-/// The path of a QEMU with the board: `HAPTERRA_QEMU` if set, else the
-/// one on the PATH, else a freshly installed one.
+/// Returns the path of a QEMU with the board: `HAPTERRA_QEMU` if set, else the one on the PATH,
+/// else a newly installed one.
 pub(crate) fn ready() -> Result<PathBuf> {
     if let Some(given) = std::env::var_os("HAPTERRA_QEMU") {
         return checked(given.into()).context("HAPTERRA_QEMU names it");
@@ -25,7 +25,7 @@ pub(crate) fn ready() -> Result<PathBuf> {
 }
 
 fn find() -> Result<PathBuf> {
-    // Windows' installer leaves the PATH alone.
+    // Windows' installer does not change the PATH.
     let installed = PathBuf::from(r"C:\Program Files\qemu\qemu-system-arm.exe");
     let found = on_path(PROGRAM).or_else(|| installed.is_file().then_some(installed));
     found.with_context(|| format!("{PROGRAM} is not on the PATH"))

@@ -21,14 +21,14 @@ type: rustup target add thumbv7em-none-eabihf
 /// Source of the boards' core library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Toolchain {
-    /// The toolchain that runs this program has it.
+    /// The toolchain that runs this program contains it.
     Own,
     /// The distribution's Rust builds it from source.
     Distribution,
 }
 
 impl Toolchain {
-    /// `cargo SUBCOMMAND` for the boards' target.
+    /// Returns `cargo SUBCOMMAND` for the boards' target.
     pub(crate) fn cargo(self, subcommand: &str) -> Command {
         let mut command = match self {
             Self::Own => cargo(),
@@ -38,7 +38,7 @@ impl Toolchain {
         if self == Self::Distribution {
             command.arg("-Zbuild-std=core");
         }
-        // Flags meant for the host have no place in an image.
+        // Flags for the host must not apply to an image.
         for variable in ["RUSTFLAGS", "CARGO_BUILD_RUSTFLAGS"] {
             command.env_remove(variable);
         }
@@ -47,8 +47,8 @@ impl Toolchain {
         command
     }
 
-    /// Returns the place where it builds. Two compilers in one directory would undo each other's
-    /// work.
+    /// Returns its build directory. Two compilers in one directory would overwrite each other's
+    /// results.
     pub(crate) fn target_dir(self) -> PathBuf {
         match self {
             Self::Own => target_dir(),
@@ -56,18 +56,18 @@ impl Toolchain {
         }
     }
 
-    /// Sees to it that `cargo clippy` is there.
+    /// Ensures that `cargo clippy` is installed.
     pub(crate) fn with_clippy(self) -> Result<()> {
         match self {
-            // A part of every usual toolchain; cargo itself reports it if it is not.
+            // Part of every default toolchain; cargo itself reports if it is missing.
             Self::Own => Ok(()),
             Self::Distribution => distribution::with_clippy(),
         }
     }
 }
 
-/// Flags for panics that name their file without the way to the registry: an image
-/// is as large wherever it is built, and a kilobyte smaller.
+/// Returns flags that shorten file names in panics to those without the registry's path: an image
+/// then has the same size on every machine, and is a kilobyte smaller.
 fn short_paths() -> String {
     let cargo = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let cargo = cargo.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
@@ -78,9 +78,8 @@ fn short_paths() -> String {
     flags.join("\x1f")
 }
 
-/// Finds a toolchain for the boards, or installs one: rustup's target first,
-/// the distribution's packages otherwise. `HAPTERRA_TOOLCHAIN=rustup` or
-/// `=distribution` allows only the one.
+/// Finds a toolchain for the boards, or installs one: rustup's target first, the distribution's
+/// packages otherwise. `HAPTERRA_TOOLCHAIN=rustup` or `=distribution` allows only that one.
 pub(crate) fn ready() -> Result<Toolchain> {
     match std::env::var("HAPTERRA_TOOLCHAIN").as_deref() {
         Err(_) | Ok("" | "auto") => either(),
@@ -91,7 +90,7 @@ pub(crate) fn ready() -> Result<Toolchain> {
 }
 
 fn either() -> Result<Toolchain> {
-    // What is here already comes before anything that needs the network.
+    // An installed toolchain is preferred over one that needs the network.
     if !own_has_target(TARGET) && distribution::is_whole().is_ok() {
         return from_distribution();
     }
@@ -106,7 +105,7 @@ fn own() -> Result<Toolchain> {
     Ok(Toolchain::Own)
 }
 
-/// Sees to it that the toolchain that runs this program compiles for browsers.
+/// Ensures that the toolchain that runs this program compiles for browsers.
 ///
 /// # Errors
 /// The command to type.

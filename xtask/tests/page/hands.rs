@@ -1,10 +1,10 @@
-//! Hands, settings and sounds of the page.
+//! Input devices, settings and sounds of the page.
 
 use serde_json::json;
 
 use crate::site::{Site, one, px};
 
-/// Up to the east, by one in two.
+/// Returns a page with a ramp, up to the east by one in two.
 fn on_a_ramp() -> Option<Site> {
     let mut site = Site::open(None)?;
     let row: String = (0..61).map(|i| format!("{} ", 25 * i)).collect();
@@ -73,7 +73,8 @@ fn finger_presses_while_it_is_down() {
 fn gamepad_moves_turns_and_presses() {
     let _one = one();
     let Some(mut site) = on_a_ramp() else { return };
-    // The left stick to the right and away, the right one to the right, half of the right trigger.
+    // The left stick to the right and forward, the right one to the right, half of the right
+    // trigger.
     let _ = site.value(
         "(() => {
             const buttons = Array.from({ length: 17 }, (_, i) => ({ value: i === 7 ? 0.5 : 0 }));
@@ -120,7 +121,7 @@ fn sound_follows_the_force_and_its_changes() {
     );
     assert!((two_newtons / one_newton - 2.0).abs() < 0.1, "{found:?}");
     assert!(rustle > 0.01, "{found:?}");
-    // In the page itself a click switches it on; a browser without a device may play nothing.
+    // In the page a click enables the sound; a browser without a sound device may be silent.
     let place = site.value(
         "(({ x, y, width, height }) => [x + width / 2, y + height / 2])(document.getElementById('sound').getBoundingClientRect())",
     );
@@ -173,8 +174,8 @@ fn tip_keeps_the_place_of_the_hand() {
     site.wait(
         "hapterra.touch.state === 'touching' && Math.hypot(...hapterra.touch.arm.speed) < 0.01",
     );
-    // Between two frames: where the arm is, in how many ticks it touches again, and when a radius is
-    // refused nothing changes.
+    // Between two frames: the arm's position, the ticks until it touches again, and no change after
+    // a refused radius.
     let found = site.value(
         "(() => {
             const { touch } = hapterra;
@@ -209,7 +210,7 @@ fn slider_of_the_surface_keeps_the_contact() {
     site.wait(
         "hapterra.touch.state === 'touching' && Math.hypot(...hapterra.touch.arm.speed) < 0.01",
     );
-    // Every tick between the changes, in one go between two frames. Less friction lets the proxy slide.
+    // All ticks between the changes run between two frames. Less friction lets the proxy slide.
     let found = site.value(
         "(() => {
             const { touch } = hapterra;

@@ -23,7 +23,7 @@ use server::Server;
 use site::{Site, one, program};
 use timeouts::{HANG, wait_until};
 
-/// The rows of a CSV file's columns, as numbers of single precision.
+/// Returns the rows of a CSV file's columns, as numbers of single precision.
 fn forces(path: &Path) -> Vec<[u32; 3]> {
     let text = fs::read_to_string(path).expect("a file");
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -38,8 +38,8 @@ fn forces(path: &Path) -> Vec<[u32; 3]> {
         .collect()
 }
 
-/// Saves the path into a folder beside the site, feels it again there, and fails unless the forces
-/// are the same, bit for bit. Returns the line that the page shows; none without the command.
+/// Saves the path into a folder beside the site, replays it there, and fails unless the forces are
+/// the same, bit for bit. Returns the line that the page shows; `None` without the command.
 fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
     let saved = site.folder.path().join(folder);
     fs::create_dir(&saved).expect("a folder");
@@ -81,7 +81,7 @@ fn saved_path_feels_the_same_in_replay_bit_for_bit() {
     let Some(mut site) = Site::open(None) else {
         return;
     };
-    // On the way it gets rough and grainy: every effect of the page.
+    // On the way the surface changes to a rough and grainy one: all effects of the page.
     site.point([0.35, 0.5]);
     site.wait("hapterra.touch.state === 'touching'");
     let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
@@ -138,7 +138,7 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
         site.wait(&format!("hapterra.touch.terrain.name === '{name}'"));
         let shape = site.value("[hapterra.touch.terrain.nx, hapterra.touch.terrain.ny]");
         assert_eq!(shape, json!([70, 50]), "{name}");
-        // As shares of the relief: a PNG has whole metres, and no cell.
+        // As shares of the relief: a PNG has whole metres, and no cell size.
         let shares = site.value(
             "Array.from(hapterra.touch.terrain.heights, (h) => h / hapterra.touch.terrain.topMm)",
         );
@@ -165,7 +165,7 @@ fn cursor_stays_behind_the_hand_on_a_slope() {
     let _one = one();
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ramp.asc");
-    // Up to the east, by one in two; 60,501 heights, of which the page gets every fourth.
+    // Up to the east, by one in two; 60,501 heights, of which the page uses every fourth.
     let row = (0..301)
         .map(|i| (5 * i).to_string())
         .collect::<Vec<_>>()

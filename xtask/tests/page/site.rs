@@ -15,9 +15,9 @@ use crate::timeouts::wait_until;
 /// Software draws the pages: one at a time, and small ones.
 static ONE: Mutex<()> = Mutex::new(());
 pub(crate) const SIZE: [u32; 2] = [720, 480];
-/// The part of a picture with ground alone, which no slider is in: left, top, width, height.
+/// The part of a picture with only ground, without sliders: left, top, width, height.
 const GROUND: [f64; 4] = [0.1, 0.2, 0.52, 0.65];
-/// Colours of the proxy and of the force's arrow, as they are lit.
+/// Colours of the proxy and of the force's arrow, including the light.
 const MARKS: [[u8; 3]; 2] = [[255, 140, 35], [255, 215, 50]];
 
 /// Waits until no other test has a page.
@@ -25,7 +25,7 @@ pub(crate) fn one() -> MutexGuard<'static, ()> {
     ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A page in a browser, and what it is served from.
+/// A page in a browser, and the folder from which it is served.
 pub(crate) struct Site {
     pub(crate) browser: Browser,
     pub(crate) page: Page,
@@ -33,7 +33,7 @@ pub(crate) struct Site {
     pub(crate) folder: tempfile::TempDir,
 }
 
-/// Returns the result of `cargo xtask page --test`; none, with a message, if it was not built.
+/// Returns a result of `cargo xtask page --test`; `None`, with a message, if it was not built.
 fn built(what: &str) -> Option<PathBuf> {
     let found = std::env::var_os(what).map(PathBuf::from);
     if found.is_none() {
@@ -43,7 +43,7 @@ fn built(what: &str) -> Option<PathBuf> {
 }
 
 impl Site {
-    /// Serves the page, with a terrain where there is one, and waits until it is touched.
+    /// Serves the page, with a terrain if there is one, and waits until it is touched.
     pub(crate) fn open(terrain: Option<&Path>) -> Option<Self> {
         let built = built("HAPTERRA_PAGE")?;
         let Some(browser) = browser::program() else {
@@ -87,7 +87,7 @@ impl Site {
         wait_until(expression, || self.value(expression) == true);
     }
 
-    /// Moves the mouse to a place, in shares of the page.
+    /// Moves the mouse to a position, in shares of the page.
     pub(crate) fn point(&mut self, place: [f64; 2]) {
         let [x, y] = px(place);
         self.input("Mouse", json!({ "type": "mouseMoved", "x": x, "y": y }));
@@ -100,7 +100,7 @@ impl Site {
         let _ = self.browser.call(&method, event, Some(&session));
     }
 
-    /// Moves a slider as a person does.
+    /// Moves a slider as a user does.
     pub(crate) fn slide(&mut self, id: &str, value: f64) {
         let _ = self.value(&format!(
             "(() => {{
@@ -138,7 +138,7 @@ impl Site {
         ));
     }
 
-    /// Fails if the page asked any other machine for anything.
+    /// Fails if the page has sent a request to another machine.
     pub(crate) fn check_requests(&self) {
         let own = [self.address.as_str(), "data:", "blob:", "about:"];
         let requests = &self.browser.requests;
@@ -149,7 +149,7 @@ impl Site {
     }
 }
 
-/// Runs the program that a variable names in a folder; none where it was not built.
+/// Runs the program named by a variable in a folder; `None` if it was not built.
 pub(crate) fn program(name: &str, folder: &Path, words: &[&str], files: &[&Path]) -> Option<()> {
     let mut command = Command::new(built(name)?);
     command.current_dir(folder).args(words).args(files);
@@ -159,7 +159,7 @@ pub(crate) fn program(name: &str, folder: &Path, words: &[&str], files: &[&Path]
     Some(())
 }
 
-/// A place in shares of the page, in its pixels.
+/// Returns a position in shares of the page, in its pixels.
 pub(crate) fn px(place: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|axis| place[axis] * f64::from(SIZE[axis]))
 }

@@ -1,7 +1,7 @@
-//! The calibration in flash: two areas at its end, which the memory map keeps from the
-//! image, in the bank that no code runs from. So code runs on while they are written.
-//! They are erased at start-up only, before the tick, the watchdog and the link: on an
-//! H743 that takes a second or two.
+//! The calibration in flash: two areas at its end. The memory map excludes them from the image, and
+//! no code runs from their bank, so code continues to run while they are written. They are erased
+//! at start-up only, before the tick, the watchdog and the link: on an H743 that takes a second or
+//! two.
 
 use core::cell::RefCell;
 
@@ -17,8 +17,8 @@ use crate::flash::read;
 /// First address of flash, on every chip.
 const FLASH_BASE: usize = 0x0800_0000;
 
-/// The flash, read past the data cache, which does not notice an erase, and read where
-/// it may not be readable.
+/// The flash, read without the data cache, which does not detect an erase, and with tolerance of
+/// unreadable words.
 struct Uncached(Flash<'static, Blocking>);
 
 impl ErrorType for Uncached {
@@ -58,12 +58,12 @@ impl NorFlash for Uncached {
     }
 }
 
-/// The board's memory for calibrations, where it has one.
+/// The board's memory for calibrations; `None` if the board has no such memory.
 pub(crate) struct CalibrationMemory(RefCell<Option<CalibrationStore<Uncached>>>);
 
 impl CalibrationMemory {
-    /// Opens the memory and returns what is stored. Makes room for the next record,
-    /// because erasing takes long, and now nothing waits. Without a flash nothing is stored.
+    /// Opens the memory and returns the stored calibration. Erases an area for the next record now,
+    /// because an erase takes long and nothing waits yet. Without a flash, nothing is stored.
     pub(crate) fn open(flash: Option<Flash<'static, Blocking>>) -> (Self, Stored) {
         let Some(flash) = flash else {
             defmt::warn!("no memory for calibrations: the option bytes give the flash one bank");

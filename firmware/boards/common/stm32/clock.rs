@@ -1,6 +1,6 @@
-//! The tick's timer, the core's cycle counter as the clock of what a tick costs, and the
-//! timer of embassy's time, which runs on while a debugger halts the core, as the clock of
-//! what passes between two ticks.
+//! The tick's timer; the core's cycle counter, which measures the cost of a tick; and the timer of
+//! embassy's time, which measures the time between two ticks because it continues while a debugger
+//! halts the core.
 
 use cortex_m::Peripherals;
 use cortex_m::peripheral::DWT;
@@ -12,24 +12,24 @@ use hapterra_firmware::board::TickClock;
 /// The timer of the haptic tick, on every chip.
 pub(crate) type TickTimer = TIM7;
 
-/// Ticks a second. `build.rs` has checked that the board can have this rate.
+/// Ticks a second. `build.rs` has checked that the board supports this rate.
 pub(crate) const TICK_HZ: u32 = match u32::from_str_radix(env!("HAPTERRA_TICK_HZ"), 10) {
     Ok(hz) => hz,
     Err(_) => panic!("build.rs writes a number"),
 };
 
-/// Divides the timer's clock before the timer counts it.
+/// Divider of the timer's clock.
 const DIVIDER: u16 = 4;
 
 /// The tick's timer and the cycle counter of a core with `HZ` cycles a second, of which
 /// `PER_COUNT` are one count of the timer.
 pub(crate) struct CycleClock<const HZ: u32, const PER_COUNT: u32> {
     timer: Timer<'static, TickTimer>,
-    /// The microsecond of the tick before, of 65,536.
+    /// The microsecond of the previous tick, modulo 65,536.
     last_us: Option<u16>,
 }
 
-/// Counts of [`microsecond`] in a second, as embassy sets its timer up.
+/// Counts of [`microsecond`] in a second, as embassy configures its timer.
 const US_HZ: u32 = {
     assert!(
         embassy_time::TICK_HZ == 1_000_000,
@@ -38,14 +38,13 @@ const US_HZ: u32 = {
     1_000_000
 };
 
-/// The microsecond that it is, of 65,536: embassy's timer, which wraps around in 16 bits.
+/// Returns the current microsecond, modulo 65,536: embassy's timer has 16 bits.
 fn microsecond() -> u16 {
     pac::TIM5.cnt().read() as u16
 }
 
 impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
-    /// The auto-reload register. Exact, where a frequency asked of embassy
-    /// would be rounded.
+    /// The auto-reload register. It is exact, while embassy would round a frequency.
     const RELOAD: u16 = {
         let counts_a_second = HZ / PER_COUNT;
         assert!(
@@ -55,7 +54,7 @@ impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
         (counts_a_second / TICK_HZ - 1) as u16
     };
 
-    /// Sets the timer up, which [`start`] starts.
+    /// Sets up the timer, which [`start`] starts.
     pub(crate) fn new(timer: Peri<'static, TickTimer>) -> Self {
         let timer = Timer::new(timer);
         let registers = timer.regs_core();
@@ -78,7 +77,7 @@ pub(crate) fn count_cycles(core: &mut Peripherals) {
     core.DWT.enable_cycle_counter();
 }
 
-/// Starts the timer. Its owner, the loop, is already with the interrupt.
+/// Starts the timer. The interrupt already owns the loop.
 pub(crate) fn start() {
     pac::TIM7.cr1().modify(|w| w.set_cen(true));
 }

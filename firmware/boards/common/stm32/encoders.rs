@@ -1,11 +1,9 @@
-//! The Phantom's encoders on three encoder timers, the safety inputs, and what the
-//! amplifiers say.
+//! The Phantom's encoders on three encoder timers, the safety inputs, and the amplifiers' feedback.
 //!
-//! A count that a disturbance adds is an undetected drift, so each channel passes
-//! a digital filter: a level counts when eight samples in a row have found it, and a
-//! sample is taken every 64 clocks of the timer. At the fastest motion that is not a
-//! fault, 128,000 counts a second, a channel keeps its level for 15.6 µs, and the other
-//! channel's edge follows after 7.8 µs.
+//! A count that a disturbance adds is an undetected drift, so each channel has a digital filter: a
+//! level counts after eight equal samples in a row, one every 64 clocks of the timer. At the
+//! fastest motion that is not a fault, 128,000 counts a second, a channel keeps its level for 15.6
+//! µs, and the other channel's edge follows after 7.8 µs.
 //!
 //! | | G474, 168 MHz | H743, 228 MHz |
 //! | --- | --- | --- |
@@ -14,9 +12,9 @@
 //! | a level of this is always counted (8 samples) | 3.1 µs | 2.3 µs |
 //! | counts a second beyond which counts are lost | 650,000 | 850,000 |
 //!
-//! So the filter takes the longest disturbance that leaves the fastest motion a margin
-//! of five: a speed that is a fault is still counted right, and is reported as that fault.
-//! Both channels are late by the same time, so their order stays.
+//! This is the longest filter that leaves a margin of five for the fastest motion: an excessive
+//! speed is still counted correctly and is reported as that fault. Both channels have the same
+//! delay, so their order is kept.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Input, Pull};
@@ -33,7 +31,8 @@ use crate::{chip, outputs};
 
 /// The emergency stop's input.
 pub(crate) trait Stop {
-    /// Returns true if the stop is pressed, its wire is broken, or either was so for a moment.
+    /// Returns true if the stop is pressed or its wire is broken, or if either was the case
+    /// briefly.
     fn is_pressed(&mut self) -> bool;
 }
 
@@ -49,13 +48,13 @@ pub(crate) struct SafetyInputs<S> {
     pub(crate) emergency_stop: S,
     /// Closed while held: high when released, and when the wire is broken.
     pub(crate) dead_man: Input<'static>,
-    /// Closed while held: high when let go, and when the wire is broken.
+    /// Closed while held: high when released, and when the wire is broken.
     pub(crate) clutch: Input<'static>,
 }
 
-/// Counts the quadrature pulses at two pins, filtered. The pull-ups give a wire that is
-/// broken, or a level shifter without supply, one level and not the noise's; a level
-/// shifter that drives has no trouble with some 40 kΩ.
+/// Counts the quadrature pulses at two pins, filtered. The pull-ups hold a constant level if a wire
+/// is broken or a level shifter has no supply, so that noise is not counted. A level shifter can
+/// drive against their 40 kΩ.
 pub(crate) fn quadrature<T: Timer>(
     timer: Peri<'static, T>,
     a: Peri<'static, impl TimerPin<T, Ch1>>,
@@ -67,12 +66,12 @@ pub(crate) fn quadrature<T: Timer>(
         ..Config::default()
     };
     let counter = Qei::new(timer, a, b, pulled_up);
-    // SAFETY: the registers of a timer with four channels begin with these, the timer is
-    // owned by `counter`, and nothing else is under way with it.
+    // SAFETY: the registers of a timer with four channels begin with these, `counter` owns the
+    // timer, and no other access is in progress.
     let registers = unsafe { TimGp16::from_ptr(T::regs().cast()) };
     registers.cr1().modify(|w| w.set_ckd(Ckd::DIV2));
     registers.ccmr_input(0).modify(|w| {
-        // Every 32nd clock of those that CKD leaves, eight times.
+        // Every 32nd clock after the division by CKD, eight times.
         w.set_icf(0, FilterValue::FDTS_DIV32_N8);
         w.set_icf(1, FilterValue::FDTS_DIV32_N8);
     });

@@ -1,8 +1,8 @@
-//! The end of a program that failed: amplifiers off, a record that survives the
-//! reset, then a reset.
+//! The end of a program that failed: switches the amplifiers off, writes a record that survives the
+//! reset, and resets the chip.
 //!
-//! Nothing here writes to the log: a program that failed inside a log line would panic
-//! again. The next start logs what it finds.
+//! Nothing here writes to the log: a program that failed inside a log line would panic again. The
+//! next start logs the record.
 
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
@@ -20,8 +20,8 @@ use crate::chip::{ENABLE_OFF, amplifiers_off, write_back};
 
 /// Ticks since the start, counted by the interrupt below the haptic one.
 static TICKS: AtomicU32 = AtomicU32::new(0);
-/// True if a record of this program's end is written or being written. The first one
-/// tells the cause; what fails after it follows from that.
+/// True if a record of this program's end is written or being written. Only the first failure is
+/// recorded, because later ones follow from it.
 static HAS_ENDED: AtomicBool = AtomicBool::new(false);
 /// CFSR: MMFAR holds the address of a forbidden access.
 const MMARVALID: u32 = 1 << 7;
@@ -39,11 +39,10 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(CrashKind::Panic, || CrashRecord::panic(file, line, ticks()))
 }
 
-/// Switches off without a stack, because the fault may be that there is none left. ARM's
-/// manual (DDI 0337, 5.12.1) has the handler run even where its frame could not be
-/// written. Then it continues on a fresh stack, which is the old one's memory: what the
-/// frame says is read before. The floating-point unit discards the registers
-/// that it still owes that frame.
+/// Switches off without a stack, because the stack may have overflowed. The handler runs even if
+/// its frame could not be written (ARM DDI 0337, 5.12.1). Then it continues on a fresh stack, which
+/// is the old one's memory: the frame's values are read before. The floating-point unit discards
+/// the registers that it has not stored in that frame yet.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".HardFault.hapterra")]
@@ -57,7 +56,7 @@ unsafe extern "C" fn HardFault() -> ! {
         "mov r2, sp",
         "movs r0, #0",
         "movs r1, #0",
-        "movw r3, #0xEF34", // FPCCR: nothing is owed.
+        "movw r3, #0xEF34", // FPCCR: no registers to store.
         "movt r3, #0xE000",
         "str r0, [r3]",
         "movw r3, #:lower16:_stack_end",
@@ -83,8 +82,8 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Continues after a hard fault at `pc`, called from about `lr` (both zero where no frame
-/// was left), with the stack pointer at `sp`.
+/// Continues after a hard fault at `pc`, called from about `lr` (both zero if no frame was stored),
+/// with the stack pointer at `sp`.
 extern "C" fn after_hard_fault(pc: u32, lr: u32, sp: u32) -> ! {
     // SAFETY: reads of status registers, which have no side effect.
     let (status, address) = unsafe { ((*SCB::PTR).cfsr.read(), (*SCB::PTR).mmfar.read()) };
@@ -110,7 +109,7 @@ pub(crate) fn count_tick() {
     TICKS.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The end of a program that met an exception or interrupt it cannot handle.
+/// Ends the program after an exception or interrupt that it cannot handle.
 #[inline(never)]
 pub(crate) fn unhandled(number: i16) -> ! {
     stop();
@@ -119,24 +118,24 @@ pub(crate) fn unhandled(number: i16) -> ! {
     })
 }
 
-/// The end of a program whose supply fell too low.
+/// Ends the program after its supply fell too low.
 pub(crate) fn supply_low() -> ! {
     stop();
     end(CrashKind::SupplyLow, || CrashRecord::supply_low(ticks()))
 }
 
-/// Amplifiers off before anything else, and no interrupt that could turn them
-/// on again.
+/// Switches the amplifiers off first, and then masks all interrupts that could switch them on
+/// again.
 fn stop() {
     amplifiers_off();
     cortex_m::interrupt::disable();
-    // Once more: the tick may have come in between.
+    // Again: a tick may have run in between.
     amplifiers_off();
 }
 
-/// Keeps the record, unless there is one of this program already, and resets the chip:
-/// before the watchdog runs nothing else would. A bare record comes first: to make the whole
-/// one takes code that may be what failed.
+/// Stores the record, unless this program has already stored one, and resets the chip: only the
+/// watchdog would run before. A minimal record is stored first, because the code that makes the
+/// full one may fail again.
 fn end(kind: CrashKind, record: impl FnOnce() -> CrashRecord) -> ! {
     if !HAS_ENDED.swap(true, Ordering::Relaxed) {
         keep(CrashRecord::bare(kind));
@@ -151,23 +150,22 @@ fn ticks() -> u32 {
 
 fn keep(record: CrashRecord) {
     let place = &raw mut RECORD;
-    // SAFETY: written here only: by `main` before any interrupt is enabled, and by a
-    // program that failed, which does nothing else any more.
+    // SAFETY: written here only: by `main` before any interrupt is enabled, and by a failed
+    // program, which runs no other code afterwards.
     unsafe { ptr::write_volatile(place.cast::<Bytes>(), *record.bytes()) };
     write_back(place as usize, CRASH_BYTES);
 }
 
-/// Takes what the program before this one left, once, before any interrupt is
-/// enabled.
+/// Takes the record of the program before this one, once, before any interrupt is enabled.
 pub(crate) fn take_record() -> Option<Crash> {
-    // SAFETY: nothing writes it now, and any bits are bytes. Its check sum says whether
-    // they are a record.
+    // SAFETY: nothing writes it now, and any bits are valid bytes. Its checksum shows if they are a
+    // record.
     let bytes = unsafe { ptr::read_volatile((&raw const RECORD).cast::<Bytes>()) };
     keep(CrashRecord::NONE);
     CrashRecord::read(&bytes)
 }
 
-/// Writes to the log how the program before this one ended.
+/// Logs how the program before this one ended.
 pub(crate) fn log(crash: Option<&Crash>) {
     if let Some(crash) = crash {
         defmt::error!(

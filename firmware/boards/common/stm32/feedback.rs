@@ -1,5 +1,5 @@
-//! Feedback of the amplifiers: a ready line of each, and a current monitor of each where
-//! they have one.
+//! Feedback of the amplifiers: a ready line of each, and a current monitor of each if they have
+//! one.
 
 use embassy_stm32::adc::{Adc, AnyAdcChannel};
 use embassy_stm32::gpio::Input;
@@ -12,15 +12,15 @@ use super::injected::Injected;
 use super::start::FULL_SCALE_A;
 use crate::chip::{SEQUENCE_US, sample_slowly};
 
-// What a tick starts is there in the next one, with a tenth of the period to spare.
+// Conversions that a tick starts end before the next one, with a margin of a tenth of the period.
 const _: () = assert!(SEQUENCE_US * TICK_HZ <= 900_000);
 
 /// The amplifiers' ready lines and current monitors, axes 1 to 3.
 pub(crate) struct Feedback {
-    /// Pulled down by an amplifier that is ready: high when one is not, and when its
-    /// wire is broken.
+    /// Pulled low by an amplifier that is ready: high if one is not ready, and if its wire is
+    /// broken.
     pub(crate) ready: [Input<'static>; 3],
-    /// Closed to ground where the monitors are wired.
+    /// Closed to ground if the monitors are wired.
     pub(crate) monitors_fitted: Input<'static>,
     pub(crate) monitors: Monitors,
 }
@@ -31,8 +31,8 @@ impl Feedback {
         self.ready.iter().any(Input::is_high)
     }
 
-    /// Currents in mA as of the tick before, where there are monitors; an error where the
-    /// conversions have not been made. Starts the next ones.
+    /// Returns the currents in mA as of the previous tick, if there are monitors, or an error if
+    /// the conversions have not ended. Starts the next ones.
     pub(crate) fn measure_ma(&self) -> Result<Option<[i16; 3]>, NotConverted> {
         let codes = self.monitors.read();
         if self.monitors_fitted.is_high() {
@@ -43,7 +43,7 @@ impl Feedback {
     }
 }
 
-/// The converter has not carried out the command of the tick before.
+/// Error: the converter has not completed the conversions of the previous tick.
 pub(crate) struct NotConverted;
 
 /// The sequence that reads the monitors.
@@ -51,7 +51,7 @@ const SEQUENCE: Injected = Injected(REGISTERS);
 
 /// The three monitors on ADC1.
 pub(crate) struct Monitors {
-    /// Keeps the converter as it was set up.
+    /// Keeps the converter's configuration.
     _adc: Adc<'static, ADC1>,
 }
 
@@ -68,7 +68,7 @@ impl Monitors {
         Self { _adc: adc }
     }
 
-    /// Takes the conversions since the last call, if all are complete; starts again.
+    /// Returns the conversions since the last call if all are complete, and starts the next ones.
     fn read(&self) -> Option<[u16; 3]> {
         let codes = SEQUENCE.read();
         SEQUENCE.start();

@@ -1,19 +1,19 @@
 //! Three conversions that one tick starts and the next tick reads: an injected sequence of a
-//! converter. embassy has no injected sequences for both chips, and in a tick nothing may wait
+//! converter. embassy does not support injected sequences on both chips, and a tick must not wait
 //! for a conversion.
 
 use embassy_stm32::pac::adc::Adc;
 
 use crate::chip::{DUMMY_CONVERSIONS, MONITOR_SHIFT};
 
-/// The injected sequence of a converter that embassy has set up.
+/// The injected sequence of a converter that embassy has configured.
 #[derive(Clone, Copy)]
 pub(crate) struct Injected(pub(crate) Adc);
 
 impl Injected {
-    /// Takes the three channels, in the order of their results. Starts nothing.
+    /// Configures the three channels, in the order of their results. Starts nothing.
     pub(crate) fn set_up(self, channels: [u8; 3]) {
-        // A sequence that the program starts, and no queue of them.
+        // The program starts each sequence; sequences are not queued.
         self.0.cfgr().modify(|w| w.set_jqdis(true));
         self.0.jsqr().write(|w| {
             w.set_jl((DUMMY_CONVERSIONS + 2) as u8);
@@ -30,8 +30,8 @@ impl Injected {
         self.0.cr().modify(|w| w.set_jadstart(true));
     }
 
-    /// Returns the 12-bit codes of the conversions that have ended since the last call; `None`
-    /// if they have not.
+    /// Returns the 12-bit codes of the conversions that have ended since the last call; `None` if
+    /// they have not ended.
     pub(crate) fn read(self) -> Option<[u16; 3]> {
         let is_done = self.0.isr().read().jeos();
         // Writing 1 clears the flag.

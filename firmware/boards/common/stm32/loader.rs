@@ -1,12 +1,12 @@
-//! The way into the USB loader in the chip's ROM: an update without a debug probe.
+//! The entry into the USB loader in the chip's ROM: an update without a debug probe.
 //!
-//! The loader wants the chip as a reset leaves it. So the program leaves a mark in RAM
-//! and resets the chip, and the next start continues to the loader before anything is set
-//! up. From the reset to the new program's own start no instruction of ours drives the
-//! enable pin: the pull-down outside holds the amplifiers off, as at every reset.
+//! The loader expects the chip in its reset state. So the program writes a mark to RAM and resets
+//! the chip, and the next start jumps to the loader before anything is configured. From the reset
+//! to the start of the new program, no instruction of this firmware drives the enable pin: the
+//! pull-down outside keeps the amplifiers off, as at every reset.
 //!
-//! The loader starts a program without a reset. Such a start resets the chip once more,
-//! so that a program always begins with the registers of a reset.
+//! The loader starts a program without a reset. Such a start resets the chip again, so that a
+//! program always begins with the registers of a reset.
 
 use core::arch::global_asm;
 use core::mem::MaybeUninit;
@@ -17,12 +17,12 @@ use cortex_m::peripheral::SCB;
 use crate::chip::{amplifiers_off, fill_memories, write_back};
 use crate::usb::{LOADER, USB_OSCILLATOR};
 
-/// Mark of a wanted loader, and its complement behind it. RAM that was
-/// without power holds both once in 2⁶⁴ starts; the loader would then wait, with the
-/// amplifiers off, for the next reset.
+/// Mark that requests the loader; its complement follows it. After a power-up, RAM contains both by
+/// chance once in 2⁶⁴ starts; the loader would then wait, with the amplifiers off, for the next
+/// reset.
 const WANTED: u32 = 0x6F4C_6164;
 
-/// Start-up code leaves this section as it is.
+/// Start-up code does not initialise this section.
 #[unsafe(link_section = ".uninit.loader")]
 static mut MARK: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
@@ -33,13 +33,13 @@ pub(crate) fn enter() -> ! {
     let mark = (&raw mut MARK).cast::<[u32; 2]>();
     // SAFETY: nothing else reads or writes it before the reset that follows.
     unsafe { ptr::write_volatile(mark, [WANTED, !WANTED]) };
-    // The reset forgets what only the data cache holds.
+    // A reset discards data that is only in the data cache.
     write_back(mark as usize, size_of::<[u32; 2]>());
     SCB::sys_reset()
 }
 
-// Decides where a start goes. The start-up code calls this before it initialises memory,
-// where no Rust may run. The mark holds for one start.
+// Selects the loader or the application at a start. The start-up code calls this before it
+// initialises memory, when Rust code must not run. The mark is valid for one start.
 global_asm!(
     ".section .text.hapterra_choose_program, \"ax\", %progbits",
     ".thumb",

@@ -1,7 +1,7 @@
-//! Common parts of the STM32 boards: everything but pins, clocks and outputs.
+//! Common parts of the STM32 boards: everything except pins, clocks and outputs.
 //!
-//! Each image names its pins and clocks in `chip.rs`, its outputs in `outputs.rs`, and
-//! how its flash is read in `flash.rs`; [`start`] assembles the application from them.
+//! Each image defines its pins and clocks in `chip.rs`, its outputs in `outputs.rs`, and the
+//! reading of its flash in `flash.rs`; [`start`] assembles the application from them.
 
 pub(crate) mod calibration_memory;
 pub(crate) mod clock;

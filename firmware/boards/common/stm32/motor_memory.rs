@@ -1,4 +1,4 @@
-//! The motors' temperatures in a RAM that survives a reset.
+//! The motors' temperatures in RAM that survives a reset.
 
 use core::mem::MaybeUninit;
 use core::ptr;
@@ -9,30 +9,30 @@ use hapterra_firmware::motor_memory::{self, Copies, Words};
 
 use crate::chip::write_back;
 
-/// A copy is a line of the data cache, so that it reaches the RAM as a whole.
+/// A copy is one line of the data cache, so that it is written to RAM as a whole.
 #[repr(C, align(32))]
 struct Lines(Copies);
 
-/// Start-up code leaves this section as it is.
+/// Start-up code does not initialise this section.
 #[unsafe(link_section = ".uninit.motors")]
 static mut COPIES: MaybeUninit<Lines> = MaybeUninit::uninit();
 
-/// Returns what the motors are to be taken for, once, before any interrupt is enabled.
+/// Returns the assumed temperatures of the motors. Called once, before any interrupt is enabled.
 pub(crate) fn begin(cause: ResetCause) -> Temperatures {
-    // SAFETY: nothing writes it now, and any bits are words. Their check sums say
-    // whether they are temperatures.
+    // SAFETY: nothing writes it now, and any bits are valid words. Their checksums show if they are
+    // temperatures.
     let found = unsafe { ptr::read_volatile((&raw const COPIES).cast::<Copies>()) };
     let (temperatures, copies) = motor_memory::begin(cause, &found);
     copies.into_iter().enumerate().for_each(keep);
     temperatures
 }
 
-/// Keeps a copy: called by [`begin`], and then by the haptic interrupt alone.
+/// Stores a copy. Called by [`begin`], and then by the haptic interrupt only.
 pub(crate) fn keep((copy, words): (usize, Words)) {
-    // There are two of them.
+    // There are two copies.
     let place = (&raw mut COPIES).cast::<Words>().wrapping_add(copy & 1);
-    // SAFETY: the place is one of the two copies. `begin` has ended before the
-    // interrupt is enabled, and the interrupt does not interrupt itself.
+    // SAFETY: the place is one of the two copies. `begin` ends before the interrupt is enabled, and
+    // the interrupt does not interrupt itself.
     unsafe { ptr::write_volatile(place, words) };
     write_back(place as usize, size_of::<Words>());
 }

@@ -10,18 +10,18 @@ use super::clock::TickTimer;
 /// The parts of a chip with outputs `O`, encoders `E`, a USB driver `U` and a watchdog
 /// `W`.
 pub(crate) struct Parts<O, E, U, W: PeripheralType + 'static> {
-    /// Off, and no current is commanded: the first thing that a start does, because after a
-    /// reset the power stages may still be on for the time that their enable input takes.
+    /// Off, without a current command. A start does this first, because after a reset the power
+    /// stages may stay on for the reaction time of their enable input.
     pub(crate) amplifiers: Off<O, Output<'static>>,
     pub(crate) encoders: E,
-    /// None where the flash is not set up as the memory map has it.
+    /// `None` if the flash is not configured as the memory map expects.
     pub(crate) flash: Option<Flash<'static, Blocking>>,
     pub(crate) timer: Peri<'static, TickTimer>,
     pub(crate) usb: U,
     pub(crate) watchdog: Peri<'static, W>,
     pub(crate) led: Output<'static>,
-    /// Changes its level in each tick that leaves the amplifiers on.
+    /// Toggles in each tick that leaves the amplifiers on.
     pub(crate) heartbeat: Output<'static>,
-    /// High for a while from each mark on.
+    /// High for a while after each mark.
     pub(crate) mark: Output<'static>,
 }

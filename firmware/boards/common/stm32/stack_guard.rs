@@ -1,27 +1,27 @@
 //! The guard at the stack's end.
 //!
-//! The stack begins at the first address of a RAM and grows down to it, so no variable lies
-//! where an overrun would write. Below that RAM, the memory protection unit forbids every
-//! access: an overrun is a hard fault at its first write, whatever is at those addresses.
+//! The stack grows down to the first address of a RAM, so an overrun cannot write to a variable.
+//! Below that RAM, the memory protection unit forbids every access: an overrun is a hard fault at
+//! its first write, whatever is at those addresses.
 
 use cortex_m::peripheral::MPU;
 
-/// First address that is forbidden. The chips' system memory ends below it.
+/// First forbidden address. The chips' system memory ends below it.
 const FIRST: u32 = 0x1FFF_8000;
-/// Bytes that are forbidden, up to the stack's end: more than any frame has, so that
-/// none reaches over them.
+/// Forbidden bytes, up to the stack's end: more than any frame has, so that no frame reaches over
+/// them.
 const BYTES: u32 = 32 * 1024;
-/// MPU_RBAR: takes the region's number, which is 0, from this register.
+/// MPU_RBAR: the region's number, 0, is in this register.
 const VALID: u32 = 1 << 4;
 /// MPU_RASR: no access at all, no code, `2 ^ (field + 1)` bytes, on.
 const NO_ACCESS: u32 = 1 << 28 | (BYTES.ilog2() - 1) << 1 | 1;
-/// MPU_CTRL: on, and what no region names is as without it. Handlers of hard faults run
-/// without it.
+/// MPU_CTRL: on, with the default map for addresses outside all regions. Handlers of hard faults
+/// run without the unit.
 const ON_OVER_DEFAULT: u32 = 1 << 2 | 1;
 
-/// Forbids what is below the stack.
+/// Forbids the addresses below the stack.
 pub(crate) fn set_up(mpu: &MPU) {
-    // SAFETY: nothing of the program lies in the region.
+    // SAFETY: no memory of the program is in the region.
     unsafe {
         mpu.rbar.write(FIRST | VALID);
         mpu.rasr.write(NO_ACCESS);

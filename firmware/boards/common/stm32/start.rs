@@ -1,5 +1,5 @@
-//! Starts a board: sets its parts up, assembles the application, and starts its tasks
-//! and then its tick.
+//! Starts a board: sets up its parts, assembles the application, and starts its tasks and then its
+//! tick.
 
 use defmt_rtt as _;
 use embassy_executor::Spawner;
@@ -21,18 +21,17 @@ use crate::application::{self, Loop, TICK_DONE};
 use crate::chip::{self, Clock};
 use crate::outputs::{BOARD, LATENCY_US};
 
-/// Current in amperes that the ends of an output's range stand for.
+/// Current in amperes at the ends of an output's range.
 pub(crate) const FULL_SCALE_A: f32 = 5.5;
-/// Time after which the watchdog resets the chip, microseconds, by an oscillator of 32 kHz.
-/// That oscillator has 29.4 to 34 kHz by the chips' data sheets, so it is 42 to 49 ms: less
-/// than the 50 ms that the documents say, and more than the 40 ms after which the tick
-/// switches off first.
+/// Time after which the watchdog resets the chip, microseconds, by an oscillator of 32 kHz. That
+/// oscillator has 29.4 to 34 kHz by the chips' data sheets, so the time is 42 to 49 ms: less than
+/// the 50 ms in the documentation, and more than the 40 ms after which the tick switches off.
 const WATCHDOG_US: u32 = 45_000;
 
 static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
     ConstStaticCell::new(DescriptorBuffers::EMPTY);
 
-/// Runs the haptic interrupt; `slot` is its own variable.
+/// Runs the haptic interrupt, which owns `slot`.
 pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
     if let Some((haptic_loop, drive)) = application::tick(slot) {
         heartbeat::beat(&drive);
@@ -40,12 +39,12 @@ pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
         if let Some(copy) = haptic_loop.motors_to_keep() {
             motor_memory::keep(copy);
         }
-        // Waking a task takes a critical section: an interrupt below does it.
+        // Waking a task needs a critical section, so an interrupt of lower priority does it.
         cortex_m::peripheral::NVIC::pend(Interrupt::TIM6_DAC);
     }
 }
 
-/// Raised by the haptic interrupt when a tick has ended; TIM6 itself is not used.
+/// Handles the interrupt that the haptic one raises at the end of a tick; TIM6 itself is not used.
 #[interrupt]
 fn TIM6_DAC() {
     failure::count_tick();
@@ -58,9 +57,9 @@ async fn main(spawner: Spawner) {
     stack_guard::set_up(&core.MPU);
     priorities::lower_all(&mut core);
     chip::prepare(&mut core);
-    // Outputs may wait for it.
+    // Outputs may wait by this counter.
     clock::count_cycles(&mut core);
-    // Commands no current, before anything that may take long.
+    // Commands no current, before any slow step.
     let parts = chip::take(embassy_stm32::init(chip::configuration()));
     let boot = BootReport {
         cause: chip::take_reset_cause(),
@@ -87,7 +86,7 @@ async fn main(spawner: Spawner) {
     let (link, monitor) = application::assemble(hardware, BOARD);
     link.offer_loader();
 
-    // The same that the link tells.
+    // The same number that the link reports.
     let serial_number = embassy_stm32::uid::uid_hex();
     let (usb, rx, tx) = device(parts.usb, serial_number, DESCRIPTORS.take());
     spawner.spawn(tasks::serve_usb(usb, monitor).expect("started once"));

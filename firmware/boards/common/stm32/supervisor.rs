@@ -14,15 +14,15 @@ use crate::chip::{self, WatchdogTimer};
 
 /// Interval of check-ins and of the supervisor, milliseconds.
 pub(super) const CHECK_MS: u32 = 10;
-/// Interval of measurements of the stack and the oscillator of USB, milliseconds.
+/// Interval of the measurements of the stack and of USB's oscillator, milliseconds.
 const MEASURE_MS: u32 = 1_000;
 
 /// Pattern of the LED: the link sets it, the supervisor shows it.
 pub(super) static LED: CriticalSectionMutex<Cell<LedPattern>> =
     CriticalSectionMutex::new(Cell::new(LedPattern::Disarmed));
 
-/// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
-/// pattern, for ever. Restores the settings for a halted core, which a debugger may have changed.
+/// Feeds the watchdog while all parts run, measures the stack, and shows the LED's pattern,
+/// forever. Restores the settings for a halted core, which a debugger may have changed.
 #[embassy_executor::task]
 pub(crate) async fn supervise(
     monitor: &'static Monitor,
@@ -39,7 +39,7 @@ pub(crate) async fn supervise(
         }
         if ms.is_multiple_of(MEASURE_MS) {
             monitor.measure_stack(stack::figures());
-            // Before the first second there may have been no host.
+            // In the first second a host may not be connected yet.
             let usb_clock = usb_clock::measure();
             if ms > 0 {
                 monitor.measure_usb_clock(usb_clock);

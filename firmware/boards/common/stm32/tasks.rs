@@ -20,14 +20,13 @@ use crate::application::TICK_DONE;
 use crate::chip::{UsbDriver, WINDOW};
 use crate::usb::EndpointHalts;
 
-/// Time for which the host has to fetch the answer before the board enters its loader.
+/// Time for the host to fetch the answer before the board enters its loader.
 const FAREWELL: Duration = Duration::from_millis(50);
 
-/// Board for the link's task. A real board keeps ticking whatever
-/// the link does.
+/// Board for the link's task. A real board continues to tick independently of the link.
 struct Board {
     memory: CalibrationMemory,
-    /// Since when the board is to enter its loader.
+    /// Time of the request to enter the loader.
     leaving: Cell<Option<Instant>>,
 }
 
@@ -52,7 +51,7 @@ impl LinkBoard for Board {
     }
 }
 
-/// Serves the link for ever.
+/// Serves the link forever.
 #[embassy_executor::task]
 pub(crate) async fn serve_link(
     link: &'static mut Link<'static, WINDOW>,
@@ -67,7 +66,7 @@ pub(crate) async fn serve_link(
     run(link, rx, tx, &board).await;
 }
 
-/// Runs the USB stack and what its interrupt has to do, for ever, and checks in for both.
+/// Runs the USB stack and the work of its interrupt, forever, and checks in for both.
 #[embassy_executor::task]
 pub(crate) async fn serve_usb(
     mut device: UsbDevice<'static, EndpointFilter<UsbDriver, EndpointHalts>>,
@@ -80,6 +79,6 @@ pub(crate) async fn serve_usb(
             ticker.next().await;
         }
     };
-    // What an interrupt tells comes before what the stack makes of it.
+    // The events of an interrupt are handled before the stack uses them.
     join3(usb_interrupt::serve(), device.run(), checking_in).await;
 }

@@ -1,12 +1,12 @@
-//! Check that the oscillator of USB follows the host's start-of-frames, as the chip's clock
-//! recovery tells it. Full speed allows 0.25 % of error; alone the oscillator has 1 % at 30 °C
-//! and 3.5 % over all temperatures, and only some hosts put up with that.
+//! Check that USB's oscillator follows the host's start-of-frames, as the chip's clock recovery
+//! reports. Full speed allows an error of 0.25 %. Without the recovery, the oscillator has 1 % at
+//! 30 °C and 3.5 % over all temperatures, which only some hosts tolerate.
 
 use embassy_stm32::pac::CRS;
 use hapterra_core::wire::status::UsbClock;
 
-/// Returns what has happened since the last call: locked if there was a start-of-frame and
-/// none that was missed or too far off.
+/// Returns the state since the last call: locked if a start-of-frame arrived and none was missed or
+/// too far off.
 pub(crate) fn measure() -> UsbClock {
     let found = CRS.isr().read();
     CRS.icr().write(|w| {

@@ -1,10 +1,10 @@
 //! USB's interrupt, whose work a task does.
 //!
-//! embassy's handlers check what they find with panics: an endpoint's number that the
-//! peripheral says, a packet longer than its buffer. No interrupt of ours is to reach a panic
-//! (`cargo xtask panics`), so the vector only closes its own line and wakes a task, which runs
-//! embassy's handler and opens the line again. A peripheral that waits answers NAK, as it does
-//! whenever a task is slow.
+//! embassy's handlers check their input with panics: an endpoint number that the peripheral
+//! reports, a packet longer than its buffer. No interrupt of this firmware may reach a panic
+//! (`cargo xtask panics`), so the vector only masks its own line and wakes a task, which runs
+//! embassy's handler and unmasks the line. Meanwhile the peripheral answers NAK, as with any slow
+//! task.
 
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt::typelevel::Handler;
@@ -13,7 +13,7 @@ use embassy_sync::signal::Signal;
 
 use crate::chip::{USB_INTERRUPT, UsbInterrupt, UsbWork};
 
-/// The line is closed, and the task has something to do.
+/// Raised when the line is masked and the task has work.
 static RAISED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Runs the interrupt's vector.
@@ -22,14 +22,14 @@ pub(crate) fn raised() {
     RAISED.signal(());
 }
 
-/// Does the work of each interrupt, for ever.
+/// Does the work of each interrupt, forever.
 pub(crate) async fn serve() {
     loop {
         RAISED.wait().await;
-        // SAFETY: the interrupt that this is the handler of cannot come while its line is
-        // closed, and no other task is in the driver while this one runs.
+        // SAFETY: this handler's interrupt cannot occur while its line is masked, and no other task
+        // uses the driver while this one runs.
         unsafe { <UsbWork as Handler<UsbInterrupt>>::on_interrupt() };
-        // SAFETY: critical sections hold it back as before, by its priority.
+        // SAFETY: critical sections mask it by its priority, as before.
         unsafe { NVIC::unmask(USB_INTERRUPT) };
     }
 }

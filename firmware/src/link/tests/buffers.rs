@@ -1,4 +1,4 @@
-//! The link's tile buffers, against a loop that is played by the test.
+//! The link's tile buffers, with a loop that the test simulates.
 
 use std::boxed::Box;
 use std::vec::Vec;
@@ -18,7 +18,7 @@ use crate::link::{DeviceState, KnownArm, Link};
 use crate::native::{FULL_SCALE_A, StoppedClock};
 use crate::queues::{LoopEnds, QueuedTick, SPARES};
 
-/// A link in a session, and the loop's ends of its queues.
+/// Returns a link in a session, and the loop's ends of its queues.
 pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     let tiles = Box::leak(Box::new(TileBuffers::<D>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));
@@ -45,7 +45,7 @@ pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     (link, loop_ends)
 }
 
-/// Polls the link and reads which tiles it asks for.
+/// Polls the link and returns the tiles that it requests.
 fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
     link.poll();
     let mut reader = FrameReader::<2048>::new();
@@ -96,7 +96,7 @@ fn at(column: i32) -> QueuedTick {
 fn no_more_tiles_are_asked_for_than_there_are_buffers() {
     let (mut link, mut loop_ends) = link();
     let mut total = 0;
-    // The loop sleeps: no buffer returns, wherever the HIP goes.
+    // The loop sleeps: no buffer returns, wherever the HIP moves.
     for column in 0..12 {
         assert!(loop_ends.records.enqueue(at(column)).is_ok());
         for key in asked(&mut link) {
@@ -107,7 +107,7 @@ fn no_more_tiles_are_asked_for_than_there_are_buffers() {
     assert_eq!(total, SPARES);
     let tiles = tiles_handed_over(&mut loop_ends);
     assert_eq!(tiles.len(), SPARES, "every answer found its buffer");
-    // It wakes: they return, and asking continues.
+    // The loop wakes: the buffers return, and requests continue.
     for tile in tiles {
         tile.vacate();
         assert!(loop_ends.spent.enqueue(tile).is_ok());

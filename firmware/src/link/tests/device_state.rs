@@ -1,4 +1,4 @@
-//! Arming, calibration and status, as a host sees them.
+//! Arming, calibration and status, as a host receives them.
 
 use hapterra_core::guard::{Blockers, Fault, Mode};
 use hapterra_core::phantom::{Bound, Calibration, CalibrationError, CalibrationField, Model};
@@ -76,7 +76,7 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
     assert_eq!(rig.report().and_then(|r| r.fault), Some(Fault::EncoderJump));
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
-    // Another one, or none, was seen: it stays.
+    // Another fault, or none, was seen: this one stays.
     for seen in [None, Some(Fault::Hardware)] {
         rig.ask(Request::ClearFault { seen });
         rig.run(30);
@@ -211,8 +211,8 @@ fn while_something_waits_for_a_press_time_does_not_stand_still() {
     assert!(rig.device.link.may_stand_still());
 }
 
-/// A record is not its own ceiling: each is refused by name when it is taken, and when
-/// it is found at the start.
+/// A record's limits do not justify its own values: each value is refused by name when the record
+/// is set and when it is found at the start.
 #[test]
 fn a_record_above_a_ceiling_is_refused_by_name_and_does_not_arm() {
     type Case = (fn(&mut Calibration), CalibrationField);

@@ -15,7 +15,7 @@ use hapterra_core::wire::version::VersionCheck;
 
 use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
 
-/// Returns the forces of a descent's points; nothing about ticks and costs.
+/// Returns the forces of a descent's points, without ticks and costs.
 fn forces(rendered: &[(u32, TickRecord)]) -> Vec<(u32, hapterra_core::Vec3)> {
     rendered.iter().map(|(seq, s)| (*seq, s.force_n)).collect()
 }
@@ -27,14 +27,14 @@ fn undisturbed() -> Vec<(u32, hapterra_core::Vec3)> {
 #[test]
 fn another_protocol_is_refused_in_words_that_every_version_knows() {
     let mut rig = Rig::new();
-    // A host of protocol 3 says its hello and continues in its own tongue.
+    // A host of protocol 3 sends its open message and continues in its own protocol.
     rig.send(&asked(3));
     rig.send(&[1, 7, 0, 0]);
     rig.run(3);
     assert_eq!(rig.heard, []);
     let refused = VersionCheck::Refused { protocol: PROTOCOL };
     assert_eq!(rig.refused, [refused]);
-    // A later one asks, too, whatever its hello is like.
+    // A later host also sends the query, whatever its open message is.
     rig.send(&asked(PROTOCOL + 1));
     rig.say(&ToDevice::Hello(HostHello {
         protocol: PROTOCOL + 1,
@@ -97,7 +97,7 @@ fn a_hello_that_is_repeated_changes_nothing() {
         next += telemetry.samples.len() as u32;
     }
     assert!(next > 250, "{next}");
-    // The request was done once before the hello and is known after it.
+    // The request was done once before the open message and is known after it.
     rig.number -= 1;
     rig.ask(Request::Disarm);
     rig.run(1);
@@ -116,7 +116,7 @@ fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
             first,
             &ToDevice::Hello(HostHello { number, ..HELLO }),
         ));
-        // Of what else it says nothing is answered.
+        // Its other messages are not answered.
         for message in [
             ToDevice::Heartbeat,
             ToDevice::Status { number },
@@ -155,7 +155,7 @@ fn a_host_that_was_let_go_is_told_so_and_one_that_has_left_is_not() {
     let end = SessionEnd::HostSilent;
     let told = (rig.session, ToHost::SessionClosed { number: 3, end });
     assert_eq!(over(&mut rig, 3), [told]);
-    // Goodbye is all that it wants to hear when it leaves.
+    // A leaving host needs only the answer to its close.
     rig.say(&ToDevice::Bye);
     assert_eq!(over(&mut rig, 4), []);
     rig.run(250);
@@ -175,7 +175,7 @@ fn a_request_is_done_once_however_often_it_comes() {
     let disarm = rig.number;
     rig.run(200);
     rig.arm();
-    // A double of what was asked before arrives late.
+    // A duplicate of an earlier request arrives late.
     let request = Request::Disarm;
     rig.say(&ToDevice::Request {
         number: disarm,
@@ -215,7 +215,7 @@ fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
     for _ in 0..6_900 {
         assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
     }
-    // A frame of this session, and it has its time again.
+    // A frame of this session restarts the host's time-out.
     rig.say(&ToDevice::Heartbeat);
     rig.run(1);
     let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
@@ -269,7 +269,7 @@ fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
         _ => '?',
     });
     assert_eq!(answers.collect::<std::string::String>(), "hsc".repeat(6));
-    // It asks for nothing, and the session before is the one that was left.
+    // It requests nothing, and the session before is the one that was left.
     rig.send(&framed(looker, &ToDevice::Bye));
     rig.heard.clear();
     rig.greet_anew();
@@ -310,7 +310,7 @@ fn a_host_that_speaks_is_not_let_go() {
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
 }
 
-/// The hello that a new host hears.
+/// Returns the answer that a new host receives to its open message.
 fn greeted(rig: &mut Rig) -> DeviceHello {
     rig.heard.clear();
     rig.greet_anew();
@@ -321,7 +321,7 @@ fn greeted(rig: &mut Rig) -> DeviceHello {
     }
 }
 
-/// A host that looks and detaches.
+/// Opens and detaches a session without any request.
 fn look(rig: &mut Rig, silence_s: u16) {
     rig.greet_anew();
     rig.say(&ToDevice::Hello(HostHello { silence_s, ..HELLO }));
@@ -343,8 +343,8 @@ fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
     look(&mut rig, 60);
     rig.run(500);
     assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
-    // Its own late hello does not open it again, and neither does the one before's, which
-    // is answered.
+    // Its own late open message does not open it again, and neither does that of the previous
+    // session, which is answered.
     rig.heard.clear();
     for session in [second, rig.session] {
         rig.send(&framed(session, &ToDevice::Hello(HELLO)));
@@ -450,7 +450,7 @@ fn goodbye_is_said_again_to_a_host_that_missed_it() {
         .collect();
     assert_eq!(goodbyes.len(), 3);
     assert!(goodbyes.windows(2).all(|pair| pair[0] == pair[1]));
-    // After that nothing of the session is heard.
+    // After that, no message of the session is handled.
     rig.ask(Request::Arm);
     rig.run(100);
     assert_eq!(rig.answers(|r| matches!(r, Request::Arm)).len(), 1);
@@ -520,7 +520,7 @@ fn duplicated_frames_change_nothing() {
         rig.run(600);
     }
     let mut rendered = rig.rendered();
-    // The second of each pair is answered, too, with the same words.
+    // The second of each pair is also answered, with the same content.
     assert!(rendered.len() >= 40);
     rendered.dedup();
     assert_eq!(forces(&rendered), undisturbed());
@@ -775,7 +775,7 @@ fn a_host_that_is_gone_has_no_arm_armed_and_no_record_stored() {
     rig.run(3_000);
     rig.press();
     assert_eq!(rig.device.link.to_store(), None);
-    // A host that is there may take its time.
+    // A host that is present may take its time.
     rig.ask(Request::Arm);
     for _ in 0..10 {
         rig.run(1_000);
@@ -816,7 +816,7 @@ fn nothing_is_armed_while_a_record_is_being_stored() {
     rig.ask(Request::StoreCalibration);
     rig.run(150);
     rig.sense.dead_man = true;
-    // The loop tells of the press, and the board has not come to store it.
+    // The loop reports the press, and the board has not stored the calibration yet.
     (0..100).for_each(|_| _ = rig.device.tick_alone(rig.sense));
     rig.device.link.poll();
     assert!(rig.device.link.to_store().is_some());

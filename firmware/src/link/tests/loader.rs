@@ -1,4 +1,4 @@
-//! The way into the loader in the chip's ROM.
+//! The entry into the loader in the chip's ROM.
 
 use hapterra_core::Vec3;
 use hapterra_core::guard::Mode;
@@ -32,7 +32,7 @@ fn an_armed_device_does_not_enter_its_loader() {
     rig.run(100);
     assert_eq!(rig.answers(TO_ENTER), [Err(Refusal::NotWhileArmed)]);
     assert!(!enters(&rig) && rig.device.tick(rig.sense).enabled);
-    // Nor while force goes out.
+    // Nor while there is force.
     rig.ask(Request::Disarm);
     rig.run(1);
     rig.ask(Request::EnterLoader);

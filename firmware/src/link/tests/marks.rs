@@ -1,4 +1,4 @@
-//! Marks: each request makes one pulse, and its answer names the tick.
+//! Marks: each request makes one pulse, and its answer contains the tick.
 
 use std::vec::Vec;
 
@@ -29,7 +29,7 @@ fn a_mark_is_answered_with_its_tick_when_its_pulse_is_over() {
     let before = latest_tick(&rig);
     let number = rig.asked.last().map_or(0, |(number, _)| number + 1);
     let request = Request::Mark;
-    // Asked for again and again, as a host does that hears no answer.
+    // Repeated, as by a host that receives no answer.
     for _ in 0..4 {
         rig.say(&ToDevice::Request { number, request });
         rig.run(1);
@@ -42,7 +42,7 @@ fn a_mark_is_answered_with_its_tick_when_its_pulse_is_over() {
     };
     assert_eq!(answered, number);
     assert!((before..before + 20).contains(&tick), "{before} {tick}");
-    // Asked for once more, it is answered again and marks no other tick.
+    // Repeated once more, it is answered again and marks no other tick.
     rig.say(&ToDevice::Request { number, request });
     rig.run(40);
     assert_eq!(marked(&rig), [(number, tick); 2]);

@@ -32,7 +32,7 @@ fn scene_of(table: &MaterialTable, epoch: u32) -> Scene {
     }
 }
 
-/// Sends a scene with its table; whether that was taken.
+/// Sends a scene with its table and returns true if it was accepted.
 fn sends(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
     let mut room = [0; MAX_TABLE_BYTES];
     let table = table_bytes(table, &mut room);
@@ -41,7 +41,7 @@ fn sends(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
     is_taken(rig, scene.epoch)
 }
 
-/// The last answer to a scene.
+/// Returns true if the last answer, which is to scene `epoch`, accepts it.
 fn is_taken(rig: &Rig, epoch: u32) -> bool {
     let answer = |message: &ToHost| match message {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
@@ -60,7 +60,7 @@ fn greeted() -> Rig {
     rig
 }
 
-/// A flat tile at height 1.5.
+/// Returns a flat tile at height 1.5.
 fn flat<'t>(epoch: u32, key: TileKey) -> TileMessage<'t> {
     TileMessage {
         epoch,
@@ -80,7 +80,7 @@ fn answers(rig: &mut Rig, epoch: u32, materials: TileMaterials<'_>) {
     rig.run(4);
 }
 
-/// The force in N, half a cell deep in the plane: half of the stiffness.
+/// Returns the force in N, half a cell deep in the plane: half of the stiffness.
 fn rendered(rig: &mut Rig) -> f32 {
     let from = rig.rendered().last().map_or(0, |(seq, _)| seq + 1);
     for (seq, z) in [(from, 2.0), (from + 1, 1.0)] {
@@ -101,10 +101,10 @@ fn tile_is_rendered_with_its_own_material() {
     assert!(sends(&mut rig, scene_of(&table, 9), &table));
     answers(&mut rig, 9, TileMaterials::One(2));
     assert_eq!(rig.status().bad_frames, 0);
-    // The scene is a quarter stiffer than the table's default, and so is all of it.
+    // The scene is a quarter stiffer than the table's default, and so are all materials.
     let force = rendered(&mut rig);
     assert!((force - 0.5 * 0.8 * 0.5 / 0.4).abs() < 1e-6, "{force}");
-    // Said again, because the answer was lost: what is held stays.
+    // Repeated, because the answer was lost: the stored table stays.
     rig.heard.clear();
     assert!(sends(&mut rig, scene_of(&table, 9), &table));
     rig.run(300);
@@ -128,10 +128,10 @@ fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
     }
     rig.run(4);
     assert_eq!(rig.status().bad_frames, 4);
-    // Each buffer is there again.
+    // All buffers are available again.
     answers(&mut rig, 9, TileMaterials::One(1));
     assert_eq!(rendered(&mut rig), 0.5);
-    // And without materials a tile has none.
+    // Without materials in the scene, a tile has none.
     let plain = scene(Source::Points);
     rig.heard.clear();
     rig.say(&ToDevice::Scene(plain));
@@ -164,7 +164,7 @@ fn a_scene_is_refused_whose_table_did_not_come_or_is_none() {
     }
     assert_eq!(rig.status().device.epoch, None);
     assert!(sends(&mut rig, alone, &known));
-    // Its table is here by now.
+    // Its table has arrived by now.
     rig.say(&ToDevice::Scene(scene_of(&known, 10)));
     rig.run(1);
     assert!(is_taken(&rig, 10));

@@ -26,7 +26,7 @@ use crate::store::Stored;
 /// Tiles along the window's side in these tests.
 pub(super) const D: usize = 4;
 
-/// First message of a host of this protocol.
+/// Open message of a host of this protocol.
 pub(super) const HELLO: HostHello = HostHello {
     protocol: PROTOCOL,
     number: 1,
@@ -35,7 +35,7 @@ pub(super) const HELLO: HostHello = HostHello {
 /// The rig's first session.
 pub(super) const FIRST: SessionNumber = SessionNumber::new(1 << 8);
 
-/// A device without a host. Its memory is leaked, as a board's is never freed.
+/// Creates a device without a host. Its memory is leaked, as a board's is never freed.
 pub(super) fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D> {
     Device::new(
         Box::leak(Box::new(TileBuffers::VACANT)),
@@ -46,7 +46,7 @@ pub(super) fn device(stored: Stored, boot: BootReport) -> Device<StoppedClock, D
     )
 }
 
-/// A scene whose terrain is the plane at height 1.5.
+/// Returns a scene whose terrain is the plane at height 1.5.
 pub(super) fn scene(source: Source) -> Scene {
     Scene {
         epoch: 7,
@@ -63,24 +63,24 @@ pub(super) fn scene(source: Source) -> Scene {
     }
 }
 
-/// A frame of a session.
+/// Returns a frame of a session.
 pub(super) fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
     let framed = InSession { session, message };
     encode(&framed, &mut [0; MAX_FRAME]).unwrap().to_vec()
 }
 
-/// A frame of the first session.
+/// Returns a frame of the first session.
 pub(super) fn frame(message: &ToDevice<'_>) -> Vec<u8> {
     framed(FIRST, message)
 }
 
-/// Returns a host's query whether the device speaks its protocol.
+/// Returns a host's query for the device's protocol.
 pub(super) fn asked(protocol: u16) -> Vec<u8> {
     let asked = VersionCheck::Asked { protocol };
     encode(&asked, &mut [0; 16]).unwrap().to_vec()
 }
 
-/// A tile of the plane at height 1.5, with every sample sent, in the first session.
+/// Returns a tile of the plane at height 1.5, with every sample sent, in the first session.
 pub(super) fn tile(epoch: u32, key: TileKey) -> Vec<u8> {
     tile_in(FIRST, epoch, key)
 }
@@ -99,7 +99,7 @@ fn tile_in(session: SessionNumber, epoch: u32, key: TileKey) -> Vec<u8> {
     framed(session, &ToDevice::Tile(message))
 }
 
-/// A point in the first session.
+/// Returns a point in the first session.
 pub(super) fn point(seq: u32, x: f32, z: f32) -> Vec<u8> {
     point_in(FIRST, seq, x, z)
 }
@@ -113,24 +113,24 @@ fn point_in(session: SessionNumber, seq: u32, x: f32, z: f32) -> Vec<u8> {
 pub(super) struct Rig {
     pub(super) device: Device<StoppedClock, D>,
     reader: Box<FrameReader<8192>>,
-    /// Bytes to the device that it has not taken yet.
+    /// Bytes to the device that it has not read yet.
     pub(super) on_the_way: VecDeque<u8>,
-    /// Bytes the writer takes a step; `usize::MAX` for a fast one.
+    /// Bytes that the writer takes in a step; `usize::MAX` for a fast one.
     pub(super) writer: usize,
     pub(super) heard: Vec<ToHost>,
-    /// The session of a host that only looks, and what that has heard.
+    /// The session of a host that only reads, if there is one.
     pub(super) looker: Option<SessionNumber>,
     pub(super) looked_at: Vec<ToHost>,
-    /// Messages to the hosts of sessions before.
+    /// Messages to the hosts of earlier sessions.
     pub(super) heard_before: Vec<(SessionNumber, ToHost)>,
-    /// The session that is spoken in, and the number of its last request.
+    /// The current session, and the number of its last request.
     pub(super) session: SessionNumber,
     pub(super) number: u8,
-    /// Requests by the number that they were given.
+    /// Requests with their numbers.
     pub(super) asked: Vec<(u8, Request)>,
-    /// Refusals heard.
+    /// Refusals received.
     pub(super) refused: Vec<VersionCheck>,
-    /// True if tiles asked for are answered.
+    /// True if requests for tiles are answered.
     pub(super) answers_tiles: bool,
     /// Damage of the answer with a tile.
     pub(super) damage: fn(&mut Vec<u8>),
@@ -138,13 +138,13 @@ pub(super) struct Rig {
 }
 
 impl Rig {
-    /// A host that has not sent anything yet.
+    /// Creates a host that has not sent anything yet.
     pub(super) fn new() -> Self {
         let stored = Stored::Found(Calibration::PREMIUM_1_5);
         Self::started(stored, BootReport::default())
     }
 
-    /// The same, with a device that started like this.
+    /// Creates a host with a device that started with this memory and boot report.
     pub(super) fn started(stored: Stored, boot: BootReport) -> Self {
         Self {
             device: device(stored, boot),
@@ -165,7 +165,7 @@ impl Rig {
         }
     }
 
-    /// A session in this scene.
+    /// Opens a session in this scene.
     pub(super) fn in_scene(scene: Scene) -> Self {
         let mut rig = Self::asking(scene);
         rig.answers_tiles = true;
@@ -175,7 +175,7 @@ impl Rig {
         rig
     }
 
-    /// A session in this scene, its first tiles asked for and not answered.
+    /// Opens a session in this scene whose first tiles are requested but not answered.
     pub(super) fn asking(scene: Scene) -> Self {
         let mut rig = Self::new();
         rig.answers_tiles = false;
@@ -186,7 +186,7 @@ impl Rig {
         rig
     }
 
-    /// A session in a scene that is touched by the arm, armed.
+    /// Opens a session in a scene that the arm touches, and arms.
     pub(super) fn armed() -> Self {
         let mut rig = Self::in_scene(scene(Source::Encoders));
         rig.arm();
@@ -204,7 +204,7 @@ impl Rig {
         assert_eq!(self.report().map(|r| r.mode), Some(Mode::Armed));
     }
 
-    /// Presses the dead-man switch for a moment, and lets it go.
+    /// Presses the dead-man switch briefly and releases it.
     pub(super) fn press(&mut self) {
         for dead_man in [false, true, false] {
             self.sense.dead_man = dead_man;
@@ -235,7 +235,7 @@ impl Rig {
         self.on_the_way.extend(bytes);
     }
 
-    /// So many ticks, in lock-step where the device wants it.
+    /// Runs `ticks` ticks, in lock-step if the device requires it.
     pub(super) fn run(&mut self, ticks: u32) {
         for _ in 0..ticks {
             self.deliver();
@@ -247,8 +247,8 @@ impl Rig {
         }
     }
 
-    /// Ends the session and reads on while there is something to read. No more
-    /// ticks: the program may be about to end.
+    /// Closes the session and reads while there are messages. No more ticks: the program may be
+    /// about to end.
     pub(super) fn say_goodbye(&mut self) {
         self.say(&ToDevice::Bye);
         self.deliver();
@@ -263,7 +263,7 @@ impl Rig {
         self.on_the_way.drain(..taken);
     }
 
-    /// Reads what the device has to say and answers requests for tiles.
+    /// Reads the device's messages and answers requests for tiles.
     fn listen(&mut self) {
         let mut left = self.writer;
         let mut chunk = [0; 64];
@@ -343,7 +343,7 @@ impl Rig {
         self.heard.iter().rev().find_map(guard)
     }
 
-    /// All answers to a kind of request.
+    /// Returns all answers to a kind of request.
     pub(super) fn answers(&self, to: fn(&Request) -> bool) -> Vec<Result<(), Refusal>> {
         let answer = |m: &ToHost| match m {
             ToHost::Answer(Answer { number, result }) => {
@@ -355,7 +355,7 @@ impl Rig {
         self.heard.iter().filter_map(answer).collect()
     }
 
-    /// Asks for the status.
+    /// Requests the status.
     pub(super) fn status(&mut self) -> Status {
         self.say(&ToDevice::Status { number: 0 });
         self.run(1);
@@ -366,7 +366,8 @@ impl Rig {
         self.heard.iter().rev().find_map(status).expect("answered")
     }
 
-    /// Points from above down into the plane, sent one by one, each after the answer to the one before.
+    /// Sends points from above down into the plane, one by one, each after the answer to the one
+    /// before.
     pub(super) fn descend(&mut self, points: u32) -> Vec<(u32, TickRecord)> {
         for seq in 0..points {
             let (x, z) = (seq as f32 * 0.9, 4.0 - seq as f32 * 0.1);

@@ -35,7 +35,7 @@ impl Read for Sent {
     }
 }
 
-/// The way to a host that does not read.
+/// The transport to a host that does not read.
 struct Stuck;
 
 impl ErrorType for Stuck {
@@ -52,7 +52,7 @@ impl Write for Stuck {
     }
 }
 
-/// Ticks that have ended and were not waited for, and looks at the link.
+/// Ticks that have ended and were not waited for, and polls of the link.
 #[derive(Default)]
 struct Board {
     ticks: Cell<u32>,

@@ -1,4 +1,4 @@
-//! Other views of a scene, put in while the clutch is open.
+//! Changes of a scene's placement while the clutch is open.
 
 use std::vec::Vec;
 
@@ -26,14 +26,14 @@ fn view(number: u8, hip: GridPoint) -> SceneChange {
     }
 }
 
-/// The latest reported sample.
+/// Returns the latest reported sample.
 fn latest(rig: &Rig) -> TickRecord {
     let told = rig.telemetry();
     let last = told.last().and_then(|telemetry| telemetry.samples.last());
     *last.expect("samples")
 }
 
-/// Returns the outcomes of scene changes, in the order of the answers, from the first on.
+/// Returns the outcomes of scene changes, in the order of the answers, from the first.
 fn taken(rig: &Rig) -> Vec<(u32, bool)> {
     let answer = |message: &ToHost| match message {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
@@ -64,7 +64,7 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     assert_eq!(taken(&rig), [(1_001, true)]);
     assert!(!rig.needs().is_empty(), "its own tiles are asked for");
     assert_eq!((latest(&rig).view, latest(&rig).mode), (1, Mode::Armed));
-    // Said again, because the answer was lost.
+    // Repeated, because the answer was lost.
     rig.say(&ToDevice::SceneChange(wanted));
     rig.run(10);
     assert_eq!(taken(&rig), [(1_001, true); 2]);
@@ -76,12 +76,12 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     assert_eq!((sample.view, sample.mode), (1, Mode::Armed));
     assert_eq!(sample.limits, Limits::empty());
     assert_eq!(rig.status().device.epoch, Some(1_001));
-    // Said once more, late: it is in force, and nothing is done.
+    // Repeated once more, late: it is already active, and nothing is done.
     rig.say(&ToDevice::SceneChange(wanted));
     rig.run(10);
     assert_eq!(taken(&rig), [(1_001, true); 3]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
-    // One from before, late.
+    // An earlier one, late.
     rig.say(&ToDevice::SceneChange(view(0, sample.hip)));
     rig.say(&ToDevice::SceneChange(view(200, sample.hip)));
     rig.run(10);
@@ -97,7 +97,7 @@ fn placement_during_contact_is_refused() {
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
-    // The clutch was held, and is let go: that is no better.
+    // The clutch was held and then released: this is no better.
     let mut rig = with_an_open_clutch();
     rig.ask(Request::Clutch {
         hold: ClutchHold::LetGo,
@@ -106,7 +106,7 @@ fn placement_during_contact_is_refused() {
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
-    // It is held, and has yet to open.
+    // It is held, and has not opened yet.
     let mut rig = Rig::armed();
     rig.ask(Request::Clutch {
         hold: ClutchHold::InPlace,
@@ -116,13 +116,13 @@ fn placement_during_contact_is_refused() {
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
-    // It is open, but the loop's last report is of the placement before.
+    // It is open, but the loop's last report is from the previous placement.
     let mut rig = with_an_open_clutch();
     rig.say(&ToDevice::SceneChange(view(1, before.hip)));
     rig.say(&ToDevice::SceneChange(view(2, before.hip)));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, true), (1_002, false)]);
-    // Nor is a replay put in like this.
+    // Nor can a replay be changed like this.
     let mut rig = with_an_open_clutch();
     let mut points = view(1, before.hip);
     points.scene.source = Source::Points;
