@@ -254,8 +254,7 @@ fn largest_jump(answers: &[Answer]) -> f64 {
     changes.fold(0.0, f64::max)
 }
 
-/// Returns the share of missed ticks. The first HIP is above the surface, so any later one below it
-/// should be rendered.
+/// Returns the share of missed ticks: any HIP below the surface, after the first, has a force.
 fn missed(grid: &Grid, path: &Path, answers: &[Answer]) -> f64 {
     let below = path.hips.iter().zip(answers).filter(|(hip, _)| {
         let [x, y, z] = hip.wide;

@@ -109,8 +109,7 @@ fn own(command: &Command) -> Vec<&Arg> {
     arguments.filter(is_own).collect()
 }
 
-/// Appends a command's arguments and options. Those of several commands are named, and explained
-/// elsewhere.
+/// Appends a command's arguments and options. Those of several commands are only named.
 fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTreeSet<String>) {
     let _ = write!(
         page,

@@ -1,7 +1,6 @@
 //! The cost of a ball's tiles, as a table: `cargo run -p hapterra-tests --example tip >
-//! docs/tip.csv`. Radii from half a cell to 8 cells, over a city with walls or synthetic ground,
-//! compared with the tiles that a link of 1,000 kB/s carries in a second
-//! (docs/explanation/tiles-and-levels.md).
+//! docs/tip.csv`. Radii from half a cell to 8 cells, over a city with walls or synthetic ground; a
+//! link of 1,000 kB/s is the reference (docs/explanation/tiles-and-levels.md).
 
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{HapticCells, HapticGrid, Terrain, TileBuffer};
@@ -41,8 +40,7 @@ fn processor_s() -> f64 {
     ran_ns.expect("a number") * 1e-9
 }
 
-/// Returns the mean bytes of the heights of tiles from the middle on, and the tiles made in a
-/// second of processor time.
+/// Returns the mean bytes of the tiles' heights, and the tiles made in a second of processor time.
 fn made_tiles(terrain: &Terrain<'_>) -> (f64, f64) {
     let mut buffer = TileBuffer::default();
     let first = terrain.size().map(|cells| cells / 64);

@@ -122,8 +122,7 @@ fn look_up(source: &str, root: &Path) -> Result<f64, String> {
     value.parse().map_err(|_| format!("{value:?} is no number"))
 }
 
-/// Returns true if a figure equals `value` to its number of digits, or `None` if it is not a
-/// figure.
+/// Returns true if a figure equals `value` to its digits, or `None` if it is not a figure.
 fn is_rounded(shown: &str, value: f64) -> Option<bool> {
     let shown = shown.replace(',', "");
     let (mantissa, exponent) = shown.split_once('e').unwrap_or((&shown, "0"));

@@ -101,8 +101,7 @@ pub struct Counted {
     pub converged: bool,
     /// Work units.
     pub work: u32,
-    /// For the contact: displacement in cells. For encoder counts or on materials: force in
-    /// newtons.
+    /// Displacement in cells; for encoder counts or on materials, force in newtons.
     pub vector: Vec3,
     /// The proxy.
     pub proxy: GridPoint,

@@ -79,8 +79,7 @@ pub fn floats_in_a_strip([columns, rows]: [u32; 2], place: u32) -> Directory {
     ]
 }
 
-/// Returns the tags that place an image in a zone of UTM, with its first sample's outer corner at
-/// `corner`.
+/// Returns the tags that place an image in a UTM zone, its first sample's outer corner at `corner`.
 pub fn placed(corner: [f64; 2], cell: f64, zone: u16) -> Directory {
     let keys = vec![1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, zone];
     vec![

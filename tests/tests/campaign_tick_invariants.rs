@@ -23,8 +23,7 @@ struct Tick {
 }
 
 impl Tick {
-    /// Returns a tick in which the motors make this force with the levers of `POSE`, reported and
-    /// true.
+    /// Returns a tick in which the motors make this force with the true levers of `POSE`.
     fn pushing(force_n: [f64; 3]) -> Self {
         let model = PhantomModel::premium_1_5();
         let counts = counts(&model, POSE);

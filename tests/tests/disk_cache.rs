@@ -54,8 +54,7 @@ fn heights(raster: &Raster, level: u8) -> Vec<u64> {
     all
 }
 
-/// Returns the heights read with this cache, and the number of blocks read besides opening the
-/// file.
+/// Returns the heights with this cache, and the blocks read besides opening the file.
 fn look(path: &Path, cache: &DiskCache) -> (Vec<u64>, u64) {
     let raster = open(path, cache);
     let before = raster.blocks_read();

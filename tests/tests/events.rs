@@ -373,8 +373,7 @@ fn demo_tells_samples_marks_and_refusals() {
     assert_eq!(kind("end")[0]["disarmed"], true);
 }
 
-/// The program that sends commands is gone, and has left more commands than a device can still
-/// execute.
+/// The program that sends commands is gone, and has left more than a device can still execute.
 #[test]
 fn run_ends_disarmed_when_its_input_ends() {
     let folder = tempfile::tempdir().expect("a folder");

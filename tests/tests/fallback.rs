@@ -92,8 +92,7 @@ impl<'t> Slide<'t> {
         }
     }
 
-    /// Returns the samples of a slide over a line of this rate, and the client, with its session
-    /// open.
+    /// Returns the samples of a slide over a line of this rate, and the client, still open.
     fn rendered(
         &self,
         scene: Scene,

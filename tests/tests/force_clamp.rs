@@ -16,8 +16,7 @@ const MIDDLE: f64 = 2_048.0;
 const SPAN: f64 = 1_792.0;
 const FULL_SCALE_A: f32 = 5.5;
 
-/// Returns poses between the stops, six degrees apart. A turn of joint 1 turns everything, so it is
-/// left out.
+/// Returns poses between the stops, six degrees apart, for one angle of joint 1, which turns all.
 fn poses(record: &Calibration) -> Vec<Vec3> {
     let step = |i: i32| (6.0 * i as f32).to_radians();
     let all = (-25..=40).flat_map(|i| (-25..=40).map(move |j| Vec3::new(0.0, step(i), step(j))));

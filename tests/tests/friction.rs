@@ -23,9 +23,8 @@ fn params(friction: Friction) -> SurfaceParams {
 /// Distance from which a proxy counts as caught, mm.
 const CAUGHT_MM: f64 = 20.0;
 
-/// Returns the samples of a HIP that slides around the middle of a terrain on an ellipse, `depth`
-/// mm deep, at `speed` mm a tick. A hand whose proxy is caught at the edge of no-data lifts for a
-/// tick.
+/// Returns the samples of a HIP that slides on an ellipse around the middle of a terrain, `depth`
+/// mm deep, at `speed` mm a tick. A hand caught at the edge of no-data lifts for a tick.
 fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
     let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
@@ -251,8 +250,7 @@ fn a_live_tick_ends_where_friction_holds() {
 }
 
 /// Checks that at 1 kHz all ticks but two in 1,000 converge, at 10 kHz all but eight. The others
-/// release a proxy from a concave edge: it moves over tens of cells, in as many ticks as its work
-/// takes.
+/// release a proxy from a concave edge: it moves over tens of cells in several ticks.
 fn all_end(name: &str, height: &dyn Fn(f64, f64) -> Option<f64>, frictions: [Friction; 2]) {
     for friction in frictions {
         for cell_mm in CELLS_MM {

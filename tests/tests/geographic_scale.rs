@@ -112,8 +112,7 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
             force[1 - axis].abs() < 1e-3 * force[2],
             "{slope:?}: {rendered:?}"
         );
-        // The slope is 45° in millimetres, so the proxy is half way between the plane's points above
-        // and beside the HIP.
+        // At 45° the proxy is half way between the plane's points above and beside the HIP.
         assert!((proxy[axis] - 25.0).abs() < 0.05, "{slope:?}: {rendered:?}");
         assert!((proxy[2] - 25.0).abs() < 0.05, "{slope:?}: {rendered:?}");
     }

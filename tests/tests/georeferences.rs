@@ -121,8 +121,7 @@ fn compare(raster: &Raster, row: &Row, reader: Reader) {
     if !has_lost_code {
         return assert_same(raster.bounds_lonlat(), degrees, file);
     }
-    // Without the code, the transformation to WGS 84 is that of the datum's name: usually within 45
-    // m.
+    // Without the code, the shift to WGS 84 is that of the datum's name: usually within 45 m.
     let found = sides(raster.bounds_lonlat().expect("a known projection"));
     for (found, wanted) in found.iter().zip(degrees) {
         assert!((found - wanted).abs() * 110_000.0 < 45.0, "{file}: {found}");

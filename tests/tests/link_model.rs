@@ -147,8 +147,7 @@ fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
     };
     let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
     for harm in HARMS {
-        // The last frames in each direction: the close, its confirmation, and the frames around
-        // them.
+        // The last frames in each direction: the close, its confirmation, and others around them.
         for (way, count) in [Direction::ToDevice, Direction::ToHost]
             .into_iter()
             .zip(frames)

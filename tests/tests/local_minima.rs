@@ -27,8 +27,7 @@ struct Found {
     disputed: Vec<usize>,
     /// Contacts that began.
     began: u64,
-    /// Those of `began` that are farther from the HIP than the first point of its path below
-    /// ground.
+    /// Those of `began` farther from the HIP than the first point of its path below ground.
     late: Vec<usize>,
     /// Free paths that are below ground somewhere: around or over an obstacle.
     dipped: u64,

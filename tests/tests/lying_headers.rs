@@ -254,8 +254,7 @@ fn a_tile_that_says_it_is_huge_takes_no_memory() {
         let image = with(image, 324, Values::Longs(places));
         with(image, 259, Values::Longs(vec![compression]))
     };
-    // The other tiles are not valid streams, so they are no-data as well; the result is a file
-    // without heights.
+    // The other tiles are not such streams, so they are no-data: the file has no heights.
     let bomb = zstd_bomb(1 << 15);
     let all = [data(), bomb.clone()].concat();
     let place = DATA + data().len() as u32;

@@ -73,8 +73,7 @@ fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Checks that every sample of levels 0 to 6 of both is the same. Returns the number of heights
-/// among them.
+/// Checks that all samples of levels 0 to 6 are equal. Returns the number of heights among them.
 fn assert_same(many: &Raster, one: &Raster) -> usize {
     assert_eq!((many.columns(), many.rows()), (one.columns(), one.rows()));
     let mut rows = [(); 2].map(|()| vec![0.0; one.columns() as usize]);

@@ -201,8 +201,7 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     assert_eq!(found(&[from(13.0), slid]), [Invariant::Cone]);
 }
 
-/// A height is exact only to the last place of the corners it is interpolated from, and so is the
-/// pull.
+/// A height, and so the pull, is exact only to the last place of the corners it is made from.
 #[test]
 fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
     // Level in the middle of the patch (10, 10) for any corner heights.

@@ -187,8 +187,7 @@ fn judge(samples: &[TickRecord], most_n: f32) {
     judge_press(samples, most_n, 1.03);
 }
 
-/// Same as `judge`, with `most_times` the force at the start as the limit while the hand is pushed
-/// back.
+/// Same as `judge`, with a limit of `most_times` the first force while the hand is pushed back.
 fn judge_press(samples: &[TickRecord], most_n: f32, most_times: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];

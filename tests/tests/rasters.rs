@@ -348,8 +348,7 @@ fn a_large_file_is_held_once_in_its_own_type() {
     );
 }
 
-/// Checks for the same tiles at each level, in a file whose coarse levels are subsets of its
-/// samples.
+/// Checks for the same tiles at each level, if coarse levels are subsets of the file's samples.
 fn same_tiles(held: &Raster, blocks: &Raster) {
     let scale = Scale::new(1.0, 0.01).expect("a scale");
     for level in 0..3 {

@@ -99,8 +99,7 @@ fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     lines.into_inner()
 }
 
-/// Returns the rows of a recording without the ticks' costs, which depend on the machine, and its
-/// settings.
+/// Returns the settings and rows of a recording, without the ticks' costs on this machine.
 fn rendered(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
     let text = std::fs::read_to_string(path).expect("a recording");
     let (settings, rows): (Vec<&str>, Vec<&str>) =
@@ -417,8 +416,7 @@ fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     let read_by = |devices: usize| {
         let mut command = Command::new(hapterra_binary());
         command.args(["run", path, "--input", "in-memory=1MB", "--duration", "8s"]);
-        // Otherwise the second run would read the first run's disk cache of a file that is two
-        // seconds old.
+        // Otherwise the second run would read the first run's cache of a file two seconds old.
         command.args(["--cache", "off"]);
         for _ in 0..devices {
             command.args(["--device", "native"]);

@@ -16,7 +16,7 @@ const ROUND: f64 = 300.0;
 /// Distance of two HIPs in tests with many rounds, cells.
 const LONG_STEP: f64 = 0.03;
 
-/// Most energy that a shaded round gives, mJ, at a constant depth of 0.3 mm
+/// Most energy of a shaded round, mJ, at a constant depth of 0.3 mm
 /// (`docs/explanation/effects.md`).
 const MAX_EVEN_MJ: f64 = 0.06;
 /// The same at depths from 0.5 to 1.5 mm.
@@ -122,8 +122,7 @@ fn on_real_ground_the_force_turns_a_tenth_as_fast() {
     }
 }
 
-/// Runs rounds in both directions around five centres: energy gained in one direction is lost in
-/// the other.
+/// Runs rounds in both directions around five centres: a gain in one is a loss in the other.
 fn given_by_rounds(terrain: &Terrain<'_>, depth: &dyn Fn(f64) -> f64) -> Vec<f64> {
     let margins_mm = ROUND / std::f64::consts::TAU + 2.0;
     let has_room = |middle: &[f64; 2]| {

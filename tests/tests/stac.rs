@@ -1,5 +1,4 @@
-//! A STAC as one terrain: its items, read by GDAL, and the command for items that GDAL does not
-//! read.
+//! A STAC as one terrain: items that GDAL reads, and the command for items that it does not read.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -82,8 +82,7 @@ fn terrains(raster: &Raster, scale: Scale, radius: f64) -> [Terrain<'_>; 2] {
     [ball, grid].map(|grid| Terrain::over(grid, scale, 0).expect("terrain"))
 }
 
-/// Raises a path over a terrain so that the ball's centre is as high over its own terrain as the
-/// point is over the ground.
+/// Raises a path to the same height over a ball's terrain as it has over the ground.
 fn raised(path: Vec<[f64; 3]>, [ball, ground]: &[Terrain<'_>; 2]) -> Vec<[f64; 3]> {
     let raise = |[x, y, z]: [f64; 3]| {
         let heights = [ball, ground].map(|terrain| terrain.height_mm(x, y));
@@ -95,8 +94,7 @@ fn raised(path: Vec<[f64; 3]>, [ball, ground]: &[Terrain<'_>; 2]) -> Vec<[f64; 3
     path.into_iter().map(raise).collect()
 }
 
-/// Returns the errors of the proxies' distance from the ground on some walks, as fractions of the
-/// radius, sorted.
+/// Returns the sorted errors of the proxies' distance from the ground, as fractions of the radius.
 fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     let terrains = terrains(raster, scale, radius);
     let [terrain, point] = &terrains;
@@ -269,8 +267,7 @@ fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]>
     way
 }
 
-/// The same paths with the ball of a hand and with a point, each at the same depth in its own
-/// terrain.
+/// The same paths with the ball of a hand and with a point, each as deep in its own terrain.
 #[test]
 fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
     let Some(path) = shared("dem/real/dom1_32_356_5699_1_nw_2020.tif") else {

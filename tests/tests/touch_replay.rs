@@ -1,5 +1,5 @@
-//! Forces of the library for arrays compared with `replay` on a file of the same heights: the bits
-//! must be identical.
+//! Forces of the library for arrays equal those of `replay` on a file of the same heights, to the
+//! bit.
 
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra::replay::{on_native_at, state_name};
@@ -135,8 +135,7 @@ fn forces_over_an_array_are_those_of_a_replay() {
     }
 }
 
-/// Radii from less than a cell to 8 cells; with the smallest, a haptic cell is half an encoder
-/// count.
+/// Radii from less than a cell to 8 cells; the smallest has haptic cells of half a count.
 #[test]
 fn forces_under_a_tip_are_those_of_a_replay() {
     let heights = heights();

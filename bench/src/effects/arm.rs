@@ -85,8 +85,7 @@ impl<'g> Arm<'g> {
         self.way("arm taps", 0.02, ticks, |tick| 0.5 * phase(tick).cos())
     }
 
-    /// Returns a path of `step` mm a tick at this height above the surface, for half of the ticks,
-    /// and back.
+    /// Returns a path of `step` mm a tick at this height, for half of the ticks, and back.
     fn way(
         &self,
         name: &'static str,

@@ -30,8 +30,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     Ok(errors)
 }
 
-/// Returns the angles between the force and the vector from the HIP to the proxy; below 90° no
-/// force pulls.
+/// Returns the angles between force and displacement; below 90° no force pulls.
 fn off_degrees(rendered: &[EffectTick]) -> Vec<f64> {
     let rendered = rendered.iter().filter(|record| record.whole);
     let rendered = rendered.filter(|record| length(record.force_n) > 0.0);

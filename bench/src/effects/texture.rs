@@ -1,5 +1,4 @@
-//! Texture: the rendered height, and the force along the surface, compared with the documented
-//! formulas.
+//! Texture: the rendered height and the force along the surface, and the documented formulas.
 
 use std::f64::consts::TAU;
 

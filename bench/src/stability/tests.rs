@@ -263,8 +263,7 @@ fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
             }
         }
     }
-    // A stiffness that is still on an even surface is too much here: the texture rocks a hand that
-    // slides sideways.
+    // The limit of an even surface is too much here: the texture rocks a hand that slides.
     let (hz, without, _) = STILL_N_PER_MM[0];
     let whole = at(hz, without.into(), SHORT_S, UNDAMPED);
     assert_eq!(whole, Verdict::Unstable);

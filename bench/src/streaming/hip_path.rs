@@ -156,9 +156,8 @@ impl HipPaths {
     }
 }
 
-/// Returns the south-west corner of the paths in the square around the middle of a synthetic
-/// terrain, whose rows count from the north: the same samples in a terrain of any size with room
-/// for them.
+/// Returns the south-west corner of the paths around the middle of a synthetic terrain, whose rows
+/// count from the north: the same samples in a terrain of any size with room for them.
 fn in_the_square([columns, rows]: [u32; 2], long: u32) -> [u32; 2] {
     let first = |count: u32| count / 2 / PERIOD * PERIOD + FROM_BORDER;
     [first(columns), rows - 1 - first(rows) - long]

@@ -27,15 +27,13 @@ pub struct Row {
     pub open_requests: Option<u64>,
     /// Bytes of these.
     pub open_bytes: Option<u64>,
-    /// Requests or reads after the opening: a touch, and the straight path at [`USUAL`] cells a
-    /// second.
+    /// Requests or reads from then on: a touch, and the straight path at [`USUAL`] cells a second.
     ///
     /// [`USUAL`]: super::USUAL
     pub way_requests: Option<u64>,
     /// Bytes of these.
     pub way_bytes: Option<u64>,
-    /// Cells of the straight path; empty, like the next figures, if only the first force was
-    /// measured.
+    /// Cells of the straight path; empty, like the next figures, without a measured motion.
     pub straight_cells: Option<u32>,
     /// Cells of the turning path.
     pub turning_cells: Option<u32>,
@@ -45,8 +43,7 @@ pub struct Row {
     pub tile_bytes_mean: Option<f64>,
     /// 99th percentile of the bytes of their frames.
     pub tile_bytes_p99: Option<u64>,
-    /// Tiles a second while the HIP is faster than the link, 20,000 cells a second on the straight
-    /// path.
+    /// Tiles a second while the HIP outruns the link, 20,000 cells a second on the straight path.
     pub tiles_per_s: Option<f64>,
     /// Mean time of the host for a tick that requests tiles, ms, in the same run.
     pub host_ms_mean: Option<f64>,
@@ -56,8 +53,7 @@ pub struct Row {
     pub held_straight: Option<f64>,
     /// The same on the turning path.
     pub held_turning: Option<f64>,
-    /// Without a fallback: ticks whose terrain was missing, on the straight path at 500 cells a
-    /// second.
+    /// Without a fallback: ticks with missing terrain, on the straight path at 500 cells a second.
     pub missing_straight_500: Option<u32>,
     /// At 2,000 cells a second.
     pub missing_straight_2000: Option<u32>,

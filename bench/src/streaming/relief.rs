@@ -1,5 +1,4 @@
-//! The relief of the synthetic terrains: one square of mountains that repeats, in compressed
-//! blocks.
+//! The relief of the synthetic terrains: a square of mountains that repeats, in compressed blocks.
 //!
 //! A terrain of 10¹⁰ samples has 40 GB. The hand moves inside one square of [`PERIOD`] samples, so
 //! a synthetic terrain repeats that square, and its file stores each block of it once: the file's
@@ -57,8 +56,7 @@ impl Relief {
         }
     }
 
-    /// Returns the content of the block at a column and row of blocks, in an image after this many
-    /// halvings.
+    /// Returns the block's content, by its column and row in an image after these halvings.
     pub(super) fn place(halvings: u32, block: [u32; 2]) -> Place {
         let side = PERIOD >> halvings;
         (halvings, block.map(|index| index * BLOCK % side))

@@ -1,5 +1,4 @@
-//! Runs along a path: the first contact, a motion at one speed, and the fastest speed without a
-//! missing tick.
+//! Runs along a path: the first contact, a motion, and the fastest speed without a missing tick.
 
 use hapterra_core::contact::ContactState;
 
@@ -92,8 +91,7 @@ pub(super) fn travel(
     Ok((counts, [began, ended]))
 }
 
-/// Returns the cells covered this many ticks after the start of the motion, at a speed in cells a
-/// tick.
+/// Returns the cells covered this many ticks after the start, at a speed in cells a tick.
 fn covered(ticks: f64, speed: f64) -> f64 {
     match ticks < START {
         true => 0.5 * speed * ticks * ticks / START,

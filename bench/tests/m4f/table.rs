@@ -71,8 +71,7 @@ pub(crate) struct Row {
     /// The ticks with the fewest and the most instructions a work unit.
     per_unit: Option<[Tick; 2]>,
     worst: Tick,
-    /// Cycles, if they are computed: of an STM32G474 and of an STM32H743, with the same three
-    /// quantiles.
+    /// Cycles, if computed, of an STM32G474 and of an STM32H743, with the same three quantiles.
     pub(crate) cycles: [[u32; 3]; 2],
     /// True if the stored row covers more ticks: only its largest count limits this one.
     is_part: bool,

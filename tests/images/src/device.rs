@@ -275,8 +275,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// Creates a level plane at this height for a Premium 1.5, with its preset's surface
-    /// parameters.
+    /// Creates a level plane at this height for a Premium 1.5, with its preset's parameters.
     #[must_use]
     pub fn level(home_mm: [f64; 3], height_mm: f64) -> Self {
         Self {

@@ -88,8 +88,7 @@ impl Mishap {
             Kind::EncoderStuck => {
                 counts[self.axis] = *self.held.get_or_insert(counts[self.axis]);
             }
-            // Below the limit for one tick, whatever the hand adds, and above the speed of a real
-            // tip.
+            // Below the limit for a tick, whatever the hand adds, but above a real tip's speed.
             Kind::EncoderRunaway => {
                 let count = &mut counts[self.axis];
                 let away = *count + self.sign * 110 * since;

@@ -4,8 +4,7 @@
 //! - with the levers of the encoders' pose, the force is always within the guard's clamp;
 //! - with the arm's true levers, it is within the record's largest force while no encoder is off by
 //!   more than [`OFF_COUNTS`];
-//! - while an encoder is off by more, the device cannot compute the true levers: that force is
-//!   recorded.
+//! - while one is, the true levers cannot be computed: that force is recorded.
 
 use hapterra::phantom::{Encoder, PhantomModel};
 use hapterra_core::Vec3;
@@ -104,8 +103,7 @@ impl Watch {
         self.force_at_the_tip(torque, truth.counts, truth)
     }
 
-    /// Checks the device's estimate of the motors' temperatures: it must not be lower than the
-    /// truth.
+    /// Checks the device's estimate of the motors' temperatures, which must not be too low.
     ///
     /// # Errors
     /// If it is lower.

@@ -10,11 +10,11 @@ pub enum Core {
     /// The Cortex-M4, by its manual's tables (DDI 0439, 3.3 and 7.2). A load or store takes its 2
     /// cycles though neighbours overlap, a refill of the pipeline the maximum of 3, a division 12.
     M4,
-    /// The Cortex-M7, for which Arm publishes no table. Uses the latencies of LLVM's model
+    /// The Cortex-M7. Arm publishes no table, so it has the latencies of LLVM's model
     /// (`ARMScheduleM7.td`), one instruction at a time: the next one waits for an integer result to
     /// the end, as if it were an address, and for a floating-point result when it reads it
-    /// ([`Floats`]). Every branch that may be mispredicted counts as mispredicted: 6 cycles, where
-    /// that model has 4 to 6.
+    /// ([`Floats`]). Every branch that may be mispredicted is: 6 cycles, where that model has 4 to
+    /// 6.
     M7,
 }
 
@@ -24,8 +24,7 @@ const REFILL: u64 = 3;
 const MISPREDICTED: u64 = 6;
 
 impl Core {
-    /// Returns the most cycles of an instruction. `jumps` is true if the next one executed is not
-    /// the next one in memory.
+    /// Returns the most cycles of an instruction. `jumps`: the next one executed is elsewhere.
     #[must_use]
     pub fn cycles(self, instruction: &Instruction, jumps: bool) -> u64 {
         match self {
@@ -105,8 +104,7 @@ mod tests {
     use super::super::instruction::decode;
     use super::*;
 
-    /// Returns the cycles on an M4 with memory without wait states, each with the next one's
-    /// address.
+    /// Returns the cycles on an M4 without wait states, each with the next one's address.
     fn m4_cycles(program: &[(u16, u16, bool)]) -> u64 {
         let mut before = None;
         let each = program.iter().map(|&(first, second, jumps)| {

@@ -41,8 +41,7 @@ pub struct Cycles {
     pub instructions: u32,
     /// Most cycles of an STM32G474 at 168 MHz with its code in flash.
     pub g474: u32,
-    /// Most cycles of an STM32H743 at 456 MHz with its code in ITCM, except for some functions in
-    /// flash.
+    /// Most cycles of an STM32H743 at 456 MHz with its code in ITCM, except some functions.
     pub h743: u32,
 }
 

@@ -1,5 +1,4 @@
-//! Arbitrary bytes as a terrain file of each format with a reader of the project's own, with a
-//! sidecar file.
+//! Arbitrary bytes as a terrain file of each format that is read without GDAL, with a sidecar.
 
 use std::fs;
 use std::path::Path;

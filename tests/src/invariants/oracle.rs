@@ -41,8 +41,7 @@ pub struct Measured {
     pub twins: [u64; 4],
     /// Measurements on materials.
     pub on_materials: Judged,
-    /// Metamorphic tests on materials compared to the end: in another window, shifted, mirrored or
-    /// turned.
+    /// Metamorphic tests on materials, to the end: in another window, shifted, mirrored or turned.
     pub twins_on_materials: [u64; 3],
 }
 

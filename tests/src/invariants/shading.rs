@@ -16,19 +16,16 @@ const LENGTH: f64 = 1e-5;
 const SHORT: f64 = 1e-2;
 /// Rounding of a direction, rad.
 const ANGLE: f64 = 1e-3;
-/// Distance from its patch's border, cells, within which the proxy may be on it, where patches
-/// meet.
+/// Distance from a border of patches, cells, within which the proxy may be on it.
 const BORDER: f64 = 1e-5;
 /// Largest angle by which a force is turned, rad.
 const MAX_TURN: f64 = 60.0 / 45.0 * FRAC_PI_4;
-/// Bend up to which the direction changes along a whole edge, and bend from which it changes along
-/// a fifth.
+/// Bends up to which the direction changes along a whole edge, and from which along a fifth.
 const GENTLE: f64 = FRAC_PI_4;
 const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
 
 impl TickOracle<'_> {
-    /// Checks the length, which shading keeps; also the direction, along the smoothed normal,
-    /// inside a patch without friction.
+    /// Checks the length, and without friction the direction inside a patch.
     pub(super) fn is_shaded(&self, seen: &ObservedTick) -> Verdict {
         let Some(shaded) = seen.shaded else {
             return Ok(());

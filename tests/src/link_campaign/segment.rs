@@ -228,8 +228,7 @@ impl<'t> Segment<'t> {
         self.judge_last_end()
     }
 
-    /// Checks that the first host after one that vanished receives the reason why the arm is
-    /// disarmed.
+    /// Checks that the first host after one that vanished receives the reason for the disarming.
     fn judge_last_end(&mut self) -> Result<(), String> {
         let greeted = self.host.as_ref().and_then(|host| host.last_end);
         match greeted.filter(|_| self.owed) {

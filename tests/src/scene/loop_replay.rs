@@ -1,5 +1,4 @@
-//! A scene on materials, rendered by the product's whole loop: points are the input, samples the
-//! output.
+//! A scene on materials, rendered by the product's whole loop, from points to samples.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -95,8 +94,7 @@ pub fn replay<const D: usize>(
 }
 
 /// Replays the path of a scene on materials in a window as large as the counting board's. Returns
-/// the scene as the device receives it, tiles and points in their order of arrival, and each tick's
-/// report.
+/// the scene as the device receives it, tiles and points in order, and each tick's report.
 ///
 /// # Panics
 /// Like [`replay`], and if a point is never answered.

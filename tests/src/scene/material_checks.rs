@@ -78,9 +78,8 @@ fn replay_in(
     }
 }
 
-/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each
-/// point was rendered with all of its terrain, which fails if it needs more tiles than the window
-/// has.
+/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and no
+/// point lacked terrain, as one does that needs more tiles than its window has.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();

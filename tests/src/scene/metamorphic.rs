@@ -36,8 +36,7 @@ const BESIDE: f64 = 128.0;
 /// Range above or below, cells: farther down than any spike is high.
 const DEEP: f64 = 4e6;
 
-/// Runs a scene up to 10⁸ cells away: the bits must be identical, except for textures that differ
-/// there.
+/// Runs a scene up to 10⁸ cells away: the same bits, except for textures that differ there.
 ///
 /// Both runs are away from the origin, so that the space beyond the field is alike: not in the
 /// window until requested. The shift is whole tiles, and any whole cells up and down; in real time,

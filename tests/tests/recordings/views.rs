@@ -387,8 +387,7 @@ fn replay_of_a_steep_saw_equals_the_live_forces() {
     }
 }
 
-/// Before cells were measured again, the description of a placement had no place: cells are those
-/// of the start.
+/// Old recordings describe a placement without its place: cells are those of the start.
 #[test]
 fn recording_without_measured_places_replays_unchanged() {
     let folder = Folder::of(SIZE);

@@ -157,8 +157,7 @@ fn a_signal_before_it_has_begun_is_heeded() {
         .arg("--unchecked")
         .spawn();
     let child = child.expect("it runs");
-    // It sends an open to a device that does not answer; after the open arrives, the session is
-    // closed.
+    // The device does not answer the open. When the open arrives, the session is closed.
     served.wait_for_unheard_hello();
     signal(&child, "INT");
     pass(Duration::from_millis(500));

@@ -26,8 +26,7 @@ const SCOPES: [&str; 3] = [
 /// Longest validity of a token, seconds.
 const LONGEST: u64 = 3600;
 
-/// A token in the form that `gcloud auth print-access-token` prints, of an account that may read
-/// everything.
+/// A token of an account that may read everything, as `gcloud auth print-access-token` prints it.
 pub const TOKEN: &str = "ya29.a0-of-the-surveyor";
 
 /// A service account. Its key was made for these tests and gives access to nothing else.

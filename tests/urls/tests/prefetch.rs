@@ -80,8 +80,7 @@ fn tiles_read_ahead_need_no_request() {
     terrain.grid().prefetch(40, [i32::MAX; 2], [i32::MIN; 2]);
 }
 
-/// While the clutch is open, the blocks of the next placement are fetched before the device
-/// requests tiles.
+/// While the clutch is open, blocks of the next placement are fetched before any tile request.
 #[test]
 fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     let (_folder, raster, server) = hills();
@@ -111,9 +110,8 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     );
 }
 
-/// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: counts the checks,
-/// one every 10 ms along 3000 cells, at which the tile under the HIP had not arrived; answers are
-/// delayed by 100 ms.
+/// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: counts checks, one
+/// every 10 ms along 3000 cells, without the tile under the HIP; answers take 100 ms.
 #[test]
 #[ignore = "it prints figures, and takes as long as the hand"]
 fn looks_without_a_tile_at_100_ms() {

@@ -1,5 +1,4 @@
-//! Only the requested parts of a file at a URL are fetched, and they equal those of the file on
-//! disk.
+//! Only the requested parts of a file at a URL are fetched; they equal those of the file on disk.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

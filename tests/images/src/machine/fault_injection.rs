@@ -124,8 +124,7 @@ impl Machine {
         self.patch(function.address, &code);
     }
 
-    /// Disables the interrupt of the supply's comparator, as if the program had disabled it by
-    /// mistake.
+    /// Disables the interrupt of the supply's comparator, like a faulty program.
     pub fn mask_supply_interrupt(&mut self) {
         let interrupt = self.chip.comparator.interrupt as u32;
         let clear_enable = NVIC_ICER + 4 * (interrupt / 32);

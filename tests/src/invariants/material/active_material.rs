@@ -1,5 +1,4 @@
-//! The active material, by docs/how-to/materials.md: the target material, and the linear change to
-//! it.
+//! The active material, by docs/how-to/materials.md: the target, and the linear change to it.
 
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::Texture;

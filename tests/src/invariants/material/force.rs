@@ -104,8 +104,7 @@ impl TickConditions<'_> {
             spring(most, newtons + unsure),
         );
         let damping = material.damping() + material.unsure_damping();
-        // For a fast HIP the damping cancels nearly all of the spring's force, and the difference
-        // keeps the rounding of both.
+        // Damping of a fast HIP cancels nearly all force: a difference of two rounded values.
         let fast = 1e-3 * damping * self.velocity_mm_s.length() * (1.0 + ROUNDING);
         let least = if fades { 0.0 } else { (least - fast).max(0.0) };
         let most = (most + fast.min(most)).min(self.most_n);

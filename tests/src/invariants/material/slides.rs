@@ -21,8 +21,7 @@ const PRESSES: std::ops::Range<f64> = 1e-3..100.0;
 const SLACK: f64 = 0.031;
 
 impl MaterialJudge<'_> {
-    /// Checks that a proxy that slides on a plane, not too fast, ends where the pull equals
-    /// friction.
+    /// Checks that a proxy that slides on a plane, not too fast, ends where friction holds it.
     pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &ObservedTick) -> Verdict {
         let (friction, [_, most]) = (course.friction(), course.frictions());
         let Some(before) = self.before else {
