@@ -25,7 +25,7 @@ fn slope(readings: &[f64], noise: f64) -> f64 {
     tried.last().unwrap_or(0.0)
 }
 
-/// Returns the smallest and largest slope through the newest reading that miss none by the noise.
+/// Returns the range of slopes through the newest reading that fit all readings within the noise.
 fn allowed(window: &[f64], noise: f64) -> (f64, f64) {
     let newest = window[window.len() - 1];
     let ago = window.iter().rev().enumerate().skip(1);

@@ -124,7 +124,7 @@ impl<'t> Chain<'t> {
         self.client.tally()
     }
 
-    /// Runs a tick with these inputs, and calls `look` with the samples that arrive at the host.
+    /// Runs a tick with these inputs, and calls `take` with the samples that arrive at the host.
     ///
     /// # Errors
     /// If host and device do not understand each other.

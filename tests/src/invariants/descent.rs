@@ -9,7 +9,7 @@ use super::surface::{Corners, Patch, distance};
 
 /// First step of the descent, cells: on a slope of 10⁶ the next minimum is close.
 const STEP: f64 = 1e-9;
-/// Least gain of a neighbouring patch, cells.
+/// Least motion into a neighbouring patch, cells.
 const LEAST_WAY: f64 = 1e-11;
 /// Most patches.
 const PATCHES: usize = 10_000;
