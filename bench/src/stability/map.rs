@@ -72,8 +72,8 @@ impl Plan {
         })
     }
 
-    /// Runs all trials on all processors. `on_trial` is called after each trial with the total number,
-    /// and returns true to continue. Returns `None` if it stopped.
+    /// Runs all trials on all processors. `on_trial` receives the total number after each, and
+    /// returns true to continue. Returns `None` if it stopped.
     ///
     /// # Errors
     /// [`OutOfReach`] from a trial.

@@ -16,7 +16,7 @@ const SILENCE: u64 = SILENCE_S as u64 * 1_000 + FADE;
 pub enum Wrong {
     /// The run did not end within `LONGEST` ticks.
     Hangs,
-    /// The amplifiers were on at this tick without a host that wanted force.
+    /// The amplifiers were on at this tick without a host that requested force.
     Driven(u64),
     /// The amplifiers were switched on at this tick in a session whose host had not requested it.
     Unasked(u64),
@@ -41,7 +41,7 @@ pub enum Wrong {
 #[derive(Default)]
 pub(super) struct RunOracle {
     account: FrameRecord,
-    /// The tick since which no host wants force.
+    /// The tick since which no host requests force.
     unwished: Option<u64>,
     /// True if the present host has requested arming.
     asked: bool,
@@ -70,12 +70,12 @@ impl RunOracle {
         self.asked = false;
     }
 
-    /// Records that a host wants force.
+    /// Records that a host requests force.
     pub(super) const fn wished(&mut self) {
         self.unwished = None;
     }
 
-    /// Records that no host wants force from this tick on.
+    /// Records that no host requests force from this tick on.
     pub(super) const fn unwished_from(&mut self, tick: u64) {
         self.unwished = Some(tick);
     }
