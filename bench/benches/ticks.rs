@@ -1,4 +1,4 @@
-//! `cargo bench`: a tick in each state, ours and the plain paper.
+//! `cargo bench`: a tick in each state, by the product and by the plain algorithm of the paper.
 
 use divan::{Bencher, counter::ItemsCount};
 use hapterra_lab::baseline::{Paper, Start};

@@ -1,9 +1,8 @@
-//! The time a measurement took.
+//! The time of a measurement.
 
 use std::time::Duration;
 
-/// Counts the time this thread has had the processor, where the system tells;
-/// the time that has passed elsewhere.
+/// Counts this thread's processor time, or the elapsed time if the system does not report it.
 pub(crate) struct Stopwatch {
     begin: Duration,
 }

@@ -13,22 +13,22 @@ use crate::variant::{Answer, Haptics};
 /// Effort of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Ticks along a path.
+    /// Ticks of a path.
     pub ticks: usize,
-    /// Times every variant runs every path.
+    /// Times that every variant runs every path.
     pub rounds: usize,
-    /// Answers judged against the truth, at most, on each path.
+    /// Most results of a path that are compared with the oracle.
     pub judged: usize,
 }
 
 impl Effort {
-    /// For figures to be quoted.
+    /// For figures that are quoted.
     pub const FULL: Self = Self {
         ticks: 20_000,
         rounds: 15,
         judged: 4000,
     };
-    /// For a look.
+    /// For a quick check.
     pub const QUICK: Self = Self {
         ticks: 4000,
         rounds: 5,
@@ -36,31 +36,31 @@ impl Effort {
     };
 }
 
-/// Whose a variant is.
+/// Origin of a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
-    /// The product's.
+    /// The product.
     Ours,
     /// The paper's algorithm as published.
     Paper,
-    /// Anything on triangles.
+    /// Any method on triangles.
     Triangles,
     /// No contact at all: a bound.
     Bound,
 }
 
-/// Name of a variant, and the size of its state.
+/// Name of a variant, and the size of its data.
 #[derive(Clone, Copy, Debug)]
 pub struct Label {
-    /// In tables and pictures.
+    /// Name in tables and pictures.
     pub name: &'static str,
-    /// Whose it is.
+    /// Its origin.
     pub family: Family,
-    /// Bytes a sample beyond the `f32` height itself.
+    /// Bytes of a sample besides the `f32` height itself.
     pub extra_bytes: f64,
 }
 
-/// The variant that the others are compared with: the paper, plainly.
+/// The variant with which the others are compared: the plain algorithm of the paper.
 pub const PLAIN: &str = "paper f32";
 
 /// One variant along one path.
@@ -70,39 +70,39 @@ pub struct Row {
     pub terrain: String,
     /// The path's name.
     pub path: &'static str,
-    /// Which variant.
+    /// The variant.
     pub label: Label,
     /// Nanoseconds a tick: lower quartile, median, upper quartile.
     pub ns: [f64; 3],
-    /// Median over the rounds of its time over that of [`PLAIN`].
+    /// Median over the rounds of the ratio of its time to that of [`PLAIN`].
     pub ratio: f64,
-    /// Of the answers judged; `None` where no force was rendered.
+    /// Errors of the results; `None` if no force was rendered.
     pub error: Option<Error>,
     /// Largest change of the displacement from one tick to the next, cells.
     pub jump: f64,
-    /// Share of the ticks below the surface without a force.
+    /// Share of the ticks below the surface that had no force.
     pub missed: f64,
-    /// Part of the ticks in which work was left over.
+    /// Share of the ticks that did not converge.
     pub unconverged: f64,
 }
 
-/// Errors against the truth.
+/// Errors compared with the oracle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Error {
-    /// Distance from the exact closest point, cells.
+    /// Mean distance from the exact closest point, cells.
     pub mean: f64,
-    /// 99 % are below, cells.
+    /// 99th percentile of this distance, cells.
     pub p99: f64,
-    /// Largest, cells.
+    /// Largest distance, cells.
     pub max: f64,
     /// Mean angle between the forces, degrees.
     pub angle_mean: f64,
-    /// 99 % are below, degrees.
+    /// 99th percentile of this angle, degrees.
     pub angle_p99: f64,
 }
 
 impl Error {
-    /// Sums up; `None` of nothing.
+    /// Computes the errors; `None` without results.
     #[must_use]
     pub fn of(verdicts: &[Verdict]) -> Option<Self> {
         if verdicts.is_empty() {
@@ -126,7 +126,7 @@ impl Error {
 
 pub(crate) type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
 
-/// Measures every variant on one terrain. `progress` gets each path.
+/// Measures every variant on one terrain. `progress` receives the name of each path.
 pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> Vec<Row> {
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(grid, &mut buffers);
@@ -148,7 +148,7 @@ pub const SWEPT: Label = Label {
     extra_bytes: (21.0 * 4.0 + 8.0) / 1024.0,
 };
 
-/// The product on a held field.
+/// Returns the product's variants on a stored field.
 pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
     vec![(SWEPT, Box::new(Product::new(window)))]
 }
@@ -159,7 +159,7 @@ pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
     let (last, centre) = (Start::LastPoint, Start::Centre);
     let double = Box::new(Paper::<_, f64>::new(grid, last, 20));
     let parry = |project| Box::new(Parry::new(grid, project));
-    // parry has its own copy of the heights and a byte of status a cell.
+    // parry has its own copy of the heights and a status byte for each cell.
     let entries: [(&'static str, Family, f64, Box<dyn Haptics + '_>); 10] = [
         (PLAIN, Family::Paper, 0.0, single(last, 10)),
         ("paper f64", Family::Paper, 0.0, double),
@@ -254,7 +254,7 @@ fn largest_jump(answers: &[Answer]) -> f64 {
     changes.fold(0.0, f64::max)
 }
 
-/// The first HIP is above the surface, so one below it should be rendered.
+/// Returns the share of missed ticks: any HIP below the surface, after the first, has a force.
 fn missed(grid: &Grid, path: &Path, answers: &[Answer]) -> f64 {
     let below = path.hips.iter().zip(answers).filter(|(hip, _)| {
         let [x, y, z] = hip.wide;

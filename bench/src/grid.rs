@@ -1,4 +1,4 @@
-//! The terrain that every variant gets: plain heights in cells.
+//! The terrain for every variant: plain heights in cells.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{HapticCells, HapticGrid};
 use heightfield::{Raster, Wait};
 
-/// Most samples along a side; a larger field is cut to its middle.
+/// Most samples along a side; of a larger field only the middle is used.
 pub const MAX_SIDE: u32 = 4097;
 
-/// Heights in cells, row by row from the south, with no hole.
+/// Heights in cells, row by row from the south, without no-data.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Its name in tables.
@@ -20,12 +20,12 @@ pub struct Grid {
     pub rows: usize,
     /// `(columns + 1) × (rows + 1)` samples.
     pub posts: Vec<f32>,
-    /// Changes for the comparison, one sentence each.
+    /// Changes of the data for the comparison, one sentence each.
     pub remarks: Vec<String>,
 }
 
 impl Grid {
-    /// A field of `columns × rows` patches.
+    /// Creates a field of `columns × rows` patches.
     pub fn from_fn(
         name: &str,
         [columns, rows]: [usize; 2],
@@ -44,15 +44,15 @@ impl Grid {
         }
     }
 
-    /// Mountains made by formula, their heights times `steepness`.
+    /// Creates synthetic mountains, with heights times `steepness`.
     pub fn fractal(name: &str, size: [usize; 2], seed: u64, steepness: f64) -> Self {
         let amplitude = steepness * Kind::Fractal.usual_amplitude_cells();
         let synth = Synth::new(Kind::Fractal, seed, amplitude);
         Self::from_fn(name, size, |x, y| synth.height(x as u32, y as u32))
     }
 
-    /// A terrain file's field at true proportions if it states them, else
-    /// one cell a vertical unit, times `steepness`.
+    /// Returns a terrain file's field at true proportions if it states them, else one cell a
+    /// vertical unit, times `steepness`.
     pub fn from_raster(path: &Path, raster: &Raster, steepness: f64) -> Self {
         let scale = HapticGrid::new(raster, HapticCells::Stored)
             .cells_per_vertical_unit()
@@ -69,12 +69,12 @@ impl Grid {
             if row_of.0 != y as u32 {
                 row_of.0 = y as u32;
                 let row = first[1] + y as u32;
-                // Heights that a server did not send are filled, too.
+                // Heights that a server did not send are filled as well.
                 let _ = raster.read_row(0, row, first[0], &mut row_of.1, Wait::UntilRead);
             }
             let height = row_of.1[x];
             filled += u64::from(height.is_nan());
-            // Near zero, so that the plain versions keep what bits they have.
+            // Near zero, so that the plain versions keep their precision.
             let height = if height.is_nan() {
                 summary.lowest
             } else {
@@ -94,7 +94,7 @@ impl Grid {
         grid
     }
 
-    /// The middle of it: at most `side` patches along each side.
+    /// Returns its middle: at most `side` patches along each side.
     #[must_use]
     pub fn middle(&self, side: usize) -> Self {
         let size = [self.columns, self.rows].map(|patches| patches.min(side));
@@ -106,21 +106,21 @@ impl Grid {
         }
     }
 
-    /// The height of a sample.
+    /// Returns the height of a sample.
     #[must_use]
     pub fn post(&self, column: usize, row: usize) -> f32 {
         self.posts[row * (self.columns + 1) + column]
     }
 
-    /// Returns true if there is such a patch.
+    /// Returns true if this patch exists.
     #[inline]
     #[must_use]
     pub fn has(&self, [x, y]: [i32; 2]) -> bool {
         (x as u32 as usize) < self.columns && (y as u32 as usize) < self.rows
     }
 
-    /// The corner heights of a patch that exists: south-west, south-east,
-    /// north-west, north-east.
+    /// Returns the corner heights of a patch that exists: south-west, south-east, north-west,
+    /// north-east.
     #[inline]
     #[must_use]
     pub fn corners(&self, [x, y]: [i32; 2]) -> [f32; 4] {
@@ -133,7 +133,7 @@ impl Grid {
         [south[0], south[1], north[0], north[1]]
     }
 
-    /// The bilinear surface at a place inside the field.
+    /// Returns the height of the bilinear surface at a point inside the field.
     #[must_use]
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let column = (x as usize).min(self.columns - 1);
@@ -144,7 +144,7 @@ impl Grid {
         south + v * (north - south)
     }
 
-    /// The highest sample.
+    /// Returns the highest sample.
     #[must_use]
     pub fn top(&self) -> f32 {
         self.posts.iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b))

@@ -1,11 +1,11 @@
-//! Run time against error: hapterra's contact and honest opponents on the same
-//! terrain, under the same HIP, in the same run.
+//! Run time against error: hapterra's contact and other methods at their best, on the same terrain,
+//! under the same HIP, in the same run.
 //!
 //! - [`grid`] and [`path`]: the terrains and the paths of the HIP;
 //! - [`variant`]: the interface of every compared contact rule;
 //! - [`product`]: the product's contact rule;
-//! - [`baseline`]: the compared methods, none of which is in the product;
-//! - [`oracle`]: the exact closest point in f64, against which every answer is measured;
+//! - [`baseline`]: the compared methods, which are not in the product;
+//! - [`oracle`]: the exact closest point in f64, with which every result is compared;
 //! - [`compare`]: all variants on one terrain, interleaved;
 //! - [`continuity`]: the change of the force from one tick to the next;
 //! - [`effects`]: cost and error of friction, shading, texture and damping;

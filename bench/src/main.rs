@@ -1,4 +1,4 @@
-//! `hapterra-lab`; everything it does is in the library.
+//! `hapterra-lab`; all its code is in the library.
 
 #![forbid(unsafe_code)]
 

@@ -1,6 +1,5 @@
-//! The oracle: the exact local closest point of the bilinear surface, in f64, by the
-//! slow and plain descent that judges the product in the tests, which is none of any
-//! variant's.
+//! The oracle: the exact local closest point of the bilinear surface, in f64, by the slow and
+//! simple descent of the product's tests. No variant uses it.
 
 use hapterra_tests::invariants::descent;
 use hapterra_tests::invariants::surface::{Corners, Patch};
@@ -8,17 +7,17 @@ use hapterra_tests::invariants::surface::{Corners, Patch};
 use crate::grid::Grid;
 use crate::variant::{Answer, Hip};
 
-/// Verdict on an answer.
+/// Errors of a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// Distance from the answer's proxy to the exact closest point, cells.
+    /// Distance from the result's proxy to the exact closest point, cells.
     pub error: f64,
-    /// Angle between the answer's force and the exact one, degrees.
+    /// Angle between the result's force and the exact one, degrees.
     pub angle: f64,
 }
 
-/// Judges an answer that says "touching": how far is it from the local closest
-/// point that a descent from it ends at? `None` over the border of the field.
+/// Compares a result in contact with the local closest point at the end of a descent from it.
+/// `None` over the border of the field.
 #[must_use]
 pub fn judge(grid: &Grid, hip: &Hip, answer: &Answer) -> Option<Verdict> {
     let displacement = answer.displacement.map(f64::from);
@@ -40,8 +39,8 @@ pub fn judge(grid: &Grid, hip: &Hip, answer: &Answer) -> Option<Verdict> {
 }
 
 /// Returns the starts for a proxy at `x`: there, and on both sides of a border of patches that
-/// single precision cannot tell it from. On a sharp ridge the two sides lead to different valleys,
-/// and rounding is not to choose.
+/// equals it to single precision. From a sharp ridge the two sides lead to different valleys, and
+/// rounding must not decide.
 fn sides(x: f64) -> [f64; 3] {
     const ROUNDING: f64 = 1e-6;
     let border = x.round();
@@ -51,8 +50,8 @@ fn sides(x: f64) -> [f64; 3] {
     [x, border, border - 1e-12]
 }
 
-/// The closest point to `hip` that a descent over the surface from the place
-/// `from` ends at; `None` off the field.
+/// Returns the closest point to `hip` at the end of a descent from the point `from`; `None` off the
+/// field.
 #[must_use]
 pub fn closest(grid: &Grid, hip: &[f64; 3], from: [f64; 2]) -> Option<[f64; 3]> {
     let patch = Patch::at(grid, from.map(|x| x.floor() as i32))?;
@@ -70,10 +69,10 @@ pub(crate) fn length(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Forces below this, in cells of displacement, have no direction to speak of.
+/// Forces below this, in cells of displacement, have no reliable direction.
 const LEAST_FORCE: f64 = 1e-3;
 
-/// From the exact force to the rendered one, in degrees.
+/// Returns the angle between two forces, degrees.
 pub(crate) fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     if length(b) < LEAST_FORCE {
         return 0.0;

@@ -1,16 +1,16 @@
-//! The paths of the HIP: seeded, and placed by the surface they are over.
+//! The paths of the HIP: from a seed, relative to the surface below.
 
 use crate::grid::Grid;
 use crate::variant::Hip;
 
-/// A HIP's way over one terrain.
+/// A path of the HIP over one terrain.
 #[derive(Clone, Debug)]
 pub struct Path {
     /// Its name in tables.
     pub name: &'static str,
-    /// One haptic interface point a tick; the first is above the surface.
+    /// One HIP a tick; the first is above the surface.
     pub hips: Vec<Hip>,
-    /// Number of them, at the beginning, that descend from above the surface.
+    /// Number of HIPs at the start that descend from above the surface.
     pub approach: usize,
 }
 
@@ -27,8 +27,8 @@ impl Path {
 /// Cells kept free at the border of the field.
 const MARGIN: f64 = 4.0;
 
-/// All ways of the comparison over a terrain, `ticks` long; the long sweeps
-/// only where the terrain is large enough.
+/// Returns all paths of the comparison over a terrain, `ticks` long; the long sweeps only if the
+/// terrain is large enough.
 #[must_use]
 pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
     let mut paths = vec![
@@ -50,13 +50,13 @@ pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
     paths
 }
 
-/// Slides `depth` 0.1 cell below the surface, `step` cells a tick.
+/// Returns a slide 0.1 cell below the surface, `step` cells a tick.
 #[must_use]
 pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
     slide_at(grid, name, [step, 0.1], ticks)
 }
 
-/// The same at any depth: `[step, depth]`, cells.
+/// Returns a slide at any depth: `[step, depth]`, cells.
 #[must_use]
 pub fn slide_at(grid: &Grid, name: &'static str, [step, depth]: [f64; 2], ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 11);
@@ -66,7 +66,7 @@ pub fn slide_at(grid: &Grid, name: &'static str, [step, depth]: [f64; 2], ticks:
     Path::new(name, hips, approach)
 }
 
-/// Taps half a cell deep every hundred ticks, wandering slowly.
+/// Returns taps half a cell deep every hundred ticks, on a slow path.
 #[must_use]
 pub fn tapping(grid: &Grid, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 12);
@@ -78,7 +78,7 @@ pub fn tapping(grid: &Grid, ticks: usize) -> Path {
     Path::new("tapping", hips, 0)
 }
 
-/// Jumps up to 0.3 cell every way, mostly near the surface.
+/// Returns jumps of up to 0.3 cell in all directions, mostly near the surface.
 #[must_use]
 pub fn random(grid: &Grid, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 13);
@@ -95,7 +95,7 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
     Path::new("random", hips, 0)
 }
 
-/// Rests 0.1 cell below the surface and does not move by one bit.
+/// Returns a rest 0.1 cell below the surface, without a change of any bit.
 #[must_use]
 pub fn resting(grid: &Grid, ticks: usize) -> Path {
     let walk = Walk::new(grid, 14);
@@ -109,13 +109,13 @@ pub fn resting(grid: &Grid, ticks: usize) -> Path {
 /// Height of the HIP's path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flight {
-    /// One cell above the surface under it.
+    /// One cell above the surface below it.
     Low,
     /// Above the whole terrain.
     High,
 }
 
-/// Flies free, 0.5 cell a tick.
+/// Returns a free flight, 0.5 cell a tick.
 #[must_use]
 pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 15);
@@ -131,9 +131,8 @@ pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> 
     Path::new(name, hips, 0)
 }
 
-/// Sweeps of `length` cells in one tick each, there and back, half a cell
-/// above the highest point on their way: they hit nothing. `None` when the
-/// terrain is too small.
+/// Returns sweeps of `length` cells in one tick each, there and back, half a cell above the highest
+/// point of their path, so that they hit nothing. `None` if the terrain is too small.
 #[must_use]
 pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Option<Path> {
     const THERE_AND_BACK: usize = 4;
@@ -172,7 +171,7 @@ pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Opt
     Some(Path::new(name, hips, 0))
 }
 
-/// The highest sample beside a straight way: an upper bound of the surface.
+/// Returns the highest sample beside a straight line: an upper bound of the surface.
 fn highest_between(grid: &Grid, from: [f64; 2], to: [f64; 2]) -> f64 {
     let steps = (4.0 * (to[0] - from[0]).hypot(to[1] - from[1])).ceil();
     let mut highest = f32::NEG_INFINITY;
@@ -189,14 +188,14 @@ fn highest_between(grid: &Grid, from: [f64; 2], to: [f64; 2]) -> f64 {
     f64::from(highest)
 }
 
-/// From half a cell above down to `height`.
+/// Returns the descent from half a cell above the surface to `height`.
 pub(crate) fn way_in(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hip> {
     (0..=10)
         .map(|i| over(grid, at, 0.5 + f64::from(i) / 10.0 * (height - 0.5)))
         .collect()
 }
 
-/// So far above the surface at a place.
+/// Returns a HIP at a height above the surface.
 pub(crate) fn over(grid: &Grid, [x, y]: [f64; 2], height: f64) -> Hip {
     Hip::at([x, y, grid.height(x, y) + height])
 }
@@ -206,7 +205,7 @@ fn inside(grid: &Grid, [x, y]: [f64; 2]) -> bool {
     within(x, grid.columns) && within(y, grid.rows)
 }
 
-/// A walk that turns slowly and stays inside the field.
+/// A path that turns slowly and stays inside the field.
 struct Walk {
     random: Random,
     at: [f64; 2],
@@ -242,14 +241,14 @@ impl Walk {
     }
 }
 
-/// A small seeded generator, the same everywhere (xorshift64*).
+/// A small seeded generator, the same on all machines (xorshift64*).
 pub struct Random(
-    /// Its state; any number but zero.
+    /// Its state: any number except zero.
     pub u64,
 );
 
 impl Random {
-    /// In `[low, high)`.
+    /// Returns a number in `[low, high)`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;

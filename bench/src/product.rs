@@ -1,4 +1,4 @@
-//! The product's own contact over a window that holds the whole field.
+//! The product's own contact over a window that stores the whole field.
 
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
@@ -6,20 +6,20 @@ use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 use crate::grid::Grid;
 use crate::variant::{Answer, Haptics, Hip};
 
-/// Tiles along the window's side: enough for [`crate::grid::MAX_SIDE`], so
-/// that no variant ever waits for terrain.
+/// Tiles along the window's side: enough for [`crate::grid::MAX_SIDE`], so that no variant waits
+/// for terrain.
 pub const SIDE: usize = 128;
 
-/// Buffers for the tiles of a `D × D` window, and one to fill next.
+/// Allocates the tiles of a `D × D` window, and one for the next tile.
 #[must_use]
 pub fn buffers<const D: usize>() -> Vec<Tile> {
     vec![Tile::VACANT; D * D + 1]
 }
 
-/// An empty window over `grid`, and a buffer to fill first.
+/// Returns an empty window over `grid`, and the first free buffer.
 ///
 /// # Panics
-/// When there are fewer buffers than [`buffers`] makes.
+/// If there are fewer buffers than [`buffers`] allocates.
 #[must_use]
 pub fn empty<'t, const D: usize>(
     grid: &Grid,
@@ -35,11 +35,10 @@ pub fn empty<'t, const D: usize>(
     (window, spare)
 }
 
-/// A window that holds all of `grid`.
+/// Returns a window that stores all of `grid`.
 ///
 /// # Panics
-/// When there are fewer buffers than [`buffers`] makes, or the field is too
-/// large.
+/// If there are fewer buffers than [`buffers`] allocates, or the field is too large.
 #[must_use]
 pub fn window<'t, const D: usize>(grid: &Grid, buffers: &'t mut [Tile]) -> Box<Window<'t, D>> {
     let (mut window, mut spare) = empty(grid, buffers);
@@ -57,7 +56,7 @@ pub fn window<'t, const D: usize>(grid: &Grid, buffers: &'t mut [Tile]) -> Box<W
 /// Fills a tile of `grid`.
 ///
 /// # Panics
-/// When the tile lies west or south of the field.
+/// If the tile lies west or south of the field.
 pub fn fill(grid: &Grid, key: TileKey, tile: &mut Tile) {
     let [col, row] =
         [key.index.col, key.index.row].map(|n| usize::try_from(n).expect("in the field"));
@@ -78,7 +77,7 @@ pub struct Product<'w, 't, const D: usize> {
 }
 
 impl<'w, 't, const D: usize> Product<'w, 't, D> {
-    /// The contact on a held field.
+    /// Creates the contact on a stored field.
     #[must_use]
     pub fn new(window: &'w Window<'t, D>) -> Self {
         Self {
@@ -103,7 +102,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
         }
     }
 
-    /// To be judged: the proxy itself, before any fading.
+    /// For the oracle: the proxy itself, before any fade.
     fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
         let step = |hip: &Hip| {
@@ -124,8 +123,8 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
     }
 }
 
-/// The least that a tick can do: see that the HIP has not moved, and give the
-/// last answer again. Right for a HIP that rests and for nothing else.
+/// The least work of a tick: detect that the HIP has not moved, and return the last result. Correct
+/// only for a HIP at rest.
 #[derive(Default)]
 pub struct Copy {
     last: Option<(Hip, Answer)>,

@@ -1,5 +1,5 @@
-//! The parts alone: the closest point of one patch by every solver setting,
-//! and the ray's quadratic by every square root.
+//! The parts alone: the closest point of one patch with every solver setting, and the ray's
+//! quadratic with every square root.
 
 use std::hint::black_box;
 
@@ -25,7 +25,7 @@ struct Case {
     grid: Grid,
     corners: [f32; 4],
     hip: [f64; 3],
-    /// Answer of the last tick, for a HIP 0.01 cell away.
+    /// Result of the last tick, for a HIP 0.01 cell away.
     last: (f32, f32),
 }
 
@@ -70,9 +70,9 @@ impl Case {
         newton(self.corners.map(f64::from), self.hip, iterations)
     }
 
-    /// Returns the distance of a place from the local closest point below it.
+    /// Returns the errors of a point compared with the local closest point below it.
     fn judge(&self, (u, v): (f64, f64)) -> Option<Verdict> {
-        // The upper borders belong to this patch: there is no other.
+        // The upper borders belong to this patch, as there is no other.
         let inside = |x: f64| x.clamp(0.0, 1.0 - f64::EPSILON);
         let from = [inside(u), inside(v)];
         let exact = oracle::closest(&self.grid, &self.hip, from)?;
@@ -90,7 +90,7 @@ impl Case {
     }
 }
 
-/// A way to solve a case: its name, whose it is, and the way.
+/// A solver of a case: its name, its origin, and its function.
 type Solver<Case, Found> = (&'static str, Family, fn(&Case) -> Found);
 
 const SOLVERS: [Solver<Case, (f64, f64)>; 11] = [
@@ -119,7 +119,7 @@ const SOLVERS: [Solver<Case, (f64, f64)>; 11] = [
     }),
 ];
 
-/// The closest point of one patch, by solver and slope.
+/// Measures the closest point of one patch, by solver and slope.
 #[must_use]
 pub fn patches(effort: Effort) -> Vec<Row> {
     let rows = |slope: f64| {
@@ -140,7 +140,7 @@ pub fn patches(effort: Effort) -> Vec<Row> {
     SLOPES.into_iter().flat_map(rows).collect()
 }
 
-/// Times every solver over all cases, in turns, and judges it over the first of them.
+/// Times every solver over all cases, in turn, and checks it on the first of them.
 fn measure<Case, Found>(
     (terrain, path): (&str, &'static str),
     solvers: &[Solver<Case, Found>],
@@ -183,8 +183,8 @@ fn measure<Case, Found>(
 /// Bernstein coefficients of a height gap that has a crossing.
 type Gap = [f32; 3];
 
-/// The first root as in [`hapterra_core::contact::crossing`], by any square
-/// root: that is the one place where a tick in contact or in the air needs one.
+/// Returns the first root as [`hapterra_core::contact::crossing`] does, with any square root: the
+/// only place where a tick in contact or in the air needs one.
 #[inline]
 fn root<R: Float>([start, middle, end]: [R; 3], sqrt: impl Fn(R) -> R) -> R {
     let root = sqrt(middle * middle - start * end);
@@ -204,7 +204,7 @@ const ROOTS: [Solver<Gap, f32>; 3] = [
     }),
 ];
 
-/// The ray's quadratic, by square root. Errors are in parts of the ray.
+/// Measures the ray's quadratic, by square root. Errors are fractions of the ray.
 #[must_use]
 pub fn roots(effort: Effort) -> Vec<Row> {
     let mut random = Random(22);

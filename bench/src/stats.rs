@@ -1,7 +1,7 @@
-//! Medians and shares, and the turns that variants take.
+//! Medians and shares, and the order of interleaved measurements.
 
-/// Lets `count` variants take turns, beginning with another one each round.
-/// Answers what each measured, round by round.
+/// Interleaves the measurements of `count` variants, beginning with another one each round. Returns
+/// the results of each, round by round.
 pub(crate) fn interleave(
     count: usize,
     rounds: usize,
@@ -18,15 +18,14 @@ pub(crate) fn interleave(
     measured
 }
 
-/// The quartiles of what was measured, and the median over the rounds of its ratio
-/// to another's.
+/// Returns the quartiles of a measurement, and the median over the rounds of its ratio to another.
 pub(crate) fn timing(own: &[f64], other: &[f64]) -> ([f64; 3], f64) {
     let ratios = own.iter().zip(other).map(|(own, other)| own / other);
     let [ratio] = quantiles(ratios.collect(), [0.5]);
     (quantiles(own.to_vec(), [0.25, 0.5, 0.75]), ratio)
 }
 
-/// Which part of the answers is yes.
+/// Returns the share of true values.
 pub(crate) fn part(of: impl Iterator<Item = bool>) -> f64 {
     let (mut yes, mut all) = (0_u32, 0_u32);
     for is in of {
@@ -36,7 +35,7 @@ pub(crate) fn part(of: impl Iterator<Item = bool>) -> f64 {
     f64::from(yes) / f64::from(all.max(1))
 }
 
-/// Nearest-rank quantiles of at least one value.
+/// Returns nearest-rank quantiles of at least one value.
 pub(crate) fn quantiles<const N: usize>(mut values: Vec<f64>, at: [f64; N]) -> [f64; N] {
     values.sort_by(f64::total_cmp);
     at.map(|q| values[(q * (values.len() - 1) as f64).round() as usize])

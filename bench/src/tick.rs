@@ -1,6 +1,5 @@
-//! Runs one state of the tick, so that its instructions can be counted:
-//! `valgrind --tool=callgrind --toggle-collect='*counted_tick*' hapterra-tick sliding`
-//! divided by the ticks printed.
+//! Runs one state of the tick, to count its instructions: `valgrind --tool=callgrind
+//! --toggle-collect='*counted_tick*' hapterra-tick sliding` divided by the ticks printed.
 
 #![forbid(unsafe_code)]
 
@@ -38,7 +37,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// The name of the function that is counted.
+/// Runs one tick; callgrind counts this function by its name.
 #[inline(never)]
 fn counted_tick(product: &mut Product<'_, '_, SIDE>, hip: &Hip) -> Answer {
     product.tick(hip)

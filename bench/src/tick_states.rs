@@ -1,11 +1,11 @@
-//! States of a tick: one path of the HIP for each state, in which the
-//! ticks of that state are marked.
+//! States of a tick: one path of the HIP for each state, on which the ticks of that state are
+//! marked.
 
 use crate::grid::Grid;
 use crate::path::{self, Flight, Path};
 use crate::variant::Hip;
 
-/// Ticks of a state that are counted.
+/// Ticks counted for each state.
 pub const TICKS: usize = 2000;
 
 /// A state's name and its path of the HIP.
@@ -14,13 +14,13 @@ pub type Make = fn(&Grid) -> Vec<Step>;
 /// One tick: the HIP, and whether the tick is one of the state's own.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Place where the HIP is.
+    /// The HIP.
     pub hip: Hip,
     /// True if it counts.
     pub counts: bool,
 }
 
-/// All states, as the table lists them.
+/// All states, in the order of the table.
 pub const STATES: [(&str, Make); 8] = [
     ("unmoved", |grid| last(path::resting(grid, TICKS))),
     ("free high", |grid| {
@@ -40,13 +40,13 @@ pub const STATES: [(&str, Make); 8] = [
     }),
 ];
 
-/// The terrain of the counts.
+/// Returns the terrain of the counts.
 #[must_use]
 pub fn terrain() -> Grid {
     Grid::fractal("256 × 256", [256, 256], 6, 1.0)
 }
 
-/// The last [`TICKS`] of a path count.
+/// Marks the last [`TICKS`] of a path.
 fn last(path: Path) -> Vec<Step> {
     let uncounted = path.hips.len().saturating_sub(TICKS).max(1);
     let step = |(tick, hip): (usize, &Hip)| Step {
@@ -56,7 +56,7 @@ fn last(path: Path) -> Vec<Step> {
     path.hips.iter().enumerate().map(step).collect()
 }
 
-/// Up and down through the surface; going down counts.
+/// Moves up and down through the surface; the ticks downward count.
 fn first_contact(grid: &Grid) -> Vec<Step> {
     let above = path::slide(grid, "", 0.03, TICKS).hips;
     let step = |hip: &Hip| {
@@ -68,8 +68,7 @@ fn first_contact(grid: &Grid) -> Vec<Step> {
     above[above.len() - TICKS..].iter().flat_map(step).collect()
 }
 
-/// Pressed on one spot, the HIP trembles by one encoder count of 0.03 mm, with
-/// cells of 1 mm.
+/// Presses on one spot with a tremor of one encoder count of 0.03 mm, with cells of 1 mm.
 fn resting(grid: &Grid) -> Vec<Step> {
     const COUNT: f64 = 0.03;
     let mut steps = last(path::resting(grid, TICKS));

@@ -8,7 +8,7 @@ use hapterra_core::grid::GridPoint;
 
 use crate::clock::Stopwatch;
 
-/// One haptic interface point, ready for every variant's arithmetic.
+/// One haptic interface point, in the form of every variant's arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hip {
     /// Cell and fraction.
@@ -20,7 +20,7 @@ pub struct Hip {
 }
 
 impl Hip {
-    /// The point of the grid next to `[x, y, z]` in cells.
+    /// Returns the point of the grid nearest to `[x, y, z]` in cells.
     #[must_use]
     pub fn at(point: [f64; 3]) -> Self {
         let cell = point.map(|c| c.floor() as i32);
@@ -36,26 +36,26 @@ impl Hip {
     }
 }
 
-/// Answer of a variant.
+/// Result of a variant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
     /// True if there is a force.
     pub touching: bool,
-    /// True if all there was to do for this HIP was done.
+    /// True if all work for this HIP was done.
     pub converged: bool,
-    /// From the HIP to the proxy, cells.
+    /// Vector from the HIP to the proxy, cells.
     pub displacement: [f32; 3],
 }
 
 impl Answer {
-    /// No force is rendered.
+    /// The result without a force.
     pub const FREE: Self = Self {
         touching: false,
         converged: true,
         displacement: [0.0; 3],
     };
 
-    /// The proxy is `displacement` away from the HIP.
+    /// Returns a result in contact, with the proxy `displacement` away from the HIP.
     #[must_use]
     pub const fn touching(displacement: [f32; 3]) -> Self {
         Self {
@@ -67,7 +67,7 @@ impl Answer {
 }
 
 impl Answer {
-    /// From this displacement to another, cells.
+    /// Returns the change from this displacement to another, cells.
     #[must_use]
     pub fn change(&self, other: &Self) -> f64 {
         let off = |i: usize| f64::from(other.displacement[i]) - f64::from(self.displacement[i]);
@@ -75,15 +75,15 @@ impl Answer {
     }
 }
 
-/// A way to render a height field: one of ours or an opponent.
+/// A method of rendering a height field: the product's or another.
 pub trait Haptics {
-    /// Forgets the last tick.
+    /// Clears all state of earlier ticks.
     fn forget(&mut self);
 
-    /// One tick.
+    /// Runs one tick.
     fn tick(&mut self, hip: &Hip) -> Answer;
 
-    /// Time for a whole path, from nothing.
+    /// Returns the time for a whole path, with cleared state.
     fn time(&mut self, path: &[Hip]) -> Duration {
         self.forget();
         let watch = Stopwatch::start();
@@ -93,7 +93,7 @@ pub trait Haptics {
         watch.elapsed()
     }
 
-    /// Returns the answers along a path, from nothing.
+    /// Returns the results along a path, with cleared state.
     fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
         path.iter().map(|hip| self.tick(hip)).collect()

@@ -1,5 +1,5 @@
-//! The kept figures of the effects: all of them are there, none is above what it may be, and the errors
-//! are those of the code as it is.
+//! The stored figures of the effects: all exist, none exceeds its bound, and the errors equal those
+//! of the present code.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use hapterra_lab::compare::Effort;
 use hapterra_lab::effects::{Effect, Error, errors, measure};
 use hapterra_lab::{report, tick_states};
 
-/// A kept figure may be off by this share of itself, or of what it may be: four digits are kept, and
+/// Tolerance of a stored figure, as a share of itself or of its bound: four digits are stored, and
 /// machines round sines differently.
 const OFF: f64 = 0.02;
 

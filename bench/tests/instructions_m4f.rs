@@ -1,11 +1,10 @@
-//! Instructions of single ticks, and of filling a buffer with a tile, on an emulated Cortex-M4F, beside the table that
-//! is kept and the targets that were set.
+//! Instructions of single ticks, and of filling a buffer with a tile, on an emulated Cortex-M4F,
+//! compared with the stored table and the targets.
 //!
-//! Exact counts of the code that a board runs; no other load disturbs them.
-//! They are instructions, not cycles. `cargo xtask counts` builds the image and
-//! runs this over all scenes; after a change that is meant, `cargo xtask counts
-//! --write`. Run as a test, it counts a part of the scenes, of which only the
-//! largest counts are held against the table.
+//! Exact counts of the code on a board; no other load affects them. They are instructions, not
+//! cycles. `cargo xtask counts` builds the image and runs this over all scenes; after an intended
+//! change, `cargo xtask counts --write`. As a test, it counts a part of the scenes, and only their
+//! largest counts are compared with the table.
 
 #[allow(dead_code)] // The cycles use others of them.
 mod m4f;

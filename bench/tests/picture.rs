@@ -1,11 +1,11 @@
-//! The picture of run time against error, from the figures that are kept.
+//! The picture of run time against error, from the stored figures.
 
 use std::path::Path;
 
 use hapterra_lab::compare::{Error, Family, Label, Row};
 use hapterra_lab::report;
 
-/// Kept figures as they were measured; names live as long as the program.
+/// Returns the stored figures as measured; names live as long as the program.
 fn kept() -> Vec<Row> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bench.csv");
     let mut table = csv::Reader::from_path(file).expect("it is kept");

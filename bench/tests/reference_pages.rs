@@ -1,5 +1,5 @@
-//! The pages of the reference that the code writes: `cargo xtask docs` compares them, and
-//! `cargo xtask docs --write` writes them anew.
+//! The pages of the reference that are generated: `cargo xtask docs` compares them, and `cargo
+//! xtask docs --write` writes them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -15,17 +15,17 @@ use hapterra_tests::repository;
 const MAX_LINE: usize = 120;
 const MARK: &str = "<!-- Written by `cargo xtask docs --write`: change the texts in the code. -->";
 
-/// The text of a page of the reference.
+/// Returns the text of a page of the reference.
 fn read(page: &str) -> String {
     let path = repository().join("docs/reference").join(page);
     std::fs::read_to_string(path).unwrap_or_default()
 }
 
-/// Stands before a table that the code writes.
+/// Marks a generated table.
 const TABLE: &str =
     "<!-- Written by `cargo xtask docs --write`: change the meanings in the code. -->";
 
-/// Compares a page with the text that the code gives, or writes it.
+/// Compares a page with the generated text, or writes it.
 fn check(page: &str, text: &str) {
     let path = repository().join("docs/reference").join(page);
     if std::env::var_os("HAPTERRA_DOCS").is_some_and(|wanted| wanted == "write") {
@@ -39,7 +39,7 @@ fn check(page: &str, text: &str) {
     );
 }
 
-/// One item of a list, on lines of the page's length.
+/// Appends one item of a list, in lines of the page's length.
 fn item(page: &mut String, text: &str) {
     let mut line = "-".to_owned();
     for word in text.split_whitespace() {
@@ -55,7 +55,7 @@ fn item(page: &mut String, text: &str) {
     *page += "\n";
 }
 
-/// As a sentence of its own.
+/// Returns a text as a sentence.
 fn sentence(text: &str) -> String {
     let text = text.trim().trim_end_matches('.');
     let mut letters = text.chars();
@@ -69,7 +69,7 @@ fn shown(text: Option<&StyledStr>) -> String {
     text.map(ToString::to_string).unwrap_or_default()
 }
 
-/// The text of `-h` on an option or argument.
+/// Returns the text of `-h` for an option or argument.
 fn about(arg: &Arg) -> String {
     let short = arg.get_short().map(|short| format!("-{short}, "));
     let short = short.unwrap_or_default();
@@ -94,7 +94,7 @@ fn about(arg: &Arg) -> String {
     text
 }
 
-/// Options and arguments that are this command's own: those of all commands are named once.
+/// Returns the options and arguments of this command alone: those of all commands are listed once.
 fn own(command: &Command) -> Vec<&Arg> {
     let arguments = command.get_arguments();
     let is_own = |arg: &&Arg| {
@@ -109,7 +109,7 @@ fn own(command: &Command) -> Vec<&Arg> {
     arguments.filter(is_own).collect()
 }
 
-/// A command's arguments and options. Those of several commands are named, and explained elsewhere.
+/// Appends a command's arguments and options. Those of several commands are only named.
 fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTreeSet<String>) {
     let _ = write!(
         page,
@@ -133,7 +133,7 @@ fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTre
     }
 }
 
-/// The texts of all arguments, each with the number of commands that have it.
+/// Returns the texts of all arguments, each with the number of commands that have it.
 fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, usize> {
     let mut texts = BTreeMap::new();
     for arg in commands.flat_map(own) {
@@ -142,7 +142,7 @@ fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, us
     texts
 }
 
-/// The command of a program, as it is parsed.
+/// Returns the command of a program, in its parsed form.
 fn built(mut command: Command) -> Command {
     command = command.term_width(100);
     command.build();
@@ -156,7 +156,7 @@ fn command_line_is_that_of_the_programs() {
         built(hapterra_lab::cli::Cli::command()),
     ];
     let is_option = |text: &&String| text.starts_with("`-");
-    // Beside them --verbose, --help and --version.
+    // Besides them --verbose, --help and --version.
     let all = 3 + texts(programs[0].get_subcommands())
         .keys()
         .filter(is_option)

@@ -42,7 +42,7 @@ fn rule_of_the_paper_is_stated_recorded_and_replayed() {
     let paper = replay(folder, "in.csv", "paper.csv", &["--contact", "paper"]);
     assert_ne!(rows(&swept), rows(&paper));
     assert!(paper.contains("paper") && !swept.contains("paper"));
-    // A recording's rule is its own, and one that is stated wins.
+    // A recording has its own rule, and a stated one has priority.
     let again = replay(folder, "paper.csv", "again.csv", &[]);
     assert_eq!(rows(&again), rows(&paper));
     let other = replay(folder, "paper.csv", "other.csv", &["--contact", "swept"]);

@@ -1,4 +1,4 @@
-//! Results of `streaming` that do not depend on a clock, and the kept figures.
+//! Results of `streaming` that do not depend on a clock, and the stored figures.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,8 +6,8 @@ use std::process::Command;
 use hapterra_lab::report::{self, STREAMING_HEADER};
 use hapterra_lab::streaming::{LATENCIES_MS, RATES, Reading, Row, SIDES};
 
-/// Bytes that the host may take for any terrain, 10⁶: the device in the same process is one of
-/// these megabytes.
+/// Memory limit of the host for any terrain, 10⁶ bytes: the device in the same process takes one of
+/// them.
 const MAX_MB: f64 = 256.0;
 
 fn rows(path: &Path) -> Vec<Row> {
@@ -20,7 +20,7 @@ fn kept() -> Vec<Row> {
     rows(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/streaming.csv"))
 }
 
-/// The program's exit, what it says on both outputs, and the table that it writes.
+/// Returns the program's success, both of its outputs, and the table that it writes.
 fn streamed(name: &str, arguments: &[&str]) -> (bool, String, PathBuf) {
     let csv = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let output = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"))
@@ -49,8 +49,8 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
     let [small, large] = [SIDES[1], SIDES[4]].map(|side| u64::from(side) * u64::from(side));
     for link in RATES {
         let (small, large) = (of(small, link), of(large, link));
-        // The same way over the same samples: tiles differ by what their numbers take, and by the
-        // ticks that the fallback takes on the link, whose heights are others.
+        // The same path over the same samples: tiles differ by the size of their numbers, and by
+        // the link ticks of the fallback, which has other heights.
         let [a, b] = [small, large].map(|row| row.tiles.expect("tiles"));
         assert!(a.abs_diff(b) <= 3, "{a} {b}");
         let [a, b] = [small, large].map(|row| row.tile_bytes_mean.expect("tiles"));
@@ -59,12 +59,12 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
             "{a} {b}"
         );
         assert!(large.tile_bytes_p99 < Some(1300), "{large:?}");
-        // A hand at 500 cells a second has only the ground under it.
+        // A hand at 500 cells a second never has missing ground.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.missing();
             assert_eq!([straight, turning], [Some(0); 2], "{row:?}");
         }
-        // A fallback leaves no hole at any speed, and a slow hand does not feel it.
+        // A fallback avoids no-data at any speed, and a slow hand never needs it.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.coarse();
             let seen = [straight, turning, row.holes_underlaid];
@@ -77,11 +77,11 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
             "{small:?}"
         );
         assert!(small.tiles_per_s > Some(f64::from(link) / 3.0), "{small:?}");
-        // Of the file: the same blocks, in as many reads. The index grows, by 8 bytes a block.
+        // From the file: the same blocks, in as many reads. The index grows by 8 bytes a block.
         if let [Some(a), Some(b)] = [small, large].map(|row| row.way_bytes) {
             assert!(a.abs_diff(b) < a / 100, "{a} {b}");
-            // The near tile of the fallback lies so many of its cells from the corner of the wide
-            // one, which is elsewhere in each terrain: its border may reach a block farther.
+            // The near tile of the fallback lies a multiple of its cells from the corner of the
+            // wide one, which differs between the terrains: its border may reach a block farther.
             let [a, b] = [small, large].map(|row| row.way_requests.expect("of the file"));
             assert!(a.abs_diff(b) <= 1, "{a} {b}");
             assert!(large.open_bytes < Some(2_000_000), "{large:?}");
@@ -121,7 +121,7 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
     let rows = rows(&csv);
     assert_eq!(rows.len(), RATES.len());
     for row in rows {
-        // Of text there are no blocks.
+        // Text has no blocks.
         assert_eq!((&*row.terrain, row.reading), ("hills", Reading::Whole));
         assert_eq!(row.missing()[0][0], Some(0), "{row:?}");
     }

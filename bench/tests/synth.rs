@@ -70,7 +70,7 @@ fn report_that_cannot_be_printed_is_a_failure() {
     assert_eq!(output.status.code(), Some(1), "{}", output_text(&output));
 }
 
-/// Its name is that of what a killed command left: nothing waits for a writer of the pipe.
+/// Its name is that of a killed command's partial file: no step waits for a writer of the pipe.
 #[cfg(unix)]
 #[test]
 fn pipe_named_as_a_partial_file_holds_nothing_up() {

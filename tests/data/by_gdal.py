@@ -5,8 +5,8 @@
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4
     venv/bin/python tests/data/by_gdal.py tests/data/by_gdal
 
-Row 0 is the northernmost; the height at a column and row is `height` below, and there
-is none at HOLE.
+Row 0 is the northernmost; the height at a column and row is `height` below; HOLE
+is no-data.
 """
 import os
 import sys

@@ -1,5 +1,5 @@
-"""Prints a place of each projected system of EPSG's, or of every N-th: code, longitude and latitude in
-degrees of the system's own datum, counted from Greenwich, and x and y in its units (pyproj).
+"""Prints a point of each projected system of EPSG's, or of every N-th: code, longitude and latitude
+in degrees of the system's own datum, counted from Greenwich, and x and y in its units (pyproj).
 
     python3 epsg_places.py 20 > ../../heightfield/src/crs/places.txt
 """

@@ -13,7 +13,7 @@ import pyproj
 from pyproj import CRS
 from pyproj.database import query_crs_info
 
-# What `proj4rs` computes; the rest is left to PROJ.
+# Projections of `proj4rs`; PROJ computes the others.
 PROJECTIONS = {"tmerc", "utm", "lcc", "laea", "aeqd", "aea", "sterea", "omerc", "cass", "stere", "merc"}
 LEFT_OUT = {"+type=crs", "+no_defs", "+hyperbolic"}
 

@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
-"""Writes one field in the ways in which NetCDF stores a variable, for `tests/tests/netcdf.rs`:
+"""Writes one field in the forms in which NetCDF stores a variable, for `tests/tests/netcdf.rs`:
 
     python3 -m venv venv && venv/bin/pip install numpy==2.4.6 netCDF4==1.7.5.1 h5py==3.16.0 hdf5plugin==7.1.0
     venv/bin/python tests/data/netcdf.py tests/data/netcdf
 
-Row 0 is the northernmost; the height at a column and row is `field` below, and there is none
-at HOLE.
+Row 0 is the northernmost; the height at a column and row is `field` below; HOLE is no-data.
 """
 import os
 import sys
@@ -33,7 +32,7 @@ def classic_or_4(folder, name, kind, model="NETCDF4", fill=None, dims=("lat", "l
             dataset.createDimension(dim, None if dim in unlimited else lengths[dim])
         latitudes = 50 - 0.01 * np.arange(ROWS)
         axes = {"lat": latitudes[::-1] if south else latitudes, "lon": 8 + 0.01 * np.arange(COLUMNS)}
-        # Before any record is written: the classic format has its variables at its beginning.
+        # Before any record is written, as the classic format stores these variables first.
         variables = {}
         for dim, units in (("lat", "degrees_north"), ("lon", "degrees_east")):
             variables[dim] = dataset.createVariable(dim, "f8", (dim,))
@@ -41,7 +40,7 @@ def classic_or_4(folder, name, kind, model="NETCDF4", fill=None, dims=("lat", "l
         heights = dataset.createVariable("z", kind, dims, fill_value=fill, **storage)
         heights.set_auto_maskandscale(False)
         if also:
-            # A record of an odd number of bytes beside it.
+            # Another variable, with records of an odd number of bytes.
             dataset.createVariable("quality", "i1", dims)
         for key, value in (attributes or {}).items():
             heights.setncattr(key, value)
@@ -59,7 +58,7 @@ def classic_or_4(folder, name, kind, model="NETCDF4", fill=None, dims=("lat", "l
 
 
 def by_h5py(folder, name, chunks, libver, **storage):
-    """With a filter of a plug-in."""
+    """Writes it with a filter of a plug-in."""
     with h5py.File(os.path.join(folder, name), "w", libver=libver) as file:
         axes = {"lat": 50 - 0.01 * np.arange(ROWS), "lon": 8 + 0.01 * np.arange(COLUMNS)}
         for dim, units in (("lat", "degrees_north"), ("lon", "degrees_east")):
@@ -98,7 +97,7 @@ def main():
     classic_or_4(folder, "classic.nc", "i2", model="NETCDF3_CLASSIC", fill=-1, south=True,
                  attributes=dict(scale_factor=0.5, valid_min=np.int16(0)), stored=lambda heights: 2 * heights)
     classic_or_4(folder, "classic_records.nc", "f4", model="NETCDF3_64BIT_OFFSET", fill=-1, unlimited=("lat",), also=True)
-    # Of a packing that most builds of GDAL cannot undo.
+    # With a compression that most builds of GDAL lack.
     by_h5py(folder, "early.nc", CHUNKS, "earliest", **hdf5plugin.Zstd())
 
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Writes small terrains whose places are not plain, for `tests/tests/odd_places.rs`, and where
-GDAL and PROJ (without grids) see them:
+"""Writes small terrains with unusual georeferences, for `tests/tests/odd_places.rs`, and their
+positions by GDAL and PROJ (without grids):
 
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2
     venv/bin/python tests/data/odd_places.py tests/data/odd_places
 
-`lean` is the cosine of the angle between a row and a column on the ground. Longitudes and latitudes are those of WGS 84; of another body, and of a datum whose way to
-WGS 84 PROJ does not know, its own.
+`lean` is the cosine of the angle between a row and a column on the ground. Longitudes and latitudes are those of WGS 84, or
+of the file's own datum for another body, or if PROJ has no transformation to WGS 84.
 """
 import os
 import sys
@@ -36,8 +36,8 @@ def square(side):
     return (side, 0.0, 0.0, -side)
 
 
-# Name: reference system, place of the first cell's outer corner, steps (column x, row x,
-# column y, row y). In ranges where each projection is usual.
+# Name: reference system, position of the first cell's outer corner, steps (column x, row x,
+# column y, row y), where each projection is usually used.
 FILES = {
     "ntf_paris_grads": ("EPSG:4807", (2.0, 53.0), square(0.01)),
     "ntf_lambert": ("EPSG:27572", (6e5, 2.2e6), square(100)),
@@ -76,12 +76,12 @@ FILES = {
     "rotated_degrees": ("EPSG:4326", (10.0, 60.0), (0.008, 0.006, 0.006, -0.008)),
     "polar_scale": ("+proj=stere +lat_0=-90 +k=0.97276 +lon_0=0 +datum=WGS84", (1e5, 2e5), square(100)),
 }
-# Projections that are not known: they are refused by name, and are not in the table.
+# Unknown projections, which are refused by name and are not in the table.
 UNKNOWN = {
     "new_zealand": ("+proj=nzmg +lat_0=-41 +lon_0=173 +x_0=2510000 +y_0=6023150 +ellps=intl", (2.6e6, 6.0e6), square(100)),
     "grinten": ("+proj=vandg +lon_0=0 +R=6371000", (1e6, 4e6), square(1000)),
 }
-# As an ASCII grid with a `.prj` of WKT 2, which binds a system to its way to WGS 84.
+# As an ASCII grid with a `.prj` of WKT 2, which binds a system to its shift to WGS 84.
 BOUND = {
     "bound": ("+proj=sterea +lat_0=52.15 +lon_0=5.38 +k=0.9999 +x_0=155000 +y_0=463000 +ellps=bessel +towgs84=565.2,50.1,465.5,-0.4,0.35,-1.87,4.07", (120000, 480000), square(100)),
     "bound_three": ("+proj=longlat +ellps=intl +towgs84=-87,-98,-121", (2.0, 45.0), square(0.01)),
@@ -89,7 +89,7 @@ BOUND = {
 
 
 def way(system):
-    """To WGS 84, if PROJ knows it."""
+    """Returns the transformation to WGS 84, if PROJ has one."""
     if abs(system.ellipsoid.semi_major_metre - 6.35e6) > 5e4:
         return pyproj.Transformer.from_crs(system, system.geodetic_crs, always_xy=True)
     group = TransformerGroup(system, "EPSG:4326", always_xy=True)
@@ -113,7 +113,7 @@ def write_grid(path, wanted, transform, samples):
         print(pyproj.CRS.from_user_input(wanted).to_wkt("WKT2_2019"), file=projection)
 
 
-# What each kind of file is called, and who writes it.
+# Extension and writer of each kind of file.
 KINDS = ((FILES, ".tif", write_tiff), (UNKNOWN, ".tif", write_tiff), (BOUND, ".asc", write_grid))
 
 

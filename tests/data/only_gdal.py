@@ -1,7 +1,7 @@
 """Files that only GDAL reads, written with rasterio: python tests/data/only_gdal.py
 
-5 × 4 samples, height 100.5 + 7 column - 3 row, a hole at column 3, row 1. A second band is 1000
-higher. `tests/tests/only_gdal.rs` reads them.
+5 × 4 samples, height 100.5 + 7 column - 3 row, no-data at column 3, row 1. A second band is
+1000 higher. `tests/tests/only_gdal.rs` reads them.
 """
 
 import pathlib
@@ -32,7 +32,7 @@ if __name__ == "__main__":
     write("geomatica.pix", "PCIDSK", 2)
     write("saga.sdat", "SAGA", 1)
 
-    # A large one, in which GDAL has overviews: 600 × 500, every block its own.
+    # A large one, for which GDAL has overviews: 600 × 500, with a different content in each block.
     row, column = np.mgrid[0:500, 0:600]
     with rasterio.open(
         FOLDER / "overviews.img", "w", driver="HFA", width=600, height=500, count=1, dtype="int16",

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes where GDAL sees the shared terrain files, for `tests/tests/georeferences.rs`:
+"""Writes the positions of the shared terrain files by GDAL, for `tests/tests/georeferences.rs`:
 
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2
     venv/bin/python tests/data/places_by_gdal.py ../shared/dem > tests/data/places_by_gdal.csv
 
-Longitudes and latitudes are those of WGS 84, by PROJ's best way without grids where a
-datum differs.
+Longitudes and latitudes are those of WGS 84, by PROJ's best transformation without grids
+if a datum differs.
 """
 import os
 import sys
@@ -18,18 +18,18 @@ STEPS = 32
 
 
 def way(system):
-    """To WGS 84, if PROJ knows it."""
+    """Returns the transformation to WGS 84, if PROJ has one."""
     group = TransformerGroup(system, "EPSG:4326", always_xy=True)
     known = [one for one in group.transformers if one.accuracy is not None and one.accuracy >= 0]
     return (known or group.transformers)[0]
 
 
 def lonlat(dataset):
-    """Smallest and largest longitude and latitude on the edges."""
+    """Returns the smallest and largest longitude and latitude on the edges."""
     system = pyproj.CRS.from_user_input(dataset.crs.to_wkt())
     b = dataset.bounds
     if system.is_geographic:
-        # Longitudes run on over 180 degrees where the field does.
+        # Longitudes exceed 180 degrees if the field crosses that meridian.
         moved = way(system).transform([b.left % 360, b.right % 360], [b.bottom, b.top])
         to_own = [(v - own % 360 + 180) % 360 - 180 + own for v, own in zip(moved[0], (b.left, b.right))]
         return [to_own[0], moved[1][0], to_own[1], moved[1][1]]

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Prints how far off shifts between datums are that know no grids, for
+"""Prints the errors of shifts between datums without grids, for
 `heightfield/src/crs/shift.rs` and `docs/how-to/place-and-scale.md`:
 
     python3 -m venv venv && venv/bin/pip install pyproj==3.7.2
     venv/bin/python tests/data/shift_errors.py ~/.cargo/registry/src/*/crs-definitions-0.6.0/src/defs.rs
 
 Each geographic system of `crs-definitions` is compared with PROJ's best transformation without
-grids in the middle of its area; the accuracy that PROJ states for that is added, metres.
+grids in the middle of its area; PROJ's stated accuracy is added, metres.
 """
 import math
 import re
@@ -17,12 +17,12 @@ import pyproj
 from pyproj.transformer import Transformer, TransformerGroup
 
 WGS84 = "+proj=longlat +datum=WGS84"
-# Systems that hapterra does not trust, either.
+# Systems that hapterra does not trust.
 NOT_TRUSTED = {4161, 4240, 4688, 4805, 4751}
 
 
 def kind(words):
-    """Of a definition: no shift, three parameters or seven."""
+    """Returns the kind of a definition: no shift, three parameters or seven."""
     if "NAD27" in words:
         return "three", "+proj=longlat +ellps=clrk66 +towgs84=-8,160,176"
     if "datum=WGS84" in words or "datum=NAD83" in words:
@@ -38,7 +38,7 @@ def kind(words):
 
 
 def off(code, words):
-    """Metres between both ways, and what PROJ states for its own."""
+    """Returns the distance of both results, plus PROJ's stated accuracy, metres."""
     system = pyproj.CRS.from_epsg(code)
     area = system.area_of_use
     east = area.east if area.east > area.west else area.east + 360
@@ -65,7 +65,7 @@ def main():
             metres = off(int(code), words)
         except (pyproj.exceptions.CRSError, pyproj.exceptions.ProjError, AttributeError, StopIteration):
             continue
-        # One of both ways has no such place.
+        # One of both transformations has no result there.
         if math.isfinite(metres):
             found[how].append(metres)
     for how, metres in found.items():

@@ -1,6 +1,6 @@
 //! The cost of a ball's tiles, as a table: `cargo run -p hapterra-tests --example tip >
-//! docs/tip.csv`. Radii from half a cell to 8 cells, over a city of walls or made ground, against the
-//! tiles that a link of 1,000 kB/s carries in a second (docs/explanation/tiles-and-levels.md).
+//! docs/tip.csv`. Radii from half a cell to 8 cells, over a city with walls or synthetic ground; a
+//! link of 1,000 kB/s is the reference (docs/explanation/tiles-and-levels.md).
 
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{HapticCells, HapticGrid, Terrain, TileBuffer};
@@ -33,14 +33,14 @@ fn main() {
     }
 }
 
-/// Time that this thread had a processor, s (Linux): other programs take none of it.
+/// Returns the processor time of this thread, s (Linux), so that other programs do not count.
 fn processor_s() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     let ran_ns = text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok());
     ran_ns.expect("a number") * 1e-9
 }
 
-/// Mean bytes of the heights of tiles from the middle on, and tiles made in a second of a processor.
+/// Returns the mean bytes of the tiles' heights, and the tiles made in a second of processor time.
 fn made_tiles(terrain: &Terrain<'_>) -> (f64, f64) {
     let mut buffer = TileBuffer::default();
     let first = terrain.size().map(|cells| cells / 64);

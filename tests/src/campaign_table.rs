@@ -1,4 +1,4 @@
-//! The rows of a campaign's table, one for each kind of thing that went wrong.
+//! The rows of a campaign's table, one for each kind of fault.
 
 use std::fmt::Debug;
 
@@ -13,7 +13,7 @@ impl<K, R> Default for Rows<K, R> {
 }
 
 impl<K: Copy + Debug + PartialEq, R: Default> Rows<K, R> {
-    /// The row of a kind, to be counted in.
+    /// Returns the row of a kind, for counting.
     pub fn of(&mut self, kind: K) -> &mut R {
         let at = self.0.iter().position(|(known, _)| *known == kind);
         let at = at.unwrap_or_else(|| {
@@ -23,21 +23,21 @@ impl<K: Copy + Debug + PartialEq, R: Default> Rows<K, R> {
         &mut self.0[at].1
     }
 
-    /// The row of a kind, where there is one.
+    /// Returns the row of a kind, if there is one.
     #[must_use]
     pub fn get(&self, kind: K) -> Option<&R> {
         let found = self.0.iter().find(|(known, _)| *known == kind);
         found.map(|(_, row)| row)
     }
 
-    /// The sum of a count over all rows.
+    /// Returns the sum of a count over all rows.
     #[must_use]
     pub fn sum(&self, count: impl Fn(&R) -> u32) -> u32 {
         self.0.iter().map(|(_, row)| count(row)).sum()
     }
 
-    /// A table in Markdown: its two lines of heading, and a line for each kind that has a
-    /// row, in the order of `all`, with the cells that `cells` writes behind its name.
+    /// Returns a table in Markdown: two heading lines, and a line for each kind that has a row, in
+    /// the order of `all`, with the cells that `cells` writes after its name.
     #[must_use]
     pub fn table(&self, heading: &str, all: &[K], cells: impl Fn(&R) -> String) -> String {
         let rows = all.iter().filter_map(|kind| Some((kind, self.get(*kind)?)));
@@ -46,7 +46,7 @@ impl<K: Copy + Debug + PartialEq, R: Default> Rows<K, R> {
     }
 }
 
-/// Kinds that a page's table does not have, or not with a count of at least one.
+/// Returns the kinds that a page's table lacks, or lists without a count of at least one.
 #[must_use]
 pub fn missing<K: Copy + Debug>(page: &str, all: &[K]) -> Vec<K> {
     let counts = |line: &str, kind: &K| {

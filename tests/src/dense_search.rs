@@ -1,7 +1,7 @@
-//! The truth about a bilinear surface, in `f64` and by dense search: slow,
-//! plain, and sharing no code with what it judges. Everything is in cells.
+//! An oracle of a bilinear surface, in `f64` and by dense search: slow, plain, and without code of
+//! the product. Everything is in cells.
 
-/// A height field by a function of the sample; NaN is a hole.
+/// A height field as a function of the sample; NaN is no-data.
 pub struct Oracle<'h> {
     height: &'h dyn Fn(i64, i64) -> f64,
     /// Patches east and north.
@@ -9,14 +9,14 @@ pub struct Oracle<'h> {
 }
 
 impl<'h> Oracle<'h> {
-    /// A field of `size` patches.
+    /// Creates a field of `size` patches.
     #[must_use]
     pub fn new(size: [i64; 2], height: &'h dyn Fn(i64, i64) -> f64) -> Self {
         Self { height, size }
     }
 
-    /// Height of the surface; `None` in a hole and off the field. A point on
-    /// the border of a patch belongs to it.
+    /// Returns the height of the surface, or `None` at no-data and off the field. A point on the
+    /// border of a patch belongs to it.
     #[must_use]
     pub fn surface(&self, x: f64, y: f64) -> Option<f64> {
         let (i, j) = (x.floor() as i64, y.floor() as i64);
@@ -35,11 +35,11 @@ impl<'h> Oracle<'h> {
             [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(di, dj)| (self.height)(i + di, j + dj));
         let height =
             (1.0 - u) * (1.0 - v) * sw + u * (1.0 - v) * se + (1.0 - u) * v * nw + u * v * ne;
-        // A weight of zero times a hole is a hole, too.
+        // A weight of zero times no-data is also no-data.
         (!height.is_nan()).then_some(height)
     }
 
-    /// Returns true if all surface within `reach` of a place is known.
+    /// Returns true if all surface within `reach` of a point has data.
     #[must_use]
     pub fn is_known_around(&self, x: f64, y: f64, reach: f64) -> bool {
         let steps = (2.0 * reach).ceil() as i32 + 1;
@@ -47,9 +47,8 @@ impl<'h> Oracle<'h> {
         (0..=steps).all(|i| (0..=steps).all(|j| self.surface(x + at(i), y + at(j)).is_some()))
     }
 
-    /// By how much a point of the surface within `reach` of `from` is closer
-    /// to the HIP than the surface at `from` is: zero at a local closest point
-    /// if `reach` is short of the next one.
+    /// Returns how much closer to the HIP than `from` a point of the surface within `reach` is:
+    /// zero at a local closest point if `reach` excludes the next one.
     ///
     /// Dense search in circles of shrinking radius.
     #[must_use]
@@ -83,7 +82,7 @@ mod tests {
         let oracle = Oracle::new([10, 10], &height);
         assert_eq!(oracle.surface(2.5, 3.0), Some(2.5));
         assert_eq!(oracle.surface(10.5, 3.0), None);
-        // Under the slope at (5, 5, 4) the closest point is (4.5, 5, 4.5).
+        // Below the slope at (5, 5, 4) the closest point is (4.5, 5, 4.5).
         assert!(oracle.closer_nearby([5.0, 5.0, 4.0], [4.5, 5.0], 0.3) < 1e-12);
         assert!(oracle.closer_nearby([5.0, 5.0, 4.0], [4.6, 5.0], 0.02) > 1e-3);
     }

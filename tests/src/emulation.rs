@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// QEMU and the image, or `None` with a visible line: the caller then returns.
+/// Returns QEMU and the image, or `None` after a visible message: the caller then returns.
 ///
-/// `cargo xtask test` builds the image and names both.
+/// `cargo xtask test` builds the image and sets the variables of both.
 #[must_use]
 pub fn emulated_board() -> Option<(PathBuf, PathBuf)> {
     let Some(image) = named("HAPTERRA_MPS2_ELF") else {
@@ -15,13 +15,13 @@ pub fn emulated_board() -> Option<(PathBuf, PathBuf)> {
     Some((qemu()?, image))
 }
 
-/// The path in an environment variable.
+/// Returns the path in an environment variable.
 pub(crate) fn named(variable: &str) -> Option<PathBuf> {
     let value = std::env::var_os(variable).filter(|value| !value.is_empty());
     value.map(PathBuf::from)
 }
 
-/// QEMU, or `None` with a visible line: the caller then returns.
+/// Returns QEMU, or `None` after a visible message: the caller then returns.
 #[must_use]
 pub fn qemu() -> Option<PathBuf> {
     let qemu = named("HAPTERRA_QEMU").unwrap_or_else(|| "qemu-system-arm".into());

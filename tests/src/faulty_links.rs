@@ -1,4 +1,4 @@
-//! Links that fail on purpose.
+//! Links with injected faults.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -13,28 +13,27 @@ use crate::random::Random;
 /// Fault of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A bit changes.
+    /// A bit flips.
     Flip,
     /// A run of bytes is lost.
     Drop,
-    /// Everything of one transfer comes twice.
+    /// One transfer is duplicated.
     Twice,
 }
 
-/// A transport that does one kind of harm, in both directions, to one transfer
-/// in `one_in`.
+/// A transport that injects one kind of fault, in both directions, into one transfer in `one_in`.
 pub struct Faulty<T> {
     inner: T,
     fault: Fault,
     one_in: usize,
     random: Random,
     incoming: VecDeque<u8>,
-    /// Transfers harmed, for tests that must not pass for want of harm.
+    /// Number of faults injected, so that tests can check that there were some.
     pub harmed: Rc<RefCell<u32>>,
 }
 
 impl<T> Faulty<T> {
-    /// Around a transport.
+    /// Wraps a transport.
     pub fn new(inner: T, fault: Fault, one_in: usize, seed: u64) -> Self {
         Self {
             inner,
@@ -82,7 +81,7 @@ impl<T: Transport> Transport for Faulty<T> {
     }
 }
 
-/// A transport that outlives the session over it.
+/// A transport that outlives its session.
 pub struct Shared<T>(pub Rc<RefCell<T>>);
 
 impl<T: Transport> Transport for Shared<T> {

@@ -1,23 +1,22 @@
-//! Compares the figures of a Markdown page with the committed tables that they come from.
+//! Compares the figures of a Markdown page with the committed tables they are taken from.
 //!
-//! A comment before a figure names its source. Readers of the page do not see it:
+//! A comment before a figure names its source. It is invisible on the rendered page:
 //!
 //! ```markdown
 //! sliding takes <!-- from bench/instructions-m4f.csv: sliding, median -->218 instructions
 //! ```
 //!
-//! The comment names the table (a CSV file, from the repository's root), the row by
-//! its first column, and after the last comma the column by its title. A row that
-//! the first column alone does not tell is named by as many first columns as it
-//! takes, with ` / ` between them:
+//! The comment names the table (a CSV file, from the repository's root), the row by its first
+//! column, and after the last comma the column by its title. If the first column is ambiguous, the
+//! row is named by more columns, separated by ` / `:
 //!
 //! ```markdown
 //! <!-- from docs/bench.csv: 525 × 525 / slide 0.01 / hapterra swept, times_plain -->0.72
 //! ```
 //!
 //! A comment before a table names the source of all its cells: the file, a column of the file for
-//! each column of the page (`-` for a column without figures), and on each further line the name
-//! of a row. An empty cell is not compared.
+//! each column of the page (`-` for a column without figures), and on each further line the name of
+//! a row. An empty cell is not compared.
 //!
 //! ```markdown
 //! <!-- table bench/instructions-m4f.csv: -, median, max
@@ -40,8 +39,8 @@ const BEGIN_TABLE: &str = "<!-- table ";
 const END: &str = "-->";
 const NO_END: &str = "a comment without an end";
 
-/// Returns the number of figures on a page, and a sentence for each that differs from its table
-/// or cannot be looked up.
+/// Returns the number of figures on a page, and a message for each that differs from its table or
+/// cannot be looked up.
 #[must_use]
 pub fn check(page: &str, root: &Path) -> (usize, Vec<String>) {
     let single = page.split(BEGIN).skip(1).map(|mark| figure(mark, root));
@@ -123,13 +122,13 @@ fn look_up(source: &str, root: &Path) -> Result<f64, String> {
     value.parse().map_err(|_| format!("{value:?} is no number"))
 }
 
-/// Returns true if a figure is `value` to the digits that it shows; `None` if it is no figure.
+/// Returns true if a figure equals `value` to its digits, or `None` if it is not a figure.
 fn is_rounded(shown: &str, value: f64) -> Option<bool> {
     let shown = shown.replace(',', "");
     let (mantissa, exponent) = shown.split_once('e').unwrap_or((&shown, "0"));
     let decimals = mantissa.split_once('.').map_or(0, |(_, part)| part.len());
     let last_digit = 10_f64.powi(exponent.parse::<i32>().ok()? - decimals as i32);
     let figure: f64 = shown.parse().ok()?;
-    // A hair more: half a digit has no exact binary fraction.
+    // Slightly more than half a digit, which has no exact binary fraction.
     Some((figure - value).abs() <= 0.5 * last_digit * (1.0 + 1e-9))
 }

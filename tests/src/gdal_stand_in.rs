@@ -5,10 +5,10 @@ use std::process::Command;
 
 use crate::repository;
 
-/// Builds it into a folder. Its path is the variable `GDAL_LIBRARY` of a command that shall use it.
+/// Builds it into a folder. A command uses it through the variable `GDAL_LIBRARY`.
 ///
 /// # Panics
-/// When it does not build.
+/// If the build fails.
 pub fn library(folder: &Path) -> PathBuf {
     let name = format!(
         "{}stand_in{}",
@@ -27,10 +27,10 @@ pub fn library(folder: &Path) -> PathBuf {
     path
 }
 
-/// A file that the stand-in takes for a terrain, and nothing else does.
+/// Writes a file that only the stand-in accepts as a terrain.
 ///
 /// # Panics
-/// When it cannot be written.
+/// If it cannot be written.
 pub fn terrain(folder: &Path) -> PathBuf {
     let path = folder.join("ground.stand-in");
     std::fs::write(&path, "a terrain for the stand-in").expect("written");

@@ -1,4 +1,4 @@
-//! A device behind a socket that asks for much and reads little.
+//! A device behind a socket that requests much and reads little.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -14,15 +14,15 @@ use hapterra_core::wire::session::SessionNumber;
 use crate::link_campaign::{frames, hostile_programs};
 use crate::timeouts::pass;
 
-/// Between two reads of so many bytes.
+/// Bytes of one read, and the pause between two reads.
 const PAUSE: Duration = Duration::from_millis(100);
 const SIP: usize = 1_024;
 
-/// Something that takes every scene, asks for the same tiles over and over, and reads a
-/// few bytes now and then.
+/// Starts a device that accepts every scene, repeats requests for the same tiles, and reads a few
+/// bytes from time to time.
 ///
 /// # Panics
-/// If there is no port for it.
+/// If no port is free.
 pub fn start() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("a port");
@@ -62,7 +62,7 @@ fn answer(mut host: TcpStream) {
     }
 }
 
-/// The session and its scene, once that was taken.
+/// The session and its scene, after the scene was accepted.
 type Taken = Option<(SessionNumber, u32)>;
 
 fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
@@ -83,7 +83,7 @@ fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
             let (epoch, accepted) = (scene.epoch, true);
             frames::from_device(session, &ToHost::SceneAck { epoch, accepted })
         }
-        // What a host asks before it serves.
+        // The host's queries before it serves tiles.
         ToDevice::GetCalibration { number } => {
             let calibration = Some(Calibration::PREMIUM_1_5);
             let answer = ToHost::Calibration {

@@ -1,8 +1,8 @@
-//! The emulated Cortex-M4F as a counter of instructions: scenes go in, and what
-//! each tick cost and answered comes out.
+//! The emulated Cortex-M4F as a counter of instructions: scenes are the input, the cost and result
+//! of each tick are the output.
 //!
-//! The image is `firmware/boards/mps2-an386-counts`. `cargo xtask test` and
-//! `cargo xtask counts` build it and name it.
+//! The image is `firmware/boards/mps2-an386-counts`. `cargo xtask test` and `cargo xtask counts`
+//! build it and set its variable.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -33,21 +33,21 @@ pub const WINDOW: usize = 16;
 
 /// `-icount shift`: an instruction takes 2¹⁰ ns, a count of the timer 40 ns.
 const SHIFT: u32 = 10;
-/// More instructions than the call and the return of a tick that is counted.
+/// Upper bound of the instructions for the call and return of a counted tick.
 const CALL: u32 = 16;
 /// Words of a record; see the image.
 const RECORD: usize = 13;
 
-/// QEMU and the counting image.
+/// QEMU and the image that counts.
 #[derive(Clone, Debug)]
 pub struct CountingBoard {
     qemu: PathBuf,
     image: PathBuf,
-    /// Follower of the image's instructions in its folder, for the cycles of each tick.
+    /// Function that follows the image's instructions in its folder, for the cycles of each tick.
     follow: Option<Follow>,
 }
 
-/// Runs an image in a folder to its end, and returns what each tick took.
+/// Runs an image in a folder to its end. Returns the cycles of each tick.
 pub type Follow = fn(image: &Path, folder: &Path) -> Vec<Cycles>;
 
 /// Event of a replay.
@@ -57,60 +57,58 @@ pub enum Event {
     Tile(TileKey),
     /// A tile of the fallback arrives.
     Coarse(CoarseTile),
-    /// A tick with the HIP here.
+    /// A tick with the HIP at this point.
     Hip(GridPoint),
-    /// Fed by encoders: what follows comes before the tick of this number.
+    /// For encoder counts: the events after this one precede the tick of this number.
     Before(u32),
 }
 
-/// A field that the host cuts into tiles.
+/// A field from which the host cuts tiles.
 pub trait Samples {
-    /// The height of a sample of the field in cells, by column and row; NaN is a
-    /// hole.
+    /// Returns the height of a sample of the field in cells, by column and row; NaN is no-data.
     fn sample(&self, column: i32, row: i32) -> f32;
 
-    /// The height that the fallback has there.
+    /// Returns the fallback's height at a sample.
     fn under(&self, column: i32, row: i32) -> f32 {
         self.sample(column, row)
     }
 }
 
-/// A scene for the contact alone, or for the loop on materials: tiles and HIPs in the order they
-/// come.
+/// Tiles and HIPs in order, for the contact alone or for the loop on materials.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
-    /// In the form that the device gets.
+    /// The scene as the device receives it.
     pub scene: &'a Scene,
     /// Source of the tiles.
     pub field: &'a dyn Samples,
     /// Its events.
     pub events: &'a [Event],
-    /// Materials of the ground: then each HIP is a tick of the whole loop.
+    /// Materials of the ground: if present, each HIP is a tick of the whole loop.
     pub materials: Option<&'a Materials>,
 }
 
-/// Cost and answer of one tick.
+/// Cost and result of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
-    /// Instructions, the call and the return included.
+    /// Instructions, with the call and the return.
     pub instructions: u32,
-    /// Cycles on the boards' chips, on a board that [follows](CountingBoard::following); else 0.
+    /// Cycles on the boards' chips if the board is [followed](CountingBoard::following), else 0.
     pub cycles: Cycles,
     /// The number of its [`hapterra_core::contact::ContactState`].
     pub state: u32,
-    /// True if all there was to do was done; on materials, whether the point is answered; fed by
-    /// encoders, whether the amplifiers are on.
+    /// For the contact: true if all work was done. On materials: true if the point is answered. For
+    /// encoder counts: true if the amplifiers are on.
     pub converged: bool,
-    /// Units of work.
+    /// Work units.
     pub work: u32,
-    /// Stretch in cells; fed by encoders or on materials, force in newtons.
+    /// Displacement in cells; for encoder counts or on materials, force in newtons.
     pub vector: Vec3,
     /// The proxy.
     pub proxy: GridPoint,
 }
 
 impl CountingBoard {
-    /// The board, or `None` with a visible line: the caller then returns.
+    /// Returns the board, or `None` after a visible message: the caller then returns.
     #[must_use]
     pub fn found() -> Option<Self> {
         let Some(image) = named(IMAGE_VARIABLE) else {
@@ -125,7 +123,7 @@ impl CountingBoard {
         })
     }
 
-    /// The board with the cycles of each tick, by something that follows what the image executes.
+    /// Returns the board with cycles for each tick, computed by `follow`.
     #[must_use]
     pub fn following(self, follow: Follow) -> Self {
         Self {
@@ -134,11 +132,11 @@ impl CountingBoard {
         }
     }
 
-    /// Steps the contact alone, in real time, through one replay after the other;
-    /// gives the ticks of each. Either all of them are on materials, or none.
+    /// Runs the contact in real time through each replay in turn. Returns the ticks of each. Either
+    /// all replays have materials, or none.
     ///
     /// # Panics
-    /// When the emulated program fails.
+    /// If the emulated program fails.
     #[must_use]
     pub fn contact(&self, replays: &[Replay<'_>]) -> Vec<Vec<Counted>> {
         let folder = tempfile::tempdir().expect("a folder");
@@ -163,11 +161,11 @@ impl CountingBoard {
         each
     }
 
-    /// Whole ticks, count to current; every tile is held before the first, and
-    /// the arm is armed.
+    /// Runs whole ticks from counts to currents. All tiles are stored before the first, and the arm
+    /// is armed.
     ///
     /// # Panics
-    /// When the emulated program fails.
+    /// If the emulated program fails.
     #[must_use]
     pub fn chain(
         &self,
@@ -179,11 +177,11 @@ impl CountingBoard {
         self.ticks_of(scene, (field, materials), (&events, counts))
     }
 
-    /// The same, but the scene's fallback is held before the first tick, and the tiles come
-    /// before the tick of a number; `None` for never.
+    /// Same as `chain`, but the scene's fallback is stored before the first tick, and the tiles
+    /// arrive before the tick of a number, or never with `None`.
     ///
     /// # Panics
-    /// When the emulated program fails, and where the scene has no fallback.
+    /// If the emulated program fails or the scene has no fallback.
     #[must_use]
     pub fn chain_over_fallback(
         &self,
@@ -204,7 +202,7 @@ impl CountingBoard {
         self.ticks_of(scene, (field, None), (&events, counts))
     }
 
-    /// Whole ticks at these counts, with events before the first of them or before some.
+    /// Runs whole ticks at these counts, with events before some of them.
     fn ticks_of(
         &self,
         scene: &Scene,
@@ -231,11 +229,11 @@ impl CountingBoard {
         self.run(folder.path())
     }
 
-    /// Fills a buffer with one tile after the other; gives what each took, and as
-    /// `converged` whether it was a tile.
+    /// Fills a buffer with each tile in turn. Returns the cost of each; `converged` is true if it
+    /// was a valid tile.
     ///
     /// # Panics
-    /// When the emulated program fails.
+    /// If the emulated program fails.
     #[must_use]
     pub fn tiles(&self, scene: &Scene, tiles: &[Heights<'_>]) -> Vec<Counted> {
         let folder = tempfile::tempdir().expect("a folder");
@@ -284,11 +282,10 @@ impl CountingBoard {
     }
 }
 
-/// Adds the cycles of each tick. Those without a record are the first ones, in which the arm is
-/// armed.
+/// Adds the cycles of each tick. The first ticks, in which the arm is armed, have no record.
 ///
 /// # Panics
-/// If what was followed is not what was counted, but for the call and the return of each tick.
+/// If the followed instructions differ from the counted ones by more than a tick's call and return.
 fn add_cycles(counted: &mut [Counted], followed: &[Cycles]) {
     let unrecorded = followed.len().checked_sub(counted.len());
     let followed = &followed[unrecorded.expect("each record's tick")..];
@@ -309,7 +306,7 @@ fn records(folder: &Path, name: &str) -> Vec<Counted> {
     words.chunks_exact(RECORD).map(counted).collect()
 }
 
-/// The keys of all tiles of a field.
+/// Returns the keys of all tiles of a field.
 pub fn tiles(size: FieldSize) -> impl Iterator<Item = TileKey> {
     let last = size.last_tile();
     (0..=last.row).flat_map(move |row| (0..=last.col).map(move |col| TileKey::new(0, col, row)))
@@ -373,7 +370,7 @@ fn coarse_bytes(size: FieldSize, place: CoarseTile, field: &dyn Samples) -> Vec<
     bytes_of(size, place.first, place.spacing(), |x, y| field.under(x, y))
 }
 
-/// The samples of a tile whose first one lies there, so many cells apart.
+/// Returns the samples of a tile by its first sample and their distance in cells.
 fn bytes_of(size: FieldSize, first: Cell, apart: i32, height: impl Fn(i32, i32) -> f32) -> Vec<u8> {
     let post = |i: usize| {
         let [x, y] = [

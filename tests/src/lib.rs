@@ -1,5 +1,5 @@
-//! Common parts of the tests across crates: where the shared data is, and the
-//! real `hapterra` binary.
+//! Shared parts of the tests across crates: the location of the shared data, and the real
+//! `hapterra` binary.
 
 #![forbid(unsafe_code)]
 
@@ -40,20 +40,20 @@ use std::sync::OnceLock;
 
 pub use terrain_file::terrain_file;
 
-/// The program of the Rust tutorial, run.
+/// The program of the Rust tutorial, which is run.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/tutorials/kernel-in-rust.md")]
 struct KernelTutorial;
 
-/// The repository's root folder.
+/// Returns the repository's root folder.
 pub fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .expect("the tests package is inside the repository")
 }
 
-/// A file or folder of the shared data beside the repository (`../shared`), or
-/// `None` with a visible line when it is absent: the caller then returns.
+/// Returns a file or folder of the shared data beside the repository (`../shared`), or `None` after
+/// a visible message if it is absent: the caller then returns.
 pub fn shared(path: &str) -> Option<PathBuf> {
     let full = repository().parent()?.join("shared").join(path);
     if full.exists() {
@@ -63,19 +63,19 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     None
 }
 
-/// Variables that cargo sets for a test program, one a line. With them, build scripts that read them
-/// would run again, and the binary would be built again for the tests of each package.
+/// Variables that cargo sets for a test program, one a line. Without their removal, build scripts
+/// that read them run again, and the binary is rebuilt for the tests of each package.
 const OF_CARGO: &str = include_str!("cargo_variables.txt");
 
-/// Path of the real `hapterra` binary, built first when need be.
+/// Returns the path of the real `hapterra` binary, which is built first if necessary.
 ///
 /// # Panics
-/// When the binary does not build.
+/// If the binary does not build.
 pub fn hapterra_binary() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
-        // This program is TARGET/PROFILE/deps/NAME: the binary goes beside it,
-        // where it was most likely built already.
+        // This program is TARGET/PROFILE/deps/NAME: the binary belongs beside `deps`, where it was
+        // probably built before.
         let this = std::env::current_exe().expect("this program has a path");
         let target = this.ancestors().nth(3).expect("it is in a target folder");
         let build = OF_CARGO
@@ -85,8 +85,8 @@ pub fn hapterra_binary() -> &'static Path {
             });
         let build = build
             .target_dir(target)
-            // From the root, so that features are those of the whole workspace
-            // and nothing is built twice.
+            // From the root, so that the features are the whole workspace's and nothing is built
+            // twice.
             .manifest_path(repository().join("Cargo.toml"))
             .bin("hapterra");
         let build = if cfg!(debug_assertions) {
@@ -105,7 +105,7 @@ pub fn hapterra_binary() -> &'static Path {
 /// Returns the output of `hapterra info --json` for a terrain.
 ///
 /// # Panics
-/// When it fails.
+/// If the command fails.
 pub fn info(path: &Path) -> serde_json::Value {
     let output = Command::new(hapterra_binary())
         .args(["info", "--json"])
@@ -116,7 +116,7 @@ pub fn info(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// A surface on which the passivity controller does not act, as a file for `--surface`.
+/// A surface without the passivity controller, as a file for `--surface`.
 pub const UNCONTROLLED: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/data/surfaces/uncontrolled.toml"

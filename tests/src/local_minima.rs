@@ -1,24 +1,24 @@
-//! All local closest points around a place, listed: a second opinion on where a
-//! proxy may rest, found without walking there from where it is.
+//! A list of all local closest points around a point: a second opinion on where a proxy may rest,
+//! without a path from its last position.
 //!
-//! In a patch, the nearest point of each ruling is known in closed form, so the
-//! squared distance is a function F of one coordinate. F's slope is looked at in
-//! hundreds of places, dense to 10⁻¹² around those where it may turn within a
-//! short way; each turn from falling to rising is halved to the end of f64. What
-//! is found on a border is kept if no patch that shares it leads on downhill.
+//! In a patch, the nearest point of each ruling is known in closed form, so the squared distance is
+//! a function F of one coordinate. The slope of F is computed at hundreds of points, dense to 10⁻¹²
+//! around those where it may change sign within a short distance; each change from falling to
+//! rising is bisected to the precision of f64. A point on a border is kept if no patch that shares
+//! it leads on downhill.
 
 use crate::invariants::surface::{Patch, distance};
 use crate::scene::terrain::Terrain;
 
-/// Places looked at in a patch by even steps.
+/// Evenly spaced points in a patch.
 const STEPS: i32 = 512;
-/// A border nearer than this to a place, in cells, has its other side looked at.
+/// Distance from a border, cells, within which its other side is searched as well.
 const NEAR: f64 = 1e-3;
-/// Slopes of the distance along a border's other side that count as none.
+/// Slopes of the distance on a border's other side that count as zero.
 const LEVEL: f64 = 1e-9;
 
-/// The local closest points to `hip` in the patches around a place: in the
-/// patch it is in, and in those whose border it is near.
+/// Returns the local closest points to `hip` in the patch at a point, and in those whose border is
+/// near.
 #[must_use]
 pub fn around(terrain: &Terrain, hip: [f64; 3], place: [f64; 2]) -> Vec<[f64; 3]> {
     let cells = |x: f64| {
@@ -38,7 +38,7 @@ pub fn around(terrain: &Terrain, hip: [f64; 3], place: [f64; 2]) -> Vec<[f64; 3]
         .collect()
 }
 
-/// The one of them that is nearest to a point, and how near.
+/// Returns the one nearest to a point, and its distance.
 #[must_use]
 pub fn nearest(all: &[[f64; 3]], point: [f64; 3]) -> Option<([f64; 3], f64)> {
     let with = all.iter().map(|at| (*at, distance(*at, point)));
@@ -47,7 +47,7 @@ pub fn nearest(all: &[[f64; 3]], point: [f64; 3]) -> Option<([f64; 3], f64)> {
 
 fn in_patch(patch: &Patch, hip: [f64; 3], place: [f64; 2]) -> Vec<[f64; 2]> {
     let low = patch.cell.map(f64::from);
-    // The steeper direction is the one in closed form.
+    // The steeper direction uses the closed form.
     let steepest = |axis: usize| {
         let ends = [[0.0, 0.0], [1.0, 1.0]];
         let slopes = ends.map(|[u, v]| patch.slopes(low[0] + u, low[1] + v)[axis].abs());
@@ -86,7 +86,7 @@ struct Ruled<'p> {
 }
 
 impl Ruled<'_> {
-    /// Returns the place where along its ruling the nearest point is.
+    /// Returns the coordinate of the nearest point along its ruling.
     fn best(&self, t: f64) -> f64 {
         let [x, y] = self.at(0.0, t);
         let slope = self.patch.slopes(x, y)[self.axis];
@@ -104,7 +104,7 @@ impl Ruled<'_> {
         self.at(self.best(t), t)
     }
 
-    /// Half the slope of F.
+    /// Returns half the slope of F.
     fn slope(&self, t: f64) -> f64 {
         let [x, y] = self.point(t);
         let other = 1 - self.axis;
@@ -112,12 +112,12 @@ impl Ruled<'_> {
         aside + (self.patch.height(x, y) - self.hip[2]) * self.patch.slopes(x, y)[other]
     }
 
-    /// Everywhere, and closely around where F may turn.
+    /// Returns points everywhere, dense around those where F may turn.
     fn places(&self, around: f64) -> Vec<f64> {
         let [x0, y0] = self.at(0.0, 0.0);
         let [x1, y1] = self.at(0.0, 1.0);
         let slopes = [(x0, y0), (x1, y1)].map(|(x, y)| self.patch.slopes(x, y)[self.axis]);
-        // The gap between surface and HIP along the ruling through the HIP.
+        // The gap between the surface and the HIP along the ruling through the HIP.
         let ahead = self.hip[self.axis] - self.low[self.axis];
         let gaps = [0.0, 1.0].map(|t| {
             let [x, y] = self.at(0.0, t);
@@ -158,7 +158,7 @@ impl Ruled<'_> {
     }
 }
 
-/// Returns true if no patch that shares the place leads on downhill from it.
+/// Returns true if no patch that shares the point leads on downhill.
 fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2]) -> bool {
     let side = |axis: usize| {
         let local = at[axis] - f64::from(own.cell[axis]);
@@ -176,7 +176,7 @@ fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2])
         .all(|(way, patch)| !leads_down(&patch, hip, at, way))
 }
 
-/// Returns true if the distance falls from a place on a patch's border into it.
+/// Returns true if the distance falls from a point on a patch's border into the patch.
 fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
     let rise = patch.height(x, y) - hip[2];
     let [east, north] = patch.slopes(x, y);
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_twist_has_more_than_one() {
-        // z = 8·(u − ½)·(v − ½): from far below the middle, two corners are near.
+        // z = 8·(u − ½)·(v − ½): seen from far below the middle, two corners are near.
         let saddle = Terrain::from_fn(
             Kind::Twisted,
             [1, 1],

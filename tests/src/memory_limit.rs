@@ -1,29 +1,29 @@
-//! The program in bounded memory, and what would take more.
+//! Runs of the program in bounded memory, and files that would need more.
 
 use std::path::Path;
 use std::process::{Command, Output};
 
 use crate::hapterra_binary;
 
-/// Address space of a child that holds 256 MB of terrain, KiB: the program itself takes some 100 MB
-/// of it.
+/// Address space of a child that reads 256 MB of terrain, KiB: the program itself needs about 100
+/// MB of it.
 pub const MAX_KIB: u32 = 400_000;
 
-/// Runs `hapterra info` on a file in [`MAX_KIB`] of address space, with these options.
+/// Runs `hapterra info` on a file with these options in [`MAX_KIB`] of address space.
 ///
 /// # Panics
-/// When it does not start.
+/// If it does not start.
 pub fn info(path: &Path, options: &[&str]) -> Output {
     command(path, options).output().expect("it runs")
 }
 
-/// The same where the machine has no GDAL: what the own readers say.
+/// Same as [`info`], without GDAL: the project's own readers answer.
 ///
 /// # Panics
-/// As [`info`].
+/// Like [`info`].
 pub fn info_without_gdal(path: &Path, options: &[&str]) -> Output {
     let mut command = command(path, options);
-    // Names no library.
+    // The name of no library.
     command.env("GDAL_LIBRARY", "none");
     command.output().expect("it runs")
 }
@@ -46,7 +46,7 @@ fn command(path: &Path, options: &[&str]) -> Command {
     command
 }
 
-/// A Zstandard frame of one byte, which is repeated so many times 128 KiB.
+/// Returns a Zstandard frame of one byte, repeated `blocks` times 128 KiB.
 pub fn zstd_bomb(blocks: usize) -> Vec<u8> {
     let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x58];
     for block in 0..blocks {

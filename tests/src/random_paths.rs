@@ -4,8 +4,8 @@ use hapterra::terrain::Terrain;
 
 use crate::random::Random;
 
-/// Random steps over a terrain in millimetres, mostly near the surface:
-/// pressing, sliding, jumping, lifting, holding still. Starts above everything.
+/// Returns a random path over a terrain in millimetres, mostly near the surface: pressing, sliding,
+/// jumping, lifting, holding still. It starts above everything.
 #[must_use]
 pub fn wander(terrain: &Terrain<'_>, seed: u64, rows: usize, margin_cells: f64) -> Vec<[f64; 3]> {
     let cell = terrain.scale().cell_mm();

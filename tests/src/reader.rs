@@ -1,5 +1,5 @@
-//! Who reads a terrain file: this program, and GDAL where there is a libgdal. The same tests hold
-//! for both.
+//! Readers of terrain files: this program, and GDAL if a libgdal is installed. The same tests run
+//! with both.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ use heightfield::{Error, OpenOptions, Raster, gdal};
 /// A reader of terrain files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reader {
-    /// A format that `hapterra` reads by itself.
+    /// A reader of `hapterra` itself.
     Own,
-    /// GDAL, asked for a file that `hapterra` reads by itself.
+    /// GDAL, for a file that `hapterra` also reads itself.
     Gdal,
 }
 
 impl Reader {
-    /// All that this machine has; reports it where there is no GDAL.
+    /// Returns all readers on this machine; prints a message without GDAL.
     pub fn all() -> Vec<Self> {
         match gdal() {
             Ok(_) => vec![Self::Own, Self::Gdal],
@@ -29,7 +29,7 @@ impl Reader {
     /// Opens a file.
     ///
     /// # Errors
-    /// As [`Raster::open`].
+    /// Like [`Raster::open`].
     pub fn open(self, path: &Path, options: &OpenOptions) -> Result<Raster, Error> {
         match self {
             Self::Own => Raster::open(path, options),
@@ -37,8 +37,8 @@ impl Reader {
         }
     }
 
-    /// Returns true if it reads a file: GDAL reads no NumPy, and `hapterra` leaves to GDAL what is
-    /// rare.
+    /// Returns true if it reads a file: GDAL reads no NumPy, and `hapterra` leaves rare formats to
+    /// GDAL.
     #[must_use]
     pub fn knows(self, file: &str) -> bool {
         let foreign: &[&str] = match self {

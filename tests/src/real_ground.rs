@@ -1,15 +1,15 @@
-//! Files of real ground that several tests slide over.
+//! Files of real ground for several tests.
 
 use hapterra::terrain::{HapticCells, HapticGrid, Terrain};
 use heightfield::{OpenOptions, Raster};
 
 use crate::shared;
 
-/// Three of them by name: mountains, a volcano with sharp ridges, a city. None where they are
-/// not on this machine, with a message.
+/// Returns three of them by name: mountains, a volcano with sharp ridges, a city. Returns none,
+/// with a message, if they are not on this machine.
 ///
 /// # Panics
-/// When one of them does not open.
+/// If one of them does not open.
 #[must_use]
 pub fn files() -> Vec<(&'static str, Raster)> {
     named(&[
@@ -19,10 +19,10 @@ pub fn files() -> Vec<(&'static str, Raster)> {
     ])
 }
 
-/// Five of them, a city seen by lidar among them; none where they are not on this machine.
+/// Returns five of them, with a lidar scan of a city; none if they are not on this machine.
 ///
 /// # Panics
-/// When one of them does not open.
+/// If one of them does not open.
 #[must_use]
 pub fn more_files() -> Vec<(&'static str, Raster)> {
     named(&[
@@ -43,11 +43,11 @@ fn named(names: &[&'static str]) -> Vec<(&'static str, Raster)> {
     there.map(|(name, path)| (name, open(path))).collect()
 }
 
-/// All of them that open, by their names' order. None where they are not on this machine, which
-/// is reported, as is a file that does not open.
+/// Returns all that open, in the order of their names. Returns none if they are not on this
+/// machine, which is reported, as is a file that does not open.
 ///
 /// # Panics
-/// When their folder cannot be read.
+/// If their folder cannot be read.
 #[must_use]
 pub fn all_files() -> Vec<(String, Raster)> {
     let folder = shared("dem/real");
@@ -71,10 +71,10 @@ pub fn all_files() -> Vec<(String, Raster)> {
     opened.collect()
 }
 
-/// A raster true to scale, a cell a millimetre.
+/// Returns a raster true to scale, with cells of a millimetre.
 ///
 /// # Panics
-/// When it cannot be rendered so.
+/// If it cannot be rendered at this scale.
 #[must_use]
 pub fn terrain(raster: &Raster) -> Terrain<'_> {
     let grid = HapticGrid::new(raster, HapticCells::Square);

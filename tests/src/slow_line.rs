@@ -1,5 +1,4 @@
-//! A line to a device that carries a number of bytes in a tick, and devices whose ticks wait
-//! for it.
+//! A line to a device with a limited number of bytes a tick, and devices whose ticks wait for it.
 
 use std::collections::VecDeque;
 
@@ -25,7 +24,7 @@ const WINDOW: usize = 16;
 pub struct SlowLine {
     bytes_a_tick: usize,
     waiting: VecDeque<Vec<u8>>,
-    /// Bytes that the line may carry by now and has not.
+    /// Bytes that the line may carry now.
     credit: usize,
 }
 
@@ -40,13 +39,13 @@ impl SlowLine {
         }
     }
 
-    /// Takes whole frames from the host.
+    /// Queues whole frames from the host.
     pub fn send(&mut self, frames: &[u8]) {
         let frames = frames.split_inclusive(|byte| *byte == 0);
         self.waiting.extend(frames.map(<[u8]>::to_vec));
     }
 
-    /// The frames that arrive in the next tick.
+    /// Returns the frames that arrive in the next tick.
     pub fn carry(&mut self) -> Vec<u8> {
         self.credit += self.bytes_a_tick;
         let mut arrived = vec![];
@@ -57,7 +56,7 @@ impl SlowLine {
             self.credit -= frame.len();
             arrived.extend(frame);
         }
-        // An idle line saves nothing for later.
+        // Unused capacity of an idle line is lost.
         if self.waiting.is_empty() {
             self.credit = 0;
         }
@@ -65,30 +64,30 @@ impl SlowLine {
     }
 }
 
-/// A device whose time passes tick by tick, on command of its host.
+/// A device whose time advances tick by tick, controlled by its host.
 pub trait Stepped {
-    /// Sends frames in no time of the device. Returns its messages since.
+    /// Sends frames without a tick. Returns the device's messages since the last call.
     fn exchange(&mut self, frames: &[u8]) -> Vec<u8>;
 
-    /// Runs one tick, then takes frames of this session. Returns all messages of the device
-    /// until it had done with both.
+    /// Runs one tick, then delivers frames of this session. Returns all messages of the device
+    /// until it has processed both.
     fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8>;
 }
 
-/// The device in this program, and the arm at it.
+/// The device in this program, and its arm.
 pub struct InMemory {
     device: Device<StoppedClock, WINDOW>,
     arm: HeldPhantom,
-    /// Bytes that the device takes after a tick only.
+    /// Bytes that the device reads only after a tick.
     unread: Vec<u8>,
 }
 
 impl InMemory {
-    /// A device that has just started, with a Premium 1.5's calibration.
+    /// Creates a device after its start, with a Premium 1.5's calibration.
     #[must_use]
     pub fn new(arm: HeldPhantom) -> Self {
-        // The two halves of the application hand tile buffers to each other by reference, for
-        // as long as the program runs.
+        // The two halves of the application exchange tile buffers by reference, as long as the
+        // program runs.
         let tiles = Box::leak(Box::new(TileBuffers::VACANT));
         let memory = Box::leak(Box::new(WorkingMemory::new()));
         let stored = Stored::Found(Calibration::PREMIUM_1_5);
@@ -127,11 +126,11 @@ impl Stepped for InMemory {
     }
 }
 
-/// The emulated board and the arm at its plant line, in this one thread.
+/// The emulated board, and the arm on its plant line, in this thread.
 ///
-/// The board's clock stands from the end of a tick until the counts of the next are there. They
-/// are sent when the board has answered a message alive that was sent after the tick and its
-/// frames: it has read those, and its requests have come.
+/// The board's clock stops from the end of a tick until the counts of the next arrive. They are
+/// sent when the board has answered a heartbeat sent after the tick and its frames: by then it has
+/// read the frames, and its requests have arrived.
 pub struct OnBoard {
     /// The link.
     pub link: Tcp,
@@ -142,12 +141,12 @@ pub struct OnBoard {
     from_link: Box<FrameReader<MAX_FRAME>>,
     from_plant: Box<FrameReader<MAX_FRAME>>,
     ticks: u32,
-    /// Messages alive that the board has not answered.
+    /// Heartbeats that the board has not answered.
     unanswered: i32,
 }
 
 impl OnBoard {
-    /// A board that has just started.
+    /// Creates a board after its start.
     #[must_use]
     pub fn new(link: Tcp, plant: Tcp, arm: HeldPhantom) -> Self {
         Self {
@@ -172,7 +171,7 @@ impl OnBoard {
         chunk[..n].to_vec()
     }
 
-    /// Counts the answers to messages alive that end in these bytes.
+    /// Counts the answers to heartbeats that end in these bytes.
     fn hear(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.from_link.push(bytes);
@@ -184,7 +183,7 @@ impl OnBoard {
         }
     }
 
-    /// Sends a frame; the host has messages alive of its own among them.
+    /// Sends a frame, and counts it if it is a heartbeat of the host.
     fn send(&mut self, frame: &[u8]) {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let (_, content) = reader.push(frame);
@@ -212,7 +211,7 @@ impl OnBoard {
             let n = self.plant.receive(&mut chunk, HANG);
             let n = n.expect("the board is there");
             assert!(n > 0, "no currents for {HANG:?}");
-            // Nothing follows a tick's currents before the next counts are sent.
+            // After a tick's currents nothing follows until the next counts are sent.
             if let (_, Some(frame)) = self.from_plant.push(&chunk[..n]) {
                 return frame.and_then(decode).expect("currents");
             }
@@ -239,12 +238,12 @@ impl Stepped for OnBoard {
         self.arm.step(currents.currents_a.map(f64::from), tick_s);
         self.ticks += 1;
         let mut said = self.settle(session);
-        // One by one: what a frame leads to does not depend on when the next one comes.
+        // One by one, so that the effect of a frame does not depend on the arrival of the next.
         for frame in frames.split_inclusive(|byte| *byte == 0) {
             self.send(frame);
             said.extend(self.settle(session));
         }
-        // Answers overtake samples that wait, which are on the line before the next answer.
+        // Answers overtake waiting samples, which are sent before the next answer.
         said.extend(self.settle(session));
         said
     }

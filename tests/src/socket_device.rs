@@ -1,4 +1,4 @@
-//! A device behind a socket, and the command that serves it.
+//! A device behind a socket, and the command that serves a terrain to it.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -19,33 +19,33 @@ use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_core::wire::status::Status;
 
-/// A device behind a socket, one host after the other. While it is deaf nothing reaches
-/// it, and what it says still comes.
+/// A device behind a socket, one host after the other. While it is deaf it receives nothing, but
+/// still sends.
 pub struct SocketDevice {
-    /// Its place.
+    /// Its address.
     pub address: SocketAddr,
-    /// True if nothing reaches it.
+    /// True if it receives nothing.
     pub deaf: Arc<AtomicBool>,
     seen: Arc<Seen>,
 }
 
-/// Events for which a test may wait.
+/// Counters that tests wait for.
 #[derive(Default)]
 struct Seen {
     /// Ticks of the device.
     ticks: AtomicU64,
-    /// Hellos and goodbyes that did not reach it, since it is deaf.
+    /// Messages to open and close a session that it missed while deaf.
     unheard_hellos: AtomicU64,
     unheard_byes: AtomicU64,
 }
 
 impl SocketDevice {
-    /// A device whose arm rests.
+    /// Starts a device whose arm rests.
     pub fn start() -> Self {
         Self::with(|| (Native::for_replay().restless(), || {}))
     }
 
-    /// The device that `make` makes in its own thread, and what is done there each few
+    /// Starts the device that `make` creates in its own thread, with a function called every few
     /// milliseconds of its time.
     pub fn with<F: FnMut()>(make: impl FnOnce() -> (Native, F) + Send + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -74,20 +74,19 @@ impl SocketDevice {
         wait_until("ticks of the device", || ticks() >= until);
     }
 
-    /// Waits until a host has greeted the device, which is deaf.
+    /// Waits until a host has sent an open to the deaf device.
     pub fn wait_for_unheard_hello(&self) {
         let hellos = &self.seen.unheard_hellos;
         wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
     }
 
-    /// Waits until a host has sent a close to the device, which ignores it.
+    /// Waits until a host has sent a close to the deaf device.
     pub fn wait_for_unheard_bye(&self) {
         let byes = &self.seen.unheard_byes;
         wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
     }
 
-    /// Waits until a host, or its guardian, has sent a message that ends a session to the
-    /// device, which is deaf.
+    /// Waits until a host or its guardian has sent the deaf device a message that ends a session.
     pub fn wait_for_unheard_end(&self) {
         let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
         let Seen {
@@ -98,7 +97,7 @@ impl SocketDevice {
         wait_until("an end", || count(unheard_hellos) + count(unheard_byes) > 0);
     }
 
-    /// Returns the end of the last session, as the next host hears it.
+    /// Returns the end of the last session, as reported to the next host.
     pub fn last_end(&self) -> SessionEnd {
         self.control().device().last.end
     }
@@ -115,10 +114,10 @@ impl SocketDevice {
     }
 }
 
-/// Ticks of the device after each look at its host.
+/// Ticks of the device between two checks of its host.
 const TICKS: u32 = 2;
 
-/// Until the host is gone.
+/// Serves a host until it disconnects.
 fn serve(
     device: &mut Native,
     mut stream: TcpStream,
@@ -139,7 +138,7 @@ fn serve(
             Err(_) => return,
         }
         between();
-        // A few milliseconds of its time go by.
+        // A few milliseconds of its time pass.
         device.pass(TICKS);
         seen.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
         let said = device
@@ -151,7 +150,7 @@ fn serve(
     }
 }
 
-/// Counts what does not reach the device.
+/// Counts the messages that the deaf device misses.
 fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
     while !bytes.is_empty() {
         let (taken, content) = reader.push(bytes);
@@ -165,7 +164,7 @@ fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
     }
 }
 
-/// A terrain in a folder; its path.
+/// Writes a terrain to a folder. Returns its path.
 pub fn terrain(folder: &Path) -> String {
     let file = folder.join("hills.tif");
     let path = file.to_str().expect("a plain path").to_owned();
@@ -173,12 +172,12 @@ pub fn terrain(folder: &Path) -> String {
     path
 }
 
-/// The command that serves terrain to the device at this address, and records.
+/// Returns the command that serves a terrain to the device at this address, and records.
 pub fn command(address: SocketAddr, folder: &Path) -> Command {
     command_over(&terrain(folder), address, folder)
 }
 
-/// The same for a terrain of this path.
+/// Same as `command`, for the terrain at this path.
 pub fn command_over(terrain: &str, address: SocketAddr, folder: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
@@ -193,7 +192,7 @@ pub fn command_over(terrain: &str, address: SocketAddr, folder: &Path) -> Comman
     command
 }
 
-/// Starts serving, and waits until samples have come.
+/// Starts the command, and waits until samples have arrived.
 pub fn start(served: &SocketDevice, folder: &Path, more: &[&str]) -> Child {
     let mut child = command(served.address, folder)
         .args(more)
@@ -203,7 +202,7 @@ pub fn start(served: &SocketDevice, folder: &Path, more: &[&str]) -> Child {
     child
 }
 
-/// Waits until the command names the terrain, which it does when the session is open.
+/// Waits until the command prints the terrain's name, which it does when the session is open.
 pub fn has_begun(stdout: &mut impl Read) {
     let mut begun = [0; 16];
     stdout.read_exact(&mut begun).expect("a session");
@@ -217,7 +216,7 @@ pub fn signal(child: &Child, name: &str) {
     assert!(sent.expect("kill runs").success());
 }
 
-/// Returns its output and error output.
+/// Returns the standard output and error output.
 pub fn output_text(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()

@@ -7,7 +7,7 @@ use hapterra::synth::{Grid, Kind, Synth, write};
 /// Writes a square terrain as `hapterra-lab synth KIND -o PATH --size SIDE --seed SEED` does.
 ///
 /// # Panics
-/// When it cannot be written.
+/// If it cannot be written.
 pub fn terrain_file(path: &Path, kind: Kind, side: u32, seed: u64) {
     let grid = Grid {
         columns: side,

@@ -1,23 +1,23 @@
-//! Little-endian TIFFs, tag by tag, so that they may say anything.
+//! Little-endian TIFFs written tag by tag, so that they can contain anything.
 
 /// The values of a tag.
 #[derive(Clone, Debug)]
 pub enum Values {
-    /// Of 16 bits.
+    /// 16-bit integers.
     Shorts(Vec<u16>),
-    /// Of 32 bits.
+    /// 32-bit integers.
     Longs(Vec<u32>),
-    /// Floats of 64 bits.
+    /// 64-bit floats.
     Doubles(Vec<f64>),
 }
 
-/// Tags of an image, in rising order of their numbers.
+/// Tags of an image in ascending order.
 pub type Directory = Vec<(u16, Values)>;
 
-/// Place where the data of a file begins.
+/// Offset of the data in a file.
 pub const DATA: u32 = 8;
 
-/// A file of some data and of images.
+/// Returns a file with this data and these images.
 pub fn tiff(data: &[u8], images: &[Directory]) -> Vec<u8> {
     let mut bytes = b"II*\0".to_vec();
     bytes.extend((DATA + data.len() as u32).to_le_bytes());
@@ -62,7 +62,7 @@ fn stored(values: &Values) -> (u16, usize, Vec<u8>) {
     }
 }
 
-/// An image of single floats in one strip without compression, which begins at `place`.
+/// Returns an image of single floats in one uncompressed strip, which begins at `place`.
 pub fn floats_in_a_strip([columns, rows]: [u32; 2], place: u32) -> Directory {
     let one = |tag: u16, value: u32| (tag, Values::Longs(vec![value]));
     vec![
@@ -79,7 +79,7 @@ pub fn floats_in_a_strip([columns, rows]: [u32; 2], place: u32) -> Directory {
     ]
 }
 
-/// The tags that place an image in a zone of UTM, its first sample's outer corner at `corner`.
+/// Returns the tags that place an image in a UTM zone, its first sample's outer corner at `corner`.
 pub fn placed(corner: [f64; 2], cell: f64, zone: u16) -> Directory {
     let keys = vec![1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, zone];
     vec![

@@ -1,12 +1,12 @@
 //! The only place where tests read the wall clock or sleep.
 //!
-//! A test's claim is held by counts, conditions and the device's own time, which is the number
-//! of its ticks, so no machine is too slow for it. Two uses of the wall clock are left:
+//! Tests check counts, conditions and the device's own time, which is the number of its ticks, so
+//! no machine is too slow for them. Two uses of the wall clock remain:
 //!
-//! - A test that would wait for ever fails after [`HANG`], which no machine meets that makes
-//!   any progress.
-//! - Where the product itself waits in real time ([`pass`]), the test may let it. A slow machine
-//!   then shows less; it fails nothing.
+//! - A test that would wait forever fails after [`HANG`]. No machine that makes progress is so
+//!   slow.
+//! - If the product itself waits in real time ([`pass`]), the test may wait for it. On a slow
+//!   machine such a test covers less, but does not fail.
 //!
 //! `tests/tests/wall_clock.rs` searches the sources of all tests for other uses.
 
@@ -17,15 +17,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Time for which a test waits for what comes at once, before it fails.
+/// Time after which a test stops waiting for a result that normally arrives at once, and fails.
 pub const HANG: Duration = Duration::from_secs(600);
-/// Between two looks at a condition.
+/// Interval between two checks of a condition.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// Waits until `look` finds something.
+/// Waits until `look` returns a value.
 ///
 /// # Panics
-/// After [`HANG`], with `what` was waited for.
+/// After [`HANG`], with `what` in the message.
 pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
     loop {
@@ -40,7 +40,7 @@ pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
 /// Waits until `holds` returns true.
 ///
 /// # Panics
-/// After [`HANG`], with `what` was waited for.
+/// After [`HANG`], with `what` in the message.
 pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     wait_for(what, || holds().then_some(()));
 }
@@ -62,7 +62,7 @@ pub fn end_of(mut child: Child) -> Output {
     child.wait_with_output().expect("its output")
 }
 
-/// The next value of a channel; none once its senders are gone.
+/// Returns the next value of a channel, or `None` when all its senders are gone.
 ///
 /// # Panics
 /// After [`HANG`].
@@ -74,8 +74,8 @@ pub fn next<T>(from: &Receiver<T>) -> Option<T> {
     }
 }
 
-/// Lets real time pass for a product that runs in another thread or process. What the test
-/// claims has to hold, too, if the product did nothing in this time.
+/// Lets real time pass for a product in another thread or process. The test must also hold if the
+/// product did nothing in this time.
 pub fn pass(time: Duration) {
     sleep(time);
 }
@@ -83,24 +83,24 @@ pub fn pass(time: Duration) {
 /// Sets the time of a file's last change to `age` before now.
 ///
 /// # Panics
-/// When the file cannot be opened.
+/// If the file cannot be opened.
 pub fn set_age(path: &Path, age: Duration) {
     set_modified(path, SystemTime::now() - age);
 }
 
-/// Sets the time of a file's last change to one that is an hour ahead: however long the test
-/// takes, the file was changed a moment ago.
+/// Sets the time of a file's last change to an hour ahead, so that the change counts as recent
+/// however long the test takes.
 ///
 /// # Panics
-/// When the file cannot be opened.
+/// If the file cannot be opened.
 pub fn set_just_changed(path: &Path) {
     set_modified(path, SystemTime::now() + Duration::from_secs(3_600));
 }
 
-/// When a file was last changed, seconds since 1970.
+/// Returns the time of a file's last change, seconds since 1970.
 ///
 /// # Panics
-/// When there is no such file.
+/// If the file does not exist.
 #[must_use]
 pub fn changed_at_unix_s(path: &Path) -> f64 {
     let changed = path.metadata().and_then(|about| about.modified());

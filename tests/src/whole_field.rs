@@ -1,4 +1,4 @@
-//! A field of patches held whole by the product's own window.
+//! A field of patches, stored whole by the product's own window.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactOutput, ContactSettings};
@@ -8,17 +8,17 @@ use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 /// Tiles along the side of the window: fields up to 256 × 256 patches.
 const SIDE: usize = 8;
 
-/// A proxy over a field given by a function of the sample.
+/// A proxy over a field defined by a function of the sample.
 pub struct FieldContact {
     window: Window<'static, SIDE>,
     contact: Contact,
 }
 
 impl FieldContact {
-    /// `size × size` patches; NaN is a hole.
+    /// Creates `size × size` patches; NaN is no-data.
     ///
     /// # Panics
-    /// When the field is larger than the window.
+    /// If the field is larger than the window.
     #[must_use]
     pub fn new(size: i32, height: impl Fn(i32, i32) -> f32) -> Self {
         let tile = || -> &'static mut Tile { Box::leak(Box::new(Tile::VACANT)) };
@@ -48,10 +48,10 @@ impl FieldContact {
         }
     }
 
-    /// Moves the HIP and answers when all there is to do for it is done.
+    /// Moves the HIP, and returns the result when it has converged.
     ///
     /// # Panics
-    /// When that takes more than 10,000 ticks.
+    /// If that needs more than 10,000 ticks.
     pub fn step(&mut self, hip: [f64; 3]) -> ContactOutput {
         let hip = point(hip);
         for _ in 0..10_000 {
@@ -64,7 +64,7 @@ impl FieldContact {
     }
 }
 
-/// A position in cells as the core takes it.
+/// Converts a position in cells to the core's form.
 #[must_use]
 pub fn point(p: [f64; 3]) -> GridPoint {
     let cell = p.map(|c| c.floor() as i32);
@@ -72,7 +72,7 @@ pub fn point(p: [f64; 3]) -> GridPoint {
     GridPoint::new(cell, Vec3::from_array(frac))
 }
 
-/// A position of the core in cells.
+/// Converts a position of the core to cells.
 #[must_use]
 pub fn position(p: &GridPoint) -> [f64; 3] {
     let (cell, frac) = (p.cell(), p.frac());

@@ -1,5 +1,5 @@
-//! Whatever a file holds, opening it ends in an error or a terrain: never a panic,
-//! never a hang, never more memory than the file justifies.
+//! Any file that is opened gives an error or a terrain: never a panic, never a hang, never more
+//! memory than the file justifies.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -9,7 +9,7 @@ use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{hapterra_binary, shared, terrain_file};
 use heightfield::{OpenOptions, Raster, RasterError};
 
-/// Address space a child may use. The program itself takes some 100 MB of it.
+/// Address space of a child. The program itself needs about 100 MB of it.
 const MEMORY_KIB: u64 = 1 << 20;
 
 fn files_in(folder: &Path) -> Vec<PathBuf> {
@@ -46,7 +46,7 @@ fn info(path: &Path) -> Output {
     end_of(child)
 }
 
-/// An exit of 0 with a report, or of 1 with what is wrong and what to do.
+/// Checks for an exit code of 0 with a report, or of 1 with the fault and a remedy.
 fn assert_ends_well(path: &Path) -> bool {
     let output = info(path);
     let told = String::from_utf8_lossy(&output.stderr);
@@ -56,7 +56,7 @@ fn assert_ends_well(path: &Path) -> bool {
         Some(0) => assert!(!output.stdout.is_empty(), "{context}"),
         Some(1) => {
             let is_told = |line: &str| line.starts_with("error: ");
-            // On a slow machine lines about the reading come before.
+            // On a slow machine, lines about progress come first.
             assert!(told.lines().any(is_told), "{context}");
             assert!(told.contains("hint: "), "{context}");
             let name = path.file_name().expect("a name").to_string_lossy();
@@ -83,7 +83,7 @@ fn every_malformed_file_ends_in_an_error_or_a_terrain() {
             opened.push(name);
         }
     }
-    // Flipped bytes may leave a terrain; cut, wrong and hostile files must not.
+    // Flipped bytes may leave a terrain; truncated, wrong and hostile files must not.
     for name in opened {
         let may_open = name.starts_with("flip") || name.starts_with("made_ok");
         assert!(may_open, "{name} opened as if nothing were wrong with it");
@@ -121,7 +121,7 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
         missing.expect_err("missing").fault(),
         RasterError::Unreadable(_)
     ));
-    // Of a folder it is the first file, by name, that is to be a terrain.
+    // In a folder the first file by name must be the terrain.
     let itself = Raster::open(&folder, &OpenOptions::default());
     let itself = itself.expect_err("a folder");
     match itself.fault() {
@@ -135,7 +135,7 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
     std::fs::remove_dir_all(&folder).expect("the tries are removed");
 }
 
-/// The whole program's errors name the fault, the file and the next step.
+/// The program's errors name the fault, the file and the next step.
 #[test]
 fn an_error_says_what_where_and_what_next() {
     let output = Command::new(hapterra_binary())
@@ -154,7 +154,7 @@ fn an_error_says_what_where_and_what_next() {
     assert_eq!(usage.status.code(), Some(2));
 }
 
-/// A seeded generator (xorshift), so that every run damages files alike.
+/// A seeded generator (xorshift), so that every run damages files in the same way.
 struct Random(u64);
 
 impl Random {
@@ -166,8 +166,7 @@ impl Random {
     }
 }
 
-/// Damages a file in one of three ways; the header, where it matters most, is hit
-/// half of the time.
+/// Damages a file in one of three ways, half of the time in the header, where it matters most.
 fn damage(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut damaged = bytes.to_vec();
     match random.roll(4) {
@@ -188,9 +187,8 @@ fn damage(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     damaged
 }
 
-/// Thousands of damaged copies of every kind of file, in this process: each ends in
-/// an error or a terrain, and what it ends in is not "the decoder failed" more than
-/// now and then.
+/// Thousands of damaged copies of every kind of file, in this process: each gives an error or a
+/// terrain, and the error is rarely "the decoder failed".
 #[test]
 fn damaged_copies_of_good_files_never_panic() {
     let Some(folder) = shared("dem") else {
@@ -233,7 +231,7 @@ fn damaged_copies_of_good_files_never_panic() {
     );
 }
 
-/// To open a pipe waits for a writer: it is refused by its kind before that.
+/// Opening a pipe waits for a writer, so it must be refused by its type before.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_unopened() {
@@ -252,7 +250,7 @@ fn pipes_and_devices_are_refused_unopened() {
         assert!(!assert_ends_well(&path));
         assert!(told(&path).contains(kind), "{}", told(&path));
     }
-    // So is every other file that a command reads.
+    // All other input files of commands are refused as well.
     let hills = folder.path().join("hills.tif");
     terrain_file(&hills, Kind::Fractal, 16, 1);
     let [hills, other] = [hills, pipe("pipe.toml")].map(|path| path.display().to_string());
@@ -280,7 +278,7 @@ fn pipes_and_devices_are_refused_unopened() {
     }
 }
 
-/// Names in a file, the file's own name, and what is typed: on a terminal they control nothing.
+/// Texts in a file, the file's own name, and the user's input must not control a terminal.
 #[cfg(unix)]
 #[test]
 fn texts_of_files_reach_the_terminal_without_control_characters() {

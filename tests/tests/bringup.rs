@@ -1,6 +1,5 @@
-//! `hapterra bringup` against a virtual arm: as it should be, and with the mistakes that
-//! people make with wires, plugs and numbers. Each is named, and no joint moves faster
-//! than is stated.
+//! `hapterra bringup` with a virtual arm: without faults, and with common mistakes in wires, plugs
+//! and numbers. Each is named, and no joint moves faster than stated.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -18,12 +17,12 @@ use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::timeouts::HANG;
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
-/// Tolerance of the guard's delay and error: two counts in a millisecond, and what a motor's torque
-/// adds until its current is gone.
+/// Excess over the guard's limit due to its delay and error: two counts in a millisecond, and the
+/// motion from a motor's torque until its current is off.
 const LATE_RAD_S: f64 = 0.3;
 
 thread_local! {
-    /// Messages, a line each.
+    /// Messages, one a line.
     static SAID: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
@@ -32,7 +31,7 @@ fn say(line: &str) {
     SAID.with_borrow_mut(|text| *text += &format!("{line}\n"));
 }
 
-/// Walks with a user, and looks at how fast the joints were.
+/// Runs the walk with a user, and checks the speeds of the joints.
 fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
     let ended = walked_unwatched(user, record, log);
     let fastest = user.bench().borrow().fastest_rad_s();
@@ -42,8 +41,8 @@ fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<
     ended
 }
 
-/// Walks with a user from where a log ends; the board is switched off and on where the
-/// steps say so.
+/// Runs the walk with a user from the end of a log; the board is power-cycled where the steps
+/// require it.
 fn walked_unwatched(
     user: &mut VirtualUser,
     record: Calibration,
@@ -69,18 +68,18 @@ fn walked_once(
     walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
-/// Returns the transcript for a user without mistakes, as the documentation has it.
+/// Returns the transcript for a user without mistakes, as in the documentation.
 fn transcript() -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bring-up-transcript.txt");
     std::fs::read_to_string(file).expect("a transcript")
 }
 
-/// The step and the finding at which a walk with this bench and record ends.
+/// Returns the step and the finding at which a walk with this bench and record ends.
 fn found(bench: VirtualBench, record: Calibration) -> (Step, Finding) {
     found_from(Step::Board, bench, record)
 }
 
-/// The same, where all steps before this one were passed before.
+/// Same as `found`, with all steps before this one passed earlier.
 fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
     let mut user = VirtualUser::at(bench);
     user.says = say;
@@ -95,7 +94,7 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     let Err(BringupError::Found { step, finding }) = ended else {
         panic!("{ended:?}");
     };
-    // It notes this in the log, and continues nowhere else.
+    // The log records it, and the next start is at this step.
     assert_eq!(log.next(), Some(step));
     let last = log.entries.last().expect("an entry");
     assert_eq!((last.step, last.passed), (step, false));
@@ -128,7 +127,7 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
     assert_eq!(log.next(), Some(Step::Motor2));
     let error = SAID.take() + "error: " + &log.entries.last().expect("one").result + "\n";
     assert!(error.contains("step 8 of 11: motor 2"));
-    // The next start is at the very step, with an arm that has to be zeroed anew.
+    // The next start is at this step, and the arm must be zeroed again.
     let ended = walked(&mut user, RECORD, &mut log);
     assert!(ended.is_err());
     let text = SAID.take();
@@ -136,7 +135,7 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
         text.starts_with("step 8 of 11") && text.contains("zero pose"),
         "{text}"
     );
-    // With the sign that it named, the record is another one: it is measured again.
+    // With the reported sign the record changes, so it is measured again.
     let mut record = RECORD;
     record.motor_sign.y = -1.0;
     walked(&mut user, record, &mut log).expect("to the end");
@@ -145,12 +144,12 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
     assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
 
-/// A user who does and answers some things in another way.
+/// A user who does some tasks and answers some questions differently.
 struct Another {
     user: VirtualUser,
     /// Response to a task.
     does: fn(Task) -> Task,
-    /// Fixed answer to a question.
+    /// Fixed answer to a question, if any.
     answers: fn(Question) -> Option<bool>,
 }
 
@@ -163,7 +162,7 @@ impl Another {
         }
     }
 
-    /// Never holds the tip while a motor is jogged for the first time.
+    /// Never holds the tip at a motor's first jog.
     fn careless(user: VirtualUser) -> Self {
         Self {
             does: |task| match task {
@@ -174,7 +173,7 @@ impl Another {
         }
     }
 
-    /// Has amplifiers that do not say whether they are ready.
+    /// Has amplifiers without ready lines.
     fn without_ready(user: VirtualUser) -> Self {
         Self {
             answers: |question| (question == Question::ReadyIsWired).then_some(false),
@@ -212,7 +211,7 @@ impl Attendant for Another {
     }
 }
 
-/// The finding of the first step, where the board has these mistakes.
+/// Returns the finding of the first step if the board has these mistakes.
 fn found_of_the_board(mistakes: BenchMistakes) -> (Step, Finding) {
     found(wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
 }
@@ -231,7 +230,7 @@ fn a_board_that_ticks_at_another_rate_than_it_says_is_named() {
             "{clock_slow_by}: {finding}"
         );
     }
-    // The chips' own oscillators may be off by a hundredth.
+    // The chips' own oscillators may be off by one per cent.
     let slow = BenchMistakes {
         clock_slow_by: 0.01,
         output_off_v: [1.0; 3],
@@ -253,7 +252,7 @@ fn a_usb_clock_that_does_not_follow_the_host_is_named() {
 
 #[test]
 fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
-    // Of an arm without weight, the other joints stay where they are.
+    // On an arm without weight, the other joints keep their positions.
     let mut model = PhantomModel::premium_1_5();
     model.gravity_m_s2 = 0.0;
     for gain in [1.0, -1.0] {
@@ -273,7 +272,7 @@ fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
         println!("fastest {fastest:?} rad/s");
         let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
         assert!(fastest[0] < most, "{fastest:?}");
-        // The direction of its motion is reported all the same.
+        // The direction of its motion is still reported.
         let inverted = log
             .entries
             .iter()
@@ -303,7 +302,7 @@ fn an_amplifier_of_another_scale_is_named() {
 
 #[test]
 fn a_weight_that_the_record_does_not_know_is_named() {
-    // It is noticed before the arm is as fast as in a jog: `walked` looks at that.
+    // It is detected before the arm is as fast as in a jog: `walked` checks that.
     for gravity_2_nm in [0.03, 0.1, -0.06, -0.1] {
         let record = Calibration {
             gravity_2_nm,
@@ -366,7 +365,7 @@ fn a_wrong_ratio_is_named() {
     assert!((record - 11.2).abs() < 1e-4 && (found - 8.96).abs() < 0.1);
 }
 
-/// The step and the finding at which a walk ends whose bench has these mistakes.
+/// Returns the step and the finding at which a walk ends if the bench has these mistakes.
 fn found_at(from: Step, mistakes: BenchMistakes) -> (Step, Finding) {
     found_from(from, wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
 }
@@ -432,7 +431,7 @@ fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
                 if found == axis + 1 && (volts, expected) == (0.5, 0.0)
         );
         assert!(named, "{finding}");
-        // A stage of one-per-cent resistors is not found fault with.
+        // A stage with resistors of one per cent passes.
         let mut log = Log::default();
         let bench = wired(Wiring::RIGHT).with_mistakes(off(0.3));
         walked(&mut VirtualUser::at(bench), RECORD, &mut log).expect("to the end");
@@ -511,7 +510,7 @@ fn a_jog_beyond_its_bounds_is_refused() {
     ] {
         assert_eq!(ask(beyond), Err(Refusal::NoSuchJog), "{beyond:?}");
     }
-    // What blocks arming blocks a jog: this arm is not zeroed.
+    // Conditions that block arming also block a jog: this arm is not zeroed.
     let blocked = ask(jog(0, 0.3, 500));
     assert_eq!(blocked, Err(Refusal::Blocked(Blockers::NOT_ZEROED)));
 }

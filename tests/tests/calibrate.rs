@@ -1,5 +1,5 @@
-//! The calibration walk against a virtual Phantom whose true numbers differ
-//! from the preset, over the real link.
+//! The calibration walk with a virtual Phantom whose true numbers differ from the preset, over the
+//! real link.
 
 use hapterra::calibrate::{Attendant, Plan, Review, VirtualUser, walk};
 use hapterra::link::{ControlSession, HostClock, LinkError, Native};
@@ -7,7 +7,7 @@ use hapterra::phantom::STANDARD_GRAVITY;
 use hapterra_core::phantom::Calibration;
 use hapterra_tests::timeouts::HANG;
 
-/// The joints' friction, Nm: how far off a torque read off a still arm may be.
+/// The joints' friction, Nm: the largest error of a torque measured on a still arm.
 const FRICTION_NM: f64 = 0.01;
 
 fn calibrated(user: &mut VirtualUser) -> Review {
@@ -55,7 +55,7 @@ fn the_true_ratios_signs_and_weights_come_back() {
         weights.iter().all(|error| *error < FRICTION_NM),
         "{weights:?}"
     );
-    // The preset would have been off by more.
+    // The preset would have had a larger error.
     let preset = f64::from(Calibration::PREMIUM_1_5.gravity_2_nm);
     let truth = STANDARD_GRAVITY * user.model().lumped.g2;
     assert!((preset - truth).abs() > 3.0 * FRICTION_NM);
@@ -73,7 +73,7 @@ fn a_ruler_read_half_a_millimetre_off_costs_a_per_cent() {
 
 #[test]
 fn an_attendant_who_does_not_agree_changes_nothing() {
-    /// Says no in the end.
+    /// Refuses the result at the end.
     struct No(VirtualUser);
 
     impl Attendant for No {

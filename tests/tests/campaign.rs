@@ -1,5 +1,4 @@
-//! A short stretch of the closed-loop campaign, and whether the report that is
-//! kept is whole.
+//! A short segment of the closed-loop campaign, and a check that the stored report is complete.
 
 use hapterra_tests::campaign::fault_kind::Kind;
 use hapterra_tests::campaign::{SEED, report, run};
@@ -12,7 +11,7 @@ fn nothing_that_goes_wrong_gets_past_the_guard() {
     for kind in Kind::ALL {
         assert!(tally.injected_of(kind) > 0, "{kind:?} was not tried");
     }
-    // Otherwise the bounds were never put to the test.
+    // Otherwise the bounds would never have been tested.
     assert!(tally.extremes.force_n > 4.0, "{:?}", tally.extremes);
     assert!(tally.extremes.current_a > 2.0, "{:?}", tally.extremes);
 }

@@ -1,5 +1,5 @@
-//! The campaign's checks of the force report each violation: every violation
-//! is forged, and the honest ticks beside it pass.
+//! The campaign's checks of the force report each violation: every violation is forged, and the
+//! correct ticks before and after it pass.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;
@@ -28,7 +28,7 @@ const OFF: SurfaceParams = SurfaceParams {
     ..SurfaceParams::PREMIUM
 };
 
-/// A tick in level ground at height 0, in cells of half a millimetre.
+/// Returns a tick on level ground at height 0, in cells of half a millimetre.
 fn at(tick: u32, height: f32, force_n: Vec3) -> TickRecord {
     let place = |height| GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));
     TickRecord {
@@ -94,7 +94,7 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
     most(&plain, 1.0);
     most(&PARAMS, 2.0);
     most(&textured, 0.5 * 2.1_f32.hypot(0.2 * std::f32::consts::TAU));
-    // The stiffest of the materials, in a scene that is twice as stiff as its table.
+    // The stiffest material, in a scene twice as stiff as its table.
     let of = |stiffness_n_per_mm| Material {
         stiffness_n_per_mm,
         ..Material::of(&plain)
@@ -108,13 +108,13 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
     assert!(force(1.61).is_err());
 }
 
-/// In and out of the ground at 50 mm/s, with this much more force on the way out: whether it is
-/// reported, and the energy that was given.
+/// Enters and leaves the ground at 50 mm/s, with `more` additional force on the way out. Returns
+/// true if it is reported, and the energy that the contact gave.
 fn tap(params: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
     taps(params, more, is_calm, 1)
 }
 
-/// The same so many times, without leaving the ground between.
+/// Same as `tap`, repeated `times` times without leaving the ground in between.
 fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
     let mut watch = watch(params, None);
     let into = (0..20).map(|i| (0.5 - 0.1 * i as f32, 1.0));
@@ -135,13 +135,13 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
 
 #[test]
 fn a_contact_that_gives_is_told_with_the_controller_on() {
-    // A spring that is rendered in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s and
-    // twice 0.75 mm.
+    // A spring that is sampled in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
+    // and twice 0.75 mm.
     let (told, given) = tap(&PARAMS, 0.0, true);
     assert!(!told && (given - 0.0229).abs() < 0.001, "{given}");
     let (told, given) = tap(&PARAMS, 0.5, true);
     assert!(told && given > 0.05, "{given}");
-    // Not while something goes wrong, or without the controller.
+    // Not checked during a fault or without the controller.
     assert_eq!(tap(&PARAMS, 0.5, false), (false, 0.0));
     assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
     let shaded = SurfaceParams {
@@ -155,8 +155,8 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
     assert!(told && given > 0.344, "{given}");
 }
 
-/// A press of 2 mm at rest while the ramp lets force in, from the confirmation on, and then `more`
-/// times the force that it may have.
+/// Presses 2 mm deep at rest during the ramp, from the confirmation on, with `times` times the
+/// force that the ramp allows.
 fn ramped(times: f32) -> Result<(), String> {
     let mut watch = watch(&PARAMS, None);
     let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
@@ -178,13 +178,13 @@ fn ramped(times: f32) -> Result<(), String> {
 #[test]
 fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
     assert_eq!(ramped(1.0), Ok(()));
-    // All of the damping may double it.
+    // Damping may double it.
     assert_eq!(ramped(1.99), Ok(()));
     assert!(ramped(2.01).is_err());
     assert!(ramped(-0.01).is_err());
 }
 
-/// Taps in the ramp, with more force on the way out, as the old tick gave it.
+/// Taps during the ramp, with more force on the way out, as in an old version of the tick.
 #[test]
 fn a_tap_in_the_ramp_that_gives_is_told() {
     let tapped = |more: f32| {

@@ -1,5 +1,4 @@
-//! The campaign's watch speaks of each thing that must not be, and of nothing else:
-//! every violation is forged.
+//! The campaign's tick checks report each violation and nothing else: every violation is forged.
 
 use hapterra::phantom::{Encoder, PhantomModel, kinematics};
 use hapterra_core::Vec3;
@@ -15,7 +14,7 @@ const ZERO: [i32; 3] = [100, -200, 300];
 /// A pose in the middle of the workspace, rad.
 const POSE: [f64; 3] = [0.0, 0.2, 0.3];
 
-/// A valid tick: each change of it by a test has to be reported.
+/// A valid tick: each change by a test must be reported.
 #[derive(Clone)]
 struct Tick {
     drive: GuardOutputs,
@@ -24,7 +23,7 @@ struct Tick {
 }
 
 impl Tick {
-    /// The motors make this force by the levers of `POSE`, reported and true.
+    /// Returns a tick in which the motors make this force with the true levers of `POSE`.
     fn pushing(force_n: [f64; 3]) -> Self {
         let model = PhantomModel::premium_1_5();
         let counts = counts(&model, POSE);
@@ -74,7 +73,7 @@ fn currents(model: &PhantomModel, force_n: [f64; 3]) -> Vec3 {
     Vec3::new(current(0), current(1), current(2))
 }
 
-/// Up and outwards: holding weight explains nothing of it, and no motor is at its peak.
+/// Up and outwards, so that the arm's weight explains none of it, and no motor is at its peak.
 const fn up(newtons: f64) -> [f64; 3] {
     [0.6 * newtons, 0.0, 0.8 * newtons]
 }
@@ -84,7 +83,7 @@ fn a_tick_as_it_should_be_passes_and_is_measured() {
     let (watch, said) = Tick::pushing(up(7.6)).judged();
     assert_eq!(said, Ok(()));
     let seen = watch.extremes;
-    // The reported pose is that of whole counts.
+    // The reported pose is in whole counts.
     assert!((seen.read_force_n - 7.6).abs() < 0.01, "{seen:?}");
     assert!((seen.tip_force_n - 7.6).abs() < 1e-6, "{seen:?}");
     assert_eq!((seen.misled_ticks, seen.singular_ticks), (0, 0));
@@ -159,7 +158,7 @@ fn more_than_the_clamp_by_the_encoders_is_told_whatever_is_true() {
 fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
     let mut tick = Tick::pushing(up(7.6));
     let record = Calibration::PREMIUM_1_5;
-    // Nearer to the axis than the device believes: the same torque is more force.
+    // Nearer to the axis than the device computes: the same torque is more force.
     tick.truth.q_rad = [0.0, 0.9, 0.3];
     tick.truth.counts[1] += OFF_COUNTS as i32;
     assert!(tick.verdict().contains("at the tip"));
@@ -184,8 +183,8 @@ fn a_singular_pose_is_counted_not_judged() {
     assert_eq!(watch.extremes.singular_ticks, 1);
 }
 
-/// No tick reads switches or encoders while the core is halted; outputs and truth
-/// count all the same.
+/// While the core is halted no tick reads switches or encoders, but outputs and the true pose
+/// count.
 #[test]
 fn a_command_that_is_held_is_judged_by_what_is_true() {
     let held = |tick: &Tick| {
@@ -214,7 +213,7 @@ fn motors_taken_for_colder_than_they_are_are_told() {
     tick.truth.winding_c = [90.0, 30.0, 80.0];
     assert_eq!(told(100.0, &tick), Ok(()));
     assert_eq!(told(79.5, &tick), Ok(()));
-    // Forgotten at a reset.
+    // A reset clears it.
     assert!(told(25.0, &tick).expect_err("cold").contains("winding 3"));
     assert!(told(f32::NAN, &tick).is_err());
 }
@@ -237,7 +236,7 @@ fn every_hostile_calibration_is_refused_and_would_be_told() {
         assert!(record.validate().is_err(), "{record:?}");
         above += u32::from(hostile_calibrations::keeps_ceilings(&record).is_err());
     }
-    // Only the device detects the others: a length that is none.
+    // Only the device detects the others: a length that is NaN.
     assert!(above > 1_600, "{above}");
 }
 
@@ -250,7 +249,7 @@ fn sample(tick: u32, force_n: Vec3) -> TickRecord {
     }
 }
 
-/// Returns the verdict on the last of these samples; the others pass.
+/// Returns the result for the last of these samples; the others pass.
 fn told(samples: &[TickRecord]) -> Result<(), String> {
     let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let (last, before) = samples.split_last().expect("one");
@@ -267,7 +266,7 @@ fn each_wrong_force_that_is_told_is_told_of() {
         told(&[sample(1, push(7.65)), sample(2, push(6.65))]),
         Ok(())
     );
-    // A tick between them was not heard.
+    // The tick between them was not received.
     assert_eq!(told(&[sample(1, push(7.65)), sample(3, push(1.0))]), Ok(()));
     let nan = told(&[sample(1, push(f32::NAN))]).expect_err("no number");
     assert!(nan.contains("not a number"));

@@ -1,5 +1,5 @@
-//! The virtual Phantom around the device's own application: what comes out in
-//! millimetres and newtons.
+//! The virtual Phantom in a loop with the device's own application: the results in millimetres and
+//! newtons.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_firmware::native::StoppedClock;
 use heightfield::Raster;
 
-/// Runs a device until a tick; every sample it reported.
+/// Runs a device until a tick. Returns every sample it reported.
 fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec<TickRecord> {
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig.arming())));
     let device = Box::new(device);
@@ -45,8 +45,8 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
     samples
 }
 
-/// A plane 20 mm up, rendered with a stiffness, and a hand that presses with 2 N
-/// in its middle and lifts. Returns the samples and when the lift begins.
+/// Renders a plane 20 mm up with a stiffness, with a hand that presses with 2 N in its middle and
+/// lifts. Returns the samples and the start of the lift.
 fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     let raster = Raster::from_fn(101, 101, |_, _| 20.0).expect("raster");
     let scale = Scale::new(2.0, 1.0).expect("scale");
@@ -59,7 +59,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     let script: Script = pressed.lift(10.0).finish().wait(0.5);
     let ticks = ((HeldPhantom::ARMED_S + script.duration_s()) * 1e3) as u32;
     let home_mm = [100.0, 100.0, 24.0];
-    // With all its weight, which the device holds.
+    // With all its weight, which the device compensates.
     let model = PhantomModel::premium_1_5();
     let rig = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let params = SurfaceParams {
@@ -82,8 +82,8 @@ fn tip_rests_at_the_depth_of_two_newtons() {
     for stiffness in [0.5f32, 0.25, 1.0] {
         let (samples, lift, scale) = press(stiffness);
         let expected_mm = 2.0 / f64::from(stiffness);
-        // Friction carries 0.01 N·m on an arm of 0.21 m against the wall's and
-        // the hand's springs together; two encoders are half a count off.
+        // Friction holds 0.01 N·m on an arm of 0.21 m against the springs of wall and hand
+        // together; two encoders are half a count off.
         let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
         let bound_mm = 0.01 / 0.2095 / (f64::from(stiffness) + hand_n_per_mm) + 0.03;
         for sample in &samples[lift - 300..lift - 5] {

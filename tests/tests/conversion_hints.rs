@@ -1,6 +1,5 @@
-//! The commands that hints name for files that are refused, run as they stand: what
-//! they write opens. Where a command's program, or a package of Python's that it names, is not
-//! installed, this reports it and is skipped.
+//! The commands in hints for refused files, run unchanged: their output opens. If a command's
+//! program or Python package is not installed, the test prints this and is skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -40,7 +39,7 @@ fn shell(folder: &Path, command: &str) -> Output {
     output.expect("a shell")
 }
 
-/// Makes a file with GDAL's `options`.
+/// Creates a file with GDAL's `options`.
 fn made(folder: &Path, options: &str, name: &str) -> PathBuf {
     let path = folder.join(name);
     let from = data("lerc_i16.tif");
@@ -54,12 +53,12 @@ fn made(folder: &Path, options: &str, name: &str) -> PathBuf {
     path
 }
 
-/// The hint that `hapterra info` gives for a file.
+/// Returns the hint of `hapterra info` for a file.
 fn hint(file: &Path) -> String {
     hint_of(&["info"], file)
 }
 
-/// The hint of a command that refuses a file, where the program finds no libgdal.
+/// Returns the hint of a command that refuses a file, run without a libgdal.
 fn hint_of(words: &[&str], file: &Path) -> String {
     let output = Command::new(hapterra_binary())
         .args(words)
@@ -76,7 +75,7 @@ fn hint_of(words: &[&str], file: &Path) -> String {
     hint.1.trim().to_owned()
 }
 
-/// The command in a hint, from its program's name to the end or to the next choice.
+/// Returns the command in a hint, from its program's name to the end or the next alternative.
 fn command<'h>(hint: &'h str, program: &str) -> &'h str {
     let from = hint
         .find(program)
@@ -84,7 +83,7 @@ fn command<'h>(hint: &'h str, program: &str) -> &'h str {
     hint[from..].split("; or ").next().unwrap_or_default()
 }
 
-/// Runs the command in a hint; what it says.
+/// Runs the command in a hint. Returns its output.
 fn follow(folder: &Path, hint: &str, program: &str) -> String {
     let command = command(hint, program);
     let output = shell(folder, command);
@@ -92,7 +91,7 @@ fn follow(folder: &Path, hint: &str, program: &str) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Opens what a command wrote, and removes it.
+/// Opens the output of a command, and deletes it.
 fn taken(path: &Path) -> Raster {
     let raster = Raster::open(path, &OpenOptions::default());
     let raster = raster.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -100,7 +99,7 @@ fn taken(path: &Path) -> Raster {
     raster
 }
 
-/// Runs Python, which makes files.
+/// Runs a Python script that creates files.
 fn python(folder: &Path, script: &str) {
     let file = folder.join("make.py");
     std::fs::write(&file, script).expect("written");
@@ -140,8 +139,8 @@ fn what_gdal_reads_and_this_does_not_is_converted_by_the_hint() {
     }
 }
 
-/// Runs `demo` at a longitude and latitude where none is known, and the command in its
-/// hint; opens what that writes.
+/// Runs `demo` at a longitude and latitude for a file without them, and the command in its hint.
+/// Opens the output.
 fn brought_to_degrees(folder: &Path, name: &str, program: &str, code: &str) -> Raster {
     let words = [
         "demo", "--device", "native", "--at", "173,-41", "--crs", "lonlat",
@@ -159,14 +158,14 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
     }
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
-    // Without the hole of the field: what is one afterwards is the command's.
+    // Without the no-data of the field, so that any no-data afterwards is from the command.
     let high = "-srcwin 10 8 30 20 -scale 0 1000 1000 2000 -a_nodata none";
     for (name, projection, ground, lonlat) in [
         (
             "grid.tif",
             "+proj=nzmg +lat_0=-41 +lon_0=173 +x_0=2510000 +y_0=6023150 +ellps=intl",
             "2600000 6030000 2640000 6000000",
-            // Of the middle, by gdaltransform.
+            // Of the middle, from gdaltransform.
             [174.31, -41.07],
         ),
         (
@@ -190,7 +189,7 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
         for (found, wanted) in middle.iter().zip(lonlat) {
             assert!((found - wanted).abs() < 0.02, "{name}: {bounds:?}");
         }
-        // What lies beside the turned map is no ground.
+        // The area beside the turned map is no-data.
         let summary = raster.summary();
         assert!(summary.lowest > 900.0, "{name}: {}", summary.lowest);
         assert!(summary.holes > 0, "{name}");
@@ -206,7 +205,7 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
     assert!((bounds.west + 118.087).abs() < 1e-3, "{bounds:?}");
 }
 
-/// Pictures and numbers that are no heights as they are: the command takes one band as it is.
+/// Pictures and numbers that are not heights: the command selects one band unchanged.
 #[test]
 fn what_is_no_height_field_becomes_one_by_the_hint() {
     if !has_gdal() {
@@ -261,7 +260,7 @@ fn what_is_no_height_field_becomes_one_by_the_hint() {
     }
 }
 
-/// A name may have anything in it that a shell looks at.
+/// A name may contain any character with a meaning in a shell.
 #[test]
 fn a_name_that_a_shell_would_read_is_quoted() {
     if !has_gdal() {
@@ -279,7 +278,7 @@ fn a_name_that_a_shell_would_read_is_quoted() {
     }
 }
 
-/// `hapterra info` of two copies of a file, one of them cut: the command tells them apart.
+/// `hapterra info` for two copies of a file, one truncated: the command distinguishes them.
 #[test]
 fn a_check_sum_tells_a_whole_file_from_a_cut_one() {
     if !has_gdal() {
@@ -314,8 +313,8 @@ fn a_check_sum_tells_a_whole_file_from_a_cut_one() {
     );
 }
 
-/// Both commands for a file that is larger than memory, whose strips are too large to be read
-/// one by one. There is nothing in it.
+/// Both commands for an empty file that is larger than memory, with strips too large to be read one
+/// by one.
 #[test]
 fn what_is_too_large_is_cut_or_made_coarser_by_the_hint() {
     if !has_gdal() {
@@ -339,7 +338,7 @@ fn what_is_too_large_is_cut_or_made_coarser_by_the_hint() {
     }
 }
 
-/// GDAL does not read NumPy's files; the hint is Python's.
+/// GDAL does not read NumPy's files, so the hint uses Python.
 #[test]
 fn arrays_are_converted_by_numpy() {
     if !has_python("numpy") {
@@ -369,7 +368,7 @@ fn arrays_are_converted_by_numpy() {
             "{name}"
         );
     }
-    // Nothing makes heights of these.
+    // No command converts these to heights.
     for name in ["text.npy", "line.npy", "fields.npy"] {
         assert_eq!(hint(&at.join(name)), "take a file with heights", "{name}");
     }
@@ -399,7 +398,7 @@ fn archives_are_unpacked_by_the_hint() {
     if !has_gdal() {
         return;
     }
-    // A file inside that is refused: unpacked, it has a hint of its own.
+    // A refused file inside: unpacked, it has a hint of its own.
     let picture = made(at, "-ot Byte -co COMPRESS=JPEG", "picture.tif");
     assert!(shell(at, "gzip picture.tif").status.success());
     follow(at, &hint(&at.join("picture.tif.gz")), "gzip");
@@ -407,7 +406,7 @@ fn archives_are_unpacked_by_the_hint() {
     assert_eq!(taken(&at.join("picture-converted.tif")).rows(), 30);
 }
 
-/// Clouds of points: the ground among them, on a grid in their own reference system.
+/// Point clouds: their ground points, on a grid in their own reference system.
 #[test]
 fn points_become_a_grid_by_the_hint() {
     if !has_python("laspy, lazrs, pyproj") {
@@ -438,7 +437,7 @@ fn points_become_a_grid_by_the_hint() {
     for (name, system, lifted) in [
         ("trees.laz", Some(32611), 0.0),
         ("feet.las", Some(2229), 0.0),
-        // No point is marked as ground: all of them count.
+        // Without points marked as ground, all of them count.
         ("unknown.las", None, 15.0),
     ] {
         follow(at, &hint(&at.join(name)), "python3");
@@ -458,7 +457,7 @@ fn points_become_a_grid_by_the_hint() {
     }
 }
 
-/// Files that GDAL does not read get no hint to GDAL.
+/// Files that GDAL does not read have no hint for GDAL.
 #[test]
 fn no_hint_names_a_converter_that_cannot_read_the_file() {
     let folder = tempfile::tempdir().expect("a folder");

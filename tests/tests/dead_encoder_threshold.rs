@@ -1,17 +1,16 @@
-//! Travel of the other joints while one stands to the count, in a hand that
-//! is well: what the guard has to let pass before it calls an encoder dead.
+//! Travel of the other joints while one does not move by a count, with working encoders: the guard
+//! must accept it before it reports a dead encoder.
 
 use std::f64::consts::TAU;
 
 use hapterra::phantom::{HandModel, PhantomModel, Plant, kinematics};
 use hapterra_core::guard::TRAVEL_WHILE_ONE_STANDS;
 
-/// Turns a second of the tremor of each axis.
+/// Frequency of the tremor in each axis, Hz.
 const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
 const TICK_S: f64 = 1e-3;
 
-/// Most counts that the others travelled while a joint stayed within a count
-/// of where it was.
+/// Most counts that the others travelled while a joint stayed within a count of its position.
 #[derive(Default)]
 struct Stands {
     at: [i32; 3],
@@ -36,7 +35,7 @@ impl Stands {
     }
 }
 
-/// A hand that takes the tip along `way` (joint angles by time), trembling.
+/// Moves the tip along `way` (joint angles by time) with a tremor.
 fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds: f64) -> [u32; 3] {
     let model = PhantomModel::premium_1_5();
     let mut plant = Plant::new(model, way(0.0)).held_by(HandModel::default());
@@ -51,7 +50,7 @@ fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds:
         let (now, next): ([f64; 3], [f64; 3]) = (target(t), target(t + TICK_S));
         plant.aim(now, std::array::from_fn(|i| (next[i] - now[i]) / TICK_S));
         plant.step([current_a; 3], TICK_S);
-        // The first second settles.
+        // The first second is for settling.
         if tick == 1_000 {
             stands = Stands {
                 at: plant.counts(),
@@ -64,14 +63,14 @@ fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds:
     stands.most
 }
 
-/// The guard lets pass three times what a hand does.
+/// Checks that the guard accepts three times the travel of a hand.
 fn assert_passes(what: &str, most: [u32; 3]) {
     eprintln!("{what}: {most:?} counts");
     let allowed = TRAVEL_WHILE_ONE_STANDS / 3;
     assert!(most.iter().all(|most| *most <= allowed), "{what}: {most:?}");
 }
 
-/// The hardest case: the other joints have no reason to move but the tremor.
+/// The hardest case: only the tremor moves the other joints.
 #[test]
 fn a_hand_that_turns_one_joint_only_trembles_enough() {
     let ways = [(0.1, 0.3), (0.3, 0.3), (0.8, 0.3), (0.5, 0.03)];

@@ -1,5 +1,4 @@
-//! The commands around a device as a newcomer meets them: with nothing plugged
-//! in, and with wrong words.
+//! The device commands for a new user: without a device, and with wrong arguments.
 
 use std::process::{Command, Output, Stdio};
 
@@ -18,7 +17,7 @@ fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&both).into_owned()
 }
 
-/// Runs a command that has to fail with `code`, saying each of these.
+/// Runs a command that must fail with `code` and print each of these.
 fn fails(words: &[&str], code: i32, says: &[&str]) {
     let output = hapterra(words);
     let text = output_text(&output);
@@ -60,8 +59,7 @@ fn moved_subcommand_is_named_with_its_new_program() {
     }
 }
 
-/// A terrain is not served to a board that is emulated for the occasion; what is done
-/// instead is printed.
+/// `run` does not emulate a board for a terrain, and prints what it does instead.
 #[test]
 fn run_prints_the_rendering_of_an_emulated_board() {
     fails(
@@ -115,8 +113,7 @@ fn a_record_goes_to_a_file_and_comes_back() {
     fails(&read, 1, &["no calibration file", "arm.toml", "hint:"]);
 }
 
-/// There is no source for a Premium 1.0's ratios: a record that never measured them is not
-/// taken by oversight.
+/// A Premium 1.0's ratios have no source: a record without measured ratios needs explicit consent.
 #[test]
 fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];

@@ -1,5 +1,5 @@
-//! Disk cache of a terrain that stays in its file: another run reads next to
-//! nothing, and no state of the folder or of the file ever changes a height.
+//! Disk cache of a terrain that stays in its file: another run reads almost nothing, and no state
+//! of the folder or the file ever changes a height.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use heightfield::{OpenOptions, Raster, Wait};
 /// A level whose samples lie in many blocks.
 const LEVEL: u8 = 6;
 
-/// A TIFF without overviews of that seed, old enough to be known by its time.
+/// Writes a TIFF without overviews, old enough to be identified by its time.
 fn hills(path: &Path, seed: u64) {
     terrain_file(path, Kind::Fractal, 1500, seed);
     age(path, 1000);
@@ -37,7 +37,7 @@ fn open(path: &Path, disk_cache: &DiskCache) -> Raster {
     Raster::open(path, &options).expect("opens")
 }
 
-/// All heights of a level, as bits; holes are alike.
+/// Returns all heights of a level as bits, with one value for no-data.
 fn heights(raster: &Raster, level: u8) -> Vec<u64> {
     let [columns, rows] = [raster.columns(), raster.rows()].map(|count| ((count - 1) >> level) + 1);
     let mut row_of = vec![0.0; columns as usize];
@@ -54,7 +54,7 @@ fn heights(raster: &Raster, level: u8) -> Vec<u64> {
     all
 }
 
-/// Heights with what is kept, and how many blocks they took beyond opening the file.
+/// Returns the heights with this cache, and the blocks read besides opening the file.
 fn look(path: &Path, cache: &DiskCache) -> (Vec<u64>, u64) {
     let raster = open(path, cache);
     let before = raster.blocks_read();
@@ -86,7 +86,7 @@ fn bed() -> Bed {
 }
 
 impl Bed {
-    /// All records.
+    /// Returns all records.
     fn records(&self) -> Vec<PathBuf> {
         let pattern = self.folder.path().join("cache/v1/*/*");
         files(&pattern)
@@ -109,7 +109,7 @@ fn another_run_reads_no_block_for_what_is_coarse_and_has_the_same_bits() {
     assert!(!bed.records().is_empty());
     let (second, read) = look(&bed.file, &bed.cache);
     assert!(second == truth && read == 0, "{read}");
-    // Nothing lies beside the user's file.
+    // No file is created beside the user's file.
     assert_eq!(fs::read_dir(bed.folder.path()).expect("there").count(), 2);
     fs::remove_dir_all(bed.folder.path().join("cache")).expect("deleted");
     let (third, read) = look(&bed.file, &bed.cache);
@@ -121,7 +121,7 @@ fn another_run_reads_no_block_for_what_is_coarse_and_has_the_same_bits() {
 fn a_file_that_is_another_now_has_its_own_heights() {
     let bed = bed();
     look(&bed.file, &bed.cache);
-    // Of the same size, in the same place, with the same time.
+    // With the same size, path and time.
     let modified = fs::metadata(&bed.file).and_then(|metadata| metadata.modified());
     let other = bed.folder.path().join("other.tif");
     hills(&other, 2);
@@ -146,7 +146,7 @@ fn a_file_that_is_another_now_has_its_own_heights() {
     fs::rename(&third, &bed.file).expect("renamed");
     let (found, _) = look(&bed.file, &bed.cache);
     assert_eq!(found, truth(&bed.file));
-    // A mask that comes to lie beside it, which says that all is a hole.
+    // A new mask beside it, which declares everything no-data.
     let mask = bed.folder.path().join("hills.tif.msk");
     let (_, read) = look(&bed.file, &bed.cache);
     assert_eq!(read, 0);
@@ -215,7 +215,7 @@ fn whatever_becomes_of_the_folder_the_heights_are_right() {
         }
         let (found, read) = look(&bed.file, &bed.cache);
         assert!(found == truth && read > 0, "{number}: {read}");
-        // It was written again, and is whole.
+        // It was written again, and is complete.
         assert_eq!(look(&bed.file, &bed.cache), (truth.clone(), 0), "{number}");
     }
     for (path, _) in &whole {
@@ -238,7 +238,7 @@ fn a_folder_that_cannot_be_written_or_has_no_room_is_as_if_absent() {
         DiskCache::at(&tiny, 1),
         DiskCache::off(),
     ];
-    // A device that is full.
+    // A full device.
     if Path::new("/dev/full").exists() {
         caches.push(DiskCache::at(Path::new("/dev/full"), 64 << 20));
     }
@@ -258,7 +258,7 @@ fn several_at_once_on_one_file_have_the_same_heights() {
     std::thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
-                // As programs of their own.
+                // As separate processes.
                 let cache = DiskCache::at(&bed.folder.path().join("cache"), 1 << 20);
                 for _ in 0..3 {
                     assert_eq!(look(&bed.file, &cache).0, truth);
@@ -269,7 +269,7 @@ fn several_at_once_on_one_file_have_the_same_heights() {
     assert_eq!(look(&bed.file, &bed.cache), (truth, 0));
 }
 
-/// SRTM's tiles: a folder of them is one terrain.
+/// Writes SRTM's tiles: a folder of them is one terrain.
 fn tiles(folder: &Path) {
     for (column, name) in (0..).zip(["N00E000.hgt", "N00E001.hgt"]) {
         let places =
@@ -295,7 +295,7 @@ fn of_many_files_those_that_are_touched_tell_whether_they_are_the_same() {
     assert!(read > 0 && truth.iter().any(|bits| *bits != 0));
     assert_eq!(look(&srtm, &cache), (truth.clone(), read));
     assert_eq!(look(&srtm, &cache), (truth.clone(), 0));
-    // One of the two is another now.
+    // One of the two has changed.
     let west = srtm.join("N00E000.hgt");
     let mut bytes = fs::read(&west).expect("there");
     bytes
@@ -312,14 +312,14 @@ fn of_many_files_those_that_are_touched_tell_whether_they_are_the_same() {
     assert!(found == now && again > 0 && again <= read, "{again}");
 }
 
-/// A tour goes all over the terrain: where to, is found by coarse samples, which are kept.
+/// A tour covers the whole terrain. Its targets are found in coarse samples, which are cached.
 #[test]
 fn another_tour_of_a_large_file_is_planned_without_reading_it() {
     let bed = bed();
     let plan = || {
         let raster = open(&bed.file, &bed.cache);
         let before = raster.blocks_read();
-        // Ten samples from one planned place to the next: coarse ones serve.
+        // Ten samples from one target to the next, so coarse samples suffice.
         let scale = Scale::new(0.05, 0.05).expect("a scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
         let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("in reach");
@@ -330,13 +330,13 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
         (1..=open(&bed.file, &bed.cache).blocks()).contains(&read),
         "{read}"
     );
-    // Only what lies under the home position is read again: fine, as it is rendered.
+    // Only the samples under the home position are read again, at the rendered level.
     let (same, again) = plan();
     assert_eq!(same, home);
     assert!(again <= 1 && again < read, "{again} of {read}");
 }
 
-/// Blocks that a run at a coarse level reads, as it says with `-vv`.
+/// Returns the blocks that a run at a coarse level reads, as printed with `-vv`.
 fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
     let output = Command::new(hapterra_binary())
         .args(["-vv", "run", "--device", "native", "--duration", "0.2s"])

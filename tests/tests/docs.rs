@@ -1,4 +1,4 @@
-//! The pages of the book: figures, links, tables and lengths of lines. Marks of figures:
+//! The pages of the book: figures, links, tables and line lengths. For the marks of figures see
 //! `hapterra_tests::figures`.
 
 use std::collections::HashSet;
@@ -25,7 +25,7 @@ fn pages_in(folder: &Path) -> Vec<(PathBuf, String)> {
     pages.collect()
 }
 
-/// Returns the pages of the book and those of the root folder that are named.
+/// Returns the pages of the book and these pages of the root folder.
 fn pages_and(root: &[&str]) -> Vec<(PathBuf, String)> {
     let mut pages = pages_in(&repository().join("docs"));
     pages.extend(root.iter().map(|page| {
@@ -52,7 +52,7 @@ fn prose(text: &str) -> String {
     text.split("\n```").step_by(2).collect()
 }
 
-/// Returns the anchor that a heading gets: letters and digits in lower case, hyphens for spaces.
+/// Returns the anchor of a heading: letters and digits in lower case, hyphens for spaces.
 fn anchor(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim().to_lowercase();
     let kept = heading
@@ -61,7 +61,7 @@ fn anchor(heading: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// Returns a sentence for each link of a page to a file or a heading that does not exist.
+/// Returns a message for each link of a page to a file or a heading that does not exist.
 fn dead_links(page: &Path, text: &str) -> Vec<String> {
     let text = prose(text);
     let links = text
@@ -130,8 +130,8 @@ fn lines_of_the_book_are_short() {
     assert!(long.is_empty(), "{}", long.join("\n"));
 }
 
-/// Returns the numbers of the lines at which a table begins without a line of dashes below. A blank
-/// line inside a table leaves such rows behind it.
+/// Returns the numbers of the lines at which a table begins without a line of dashes below, as
+/// after a blank line inside a table.
 fn cut_tables(text: &str) -> Vec<usize> {
     let lines: Vec<&str> = text.lines().map(str::trim_start).collect();
     let mut cut = Vec::new();
@@ -172,7 +172,7 @@ fn cut_tables_are_found() {
     assert!(cut_tables(&code).is_empty());
 }
 
-/// Checks a page beside this table.
+/// Checks a page with this table.
 fn told(page: &str) -> (usize, Vec<String>) {
     const TABLE: &str = "state,median,share\nsliding,1218,0.04567\n\"chain, free\",1144,2.04e-6\n\
                          twice,1,1\ntwice,2,2\nempty,,1\n";

@@ -1,5 +1,5 @@
-//! One field in encodings that this repository has no encoder for, made by GDAL:
-//! `data/by_gdal.py` names the command. Every sample is exact.
+//! One field in encodings that this repository has no encoder for, written by GDAL:
+//! `data/by_gdal.py` has the command. Every sample is exact.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,13 +15,13 @@ fn path(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// The height at a column and a row from the north, as `by_gdal.py` has it.
+/// Returns the height at a column and a row from the north, as in `by_gdal.py`.
 fn height(column: u32, row: u32) -> f64 {
     let (column, row) = (f64::from(column), f64::from(row));
     100.0 + 7.0 * column - 3.0 * row + (column * row) % 5.0
 }
 
-/// Every band is 1000 above the one before.
+/// Each band is 1000 above the one before.
 fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &str) {
     assert_eq!((raster.columns(), raster.rows()), (columns, rows), "{name}");
     assert_eq!(raster.summary().holes, 1, "{name}");
@@ -136,7 +136,7 @@ fn a_variable_of_a_file_of_one_field_is_refused() {
     assert!(error.to_string().contains("TIFF has bands"), "{error}");
 }
 
-/// A side of the cells is taken where the file states none, and refused where it does.
+/// A given cell size is used if the file has none, and refused if it has one.
 #[test]
 fn a_cell_size_is_for_files_that_state_none() {
     let sized = OpenOptions {
@@ -161,7 +161,7 @@ fn a_cell_size_is_for_files_that_state_none() {
     }
 }
 
-/// Cut or changed anywhere, a file is refused or read, and never more than that.
+/// A file changed or truncated anywhere is refused or read; its memory stays bounded.
 #[test]
 fn a_damaged_copy_never_panics_and_is_bounded() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -182,7 +182,7 @@ fn a_damaged_copy_never_panics_and_is_bounded() {
         for cut in [0, 1, 9, whole.len() / 3, whole.len() / 2, whole.len() - 1] {
             fs::write(&file, &whole[..cut]).expect("written");
             let outcome = Raster::open(&file, &OpenOptions::default());
-            // The last byte of a TIFF file need not be a sample's.
+            // The last byte of a TIFF file may not belong to a sample.
             assert!(
                 outcome.is_err() || cut == whole.len() - 1,
                 "{name} cut at {cut}"
@@ -199,7 +199,7 @@ fn a_damaged_copy_never_panics_and_is_bounded() {
                 bytes[at] = (chance >> 20) as u8;
             }
             fs::write(&file, &bytes).expect("written");
-            // A panic of a decoder would be an error, too: none is wanted.
+            // A panic of a decoder would be an error as well, so look for one.
             if let Err(error) = Raster::open(&file, &OpenOptions::default()) {
                 assert!(
                     !matches!(error.fault(), RasterError::DecoderFailed(_)),

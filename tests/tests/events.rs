@@ -1,4 +1,4 @@
-//! Events on a local socket: what a native run tells, and the examples that listen to it.
+//! Events on a local socket: those of a native run, and the examples that read them.
 
 use std::io::{BufRead, BufReader, Write};
 use std::iter::from_fn;
@@ -26,13 +26,13 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("a plain path")
 }
 
-/// An example that prints, and the line from which it reads events.
+/// An example that prints, and the stream from which it reads events.
 struct Example {
     child: Child,
     line: TcpStream,
 }
 
-/// Starts an example with text for its output; none, with a line, where there is no Python.
+/// Starts an example with text as its output; `None`, with a message, without Python.
 fn example(name: &str) -> Option<Example> {
     let script = repository().join("docs/examples").join(name);
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -53,7 +53,7 @@ fn example(name: &str) -> Option<Example> {
     }
 }
 
-/// The lines that an example prints of all events.
+/// Returns the lines that an example prints for these events.
 fn said(mut example: Example, events: &[Value]) -> Vec<String> {
     for event in events {
         writeln!(example.line, "{event}").expect("taken");
@@ -71,33 +71,33 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// Returns true if numbers are the same but for their last digit, which the reader of JSON here rounds.
+/// Returns true if numbers agree except in the last digit, which the JSON reader here rounds.
 fn near(told: &[f64], recorded: &[f64]) -> bool {
     let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-12 * b.abs();
     told.len() == recorded.len() && told.iter().zip(recorded).all(is_near)
 }
 
-/// Hills in a folder.
+/// Writes hills to a folder.
 fn hills_in(folder: &Path, size: u32) -> PathBuf {
     let hills = folder.join("hills.tif");
     terrain_file(&hills, Kind::Fractal, size, 1);
     hills
 }
 
-/// A command that tells events, and what it tells.
+/// A command that sends events, and its events.
 struct Telling {
     child: Child,
     stdin: Option<ChildStdin>,
     events: JoinHandle<Vec<Value>>,
-    /// Each event as it comes.
+    /// Each event as it arrives.
     coming: Receiver<Value>,
-    /// Readers of events that never read.
+    /// Connections that are never read.
     stuck: TcpStream,
     stderr: JoinHandle<Vec<String>>,
 }
 
 impl Telling {
-    /// With what `--events` takes.
+    /// Starts the command with this value of `--events`.
     fn start(words: &[&str], events: &str) -> Self {
         let mut child = hapterra(&[words, &["--events", events]].concat())
             .stdin(Stdio::piped())
@@ -134,13 +134,13 @@ impl Telling {
         }
     }
 
-    /// The next event of a kind.
+    /// Returns the next event of a kind.
     fn wait_for(&self, kind: &str) -> Value {
         let found = from_fn(|| next(&self.coming)).find(|event| event["event"] == *kind);
         found.unwrap_or_else(|| panic!("no {kind}"))
     }
 
-    /// All events, once it has ended well.
+    /// Returns all events after a successful end.
     fn end(mut self) -> Vec<Value> {
         let stderr = self.stderr.join().expect("read to the end");
         assert!(self.child.wait().expect("ended").success(), "{stderr:?}");
@@ -149,7 +149,7 @@ impl Telling {
     }
 }
 
-/// All events of a run of five seconds over hills, its recording and the output of the examples.
+/// All events of a run of five seconds over hills, its recording, and the output of the examples.
 #[test]
 fn run_sends_events_that_the_examples_speak_and_sound() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -189,7 +189,7 @@ fn run_sends_events_that_the_examples_speak_and_sound() {
     }
 }
 
-/// Holds events against the recording of the same run.
+/// Compares events with the recording of the same run.
 fn judge(events: &[Value], record: &Path) {
     let recorded = std::fs::read_to_string(record).expect("there");
     let mut lines = recorded.lines().filter(|line| !line.starts_with('#'));
@@ -253,7 +253,7 @@ fn judge(events: &[Value], record: &Path) {
             );
             let height = event["height_m"].as_f64().expect("m");
             assert!((height * height_mm - proxy[2]).abs() < 1e-6, "{event}");
-            // The place goes as far on the ground as the proxy does in the hand.
+            // The position moves as far on the ground as the proxy does in the hand.
             let (place, cell_m) = (numbers(&event["ground"]), settings.rendered.cell_m);
             let at = [place[0], place[1], proxy[0] / cell_mm, proxy[1] / cell_mm];
             let from = *first.get_or_insert(at);
@@ -261,7 +261,7 @@ fn judge(events: &[Value], record: &Path) {
             for axis in 0..2 {
                 let on_map = at[axis] - from[axis];
                 let in_hand = cell_m * (at[axis + 2] - from[axis + 2]);
-                // A map is larger or smaller than its ground by less than this.
+                // A map differs in size from its ground by less than this.
                 let near = 1e-3 * in_hand.abs() + 1e-6;
                 assert!(
                     (on_map - in_hand).abs() <= near,
@@ -332,7 +332,7 @@ fn judge(events: &[Value], record: &Path) {
     );
 }
 
-/// A demo tells what a run tells, refuses what it cannot do and has marks.
+/// A demo sends the events of a run, refuses impossible commands, and has marks.
 #[test]
 fn demo_tells_samples_marks_and_refusals() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -373,7 +373,7 @@ fn demo_tells_samples_marks_and_refusals() {
     assert_eq!(kind("end")[0]["disarmed"], true);
 }
 
-/// The program that gives commands is gone, and has left more undone than wait for a device.
+/// The program that sends commands is gone, and has left more than a device can still execute.
 #[test]
 fn run_ends_disarmed_when_its_input_ends() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -418,7 +418,7 @@ fn run_ends_disarmed_when_its_input_ends() {
     assert!(told.contains("hint: add --commands -"), "{told}");
 }
 
-/// A real arm is zeroed by the answer to the question that was asked, and by no other.
+/// A real arm is zeroed only by the answer to the right question.
 #[test]
 fn enter_answers_the_question_of_its_number() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -438,7 +438,7 @@ fn enter_answers_the_question_of_its_number() {
     writeln!(stdin, "enter {asks}").expect("taken");
     let zeroed = run.wait_for("arming")["lines"].to_string();
     assert!(zeroed.contains("zeroed at 0 0 0 counts"), "{zeroed}");
-    // Without its program it says goodbye.
+    // Without its program it closes the session.
     drop(stdin);
     assert_eq!(run.end().last().expect("events")["disarmed"], true);
     assert_eq!(served.last_end(), SessionEnd::Goodbye);

@@ -1,5 +1,5 @@
 //! A hand that is faster than the link: 2,000 cells a second over a line of 200 bytes a tick. It
-//! feels the fallback where its tiles are late, and no hole.
+//! renders the fallback while its tiles are late, and never no-data.
 
 use std::path::Path;
 use std::time::Duration;
@@ -23,18 +23,18 @@ use hapterra_tests::slow_line::{InMemory, OnBoard, SlowLine, Stepped};
 use hapterra_tests::timeouts::HANG;
 use heightfield::{OpenOptions, Raster};
 
-/// Millimetres of the hand a cell: 2,000 cells a second are 200 mm/s.
+/// Millimetres of the hand a cell, so that 2,000 cells a second are 200 mm/s.
 const CELL_MM: f64 = 0.1;
 const SPEED_MM_S: f64 = 200.0;
-/// Bytes on the line in a tick of a millisecond: 200 kB/s.
+/// Bytes on the line in a tick of 1 ms: 200 kB/s.
 const BYTES_A_TICK: usize = 200;
-/// The same over real ground, whose tiles take fewer bytes: 100 kB/s.
+/// Same over real ground, whose tiles need fewer bytes: 100 kB/s.
 const REAL_BYTES_A_TICK: usize = 100;
-/// Of the number of the session.
+/// Seed of the session's number.
 const SEED: u64 = 36;
-/// From the middle of the slide to either end, mm.
+/// Distance from the middle of the slide to either end, mm.
 const AWAY_MM: f64 = 60.0;
-/// The guard changes the force by at most so much in a tick of a millisecond, N.
+/// The guard's limit for the change of force in a tick of 1 ms, N.
 const SLEW_N: f32 = 1.0;
 
 /// Slide of a hand around the middle of a terrain.
@@ -79,7 +79,7 @@ impl<'t> Slide<'t> {
         let scene = self
             .terrain
             .scene(SurfaceParams::PREMIUM, Source::Encoders, home);
-        // Its time continues, as a board's does.
+        // Its time continues, as on a board.
         let scene = Scene {
             hold_clock: false,
             materials: None,
@@ -92,7 +92,7 @@ impl<'t> Slide<'t> {
         }
     }
 
-    /// The samples of a slide over a line of this rate, and the client, which has not left.
+    /// Returns the samples of a slide over a line of this rate, and the client, still open.
     fn rendered(
         &self,
         scene: Scene,
@@ -103,7 +103,7 @@ impl<'t> Slide<'t> {
         let mut client = Client::numbered(self.terrain, scene, arming, patience, SEED);
         let (mut out, mut is_open) = (vec![], false);
         client.greet(ms(0), &mut out);
-        // Without a scene the device's time stands still, and a line carries all.
+        // Without a scene the device's time stops, and the line carries everything.
         while !is_open {
             let said = device.exchange(&std::mem::take(&mut out));
             let mut open = |event: Event<'_>| is_open |= matches!(event, Event::Opened { .. });
@@ -130,8 +130,8 @@ impl<'t> Slide<'t> {
         (samples, client)
     }
 
-    /// The fallback's own error over all that the hand slides over, mm: at the samples, where the
-    /// two differ most, as both are bilinear between them.
+    /// Returns the fallback's own error over the path of the hand, mm: at the samples, where the
+    /// difference is largest, as both are bilinear between them.
     fn stated_error_mm(&self, scene: &Scene) -> f64 {
         let fallback = scene.fallback.expect("a fallback");
         let size = self.terrain.size();
@@ -163,7 +163,7 @@ impl<'t> Slide<'t> {
     }
 }
 
-/// The height of a coarse tile at a sample of the level, by its own samples.
+/// Returns the height of a coarse tile at a sample of the level, from its own samples.
 fn between(tile: &CoarseTile, sample: &dyn Fn(i32, i32) -> f64, column: i32, row: i32) -> f64 {
     let side = tile.spacing();
     let along = |at: i32, first: i32| {
@@ -188,8 +188,8 @@ fn is_on_border(tile: &CoarseTile, column: i32, row: i32) -> bool {
     [0, side].contains(&(column - tile.first.x)) || [0, side].contains(&(row - tile.first.y))
 }
 
-/// Ground under the ticks: ticks in contact, those over a hole for want of a tile, those over
-/// coarse ground, and how far the proxy was from the terrain at most, mm.
+/// Ground under the ticks: ticks in contact, those over no-data for lack of a tile, those over
+/// coarse ground, and the largest distance of the proxy from the terrain, mm.
 #[derive(Debug, Default)]
 struct Ground {
     touched: u32,
@@ -235,7 +235,7 @@ fn holds(
         "{name}: {ground:?}, fallback off by up to {stated:.3} mm, {} tiles",
         tally.tiles
     );
-    // All that is known before the fallback has come is that it has not.
+    // Until the fallback has arrived, only its absence is known.
     let comes = samples
         .iter()
         .position(|s| !s.limits.contains(Limits::TERRAIN_MISSING));
@@ -262,7 +262,7 @@ fn in_memory(slide: &Slide<'_>, scene: Scene) -> (Vec<TickRecord>, LinkStats) {
     (samples, client.tally().clone())
 }
 
-/// As [`in_memory`], on the emulated board, which then says goodbye.
+/// Same as [`in_memory`] on the emulated board; then closes the session.
 fn on_board(
     slide: &Slide<'_>,
     scene: Scene,
@@ -329,7 +329,7 @@ fn on_the_emulated_board_over_real_ground_there_is_none_either() {
         return;
     };
     let file = shared("dem/large/globe_g10g_10800x6000_i16_cog.tif");
-    // Mountains of thousands of metres in millimetres.
+    // Mountains of thousands of metres, in millimetres.
     let (raster, height_mm) = match file {
         Some(path) => (
             Raster::open(path, &OpenOptions::default()).expect("opens"),

@@ -1,5 +1,5 @@
-//! The force at the true tip stays within the record's largest while an encoder is
-//! wrong by what the guard lets pass in two ticks, converters' rounding included.
+//! The force at the true tip stays within the record's limit while an encoder is wrong by what the
+//! guard accepts in two ticks, including the converters' rounding.
 
 use hapterra::phantom::{PhantomModel, kinematics};
 use hapterra_core::Vec3;
@@ -11,12 +11,12 @@ use hapterra_tests::campaign::motor_forces::{force, is_near_singular};
 
 /// Error of an encoder, counts.
 const OFF: i32 = OFF_COUNTS as i32;
-/// No current and full scale of the coarsest converter of the boards, codes.
+/// Code of zero current and full scale of the coarsest converter of the boards.
 const MIDDLE: f64 = 2_048.0;
 const SPAN: f64 = 1_792.0;
 const FULL_SCALE_A: f32 = 5.5;
 
-/// Poses between the stops, six degrees apart. Turning joint 1 turns all of it.
+/// Returns poses between the stops, six degrees apart, for one angle of joint 1, which turns all.
 fn poses(record: &Calibration) -> Vec<Vec3> {
     let step = |i: i32| (6.0 * i as f32).to_radians();
     let all = (-25..=40).flat_map(|i| (-25..=40).map(move |j| Vec3::new(0.0, step(i), step(j))));
@@ -24,7 +24,7 @@ fn poses(record: &Calibration) -> Vec<Vec3> {
         .collect()
 }
 
-/// Directions all round.
+/// Returns directions all round.
 fn directions() -> impl Iterator<Item = Vec3> {
     let steps = -2..=2;
     let all = steps.clone().flat_map(move |x| {
@@ -34,7 +34,7 @@ fn directions() -> impl Iterator<Item = Vec3> {
     all.filter(|v| *v != Vec3::ZERO).map(Vec3::normalize)
 }
 
-/// Returns the conversion of a current.
+/// Returns a current after its conversion to a code and back.
 fn converted(current_a: f32) -> f64 {
     let code = f64::from(offset_code(current_a / FULL_SCALE_A));
     (code - MIDDLE) / SPAN * f64::from(FULL_SCALE_A)
@@ -79,6 +79,6 @@ fn an_encoder_off_by_two_ticks_jumps_makes_no_force_above_the_records() {
     println!("{worst:.3} N of {most} N at most, in {judged} cases");
     assert!(judged > 100_000, "{judged}");
     assert!(worst <= most, "{worst} N");
-    // The bound is not much wider than need be.
+    // The bound is not much wider than necessary.
     assert!(worst > 0.95 * most, "{worst} N");
 }

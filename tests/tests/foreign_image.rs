@@ -1,7 +1,6 @@
-//! Foreign images in the emulator: they do nothing to its
-//! files, and nothing to its terminal.
+//! Foreign images in the emulator: they cannot change its files or control its terminal.
 //!
-//! The images are a few instructions each, put together here.
+//! The images are a few instructions each, assembled here.
 
 use std::fs;
 use std::path::Path;
@@ -12,24 +11,24 @@ use hapterra_tests::timeouts::HANG;
 
 const UART0: u32 = 0x4000_4000;
 const UART2: u32 = 0x4000_6000;
-/// Application interrupt and reset control, and what is written there for a reset.
+/// Application interrupt and reset control register, and the value for a reset.
 const AIRCR: u32 = 0xE000_ED0C;
 const RESET: u32 = 0x05FA_0004;
 
-/// Stores that turn a UART on and send these bytes.
+/// Returns stores that enable a UART and send these bytes.
 fn send(uart: u32, bytes: &[u8]) -> Vec<(u32, u32)> {
     let on = [(uart + 0x10, 16), (uart + 0x08, 1)];
     let data = bytes.iter().map(|byte| (uart, u32::from(*byte)));
     on.into_iter().chain(data).collect()
 }
 
-/// Start of the code, behind the vectors.
+/// Start of the code, after the vectors.
 const CODE: usize = 0x40;
-/// Bytes of the code of one store: three instructions, a branch over its literals, and
-/// two literals.
+/// Bytes of the code of one store: three instructions, a branch over its literals, and two
+/// literals.
 const STORE: usize = 16;
 
-/// `str` of each value at its address, then a branch to itself; begins at a multiple of
+/// Returns a `str` of each value to its address, then a branch to itself; begins at a multiple of
 /// four.
 fn store_all(stores: &[(u32, u32)]) -> Vec<u8> {
     let each = stores.iter().flat_map(|(address, value)| {
@@ -43,7 +42,7 @@ fn store_all(stores: &[(u32, u32)]) -> Vec<u8> {
     each.chain(stop).chain([0; 2]).collect()
 }
 
-/// A program that starts with `first` and does `then`, or `fault` where it may not.
+/// Returns a program that starts with `first`, then does the stores `then`, or `fault` in a fault.
 fn image(first: &[u8], then: &[(u32, u32)], fault: &[(u32, u32)], data: &[u8]) -> Vec<u8> {
     assert_eq!(first.len() % 4, 0, "the literals are aligned");
     let [then, fault] = [then, fault].map(store_all);
@@ -56,7 +55,7 @@ fn image(first: &[u8], then: &[(u32, u32)], fault: &[(u32, u32)], data: &[u8]) -
     elf(&[program, then, fault, data.to_vec()].concat())
 }
 
-/// An ELF file that loads a program at address zero.
+/// Returns an ELF file that loads a program at address zero.
 fn elf(program: &[u8]) -> Vec<u8> {
     const HEADERS: u32 = 52 + 32;
     let length = program.len() as u32;
@@ -73,8 +72,8 @@ fn elf(program: &[u8]) -> Vec<u8> {
     file
 }
 
-/// An image that creates the file at `path` through semihosting and tells what came of
-/// it: R where the call returned, F where it was a fault.
+/// Returns an image that creates the file at `path` through semihosting and sends the result: R if
+/// the call returned, F if it faulted.
 fn writes_a_file(path: &Path) -> Vec<u8> {
     let path = path.to_str().expect("text").as_bytes();
     let told = |what: u8| send(UART0, &[what]);
@@ -115,7 +114,7 @@ fn what_an_image_reports_does_not_control_the_terminal() {
     let mut stores = send(UART2, b"\x1b[2Jall is well\x07");
     stores.push((AIRCR, RESET));
     fs::write(&path, image(&[], &stores, &[], &[])).expect("written");
-    // It may be gone before its lines are connected.
+    // It may end before its lines are connected.
     let said = match Emulator::start(&qemu, &path) {
         Ok((emulator, _)) => emulator.finish().expect_err("it failed").to_string(),
         Err(error) => error.to_string(),

@@ -1,4 +1,4 @@
-//! Friction as a user meets it: real ground, an arm's encoders, the command.
+//! Friction in use: real ground, an arm's encoders, the command.
 
 use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
@@ -20,11 +20,11 @@ fn params(friction: Friction) -> SurfaceParams {
     }
 }
 
-/// Distance at which a proxy no longer follows the hand, mm.
+/// Distance from which a proxy counts as caught, mm.
 const CAUGHT_MM: f64 = 20.0;
 
-/// Returns the forces on a HIP that slides around the middle of a terrain on an ellipse, `depth` mm
-/// deep, so many millimetres a tick. A hand that the edge of a hole has caught lifts for a tick.
+/// Returns the samples of a HIP that slides on an ellipse around the middle of a terrain, `depth`
+/// mm deep, at `speed` mm a tick. A hand caught at the edge of no-data lifts for a tick.
 fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
     let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
@@ -37,7 +37,7 @@ fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -
             size[1] / 2.0 + 0.8 * radius * angle.sin(),
         ];
         let Some(ground) = terrain.height_mm(at[0], at[1]) else {
-            continue; // over a hole
+            continue; // over no-data
         };
         let behind = |last: &TickRecord| distance(position(&last.proxy), position(&last.hip));
         let is_caught = rendered.last().is_none_or(|last| behind(last) > CAUGHT_MM);
@@ -48,8 +48,8 @@ fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -
     rendered
 }
 
-/// Tangential over normal force at a place of the surface, by the slopes of the terrain
-/// there; none beside a line of the grid, where there are several.
+/// Returns tangential over normal force at a point of the surface, from the slopes of the terrain
+/// there; `None` near a grid line, where several slopes meet.
 fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
     let [x, y, _] = position(&sample.proxy);
     let is_inside = |c: f64| (0.002..0.998).contains(&(c - c.floor()));
@@ -68,9 +68,9 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
-/// Returns true if the straight way to a HIP leads through the air, or over a hole, from a place on
-/// a proxy's way: there it leaves the surface and comes down elsewhere, and may be held where it
-/// does.
+/// Returns true if, from a point on a proxy's path, the straight line to a HIP leads through air or
+/// over no-data: there the proxy leaves the surface, lands elsewhere, and may be held where it
+/// lands.
 fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     let [from, to] = way;
     let between = |from: [f64; 3], to: [f64; 3]| {
@@ -89,12 +89,12 @@ fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     })
 }
 
-/// The ratios of the forces of all slides around a terrain, so many millimetres a tick. One that is
-/// off by more than `off` of μ is left out if the proxy flew.
+/// Returns the force ratios of all slides around a terrain at `speed` mm a tick. A ratio off by
+/// more than `off` of μ is left out if the proxy flew.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> Vec<f64> {
     let rendered = slide(terrain, params(Friction::coulomb(mu as f32)), depth, speed);
-    // The proxy that has just come out of the air has not slid yet, and one that a wall has held, far
-    // behind the HIP, comes over many cells at once.
+    // A proxy that has just landed has not slid yet, and one that a wall has held, far behind the
+    // HIP, moves over many cells at once.
     let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
     let slides = rendered.windows(2).filter(|pair| {
         let touches = |sample: &TickRecord| sample.state == ContactState::Touching;
@@ -112,15 +112,14 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> V
     ratios.collect()
 }
 
-/// Coefficients, how deep, mm, and how many slides there are at least on a terrain at a speed.
+/// Coefficient, depth in mm, and the least number of slides on a terrain at one speed.
 const ON_REAL_GROUND: [(f64, f64, usize); 4] = [
     (0.2, 0.1, 350),
     (0.4, 0.3, 700),
     (0.8, 1.0, 700),
     (0.8, 0.3, 700),
 ];
-/// The same of ground that is as good as sticky, where a proxy rests on many lines of the grid,
-/// too.
+/// Same on almost sticky ground, where a proxy also often rests on grid lines.
 const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 200)];
 
 #[test]
@@ -175,11 +174,11 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
     }
 }
 
-/// Cells of a millimetre of the hand, and ticks a second.
+/// Cell sizes in the hand, mm.
 const CELLS_MM: [f64; 3] = [0.1, 0.3, 1.0];
 
-/// Contact ticks, and those that left work over, of a hand of 30 mm/s, 0.1 to 1 mm deep, over a
-/// square of 256 cells.
+/// Returns the ticks in contact, and those that did not converge, of a hand at 30 mm/s, 0.1 to 1 mm
+/// deep, over a square of 256 cells.
 fn live(
     height: &dyn Fn(f64, f64) -> Option<f64>,
     cell_mm: f64,
@@ -250,8 +249,8 @@ fn a_live_tick_ends_where_friction_holds() {
     all_end("made ground", &hills, [Friction::coulomb(0.4), viscous]);
 }
 
-/// At 1 kHz all ticks but two of 1,000 end, at 10 kHz all but eight. The others are those in which
-/// a crease lets a proxy go: it comes over tens of cells, in as many ticks as its work takes.
+/// Checks that at 1 kHz all ticks but two in 1,000 converge, at 10 kHz all but eight. The others
+/// release a proxy from a concave edge: it moves over tens of cells in several ticks.
 fn all_end(name: &str, height: &dyn Fn(f64, f64) -> Option<f64>, frictions: [Friction; 2]) {
     for friction in frictions {
         for cell_mm in CELLS_MM {

@@ -1,5 +1,5 @@
-//! The bodies of the fuzz targets, driven without a fuzzer: bytes at random, and
-//! inputs that make sense with some of their bytes changed. The same every time.
+//! The bodies of the fuzz targets, run without a fuzzer: random bytes, and valid inputs with some
+//! of their bytes changed. They are the same in each run.
 
 use std::panic::catch_unwind;
 
@@ -23,7 +23,7 @@ fn random_bytes(random: &mut Random, length: usize) -> Vec<u8> {
     (0..length).map(|_| random.bits() as u8).collect()
 }
 
-/// Some bytes changed, dropped or doubled.
+/// Returns an input with some bytes changed, dropped or doubled.
 fn mutated(random: &mut Random, input: &[u8]) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..random.below(6) {
@@ -40,7 +40,7 @@ fn mutated(random: &mut Random, input: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Every third time random bytes, fewer than so many; else sensible ones, changed.
+/// Returns short random bytes every third time, else valid ones with changes.
 fn input(
     random: &mut Random,
     round: u32,
@@ -55,7 +55,7 @@ fn input(
     mutated(random, &sensible)
 }
 
-/// A scene of points, a tile, and points that go down into it.
+/// Returns a scene of points, a tile, and points that go down into it.
 fn sensible_ticks(random: &mut Random) -> Vec<u8> {
     let mut bytes = vec![0, random.below(4) as u8, 0, 0, 0, 0, 0, 0];
     bytes.extend([1, 0, 1, 1, 0]);
@@ -68,11 +68,11 @@ fn sensible_ticks(random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// A table and a scene of it, fed by points, a tile with materials of it, and points that go down
-/// into it and along.
+/// Returns a table and a scene with it, driven by points; a tile with its materials, and points
+/// that go down into it and along.
 fn sensible_materials(random: &mut Random) -> Vec<u8> {
     let count = random.below(4) as u8;
-    // One in four of another table than it says.
+    // One in four has another table than it declares.
     let kind = [247, 247, 247, 246][random.below(4)];
     let mut bytes = vec![kind, count];
     for _ in 0..=count {
@@ -80,7 +80,7 @@ fn sensible_materials(random: &mut Random) -> Vec<u8> {
         bytes.extend([kind, 40, 20, 30 + random.below(200) as u8]);
         bytes.extend([random.below(100) as u8, kind, 100]);
     }
-    // The scene, the sum that it says, and the counts of its tick.
+    // The scene, its table's checksum, and the counts of its tick.
     bytes.push([0, 64][random.below(2)]);
     bytes.extend(vec![7; 4 * usize::from(kind == 246)]);
     bytes.extend([0; 6]);
@@ -121,7 +121,7 @@ fn no_bytes_break_the_tick_on_materials() {
     }
 }
 
-/// Each check of the fuzz target is tried: a tick is changed in one way, and refused.
+/// Tries each check of the fuzz target: a tick with one change is refused.
 #[test]
 fn a_tick_that_may_not_be_is_refused() {
     let refuses = |change: fn(&mut Outcome)| {
@@ -141,7 +141,7 @@ fn a_tick_that_may_not_be_is_refused() {
     }));
 }
 
-/// Whole messages on the line, cut into the target's chunks.
+/// Returns whole messages on the line, cut into the target's chunks.
 fn sensible_talk(random: &mut Random) -> Vec<u8> {
     let samples = [0.5f32.to_le_bytes(); 33 * 33].concat();
     let material = Material::of(&SurfaceParams::PREMIUM);
@@ -172,7 +172,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             0 => ToDevice::Tile(tile),
             5 => ToDevice::MaterialScene(MaterialScene {
                 scene: hapterra_core::scene::Scene {
-                    // With another table than its own now and then.
+                    // Sometimes with another table than its own.
                     materials: Some(table.check_sum() ^ u32::from(random.below(4) == 0)),
                     ..wire::scene()
                 },
@@ -216,7 +216,7 @@ fn no_bytes_break_the_link() {
     }
 }
 
-/// Hills in steps of a 32nd of a cell, some of them with holes, packed.
+/// Returns hills in steps of 1/32 of a cell, some with no-data, packed.
 fn sensible_tile(random: &mut Random) -> Vec<u8> {
     let (rough, holes) = (random.between(0.0, 40.0), random.below(3) * 40);
     let heights: [f32; TILE_SAMPLES * TILE_SAMPLES] = std::array::from_fn(|i| {
@@ -241,13 +241,13 @@ fn no_bytes_break_a_tile() {
     }
 }
 
-/// A small file of any kind.
+/// Returns a small file of any kind.
 fn sensible_terrain(random: &mut Random) -> Vec<u8> {
     let kind = random.below(terrain::KINDS.len());
     small_terrain(kind, random.below(32) as u8)
 }
 
-/// A small file of a kind, which opens in the way 0.
+/// Returns a small file of a kind, which opens with option byte 0.
 fn small_terrain(kind: usize, how: u8) -> Vec<u8> {
     let samples: Vec<u8> = (0..6_i16).flat_map(i16::to_le_bytes).collect();
     let world = b"10\n0\n0\n-10\n505\n5005\n".to_vec();
@@ -281,7 +281,7 @@ fn small_terrain(kind: usize, how: u8) -> Vec<u8> {
     terrain::of(kind, how, &beside, &file)
 }
 
-/// Two rows of three samples of 16 bits.
+/// Returns two rows of three 16-bit samples.
 fn small_tiff(samples: &[u8]) -> Vec<u8> {
     use hapterra_tests::tiffs::Values::{Longs, Shorts};
     let image = vec![
@@ -314,7 +314,7 @@ fn no_bytes_break_the_readers_of_terrain() {
     }
 }
 
-/// A file of each kind that the command reads besides terrain.
+/// Returns a file of each kind, besides terrain, that the command reads.
 fn sensible_text(random: &mut Random) -> Vec<u8> {
     let text = [
         "# hapterra-recording = 1\n# level = 0\nt_s,x_mm,y_mm,z_mm,contact\n0,1,2,3,0\n0.001,1,2,2.5,1\n",

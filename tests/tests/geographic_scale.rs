@@ -1,5 +1,5 @@
-//! A terrain is rendered in its true shape: planes of known slope on the ellipsoid, as a
-//! file of degrees stores them.
+//! A terrain is rendered in its true shape: planes of known slope on the ellipsoid, stored in
+//! degrees.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use heightfield::{OpenOptions, Raster};
 const SIDE: u32 = 80;
 const STEP_DEG: f64 = 0.001;
 
-/// Metres in a degree of longitude and of latitude at a latitude, from the radii of
+/// Returns the metres in a degree of longitude and of latitude at a latitude, from the radii of
 /// curvature of WGS 84.
 fn degree_m(latitude_deg: f64) -> [f64; 2] {
     let (a, e2) = (6_378_137.0_f64, 0.006_694_379_990_14);
@@ -22,8 +22,8 @@ fn degree_m(latitude_deg: f64) -> [f64; 2] {
     [a * cos / w.sqrt(), a * (1.0 - e2) / (w * w.sqrt())].map(f64::to_radians)
 }
 
-/// A grid of degrees at a latitude whose heights rise by `slope` metres a metre east
-/// and north.
+/// Writes a grid of degrees at a latitude whose heights rise by `slope` metres a metre east and
+/// north.
 fn plane(latitude_deg: f64, slope: [f64; 2]) -> PathBuf {
     let middle = latitude_deg + f64::from(SIDE) * STEP_DEG / 2.0;
     let [east, north] = degree_m(middle).map(|metres| metres * STEP_DEG);
@@ -43,7 +43,7 @@ fn plane(latitude_deg: f64, slope: [f64; 2]) -> PathBuf {
     path
 }
 
-/// The force over the middle of a terrain, a cell deep.
+/// Returns the force over the middle of a terrain, a cell deep.
 fn force(terrain: &Terrain<'_>) -> [f64; 3] {
     let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
     let [east, north] = terrain.size_mm().map(|size| size / 2.0);
@@ -78,8 +78,8 @@ fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
     }
 }
 
-/// The same through the command: at 1 mm a cell, a millimetre of the trajectory is a rendered
-/// cell, so one place east and one north of it are equally far on the ground.
+/// Same through the command: at 1 mm a cell, a millimetre of the trajectory is a rendered cell, so
+/// a step east and a step north are equally far on the ground.
 #[test]
 fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -112,8 +112,7 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
             force[1 - axis].abs() < 1e-3 * force[2],
             "{slope:?}: {rendered:?}"
         );
-        // 45°: as high as it is far, in millimetres, and in the middle between below the
-        // plane and beside it.
+        // At 45° the proxy is half way between the plane's points above and beside the HIP.
         assert!((proxy[axis] - 25.0).abs() < 0.05, "{slope:?}: {rendered:?}");
         assert!((proxy[2] - 25.0).abs() < 0.05, "{slope:?}: {rendered:?}");
     }

@@ -1,15 +1,14 @@
-//! Places of terrain files: reference systems and bounds as GDAL reads them, and what
-//! `hapterra info` says about each.
+//! Georeferences of terrain files: reference systems and bounds as GDAL reads them, and the output
+//! of `hapterra info` for each.
 //!
-//! `data/places_by_gdal.csv` was made once by `data/places_by_gdal.py`, which names
-//! its command.
+//! `data/places_by_gdal.csv` was made once by `data/places_by_gdal.py`, which has its command.
 
 use hapterra_tests::reader::Reader;
 use hapterra_tests::{info, shared};
 use heightfield::{Bounds, OpenOptions, Raster};
 
 const TABLE: &str = include_str!("../data/places_by_gdal.csv");
-/// Metres or degrees: the table has bounds in full, degrees to 9 digits.
+/// Tolerance in metres or degrees: the table has full bounds, degrees to 9 digits.
 const SAME_PLACE: f64 = 1e-6;
 
 #[derive(Debug, serde::Deserialize)]
@@ -80,7 +79,7 @@ fn files_lie_where_gdal_sees_them() {
         {
             let raster = match reader.open(&path, &OpenOptions::default()) {
                 Ok(raster) => raster,
-                // Colours and nothing but no-data.
+                // Colours, or only no-data.
                 Err(_) if is_foreign(&row) => continue,
                 Err(error) => panic!("{reader:?}: {error}"),
             };
@@ -92,7 +91,7 @@ fn files_lie_where_gdal_sees_them() {
     assert!(checked >= 30, "only {checked} files were there");
 }
 
-/// The collection of other projects' TIFFs has some that are no terrain.
+/// Returns true for files in the collection of other projects' TIFFs that are not terrain.
 fn is_foreign(row: &Row) -> bool {
     row.file.starts_with("tiff_ok/")
 }
@@ -101,7 +100,7 @@ fn compare(raster: &Raster, row: &Row, reader: Reader) {
     let file = &row.file;
     let system = raster.reference_system();
     let code = system.and_then(|system| system.code());
-    // What GDAL hands over as text may have lost its code: longitudes are compared below.
+    // GDAL's text may have lost its code: the longitudes are compared below.
     let has_lost_code = reader != Reader::Own && code.is_none() && system.is_some();
     if let (Ok(epsg), false) = (row.epsg.parse::<u16>(), has_lost_code) {
         assert_eq!(code, Some(epsg), "{file} by {reader:?}");
@@ -122,15 +121,15 @@ fn compare(raster: &Raster, row: &Row, reader: Reader) {
     if !has_lost_code {
         return assert_same(raster.bounds_lonlat(), degrees, file);
     }
-    // Without the code, the way to WGS 84 is that of the datum's name: usually within 45 m.
+    // Without the code, the shift to WGS 84 is that of the datum's name: usually within 45 m.
     let found = sides(raster.bounds_lonlat().expect("a known projection"));
     for (found, wanted) in found.iter().zip(degrees) {
         assert!((found - wanted).abs() * 110_000.0 < 45.0, "{file}: {found}");
     }
 }
 
-/// For each: reference system, bounds, way to longitudes, cell's unit, vertical unit and
-/// datum, where it comes from.
+/// For each: reference system, bounds, transformation to longitudes, cell's unit, vertical unit and
+/// datum, and their source.
 #[test]
 fn info_says_of_each_whether_it_is_stated_follows_or_is_assumed() {
     let Some(folder) = shared("dem/real") else {
@@ -170,8 +169,8 @@ fn info_says_of_each_whether_it_is_stated_follows_or_is_assumed() {
     let report = info(&folder.join("bigtujunga.tif"));
     assert_eq!(report["crs"], "EPSG:32611");
     assert_eq!(report["crs_name"], "WGS 84 / UTM zone 11N");
-    // 106 km west of the zone's middle UTM's scale is 0.99974: a metre of the map is more
-    // than a metre on the ground.
+    // 106 km west of the zone's middle, UTM's scale is 0.99974: a metre of the map is more than a
+    // metre on the ground.
     let east = report["cell"]["east_m"].as_f64().expect("a length");
     assert!((east / 30.0 - 1.000_26).abs() < 1e-5, "{east}");
     let report = info(&folder.join("N44W072.hgt"));

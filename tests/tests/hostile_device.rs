@@ -1,5 +1,5 @@
-//! A device that means no good, behind TCP: nothing that it says controls the terminal,
-//! and nothing that it asks for floods it.
+//! A hostile device behind TCP: none of its texts controls the terminal, and none of its requests
+//! floods it.
 
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
@@ -20,11 +20,10 @@ use hapterra_firmware::store::Stored;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::link_campaign::frames;
 
-/// Requests for tiles that there are not, after each message of samples.
+/// Requests for non-existent tiles after each message of samples.
 const REQUESTS: i32 = 200;
 
-/// Clears the screen, retitles the window, rings, ends the line, and writes from right to
-/// left.
+/// Clears the screen, changes the title, rings, ends the line, and writes from right to left.
 const NAME: &str = "\x1b[2J\x1b]0;owned\x07\r\n\u{202e}\u{9b}m";
 
 fn device() -> Native<StoppedClock> {
@@ -56,7 +55,7 @@ fn rename(hello: &mut DeviceHello) {
     hello.version = NAME.try_into().expect("fits");
 }
 
-/// Returns the substitute for a frame of the device.
+/// Returns the replacement for a frame of the device.
 fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
     let printed = frames::changed(frame, |message| match message {
@@ -79,7 +78,7 @@ fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     printed
 }
 
-/// Lets the device talk until the host is gone.
+/// Lets the device send until the host is gone.
 fn serve(mut stream: TcpStream) -> std::io::Result<()> {
     stream.set_read_timeout(Some(Duration::from_millis(1)))?;
     let (mut device, mut epoch) = (device(), 0);
@@ -104,13 +103,13 @@ fn serve(mut stream: TcpStream) -> std::io::Result<()> {
     }
 }
 
-/// Starts the device; gives its address.
+/// Starts the device. Returns its address.
 fn started() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("bound");
     let address = listener.local_addr().expect("bound").to_string();
     std::thread::spawn(move || {
         for stream in listener.incoming() {
-            // A host that goes is no concern of the device.
+            // A host that disconnects does not stop the device.
             let _ = serve(stream.expect("accepted"));
         }
     });
@@ -123,7 +122,7 @@ fn output_text(run: &Output) -> String {
     printed.concat()
 }
 
-/// Nothing in it that a terminal obeys but the ends of its lines.
+/// Checks that a text has no control characters except line ends.
 fn is_plain(text: &str) {
     let obeyed = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
     assert!(!text.contains(obeyed), "{text:?}");
@@ -166,13 +165,13 @@ fn nothing_that_a_device_asks_for_floods_the_terminal() {
             .output()
             .expect("started")
     };
-    // A board of this name was never brought up.
+    // A board of this name has no record of a bring-up.
     let refused = run(&device, &[]);
     assert!(!refused.status.success(), "{refused:?}");
     let why = String::from_utf8_lossy(&refused.stderr);
     is_plain(&why);
     assert!(why.contains("was not brought up"), "{why}");
-    // Nor is its arm a virtual one by its own claim.
+    // Nor does its claim to be virtual count.
     for more in [&[][..], &["--unchecked"]] {
         let refused = run(&with_plant, more);
         assert!(!refused.status.success(), "{refused:?}");

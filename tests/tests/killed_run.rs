@@ -1,4 +1,4 @@
-//! Partial recordings of killed commands are found, named and left alone.
+//! Partial recordings of killed commands are found, named and left unchanged.
 #![cfg(unix)]
 
 use std::fs;
@@ -40,7 +40,7 @@ fn say_points(process: &mut Child) {
     stdin.write_all(points.as_bytes()).expect("written");
 }
 
-/// The partial files in a folder.
+/// Returns the partial files in a folder.
 fn partial(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).expect("listed");
     let mut paths: Vec<_> = entries.map(|entry| entry.expect("entry").path()).collect();
@@ -48,10 +48,10 @@ fn partial(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// A replay that is killed while it waits for more points; gives what it left.
+/// Kills a replay while it waits for more points. Returns its partial file.
 fn killed(folder: &Path, terrain: &Path) -> PathBuf {
     let mut process = replay(folder, terrain).spawn().expect("started");
-    // Its input stays open, so it cannot come to its end.
+    // Its input stays open, so it cannot finish.
     say_points(&mut process);
     let left = wait_for("a partial recording", || {
         assert_eq!(process.try_wait().expect("waited for"), None, "it ended");
@@ -63,7 +63,7 @@ fn killed(folder: &Path, terrain: &Path) -> PathBuf {
     left
 }
 
-/// Fails unless a command named the partial file and its size, and left it alone.
+/// Checks that a command named the partial file and its size, and left it unchanged.
 fn names_it(run: &Output, left: &Path, content: &[u8]) {
     let printed = output_text(run);
     assert!(run.status.success(), "{printed}");

@@ -1,4 +1,4 @@
-//! TIFFs whose samples are all in one strip, larger than the memory of a terrain, or in millions of
+//! TIFFs with all samples in one strip larger than the memory for a terrain, or in millions of
 //! tiles.
 
 use std::fs;
@@ -12,9 +12,9 @@ use heightfield::{OpenOptions, Raster};
 
 /// Samples each way: 4.1 GB of single floats.
 const SIDE: u32 = 32_000;
-/// Place where the strip begins.
+/// Offset of the strip.
 const FIRST: u32 = 4096;
-/// Rows of heights that are written; between them the file has nothing, which reads as zeros.
+/// Distance of the rows with heights; the file is sparse between them, which reads as zeros.
 const EVERY: u32 = 997;
 
 fn height(column: u32, row: u32) -> f32 {
@@ -46,14 +46,14 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// Samples each way of a mask that is in one strip and too large to be decoded with each block.
+/// Side of a mask in one strip, too large to be decoded with each block.
 const MASKED: u32 = 6000;
 
 fn one(tag: u16, value: u32) -> (u16, Values) {
     (tag, Values::Longs(vec![value]))
 }
 
-/// Tiles of bytes that are 7, but for the first, and a mask of the same bytes in one strip.
+/// Writes tiles of bytes of 7, except the first, and a mask of the same bytes in one strip.
 fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
     const TILE: u32 = 3000;
     let image = |kind: u32, compression: u32, meaning: u32, chunk: Vec<(u16, Values)>| {
@@ -89,7 +89,7 @@ fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let path = folder.path().join("masked.tif");
     let images = [image(0, 1, 1, tiles), image(4, compression, 4, strip)];
     std::fs::write(&path, tiff(&data, &images)).expect("written");
-    // All tiles are the same one; the file is as long as if they were not.
+    // All tiles share one place; the file is as long as if they did not.
     let file = fs::OpenOptions::new()
         .write(true)
         .open(&path)
@@ -100,7 +100,7 @@ fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// Options with which all stays in the file, and what may be unpacked is in a folder.
+/// Returns options with which samples stay in the file, and unpacked data is in a folder.
 fn in_file(disk: DiskCache) -> OpenOptions {
     OpenOptions {
         most_in_memory_bytes: 0,
@@ -125,7 +125,7 @@ fn a_mask_in_one_large_strip_is_read_row_by_row() {
     }
 }
 
-/// Without a place to unpack it, all is in memory, and the reason is reported.
+/// Without a place for unpacked data, everything is in memory, and the reason is reported.
 #[test]
 fn a_packed_mask_in_one_large_strip_is_unpacked_on_disk_or_it_is_named() {
     let mask = zstd_bomb((MASKED * MASKED).div_ceil(128 * 1024) as usize);
@@ -182,11 +182,11 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     let (code, text) = info(&["--cache", cache]);
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("unpacked on disk"), "{text}");
-    // Without a place on disk it needs the memory, and there is too little.
+    // Without a place on disk it needs memory, and there is too little.
     let (code, text) = info(&["--cache", "off"]);
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("more than memory can hold"), "{text}");
-    // A strip that is cut: the rows before are rendered.
+    // A truncated strip: the rows before the end are rendered.
     write(&packed[..packed.len() / 10 * 9]);
     let (code, text) = info(&["--cache", cache]);
     assert_eq!(code, Some(0), "{text}");
@@ -194,7 +194,7 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
         text.contains("cannot be read and count as no data"),
         "{text}"
     );
-    // One of which nothing can be unpacked.
+    // One that cannot be unpacked at all.
     let mut damaged = packed.clone();
     damaged[0] = 0;
     write(&damaged);
@@ -208,7 +208,7 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     assert!(text.contains("absurd size"), "{text}");
 }
 
-/// A file that was cut: its overview, which is all that is looked at when it opens, ends early.
+/// A truncated file: its overview, the only part read when it opens, ends early.
 #[test]
 fn rows_of_an_overview_that_ends_early_are_read() {
     const WIDE: u32 = 4000;
@@ -228,7 +228,7 @@ fn rows_of_an_overview_that_ends_early_are_read() {
             one(279, side * side),
         ]
     };
-    // The directories come before the samples, as in a file that may be cut.
+    // The directories come before the samples, as is usual in truncated files.
     const SAMPLES: u32 = 4096;
     let coarse = SAMPLES + WIDE * WIDE;
     let mut bytes = tiff(&[], &[image(0, WIDE, SAMPLES), image(1, HALF, coarse)]);
@@ -265,7 +265,7 @@ fn strip_of_4_gb_is_read_in_the_memory_of_a_terrain() {
     }
 }
 
-/// All of it is searched for a height: that takes no memory, and is reported, because it takes
+/// The whole file is searched for a height, which uses no memory, but is reported, as it takes
 /// long.
 #[test]
 fn a_file_of_nothing_is_looked_through_and_it_says_so() {
@@ -287,7 +287,7 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
     let end = text.find("no surface").expect("it says what came of it");
     assert!(search < end, "{text}");
     assert!(text.contains("all 144000000 samples"), "{text}");
-    // Where zeros are heights, the first places have some.
+    // If zeros are heights, the first samples already have one.
     let output = memory_limit::info(&path, &[]);
     assert!(output.status.success());
     let text = String::from_utf8_lossy(&output.stderr);
@@ -319,7 +319,7 @@ fn four_million_tiles_are_read_in_the_memory_of_a_terrain() {
     let data = vec![7; (TILE * TILE) as usize];
     let info = |images: &[Directory]| {
         std::fs::write(&path, tiff(&data, images)).expect("written");
-        // All tiles are the same one; the file is as long as if they were not.
+        // All tiles share one place; the file is as long as if they did not.
         let file = fs::OpenOptions::new()
             .write(true)
             .open(&path)
@@ -332,7 +332,7 @@ fn four_million_tiles_are_read_in_the_memory_of_a_terrain() {
     };
     let (code, text) = info(&[image(0)]);
     assert_eq!(code, Some(0), "{text}");
-    // Five such lists are more than is kept: that is no damage.
+    // Five such lists exceed the cache: that is not damage.
     let (code, text) = info(&[0, 1, 1, 1, 1].map(image));
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("very many small tiles"), "{text}");

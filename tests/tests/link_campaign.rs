@@ -1,4 +1,4 @@
-//! A minute of the campaign of link faults, and whether the report that is kept is whole.
+//! A minute of the campaign of link faults, and a check that the stored report is complete.
 
 use hapterra_tests::link_campaign::fault::Kind;
 use hapterra_tests::link_campaign::{SEED, report, run};
@@ -10,7 +10,7 @@ fn link_faults_change_no_force_never_hang_and_are_reported() {
     for kind in Kind::ALL {
         assert!(tally.runs_with(kind) > 0, "{kind:?} was not tried");
     }
-    // Otherwise the bounds were never put to the test.
+    // Otherwise the bounds would never have been tested.
     assert!(tally.extremes.force_n > 2.0, "{:?}", tally.extremes);
     assert!(tally.touching > 5_000, "{tally:?}");
     assert!(tally.agreed() > 3, "{tally:?}");

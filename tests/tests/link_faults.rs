@@ -1,5 +1,5 @@
-//! Links that lose, damage and repeat, hosts that die, versions that differ:
-//! the host's client against the device's own application, in memory.
+//! Links that lose, damage and repeat bytes, hosts that die, different versions: the host's client
+//! with the device's own application, in memory.
 
 use std::cell::{Cell, RefCell};
 use std::io;
@@ -27,7 +27,7 @@ use hapterra_tests::random_paths::wander;
 use hapterra_tests::timeouts::HANG;
 use heightfield::Raster;
 
-/// A device in memory answers at once: what has not come in a moment is lost.
+/// A device in memory answers at once: an answer that has not arrived after a moment is lost.
 const AT_ONCE: Timeouts = Timeouts {
     again: Duration::from_millis(2),
     alive: Duration::from_millis(2),
@@ -67,7 +67,7 @@ fn force_is_the_same_over_a_bad_link() {
     };
     let mut clean = on_native(&terrain, params).expect("opened");
     let expected = walk(&mut clean);
-    // The last says everything twice, the greeting included.
+    // The last one duplicates everything, including the greeting.
     for (fault, one_in) in [
         (Fault::Flip, 20),
         (Fault::Drop, 20),
@@ -89,8 +89,8 @@ fn force_is_the_same_over_a_bad_link() {
     }
 }
 
-/// Sees what a device says before any of it is harmed: how many samples it sends, and
-/// how many it says at last that it dropped.
+/// Reads the device's bytes before any fault: counts its samples, and stores its final count of
+/// dropped ones.
 struct Tap {
     device: Native,
     reader: Box<FrameReader<MAX_FRAME>>,
@@ -155,7 +155,7 @@ fn telemetry_that_is_lost_is_counted() {
     }
     session.say_goodbye(&mut |_| {}).expect("confirmed");
     let tally = session.tally();
-    // Also what was lost before the first that came is counted, and after the last.
+    // Losses before the first and after the last sample received are counted as well.
     eprintln!("{last} ticks, {tally:?}");
     assert!(tally.lost + tally.dropped > 100, "no harm, no test");
     assert_eq!((tally.sessions, tally.uncertain), (1, 0));
@@ -215,7 +215,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
 fn a_device_that_restarts_ends_a_replay_with_a_word() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    /// Swaps the device for a new one in the middle.
+    /// Replaces the device by a new one during the session.
     struct Restarting(Native, u32);
     impl Transport for Restarting {
         fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -240,7 +240,7 @@ fn a_device_that_restarts_ends_a_replay_with_a_word() {
     assert!(matches!(error, Some(LinkError::Restarted)), "{error:?}");
 }
 
-/// Returns the answer of a device to bytes that belong to no session.
+/// Returns the answer of a device to bytes outside of any session.
 fn refusal(device: &mut Native, bytes: &[u8]) -> Option<VersionCheck> {
     device.send(bytes).expect("in memory");
     let mut chunk = [0; 512];
@@ -266,7 +266,7 @@ fn the_device_refuses_a_host_of_another_version() {
 
 #[test]
 fn the_host_says_which_versions_do_not_fit() {
-    /// Answers everything with a refusal.
+    /// Answers every message with a refusal.
     struct Newer;
     impl Transport for Newer {
         fn send(&mut self, _: &[u8]) -> io::Result<()> {

@@ -1,6 +1,6 @@
-//! Every frame of a conversation lost, repeated, delayed and overtaken, either end
-//! killed at every moment: the end is confirmed or reported, nothing is driven that no host
-//! wished, every sample is counted once.
+//! Every frame of a session lost, repeated, delayed and overtaken, either end killed at every
+//! moment: the end is confirmed or reported, no force acts that no host wanted, every sample is
+//! counted once.
 
 use hapterra_tests::link_model::{Direction, End, Harm, Interruption, Plan, Report, check, frames};
 
@@ -15,7 +15,7 @@ const HARMS: [Harm; 5] = [
 /// Ticks between two moments at which an end is killed.
 const MOMENTS: usize = 23;
 
-/// Plays a plan that leaves the line good enough to agree.
+/// Plays a plan whose line is good enough for an agreed end.
 fn agree(plan: &Plan) -> Report {
     match check(plan) {
         Ok(report) if report.end == End::Agreed && report.driven => report,
@@ -23,7 +23,7 @@ fn agree(plan: &Plan) -> Report {
     }
 }
 
-/// Every harm to every frame of an undisturbed run, first those to the device.
+/// Returns every fault of every frame of an undisturbed run, first those to the device.
 fn single_harms() -> Vec<(Direction, usize, Harm)> {
     let [to_device, to_host] = frames();
     let to_device = (0..to_device).map(|number| (Direction::ToDevice, number));
@@ -50,7 +50,7 @@ fn any_one_frame_may_be_lost_repeated_or_late() {
             harms,
             ..Plan::default()
         });
-        // Sooner than a session that is given up and taken up again.
+        // Sooner than with a resumed session.
         assert!(report.ticks < 3_000, "{harm:?}: {report:?}");
         assert_eq!(report.uncertain, 0, "{harm:?}");
     }
@@ -58,7 +58,7 @@ fn any_one_frame_may_be_lost_repeated_or_late() {
 
 #[test]
 fn any_two_frames_of_the_opening_may_be_lost_repeated_or_late() {
-    // The first frames each way: hello, scene, zero, arm, the tile and their answers.
+    // The first frames in each direction: open, scene, zero, arm, the tile and their answers.
     let opening: Vec<_> = single_harms()
         .into_iter()
         .filter(|(_, number, harm)| {
@@ -100,8 +100,7 @@ fn any_two_frames_of_the_end_may_be_lost_repeated_or_late() {
     }
 }
 
-/// Interrupts at every moment of a run, alone and with the next frame each way lost or
-/// repeated.
+/// Interrupts a run at every moment, alone and with one frame in either direction lost or repeated.
 fn interrupted(what: Interruption) {
     let ticks = agree(&Plan::default()).ticks;
     for at in (0..ticks).step_by(MOMENTS) {
@@ -112,7 +111,7 @@ fn interrupted(what: Interruption) {
         };
         let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
         assert_eq!(report.end, End::Agreed, "{plan:?}");
-        // The frames around that moment, by the frames of an undisturbed run.
+        // The first frames of the run.
         for number in 0..12 {
             for (way, harm) in [
                 (Direction::ToDevice, Harm::Lose),
@@ -148,7 +147,7 @@ fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
     };
     let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
     for harm in HARMS {
-        // The last frames each way: bye, goodbye and what is around them.
+        // The last frames in each direction: the close, its confirmation, and others around them.
         for (way, count) in [Direction::ToDevice, Direction::ToHost]
             .into_iter()
             .zip(frames)
@@ -161,7 +160,7 @@ fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
             }
         }
     }
-    // A host before had heard its goodbye, and all of that comes again.
+    // An earlier host had received its confirmation, and all its frames are repeated.
     let killed = (ticks - 2, Interruption::HostKilled);
     let again = Plan {
         interruptions: vec![killed],
@@ -178,16 +177,16 @@ fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
     }
 }
 
-/// Returns the histories before a moment, with everything that may be repeated after it.
+/// Returns histories before a moment, with the frames that may be repeated after it.
 fn histories() -> Vec<Vec<(u64, Interruption)>> {
     let ticks = agree(&Plan::default()).ticks;
-    // While it opens, while it touches, and when everything but the last answer was sent.
+    // During the opening, in contact, and when everything but the last answer was sent.
     let killed = [60, ticks / 2, ticks - 2].map(|at| vec![(at, Interruption::HostKilled)]);
     [vec![]].into_iter().chain(killed).collect()
 }
 
-/// Plays each history with something more at its end and every moment after it. It ends as it would
-/// without, as soon, in as many sessions, and nothing more is uncertain.
+/// Plays each history with one more interruption at its end and at every moment after it. The end,
+/// its time, the number of sessions and the uncertain ends must be the same as without.
 fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interruption) {
     for history in histories {
         let plan = |interruptions| Plan {
@@ -229,7 +228,7 @@ fn a_host_of_another_version_may_speak_at_any_moment() {
 fn a_host_whose_device_is_taken_is_told_so_at_once() {
     let ticks = agree(&Plan::default()).ticks;
     let mut told = 0;
-    // Once alone, and once with the word for it lost.
+    // Once alone, and once with its notification lost.
     for (at, late) in (0..ticks)
         .step_by(MOMENTS)
         .flat_map(|at| [(at, 0), (at, 900)])
@@ -243,9 +242,9 @@ fn a_host_whose_device_is_taken_is_told_so_at_once() {
             ..Plan::default()
         };
         let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
-        // Silence for 0.75 s, and hello every 0.4 s after that.
+        // Silence for 0.75 s, then an open every 0.4 s.
         assert!(report.ticks < at + late + 1_300, "{report:?} in {plan:?}");
-        // Its own hello comes after the other's, or its goodbye before.
+        // Its own open comes after the other host's, or its close before.
         let is_its_own = at == 0 || at + 200 > ticks;
         assert!(report.end == End::Told || is_its_own, "{plan:?}");
         told += u32::from(report.end == End::Told);
@@ -267,8 +266,8 @@ fn no_answer_that_comes_late_is_taken_for_that_to_a_later_question() {
     assert!(answers > 3_000, "{answers}");
 }
 
-/// A host that puts another view in while it feels, asks for the calibration, and then has
-/// outputs held, the record stored and a motor jogged.
+/// Returns the plan of a host that changes the placement while it renders, reads the calibration,
+/// then requests held outputs, the storing of the record and a jog.
 fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
     Plan {
         harms,
@@ -326,7 +325,7 @@ fn a_device_of_another_version_is_told_and_never_driven() {
     });
     let report = report.expect("nothing wrong");
     assert!(report.end == End::Told && !report.driven && report.ticks < 100);
-    // One that was given other firmware meanwhile reports it after its reset.
+    // A device that received other firmware in between reports it after its reset.
     for at in (0..ticks).step_by(MOMENTS) {
         let other = Interruption::OtherDevice;
         let interruptions = vec![(at, Interruption::DeviceReset), (at, other)];
@@ -365,7 +364,7 @@ fn the_line_may_be_cut_one_way_at_any_moment() {
                     ..Plan::default()
                 };
                 let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
-                // A cut that is longer than the time-out of the close is reported to the user.
+                // A cut longer than the time-out of the close is reported to the user.
                 assert!(report.end == End::Agreed || long > 3_000, "{plan:?}");
             }
         }
@@ -398,7 +397,7 @@ fn a_dead_line_ends_in_a_word_and_not_in_a_hang() {
             };
             let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
             assert_eq!(report.end, End::Told, "{plan:?}");
-            // Four seconds, five times; three for goodbye.
+            // Four seconds, five times; three for the close.
             assert!(report.ticks < 30_000, "{report:?} in {plan:?}");
         }
     }

@@ -1,5 +1,5 @@
-//! Random walks judged a second time: by a list of all places a proxy may rest
-//! (`hapterra_tests::local_minima`), and by looking densely at the HIP paths.
+//! Random walks checked a second time: with a list of all points where a proxy may rest
+//! (`hapterra_tests::local_minima`), and with a dense search along the HIP's paths.
 
 use hapterra::terrain::{HapticCells, HapticGrid};
 use hapterra_core::contact::ContactState;
@@ -16,20 +16,20 @@ use hapterra_tests::scene::tile_supply::{Buffers, Supply};
 use hapterra_tests::shared;
 use heightfield::{OpenOptions, Raster, Wait};
 
-/// Findings of the second opinion in a scene.
+/// Findings of the second check in a scene.
 #[derive(Debug, Default)]
 struct Found {
-    /// Proxies at rest that were looked at.
+    /// Proxies at rest that were checked.
     judged: u64,
-    /// Of those, not at any local closest point, by tick.
+    /// Those of `judged` that are not at any local closest point, by tick.
     wrong: Vec<usize>,
-    /// Those that only one of the two judges calls wrong, by tick.
+    /// Those that only one of the two checks calls wrong, by tick.
     disputed: Vec<usize>,
     /// Contacts that began.
     began: u64,
-    /// Of those, farther from the HIP than where its way first is below ground.
+    /// Those of `began` farther from the HIP than the first point of its path below ground.
     late: Vec<usize>,
-    /// Free ways that are below ground somewhere: around or over what they met.
+    /// Free paths that are below ground somewhere: around or over an obstacle.
     dipped: u64,
 }
 
@@ -65,8 +65,8 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     found
 }
 
-/// Returns true if a proxy at rest is at a local closest point, by the bound that the judge has,
-/// too; `None` if nothing can be checked.
+/// Returns true if a proxy at rest is at a local closest point, within the oracle's bound; `None`
+/// if nothing can be checked.
 fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
     let displacement = distance(seen.proxy, seen.hip);
     let rests = seen.output.state == ContactState::Touching && seen.output.converged;
@@ -85,7 +85,7 @@ fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
         return Some(true);
     }
     let level = |a: [f64; 3], b: [f64; 3]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    // How far the truth moves when the HIP does by as much as is allowed.
+    // Motion of the closest point when the HIP moves by the allowed error.
     let moved = (0..6).filter_map(|i| {
         let mut hip = seen.hip;
         hip[i / 2] += if i % 2 == 0 { allowed } else { -allowed };
@@ -95,7 +95,7 @@ fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
     Some(level(at, seen.proxy) <= 4.0 * (allowed + condition))
 }
 
-/// Looks at the path of the HIP every 256th of a cell.
+/// Checks the path of the HIP at every 1/256 of a cell.
 fn ways(
     terrain: &Terrain,
     before: &ObservedTick,
@@ -105,7 +105,7 @@ fn ways(
 ) {
     let was_free = before.output.state == ContactState::Free && before.output.converged;
     let length = distance(before.hip, now.hip);
-    // A longer way is looked at no more than so often.
+    // Longer paths would need too many points.
     if !was_free || !now.output.converged || length > 500.0 {
         return;
     }
@@ -151,7 +151,7 @@ fn a_proxy_beside_its_place_is_seen_there() {
     }
 }
 
-/// All scenes of a seed in that range.
+/// Returns all scenes of a seed in that range.
 fn scenes(numbers: std::ops::Range<u64>) -> impl Iterator<Item = (u64, Scene)> {
     numbers.map(|number| (number, Scene::random(77, number)))
 }
@@ -209,7 +209,7 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
     }
 }
 
-/// At most 200 × 200 patches of its middle, lowest sample near zero.
+/// Cuts at most 200 × 200 patches from the middle of a raster, with the lowest sample near zero.
 fn cut(raster: &Raster, steepness: f64) -> Terrain {
     const MOST: u32 = 200;
     let scale = HapticGrid::new(raster, HapticCells::Stored)
@@ -236,8 +236,8 @@ fn cut(raster: &Raster, steepness: f64) -> Terrain {
     })
 }
 
-/// A walk whose first step was 2⁻¹⁰ cell stepped over the minimum it stood on, on
-/// a wall of 10⁶ with the HIP some 10⁻⁶ cell inside.
+/// A descent whose first step was 2⁻¹⁰ cell stepped over the minimum where it started, on a slope
+/// of 10⁶ with the HIP about 10⁻⁶ cell inside.
 #[test]
 fn the_judge_stays_where_it_is_when_that_is_a_closest_point() {
     const HIPS: [(u64, [f64; 3]); 5] = [

@@ -1,6 +1,5 @@
-//! Files that are read where they are touched and lie about what is where: windows, overviews,
-//! sizes. Each ends in an error, or in a terrain whose heights are the file's, within the memory
-//! of a terrain.
+//! Files read on demand that have wrong headers: windows, overviews, sizes. Each gives an error, or
+//! a terrain with the file's heights, within the memory for a terrain.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,17 +8,17 @@ use hapterra_tests::memory_limit::{self, zstd_bomb};
 use hapterra_tests::tiffs::{DATA, Directory, Values, placed, tiff};
 use heightfield::{OpenOptions, Raster};
 
-/// Samples of the full image and of a tile each way, and bytes of a tile of single floats.
+/// Side of the full image and of a tile in samples, and bytes of a tile of single floats.
 const SIDE: u32 = 256;
 const TILE: u32 = 64;
 const TILE_BYTES: u32 = TILE * TILE * 4;
-/// The height of all samples of the full image, and of what lies behind it in the data.
+/// Height of all samples of the full image, and of the data after it.
 const HEIGHT: f32 = 7.0;
 const OTHER: f32 = 900.0;
-/// Place where the data of other images begins.
+/// Offset of the other images' data.
 const OTHERS: u32 = DATA + TILE_BYTES;
 
-/// As much as the full image would take, of which little is used.
+/// Returns data as large as the full image; only a small part is used.
 fn data() -> Vec<u8> {
     let of = |height: f32| height.to_le_bytes().repeat((TILE * TILE) as usize);
     let mut data = [of(HEIGHT), of(OTHER)].concat();
@@ -31,7 +30,7 @@ fn one(tag: u16, value: u32) -> (u16, Values) {
     (tag, Values::Longs(vec![value]))
 }
 
-/// An image of single floats, of which all tiles are the same.
+/// Returns an image of single floats whose tiles are all the same.
 fn image(kind: u32, side: u32, tile: u32, place: u32, tiles: usize) -> Directory {
     vec![
         one(254, kind),
@@ -55,7 +54,7 @@ fn full() -> Directory {
     full
 }
 
-/// An image with another value of a tag.
+/// Returns an image with another value of a tag.
 fn with(mut image: Directory, tag: u16, values: Values) -> Directory {
     let found = image.iter_mut().find(|(own, _)| *own == tag);
     found.expect("the tag is there").1 = values;
@@ -85,7 +84,7 @@ fn open(path: &Path) -> Raster {
     raster.unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// It ends, within the memory, in an error that says what, where and what next, or without.
+/// Checks that it ends within the memory, either well or in an error with fault, file and remedy.
 fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
     let options = [&["--input", "in-memory=0MB"], more].concat();
     let output = memory_limit::info(path, &options);
@@ -94,7 +93,7 @@ fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
     match output.status.code() {
         Some(0) => {}
         Some(1) => {
-            // Warnings of what is a hole may come before.
+            // Warnings about no-data may come before.
             let error = printed.find("error: ").map_or("", |at| &printed[at..]);
             assert!(error.contains("hint: "), "{what}: {printed}");
             let name = path.file_name().expect("a name").to_string_lossy();
@@ -131,7 +130,7 @@ fn overview_at_another_place_is_not_used() {
             elsewhere(here, 45.0, 32611),
             false,
         ),
-        // Writers copy tags; GDAL looks at none of an overview's.
+        // Writers copy tags; GDAL ignores an overview's.
         (
             "with the full image's place and cells",
             elsewhere(here, 30.0, 32611),
@@ -197,7 +196,7 @@ fn overview_at_another_place_is_not_used() {
     }
 }
 
-/// A damaged tile of an overview is a hole of coarse levels, and no more.
+/// A damaged tile of an overview is no-data at coarse levels, and has no other effect.
 #[test]
 fn an_overview_whose_tiles_are_not_there_leaves_the_full_image() {
     for (what, place, warns) in [
@@ -235,7 +234,7 @@ fn tiles_that_are_not_where_they_are_said_to_be_are_holes() {
     assert_eq!(raster.height(3, 3), f64::from(HEIGHT));
     let (is_open, printed) = ends_well("behind the end", &path, &[]);
     assert!(is_open && printed.contains("columns 0 to "), "{printed}");
-    // At the place of the header nothing is stored, whatever its size: no heights of zero.
+    // At the header's offset nothing is stored, whatever the size: no heights of zero.
     for options in [windows(), OpenOptions::default()] {
         let (_folder, path) = written("lie.tif", &tiff(&data(), &[places(0)]));
         let raster = Raster::open(&path, &options).expect("sparse");
@@ -255,7 +254,7 @@ fn a_tile_that_says_it_is_huge_takes_no_memory() {
         let image = with(image, 324, Values::Longs(places));
         with(image, 259, Values::Longs(vec![compression]))
     };
-    // The other tiles are no such streams, and holes, too; what is left is a file without heights.
+    // The other tiles are not such streams, so they are no-data: the file has no heights.
     let bomb = zstd_bomb(1 << 15);
     let all = [data(), bomb.clone()].concat();
     let place = DATA + data().len() as u32;
@@ -320,7 +319,7 @@ fn directories_that_lie_are_errors_or_the_full_image() {
         let (_folder, path) = written("lie.tif", &tiff(&data(), &[image]));
         assert!(!ends_well(what, &path, &[]).0, "{what}");
     }
-    // The list of directories: back to the first, to itself, behind the end.
+    // The list of directories: back to the first, to itself, past the end.
     let good = tiff(&data(), &[full(), overview()]);
     let first = u32::from_le_bytes(good[4..8].try_into().expect("four bytes"));
     let next = first as usize + 2 + 12 * full().len();
@@ -337,7 +336,7 @@ fn directories_that_lie_are_errors_or_the_full_image() {
         let (_folder, path) = written("lie.tif", &bytes);
         ends_well(what, &path, &[]);
     }
-    // A list of 3 · 10⁹ places.
+    // A list of 3 · 10⁹ entries.
     let entry = full()
         .iter()
         .position(|(tag, _)| *tag == 324)
@@ -433,7 +432,7 @@ fn plain_samples_whose_headers_lie_are_errors() {
             "{size}"
         );
     }
-    // As long as it says, and full of nothing: a terabyte that takes no memory.
+    // As long as declared, and empty: a terabyte that uses no memory.
     let (_folder, path) = written("N44W072.hgt", &[]);
     let side = 741_455_u64;
     let file = fs::OpenOptions::new()

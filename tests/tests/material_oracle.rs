@@ -1,5 +1,5 @@
-//! The judge of materials is fed false observations, one at a time, and speaks of each; of the
-//! honest ones beside them, which the product's loop made, of none.
+//! Each test gives the oracle of materials one false observation, which it must report; it reports
+//! none of the correct ones around it, from the product's loop.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
@@ -31,11 +31,11 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
-/// Violated invariant, and the point.
+/// Violated invariant and point.
 type Found = (Invariant, usize);
 
-/// A way over flat ground, whose samples from column 20 on are of the second material: down 1.5
-/// cells deep, and eastward by a step in each tick, at the end back again.
+/// A path over flat ground with the second material from column 20 on: 1.5 cells deep, eastward by
+/// a step in each tick, and back at the end.
 struct Way {
     scene: Scene,
     materials: Materials,
@@ -63,8 +63,8 @@ impl Way {
         }
     }
 
-    /// Returns the verdict of the judge if one point is changed, and of which point, and what it
-    /// learned.
+    /// Returns the oracle's result if one point is changed: the violation with its point, and the
+    /// measurements.
     fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, Judged) {
         let mut judge = MaterialJudge::new(&self.scene, &self.materials, [0; 3]);
         for (point, rendered) in self.rendered.iter().enumerate() {
@@ -85,7 +85,7 @@ impl Way {
         judged
     }
 
-    /// Returns the verdict on another force, at once.
+    /// Returns the violation by another force, which must be reported at that point.
     fn force(&self, at: usize, change: impl Fn(Vec3) -> Vec3) -> Option<Invariant> {
         let changed =
             |rendered: &mut Replied| rendered.sample.force_n = change(rendered.sample.force_n);
@@ -100,7 +100,7 @@ impl Way {
         })
     }
 
-    /// Of a proxy that is elsewhere, with the force that it has there by a stiffness.
+    /// Returns the violation by a shifted proxy with the force of a stiffness at its position.
     fn proxy(&self, at: usize, east: f64, stiffness: f64) -> Option<Invariant> {
         let moved = |rendered: &mut Replied| {
             rendered.proxy[0] += east;
@@ -114,7 +114,7 @@ impl Way {
 
 /// Start of a path, and its step.
 const SLOW: [f64; 2] = [18.51, 0.02];
-/// The first point of it beyond the border at 19.5; the first of all is above the ground.
+/// Its first point beyond the border at 19.5; point 0 is above the ground.
 const BORDER: usize = 51;
 
 #[test]
@@ -124,7 +124,7 @@ fn another_stiffness_than_that_on_the_way_is_found() {
     assert_eq!((judged.in_whole, judged.open), (300, 0));
     assert!((100..110).contains(&judged.changing), "{judged:?}");
     let wrong = Some(Invariant::Material);
-    // In one step, not at all, by one tick too early and too late.
+    // In one step, not at all, one tick early and one tick late.
     assert_eq!(way.force(BORDER, |_| Vec3::Z * 1.5), wrong);
     assert_eq!(way.force(BORDER + 40, |_| Vec3::Z * 0.6), wrong);
     assert_eq!(way.force(BORDER - 1, |f| f + Vec3::Z * 0.009), wrong);
@@ -142,13 +142,12 @@ fn another_stiffness_than_that_on_the_way_is_found() {
 
 #[test]
 fn where_two_are_equally_near_either_is_right_until_the_force_tells() {
-    // To the line half way between two samples, and not on.
+    // Up to the line half way between two samples.
     let way = Way::over([SOFT, HARD], [18.5, 1.0 / 64.0], Shading::None);
     let on_line = 66;
     assert_eq!(way.rendered[on_line - 1].proxy[0], 19.5);
     way.honest();
-    // There the class before would have been right, but then the next point is the first of the
-    // change.
+    // There the old class would be valid, but then the next point is the first of the change.
     let before = |rendered: &mut Replied| rendered.sample.force_n = Vec3::Z * 0.6;
     let (found, _) = way.with(on_line - 1, before);
     assert_eq!(found, Some((Invariant::Material, on_line)));
@@ -166,14 +165,14 @@ fn friction_of_the_place_after_is_found() {
     let way = Way::over([SOFT, rough], SLOW, Shading::None);
     let judged = way.honest();
     assert!(judged.sliding > 150 && judged.open == 0, "{judged:?}");
-    // 1.5 cells deep, each tick of the change holds 0.0075 cells more.
+    // At 1.5 cells depth, each tick of the change holds 0.0075 cells more.
     let proxy = |at, east| way.proxy(BORDER + at, east, 0.4);
     let early = proxy(0, -0.0075);
     assert_eq!(early, Some(Invariant::LocalMinimum), "nothing is held yet");
     assert_eq!(proxy(10, 0.0), None);
     assert_eq!(proxy(10, -0.0075), Some(Invariant::Cone), "one tick early");
     assert_eq!(proxy(10, 0.0075), Some(Invariant::Cone), "one tick late");
-    // On the way back it is held, and does not move.
+    // On its return it is held, and does not move.
     let [stuck, before] = [280, 279].map(|at| way.rendered[at].sample.proxy);
     assert_eq!(stuck, before);
     assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
@@ -191,7 +190,7 @@ fn two_textures_at_once_are_found() {
     let way = Way::over([textured(1.0), textured(1.7)], SLOW, Shading::None);
     way.honest();
     let wrong = Some(Invariant::Material);
-    // In the middle of the change no force of either is left.
+    // In the middle of the change neither texture has any force.
     assert_eq!(way.force(BORDER + 50, |f| f + Vec3::Z * 0.004), wrong);
     for at in [BORDER + 10, BORDER + 90, 280] {
         assert_eq!(way.force(at, |f| f + Vec3::Z * 4e-3), wrong, "{at}");
@@ -209,7 +208,7 @@ fn another_damping_is_found() {
         friction: Friction::coulomb(0.3),
         ..damped
     };
-    // 20 mm/s along the force make 0.2 N; with friction a part of that.
+    // 20 mm/s along the force make 0.2 N, and less with friction.
     let way = Way::over([SOFT, rough], SLOW, Shading::None);
     way.honest();
     let wrong = Some(Invariant::Material);

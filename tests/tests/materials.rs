@@ -22,12 +22,12 @@ const LONLAT: &str = r#"GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1
 /// Position of the terrain's first column, east of its zone's origin, m: 9° east lies between two
 /// columns.
 const FIRST_COLUMN: f64 = 499_503.0;
-/// Metres from column to column; a column is a millimetre in the hand.
+/// Distance of columns, m; a column is a millimetre in the hand.
 const COLUMN: f64 = 10.0;
-/// Rows of the trajectory a millimetre.
+/// Rows of the trajectory in a millimetre.
 const ROWS_PER_MM: u32 = 100;
 
-/// A folder with a terrain, classes and a way over their border.
+/// A folder with a terrain, classes, and a path over their border.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -55,14 +55,14 @@ impl Folder {
         folder
     }
 
-    /// Classes in degrees, of pixels that are 15.7 m wide and 22 m high, with a border in the 51st
-    /// column's western edge.
+    /// Writes classes in degrees, with pixels 15.7 m wide and 22 m high, and a border at the
+    /// western edge of the 51st column.
     fn classes(&self, name: &str, west: f64) {
         let class = |column| if column < 50 { 10 } else { 80 };
         self.grid(name, (100, 100), [west + 1e-4, 45.14], 2e-4, LONLAT, class);
     }
 
-    /// A grid by the middle of its south-west cell.
+    /// Writes a grid, placed by the middle of its south-west cell.
     fn grid(
         &self,
         name: &str,
@@ -109,7 +109,7 @@ impl Folder {
 const REPLAY: [&str; 4] = ["replay", "level.asc", "way.csv", "--out"];
 const MATERIALS: [&str; 4] = ["--materials", "classes.asc", "--surface", "table.toml"];
 
-/// Place and upward force of each row of a recording in contact.
+/// Returns the position and upward force of each row of a recording in contact.
 fn rendered(recording: &str) -> Vec<(f64, f64)> {
     let rows = recording.lines().filter(|line| !line.starts_with('#'));
     let mut rows = rows.map(|row| row.split(',').collect::<Vec<_>>());
@@ -139,8 +139,8 @@ fn classes_in_another_system_and_resolution_are_in_place() {
     );
     let rendered = rendered(&folder.read("a.csv"));
     assert_eq!(rendered.len(), 10 * ROWS_PER_MM as usize);
-    // 9° east is at 49.7 mm, between the columns 49 and 50: half a cell and half a pixel is the
-    // most that a border can be off.
+    // 9° east is at 49.7 mm, between the columns 49 and 50: a border may be off by half a cell and
+    // half a pixel.
     let border = (500_000.0 - FIRST_COLUMN) / COLUMN;
     let (first, last) = (0.4 * 2.0, 1.0 * 2.0);
     let changed = rendered
@@ -155,7 +155,7 @@ fn classes_in_another_system_and_resolution_are_in_place() {
     assert!((at - 49.5).abs() < 0.011, "{at}");
     let (_, end) = rendered[rendered.len() - 1];
     assert!((end - last).abs() < 1e-6, "{end}");
-    // 100 ms, evenly.
+    // Over 100 ms, linearly.
     let steps = rendered.windows(2).map(|pair| pair[1].1 - pair[0].1);
     let most = steps.fold(0.0, f64::max);
     assert!(
@@ -189,14 +189,14 @@ fn recording_keeps_its_materials_for_its_replay() {
     assert_eq!(rendered(&folder.read("b.csv")), rendered(&recorded));
     let (again, printed) = replay(&["--stiffness", "1"], "c.csv");
     assert!(again, "{printed}");
-    // Each material is twice as stiff as it was beside the 0.5 N/mm of the recording.
+    // Each material is twice as stiff as with the 0.5 N/mm of the recording.
     for ((_, twice), (_, once)) in rendered(&folder.read("c.csv"))
         .iter()
         .zip(rendered(&recorded))
     {
         assert!((twice - 2.0 * once).abs() < 1e-5, "{twice} {once}");
     }
-    // What each material has its own of cannot be stated beside them.
+    // Options that each material has itself cannot be given as well.
     for option in [["--friction", "0.4"], ["--surface", "sand"]] {
         let (again, printed) = replay(&option, "no.csv");
         assert!(!again && printed.contains("hint: "), "{printed}");
@@ -213,7 +213,7 @@ fn recording_keeps_its_materials_for_its_replay() {
             .iter()
             .all(|(_, force)| (force - 1.0).abs() < 1e-6)
     );
-    // The same classes elsewhere are others.
+    // The same classes at another position are different classes.
     folder.classes("classes.asc", 8.9902);
     let (again, printed) = replay(&[], "e.csv");
     assert!(
@@ -311,7 +311,7 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
     let (succeeded, printed) =
         folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
     assert!(!succeeded && printed.contains("--surface"), "{printed}");
-    // No output may be one of them.
+    // No output may overwrite one of them.
     let (succeeded, printed) =
         folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
     assert!(
@@ -320,7 +320,7 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
     );
 }
 
-/// The example of the documentation.
+/// Returns the example of the documentation.
 fn worldcover() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/worldcover.toml")
 }
@@ -343,7 +343,7 @@ fn worldcover_table_names_all_classes_and_is_valid() {
     );
 }
 
-/// Materials of all kinds in patches of some cells, over a terrain.
+/// Returns materials of all kinds in patches of some cells, over a terrain.
 fn patchwork(raster: &Raster) -> Materials {
     let plain = Material::of(&SurfaceParams::PREMIUM);
     let texture = |pattern, wavelength_mm| Texture {

@@ -1,7 +1,6 @@
-//! Many files as one terrain, judged by GDAL: what it makes one file of with `gdalwarp`, or
-//! with `gdal_translate` of a VRT, has the same samples as the folder, the pattern and the VRT,
-//! which is read through libgdal.
-//! Without GDAL's programs it is skipped, with a message.
+//! Many files as one terrain, compared with GDAL: the single file that `gdalwarp`, or
+//! `gdal_translate` of a VRT, makes of them has the same samples as the folder, the pattern and the
+//! VRT, which libgdal reads. Without GDAL's programs it is skipped, with a message.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -18,7 +17,7 @@ fn has_gdal() -> bool {
     runs
 }
 
-/// A file of the shared collection, where that is there and GDAL is installed.
+/// Returns a file of the shared collection, if it exists and GDAL is installed.
 fn shared(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/dem");
     let path = path.join(name);
@@ -29,7 +28,7 @@ fn shared(name: &str) -> Option<PathBuf> {
     has_gdal().then_some(path)
 }
 
-/// Runs commands of a shell in a folder.
+/// Runs shell commands in a folder.
 fn shell(folder: &Path, commands: &str) {
     let output = Command::new("sh")
         .args(["-e", "-c", commands])
@@ -51,7 +50,7 @@ fn open(path: impl AsRef<Path>) -> Raster {
 
 fn refused(path: impl AsRef<Path>) -> String {
     let path = path.as_ref();
-    // GDAL reads some of them.
+    // Some of them are read by GDAL.
     let options = OpenOptions {
         gdal: false,
         ..OpenOptions::default()
@@ -74,7 +73,7 @@ fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Every sample of levels 0 to 6 of both is the same; the number of heights among the samples.
+/// Checks that all samples of levels 0 to 6 are equal. Returns the number of heights among them.
 fn assert_same(many: &Raster, one: &Raster) -> usize {
     assert_eq!((many.columns(), many.rows()), (one.columns(), one.rows()));
     let mut rows = [(); 2].map(|()| vec![0.0; one.columns() as usize]);
@@ -123,7 +122,7 @@ const PACKINGS: [&str; 6] = [
 ];
 
 /// Cuts a mountain range into tiles that overlap by 16 samples, each a metre higher than the one
-/// before, so that overlaps tell the order. One tile is left out.
+/// before, so that overlaps show the order. One tile is left out.
 fn tiles(folder: &Path, from: &Path) {
     for number in 0..12 {
         if number == 7 {
@@ -163,7 +162,7 @@ fn a_folder_a_pattern_and_a_vrt_have_the_samples_that_gdal_merges() {
     let one = open(at.join("one.tif"));
     let many = open(at.join("tiles"));
     let heights = assert_same(&many, &one);
-    // The tile that is left out is a hole, and others have heights.
+    // The missing tile is no-data, and others have heights.
     let all = (one.columns() * one.rows()) as usize;
     assert!(
         heights > all / 2 && heights < all - 50_000,
@@ -173,7 +172,7 @@ fn a_folder_a_pattern_and_a_vrt_have_the_samples_that_gdal_merges() {
     assert_same(&open(at.join("tiles/t*.tif")), &one);
     assert_same(&open(at.join("tiles/all.vrt")), &one);
     assert!(many.format().contains("11 files"), "{}", many.format());
-    // The notes beside the first tile are read with it.
+    // The sidecar of the first tile is read with it.
     assert_eq!(files_read_with(&at.join("tiles")).len(), 12);
     assert_eq!(files_read_with(&at.join("tiles/all.vrt")).len(), 13);
 }
@@ -201,8 +200,8 @@ fn files_of_different_types_and_formats_are_one_terrain() {
     assert!(heights > 150_000, "{heights}");
 }
 
-/// SRTM's tiles repeat the samples at their borders: neighbours lie on one grid, without a seam,
-/// on both sides of the equator, of Greenwich and of the 180th meridian.
+/// SRTM's tiles repeat the samples at their borders: neighbours lie on one grid, without a seam, on
+/// both sides of the equator, of Greenwich and of the 180th meridian.
 #[test]
 fn neighbouring_srtm_tiles_join_without_a_seam() {
     let Some(globe) = shared("large/globe_g10g_10800x6000_i16_cog.tif") else {
@@ -216,7 +215,7 @@ fn neighbouring_srtm_tiles_join_without_a_seam() {
         let place = folder();
         let at = place.path();
         std::fs::create_dir(at.join("tiles")).expect("a folder");
-        // 2401 samples, the first and last of which lie on whole degrees.
+        // 2401 samples; the first and last lie on whole degrees.
         let half = 0.5 / 1200.0;
         let (left, right) = (f64::from(west) - half, f64::from(west) + 2.0 + half);
         let (top, bottom) = (1.0 + half, -1.0 - half);
@@ -295,7 +294,7 @@ fn vrts_of_gdals_programs_have_the_samples_that_gdal_reads() {
     }
 }
 
-/// Heights of a field that is written by hand: two tiles of plain ASCII, `gap` columns apart.
+/// Writes a field as two tiles of plain ASCII, `gap` columns apart.
 fn two_tiles(folder: &Path, gap: u32) {
     let tile = |west: u32, height: u32| {
         let row = format!("{height} {height} {height} {height}\n").repeat(3);
@@ -305,7 +304,7 @@ fn two_tiles(folder: &Path, gap: u32) {
     std::fs::write(folder.join("b.asc"), tile(4 + gap, 9)).expect("written");
 }
 
-/// A VRT of 8 × 3 samples whose band holds `inside`.
+/// Writes a VRT of 8 × 3 samples whose band contains `inside`.
 fn vrt(folder: &Path, name: &str, inside: &str) -> PathBuf {
     let text = format!(
         "<VRTDataset rasterXSize=\"8\" rasterYSize=\"3\"><GeoTransform>0, 1, 0, 3, 0, -1</GeoTransform>\
@@ -316,7 +315,7 @@ fn vrt(folder: &Path, name: &str, inside: &str) -> PathBuf {
     path
 }
 
-/// A source of 4 × 3 samples at a place of a VRT.
+/// Returns a source of 4 × 3 samples at a position of a VRT.
 fn source(file: &str, at: &str) -> String {
     format!(
         "<SimpleSource><SourceFilename relativeToVRT=\"1\">{file}</SourceFilename>\
@@ -343,13 +342,13 @@ fn gaps_are_holes_and_what_lies_outside_is_cut() {
     let none = "<NoDataValue>-1</NoDataValue>".to_owned();
     let one = open(vrt(at, "cut.vrt", &(none + &cut)));
     let found = |column, row| one.height(column, row);
-    // Row 2 is the northernmost, which the source begins below.
+    // Row 2 is the northernmost; the source begins below it.
     assert!(found(0, 2).is_nan() && found(2, 0).is_nan());
     assert_eq!([found(0, 0), found(1, 1)], [5.0, 5.0]);
 }
 
-/// One bad file is a hole with a warning that names it once, and the others are rendered; what the
-/// index needs is an error.
+/// One bad file is no-data with a single warning that names it, and the others are rendered; a
+/// fault in the index's data is an error.
 #[test]
 fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
     let place = folder();
@@ -365,12 +364,12 @@ fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
     let warnings = output_text(&output);
     assert_eq!(warnings.matches("b.asc").count(), 1, "{warnings}");
     assert!(warnings.contains("counts as no data"), "{warnings}");
-    // Gone while it is rendered: nothing but the header had been read.
+    // Deleted during rendering, when only the header had been read.
     two_tiles(at, 2000);
     let many = open(at);
     std::fs::remove_file(at.join("a.asc")).expect("removed");
     assert_eq!(many.height(2005, 1), 9.0);
-    // Its header is wanted.
+    // Its header is needed.
     std::fs::write(at.join("c.asc"), "ncols x\n").expect("written");
     let why = refused(at);
     assert!(
@@ -415,8 +414,7 @@ fn what_does_not_fit_is_refused_with_the_file_and_the_reason() {
     assert!(refused(at.join("[")).contains("pattern"));
 }
 
-/// Whatever a VRT holds, it ends in a terrain or in an error with a hint, within the memory of a
-/// terrain.
+/// Any VRT gives a terrain or an error with a hint, within the memory for a terrain.
 #[test]
 fn malformed_vrts_end_in_bounded_memory() {
     let place = folder();
@@ -487,7 +485,7 @@ fn malformed_vrts_end_in_bounded_memory() {
     }
 }
 
-/// The command in the hint, run as it stands, makes one terrain of files that do not fit.
+/// The command in the hint, run unchanged, makes one terrain of files that do not match.
 #[test]
 fn the_hint_for_files_that_do_not_fit_makes_one_of_them() {
     let Some(range) = shared("real/bigtujunga.tif") else {
@@ -512,7 +510,7 @@ fn the_hint_for_files_that_do_not_fit_makes_one_of_them() {
     assert!(one.columns() > 500 && one.summary().holes < 200_000);
 }
 
-/// A damaged block of a TIFF is a hole, and the warning names the file.
+/// A damaged block of a TIFF is no-data, and the warning names the file.
 #[test]
 fn a_damaged_block_of_one_file_is_a_hole_that_is_named() {
     let Some(range) = shared("real/bigtujunga.tif") else {

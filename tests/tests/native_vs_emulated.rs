@@ -1,6 +1,6 @@
-//! The same trajectory in this program and on the emulated Cortex-M4F: the same
-//! bits. There is no bound to state: both compile the same single-precision
-//! arithmetic, which IEEE 754 defines to the last bit.
+//! The same trajectory in this program and on the emulated Cortex-M4F: the bits must be identical.
+//! No tolerance is needed: both compile the same single-precision arithmetic, which IEEE 754
+//! defines to the last bit.
 
 use std::process::Command;
 use std::time::Duration;
@@ -18,8 +18,7 @@ use hapterra_tests::random_paths::wander;
 use hapterra_tests::timeouts::pass;
 use heightfield::Raster;
 
-/// The compared part of an answer: all but the work and the time it took, which depend on when a
-/// tile came.
+/// The compared part of a result: all but work and time, which depend on the arrival of tiles.
 type Answer = (
     [i32; 3],
     [u32; 3],
@@ -107,7 +106,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
     }
 }
 
-/// The closed loop, too: encoders, currents and the arm in between.
+/// The same for the closed loop of encoders, currents and the arm between them.
 #[test]
 fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
     let Some((qemu, image)) = emulated_board() else {
@@ -146,8 +145,8 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
     assert!(native == as_native.as_bytes(), "the recordings differ");
 }
 
-/// Ctrl-C reaches every process of a terminal, the emulator as well: that is an end like any
-/// other, and the samples until then are kept.
+/// Ctrl-C reaches every process of a terminal, including the emulator: this is a normal end, and
+/// the samples until then are kept.
 #[cfg(unix)]
 #[test]
 fn interrupted_emulated_demo_ends_in_order() {

@@ -1,6 +1,6 @@
-//! NetCDF files, through a libgdal of the machine: of many ways of storing a variable, made by
-//! NetCDF's and HDF5's libraries (`data/netcdf.py` names the command), and of what attributes say,
-//! written here. What is read where it is touched is to the bit what is read as a whole.
+//! NetCDF files, through a libgdal of the machine: many ways to store a variable, written by
+//! NetCDF's and HDF5's libraries (`data/netcdf.py` has the command), and many attributes, written
+//! here. Reading on demand gives the same bits as reading the whole file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,14 +24,14 @@ const FILES: [&str; 11] = [
     "turned_contiguous.nc",
 ];
 
-/// Returns true if there is a libgdal; reports it where not.
+/// Returns true if there is a libgdal; prints a message otherwise.
 fn has_gdal() -> bool {
     gdal()
         .inspect_err(|why| eprintln!("skipped: {why}"))
         .is_ok()
 }
 
-/// All of them; none where there is no libgdal.
+/// Returns all of them; none without a libgdal.
 fn files() -> impl Iterator<Item = &'static str> {
     FILES.into_iter().filter(|_| has_gdal())
 }
@@ -42,7 +42,7 @@ fn path(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// The height at a column and a row from the north, as `netcdf.py` has it.
+/// Returns the height at a column and a row from the north, as in `netcdf.py`.
 fn height(column: u32, row: u32) -> f64 {
     f64::from(20 + (3 * column + 2 * row + (column * row) % 5) % 230)
 }
@@ -59,7 +59,7 @@ fn open(path: &Path, options: &OpenOptions) -> Raster {
     raster.unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// All samples of a level, its row 0 the southernmost.
+/// Returns all samples of a level, from the southernmost row.
 fn samples(raster: &Raster, level: u8) -> Vec<Vec<f64>> {
     let step = 1 << level;
     let (columns, rows) = (SIZE.0.div_ceil(step), SIZE.1.div_ceil(step));
@@ -161,8 +161,8 @@ fn every_storage_holds_the_exact_field() {
 /// An attribute of text.
 type Attribute<'a> = (&'a str, &'a str);
 
-/// NetCDF's classic format: `x` and `y`, a grid mapping, and variables of 4 × 3 singles, which are 1
-/// to 12 from the north.
+/// Writes NetCDF's classic format: `x` and `y`, a grid mapping, and variables of 4 × 3 singles,
+/// which are 1 to 12 from the north.
 fn classic(
     axes: &[Attribute<'_>],
     mapping: &[Attribute<'_>],
@@ -275,7 +275,7 @@ fn axes_in_kilometres_are_as_long_on_the_ground() {
         assert_eq!(raster.height(0, 2), 1.0);
         let cell = raster.cell().expect("a cell").metres();
         assert!((cell.0 / metres - 1.0).abs() < 0.05, "{unit}: {cell:?}");
-        // The corner that is farthest from the pole is 107 of the unit away.
+        // The corner farthest from the pole is at 107 units.
         let south = raster.bounds_lonlat().expect("known").south;
         assert!((south > 89.99) == (unit == "m"), "{unit}: {south}");
     }
@@ -341,7 +341,7 @@ fn a_variable_is_chosen_by_its_name() {
         "{error}"
     );
     assert!(error.to_string().contains("bed, ice"), "{error}");
-    // A file of one variable has no parts, and yet a name for it.
+    // A file with one variable has no parts, but the variable has a name.
     let (_folder, file) = written(&classic(&[("units", "m")], &POLAR, &[("bed", &[])]));
     assert_eq!(open(&file, &named("bed")).height(0, 2), 1.0);
     Raster::open(&file, &named("ice")).expect_err("it has one variable");
@@ -356,7 +356,7 @@ fn open_options_reach_the_driver_and_unknown_ones_are_refused() {
         open_options: vec![option.to_owned()],
         ..OpenOptions::default()
     };
-    // Samples beyond the valid range are holes, unless it is not honoured.
+    // Samples beyond the valid range are no-data, unless the range is ignored.
     let [honoured, ignored] = ["YES", "NO"].map(|value| {
         let options = with(&format!("HONOUR_VALID_RANGE={value}"));
         open(&path("packed.nc"), &options).summary().holes
@@ -369,7 +369,7 @@ fn open_options_reach_the_driver_and_unknown_ones_are_refused() {
     assert!(error.to_string().contains("read without GDAL"), "{error}");
 }
 
-/// A compression that a build of GDAL lacks is reported in its words: nothing is damaged.
+/// If a build of GDAL lacks a compression, its own error is reported: the file is not damaged.
 #[test]
 fn a_packing_that_is_not_read_is_no_damage() {
     if !has_gdal() {

@@ -1,7 +1,7 @@
-//! Terrains whose places are not plain: grads, other meridians and datums, other bodies,
-//! poles, projections that only a file's own keys spell out, sheared grids.
+//! Terrains with unusual georeferences: grads, other meridians and datums, other bodies, poles,
+//! projections defined only by a file's own keys, sheared grids.
 //!
-//! `data/odd_places.py` made them with GDAL, and the table of where GDAL and PROJ see them.
+//! `data/odd_places.py` made them with GDAL, and the table of their positions by GDAL and PROJ.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +13,7 @@ use hapterra_tests::{hapterra_binary, info};
 use heightfield::{OpenOptions, Raster};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/odd_places");
-/// Metres in a degree of latitude, for what a shift may be off.
+/// Metres in a degree of latitude, for the error of a shift.
 const DEGREE_M: f64 = 110_000.0;
 
 #[derive(Debug, serde::Deserialize)]
@@ -67,7 +67,7 @@ fn info_and_placing_say_the_same_longitudes_and_latitudes_as_proj() {
         for (found, wanted) in found.iter().zip(row.sides()) {
             let found = found.unwrap_or_else(|| panic!("{}: {report:#}", row.file));
             let off_m = (found - wanted).abs() * DEGREE_M;
-            // A parallel is curved on most maps: the edges are followed in steps.
+            // A parallel is curved on most maps, so the edges are followed in steps.
             assert!(off_m < within_m, "{}: {found} for {wanted}", row.file);
         }
         let raster = row.raster();
@@ -89,7 +89,7 @@ fn what_is_asked_for_by_longitude_and_latitude_is_there() {
         let target = Target::At([row.lon_middle, row.lat_middle], Coordinates::LonLat);
         let ground = target.middle(&file).expect(&row.file).expect("a place");
         let sample = file.transform().to_samples(ground);
-        // A shift may be off by more than a sample.
+        // A shift may have an error above a sample.
         let within_m = info(Path::new(&row.path()))["bounds_lonlat"]["within_m"]
             .as_f64()
             .unwrap_or(0.0);
@@ -131,8 +131,8 @@ fn cells_are_as_large_as_on_their_own_body() {
     }
 }
 
-/// A map that is not conformal shears the ground, and a turned grid of degrees is sheared by
-/// itself: haptic cells are square on the ground all the same, in every direction.
+/// A map that is not conformal shears the ground, and a turned grid of degrees is itself sheared:
+/// still, haptic cells are square on the ground, in every direction.
 #[test]
 fn sheared_map_is_rendered_in_its_true_shape() {
     let mut sheared = 0;
@@ -150,7 +150,7 @@ fn sheared_map_is_rendered_in_its_true_shape() {
             sheared += 1;
             let stored = HapticGrid::new(&raster, HapticCells::Stored);
             let off = worst(&stored);
-            // Half of the shear is what the longest and the shortest direction are off.
+            // The longest and the shortest direction deviate by half of the shear.
             assert!(off > 0.4 * row.lean.abs(), "{}: {off}", row.file);
             assert!(stored.is_distorted() && grid.is_resampled(), "{}", row.file);
         }
@@ -214,8 +214,8 @@ fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
     assert!(!said.contains("rotated"), "{said}");
 }
 
-/// A map in feet whose heights have no unit is rendered 3.28 times too steep where they are in
-/// feet, too: every command reports it until the unit is stated.
+/// A map in feet whose heights have no unit is rendered 3.28 times too steep if they are in feet as
+/// well: every command reports it until the unit is stated.
 #[test]
 fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
     let told = |file: &str, more: &[&str]| {
@@ -241,7 +241,7 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
     assert!((unit - 1200.0 / 3937.0).abs() < 1e-12, "{unit}");
     let (said, ..) = told("nad27.tif", &[]);
     assert!(said.contains("--input height-unit="), "{said}");
-    // Metres on the ground, or a unit that the file states, need no word.
+    // Metres on the ground, or a unit stated in the file, need no note.
     let (said, ..) = told("rotated.tif", &[]);
     assert_eq!(said, "");
 }

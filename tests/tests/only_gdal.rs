@@ -1,12 +1,11 @@
-//! Files that nothing but GDAL reads here, through a libgdal of the machine:
-//! `data/only_gdal.py` makes them.
+//! Files that only GDAL reads, through a libgdal of the machine: `data/only_gdal.py` makes them.
 
 use std::path::{Path, PathBuf};
 
 use hapterra_tests::{gdal_stand_in, hapterra_binary, memory_limit};
 use heightfield::{OpenOptions, Raster, RasterError, files_read_with, gdal};
 
-/// Returns true if there is a libgdal; reports it where not.
+/// Returns true if there is a libgdal; prints a message otherwise.
 fn has_gdal() -> bool {
     gdal()
         .inspect_err(|why| eprintln!("skipped: {why}"))
@@ -49,7 +48,7 @@ fn files_that_only_gdal_reads_are_exact_and_in_place() {
             }
             let bounds = raster.bounds().expect("placed");
             assert_eq!((bounds.west, bounds.south), (400_000.0, 3_799_880.0));
-            // Some formats keep a system's parameters and lose its code.
+            // Some formats keep a system's parameters but lose its code.
             let degrees = raster.bounds_lonlat().expect("a known projection");
             let west = degrees.west;
             assert!((west + 118.0873).abs() < 1e-3, "{name}: {west}");
@@ -117,7 +116,7 @@ fn gaps_of_a_vrt_without_no_data_are_said_to_be_heights() {
     assert!(said, "{:?}", raster.remarks());
 }
 
-/// A VRT of 5 × 8 samples, of which a file has the northern half.
+/// Writes a VRT of 5 × 8 samples; a file has their northern half.
 fn vrt(folder: &Path, name: &str, of: &str) -> PathBuf {
     let text = format!(
         "<VRTDataset rasterXSize=\"5\" rasterYSize=\"8\"><VRTRasterBand dataType=\"Float32\" band=\"1\">\
@@ -147,8 +146,8 @@ fn vrts_name_files_beside_them_and_other_vrts() {
     assert!(read.contains(&second) && read.len() == 2, "{read:?}");
 }
 
-/// To open a pipe waits for ever: neither a file, nor what lies beside it, nor what a VRT names in
-/// any way is one.
+/// Opening a pipe waits forever, so no pipe is opened: not as the file, a sidecar, or a name in a
+/// VRT.
 #[cfg(unix)]
 #[test]
 fn pipes_are_not_opened_however_they_are_named() {
@@ -306,8 +305,8 @@ fn envi_is_placed_by_its_own_unit() {
     }
 }
 
-/// Without a libgdal a file of such a format is named, with what to install by system and the line
-/// that works then; a libgdal that is too old is named with its version.
+/// Without a libgdal the message names the format, the package to install by system, and the
+/// command that works then; if libgdal is too old, its version is named.
 #[test]
 fn formats_are_named_where_there_is_no_libgdal() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -350,8 +349,8 @@ fn formats_are_named_where_there_is_no_libgdal() {
     }
 }
 
-/// GDAL reads the sign for a hole as a height of 0: such a file is refused, and one with a number for
-/// holes is read.
+/// GDAL reads the no-data mark as a height of 0: such a file is refused, and one with a no-data
+/// number is read.
 #[test]
 fn holes_of_grass_are_no_heights() {
     if !has_gdal() {
@@ -372,8 +371,8 @@ fn holes_of_grass_are_no_heights() {
     assert_eq!((raster.height(0, 1), raster.summary().holes), (1.0, 1));
 }
 
-/// A libgdal that takes 300 ms for each block holds up no tick: until the blocks are there the coarse
-/// fallback is below the hand, and no hole.
+/// A libgdal that needs 300 ms for each block delays no tick: until the blocks arrive the coarse
+/// fallback is under the hand, not no-data.
 #[test]
 fn slow_libgdal_holds_up_no_tick() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,6 +1,5 @@
-//! For each invariant a test feeds the judge one false observation and checks that
-//! this invariant, and only this one, reports it. The honest observation beside it is
-//! reported by none.
+//! For each invariant a test gives the oracle one false observation and checks that only this
+//! invariant reports it. The correct observation beside it is reported by none.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState, Friction, WORK_PER_TICK};
@@ -61,7 +60,7 @@ fn free(hip: [f64; 3]) -> ObservedTick {
     ObservedTick::new(hip, rendered(ContactState::Free, hip, [0.0; 3]), [0; 3])
 }
 
-/// With that part of the spring rendered.
+/// Returns a contact that renders this share of the spring.
 fn faded(hip: [f64; 3], proxy: [f64; 3], fade: f64) -> ObservedTick {
     let displacement = [0, 1, 2].map(|i| fade * (proxy[i] - hip[i]));
     ObservedTick::new(
@@ -83,14 +82,14 @@ fn letting_go(hip: [f64; 3], displacement: [f64; 3]) -> ObservedTick {
     )
 }
 
-/// The same answer with something changed, and the forces that follow from it.
+/// Returns a tick with a changed output, and the forces that follow from it.
 fn with(seen: ObservedTick, change: impl FnOnce(&mut ContactOutput)) -> ObservedTick {
     let mut rendered = seen.output;
     change(&mut rendered);
     ObservedTick::new(seen.hip, rendered, [0; 3])
 }
 
-/// A position whose fraction no constructor would make.
+/// Returns a position with a fraction that no constructor makes.
 fn forged_position() -> GridPoint {
     let mut buffer = [0; MAX_FRAME];
     let frame = encode(&([10_i32, 10, 2], [0.5_f32, 1.5, 0.0]), &mut buffer).expect("fits");
@@ -99,8 +98,7 @@ fn forged_position() -> GridPoint {
     decode(bytes.expect("a frame").expect("undamaged")).expect("a position")
 }
 
-/// All that the judge reports of the last of these ticks. It must report nothing of
-/// those before.
+/// Returns all violations of the last of these ticks. Those before must have none.
 fn reports(terrain: &Terrain, ticks: &[ObservedTick]) -> Vec<Violation> {
     reports_of(TickOracle::new(terrain), ticks)
 }
@@ -113,14 +111,14 @@ fn reports_of(mut judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Violatio
     judge.all(last)
 }
 
-/// The invariants that the last of these ticks breaks.
+/// Returns the invariants that the last of these ticks breaks.
 fn broken_of(judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Invariant> {
     let told = reports_of(judge, ticks);
     told.iter().map(|violation| violation.invariant).collect()
 }
 
-/// Checks that the judge reports the forged tick by this invariant alone, and the
-/// honest tick by none.
+/// Checks that the oracle reports the forged tick by this invariant alone, and the correct tick by
+/// none.
 fn reports_only(
     invariant: Invariant,
     terrain: &Terrain,
@@ -134,8 +132,8 @@ fn reports_only(
     assert_eq!(found, [invariant], "{forged:?}");
 }
 
-/// With a friction of 0.5, 0.8 at rest: the proxy is outside of the cone, or moves inside
-/// of it, on flat ground and on a ridge.
+/// With friction of 0.5, and 0.8 at rest: the proxy is outside the cone, or moves inside it, on
+/// flat ground and on a ridge.
 #[test]
 fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     use Invariant::{Cone, Stuck};
@@ -162,17 +160,17 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     assert_eq!(found(&[first, at(10.9, 11.5)]), [Cone], "held at rest");
     assert_eq!(found(&[first, at(10.51, 10.9)]), [Cone, Stuck], "it crept");
     assert_eq!(found(&[first, at(10.501, 10.601)]), [Cone, Stuck]);
-    // After a rest static friction holds it.
+    // After a rest, static friction holds it.
     let rest = [first; 25];
     let broken = at(10.7, 11.2);
     assert_eq!(found(&[first, broken]), [], "it slid until just now");
     assert_eq!(found(&[&rest[..], &[broken]].concat()), [Stuck]);
-    // In the air it forgets, also where it returns to where it was.
+    // In the air the rest ends, even if the proxy returns to its old position.
     let over = with(free([10.5, 10.5, 2.5]), |rendered| {
         (rendered.proxy, rendered.converged) = (first.output.proxy, false);
     });
     assert_eq!(found(&[&rest[..], &[over, first, broken]].concat()), []);
-    // Over the ridge's edge only the side pulls that the HIP is on.
+    // At the ridge's edge only the HIP's side pulls.
     let ridge = ridge();
     let judge = || TickOracle::new(&ridge).with_friction(friction);
     let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
@@ -184,7 +182,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     );
 }
 
-/// The slide of a proxy in a tick determines the hold of the viscous part.
+/// The slide of a proxy in a tick determines the viscous part of its friction.
 #[test]
 fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     let friction = Friction {
@@ -196,17 +194,17 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
         let judge = TickOracle::new(&flat).with_friction(friction);
         broken_of(judge, ticks)
     };
-    // From (12, 10.5), where it met the ground or stood, by 2 cells: that holds 6.
+    // From (12, 10.5), where it landed or rested, by 2 cells: that holds 6.
     let slid = touching([20.03, 10.5, 1.0], [14.0, 10.5, 2.0]);
     let from = |x: f64| touching([x, 10.5, 1.9], [x, 10.5, 2.0]);
     assert_eq!(found(&[from(12.0), slid]), []);
     assert_eq!(found(&[from(13.0), slid]), [Invariant::Cone]);
 }
 
-/// A height is known to the last place of the corners that it is mixed from, and so is the pull.
+/// A height, and so the pull, is exact only to the last place of the corners it is made from.
 #[test]
 fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
-    // Level in the middle of the patch (10, 10), whatever its corners are.
+    // Level in the middle of the patch (10, 10) for any corner heights.
     let found = |corner: f32| -> Vec<Invariant> {
         let saddle = Terrain::from_fn(Kind::Rough, SIZE, |x, y| match (x, y) {
             (10, 10) | (11, 11) => 2.0 + corner,
@@ -221,12 +219,12 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
     assert_eq!(found(3e5), []);
 }
 
-/// With shading the force is as long as without, and along the smoothed normal.
+/// With shading the force has the length of the unshaded one, along the smoothed normal.
 #[test]
 fn a_force_that_is_shaded_otherwise_is_found() {
     let ridge = ridge();
-    // A quarter of a cell east of the edge, under a side that falls by 1 a cell; there the
-    // slope goes from 0 at the edge to 1 at the next sample, its direction evenly.
+    // A quarter of a cell east of the edge, under a side that falls by 1 a cell; the slope there
+    // goes from 0 at the edge to 1 at the next sample, with a linear change of direction.
     let shaded = |[x, z]: [f64; 2], is_whole| {
         let displacement = Vec3::new(x as f32, 0.0, z as f32);
         let seen = touching([20.2, 10.5, 1.7], [20.25, 10.5, 1.75]);
@@ -258,8 +256,8 @@ fn a_force_that_is_shaded_otherwise_is_found() {
     );
 }
 
-/// With texture the force is the one without and what the relief adds, once the proxy has been
-/// slow for some time.
+/// With texture the force is the untextured one plus the relief's, after the proxy was slow for
+/// some time.
 #[test]
 fn a_force_that_is_textured_otherwise_is_found() {
     let flat = flat();
@@ -269,8 +267,8 @@ fn a_force_that_is_textured_otherwise_is_found() {
         wavelength_mm: 1.0,
         ..Texture::NONE
     };
-    // Half a cell deep, on a crest and where the relief rises eastward; there 2π/10 times
-    // the depth at which the part along the surface grows no more is rendered, westward.
+    // Half a cell deep, on a crest and where the relief rises eastward; the addition there is
+    // westward, 2π/10 times the depth at which the part along the surface stops growing.
     let on = |x: f64, [along, up]: [f64; 2]| ObservedTick {
         textured: Some(Vec3::new(along as f32, 0.0, up as f32)),
         ..touching([x, 10.5, 1.5], [x, 10.5, 2.0])
@@ -283,7 +281,7 @@ fn a_force_that_is_textured_otherwise_is_found() {
             .cycle()
             .take(60 * usize::from(honest.is_some()))
         {
-            // What comes in is not looked at here.
+            // The fade-in is not checked here.
             let _ = judge.all(seen);
         }
         let told = judge.all(&last);
@@ -308,7 +306,7 @@ fn a_force_that_is_textured_otherwise_is_found() {
                 "{forged:?}"
             );
         }
-        // Too fast: nothing at all of it.
+        // Too fast: no texture at all.
         assert_eq!(told(rested, on(x + 0.25, plain)), [], "to the bit");
         assert_eq!(
             told(rested, on(x + 0.26, [0.0, 0.500_001])),
@@ -331,15 +329,15 @@ fn an_answer_that_is_no_answer_is_found() {
         (Finite, with(honest, |f| f.displacement.z = f32::NAN)),
         (Finite, with(honest, |f| f.displacement.x = f32::INFINITY)),
         (Finite, with(honest, |f| f.proxy = forged_position())),
-        // One unit more than there is, and as many as a count that wraps would tell.
+        // One unit more than the limit, and the largest count, as after a wrap.
         (Work, with(honest, |f| f.work = WORK_PER_TICK + 1)),
         (Work, with(honest, |f| f.work = u32::MAX)),
-        // A force without a contact, away from the way to the proxy, too strong.
+        // A force without contact, in another direction than to the proxy, too strong.
         (Consistent, with(honest, |f| f.displacement.x = 0.01)),
         (Consistent, with(honest, |f| f.displacement.z = -0.5)),
         (Consistent, with(honest, |f| f.displacement.z = 0.501)),
         (Consistent, with(waiting(BELOW), |f| f.displacement.z = 0.1)),
-        // Forces: too long, of another spring, in the other direction, no number.
+        // Forces: too long, of another spring, in the opposite direction, NaN.
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
         (Clamp, forces(honest, |_| [0.0, 0.0, 8.500_01])),
@@ -378,7 +376,7 @@ fn a_proxy_off_the_surface_is_found() {
 
 #[test]
 fn a_proxy_beside_the_closest_point_is_found() {
-    // On level ground, on a slope of 1, and beside the edge it would rest on.
+    // On level ground, on a slope of 1, and beside the edge where it should rest.
     let level = |off: f64| touching(BELOW, [10.5 + off, 10.5, 2.0]);
     let slope = |off: f64| touching([17.0, 10.5, -2.0], [16.5 + off, 10.5, -1.5 + off]);
     for off in [-1e-2, -3e-5, 3e-5, 1e-2] {
@@ -414,7 +412,7 @@ fn a_contact_that_pulls_is_found() {
             reports_only(Invariant::HipBelow, &terrain, &[], seen(off), seen(-off));
         }
     }
-    // What holds is never taken for it: a valley, the border of the data.
+    // Correct contacts are not reported: a valley, the border of the data.
     let valley = Terrain::from_fn(Kind::Ridges, SIZE, |x, _| (x - 20).abs() as f32);
     let at_border = |z: f64| touching([40.25, 10.5, z], [40.0, 10.5, 2.0]);
     for (terrain, honest) in [
@@ -425,8 +423,8 @@ fn a_contact_that_pulls_is_found() {
     }
 }
 
-/// North of the proxy is a hole, and beyond its corner the HIP is above the ground: the way to
-/// it leads over the hole first, as long as the proxy is before the corner.
+/// North of the proxy is no-data, and beyond its corner the HIP is above the ground: the line to
+/// the HIP first leads over no-data, while the proxy is before the corner.
 #[test]
 fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
     let hole = Terrain::from_fn(Kind::Holes, SIZE, |x, y| match (x, y) {
@@ -446,7 +444,7 @@ fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
     }
 }
 
-/// The rounding of a patch's corners is allowed where they are mixed, and not at the foot of one.
+/// Rounding of a patch's corners is allowed where they contribute, but not at the foot of one.
 #[test]
 fn a_spike_at_one_corner_excuses_nothing_at_the_others() {
     let spike = Terrain::from_fn(Kind::Spikes, SIZE, |x, y| {
@@ -489,7 +487,7 @@ fn a_contact_beyond_the_first_crossing_is_found() {
 fn a_contact_with_nothing_crossed_is_found() {
     let before = free(ABOVE);
     let near = [10.625, 10.5, 2.5];
-    // On the way still, or it would be known for pulling.
+    // Still moving, or the oracle would report it for pulling.
     let forged = with(touching(near, [10.625, 10.5, 2.0]), |f| f.converged = false);
     reports_only(Invariant::Freedom, &flat(), &[before], free(near), forged);
 }
@@ -501,7 +499,7 @@ fn a_free_hip_below_the_surface_is_found() {
         let honest = touching(below, ON);
         for before in [&[][..], &[free(ABOVE)]] {
             let forged = free(below);
-            // So far a fall is known to fewer digits.
+            // A fall from so far has fewer exact digits.
             if depth < 10.0 || before.is_empty() {
                 reports_only(Invariant::AboveSurface, &flat(), before, honest, forged);
             }
@@ -521,7 +519,7 @@ fn a_contact_out_of_nowhere_is_found() {
     );
 }
 
-/// Wherever the HIP goes; and not while a tile is missing.
+/// For any motion of the HIP, but not while a tile is missing.
 #[test]
 fn a_proxy_that_gets_no_farther_is_found() {
     let flies = |tick: usize, height: f64| {
@@ -554,7 +552,7 @@ fn a_wall_that_is_passed_is_found() {
     let honest = free([21.5, 10.5, 3.0]);
     let forged = free([25.5, 10.5, 3.0]);
     reports_only(Invariant::Wall, &walls(), &[before], honest, forged);
-    // And by a proxy that stays on the ground.
+    // Also for a proxy that stays on the ground.
     let before = touching([20.5, 10.5, -0.5], [20.5, 10.5, 0.0]);
     let honest = touching([21.5, 10.5, -0.5], [21.5, 10.5, 0.0]);
     let forged = touching([25.5, 10.5, -0.5], [25.5, 10.5, 0.0]);
@@ -571,9 +569,9 @@ fn a_force_that_comes_or_goes_at_once_is_found() {
     };
     reports_only(&[before], fades(0.97), fades(0.95));
     reports_only(&[fades(0.5)], fades(0.53), fades(0.55));
-    // Let go at once.
+    // Released at once.
     reports_only(&[before], fades(1.0), waiting(BELOW));
-    // Letting go too fast, coming back, and turning.
+    // A release that is too fast, returns, or turns.
     let go = |part: f64| letting_go(BELOW, [0.0, 0.0, 0.5 * part]);
     reports_only(&[before], go(0.97), go(0.9));
     reports_only(&[before, go(0.97)], go(0.95), go(0.99));
@@ -582,7 +580,7 @@ fn a_force_that_comes_or_goes_at_once_is_found() {
     reports_only(&[before, go(0.97), go(0.95)], go(0.92), waiting(BELOW));
 }
 
-/// A scene of a few HIPs, and what it feels.
+/// Plays a scene of a few HIPs. Returns the scene and its ticks.
 fn played(supply: Supply) -> (Scene, Vec<ObservedTick>, Buffers) {
     // Down into a side of the ridge, along it, and up again.
     let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
@@ -594,7 +592,7 @@ fn played(supply: Supply) -> (Scene, Vec<ObservedTick>, Buffers) {
     (scene, seen, buffers)
 }
 
-/// Any one bit of an answer, changed.
+/// Returns copies of the ticks, each with one bit changed.
 fn other_bits(seen: &[ObservedTick]) -> Vec<Vec<ObservedTick>> {
     let changes: [fn(&mut ContactOutput); 4] = [
         |f| f.displacement.z = f32::from_bits(f.displacement.z.to_bits() ^ 1),
@@ -677,7 +675,7 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
             [x, y, z + 1e-3]
         });
         only(Invariant::Symmetry, judge(&elsewhere));
-        // Held by a hair where the other is free.
+        // Held by rounding while the other is free.
         let mut held = other.clone();
         held[0] = touching(other[0].hip, {
             let [x, y, z] = other[0].hip;

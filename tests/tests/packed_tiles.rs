@@ -1,6 +1,6 @@
-//! Every tile of real terrain arrives as it was made: bit for bit what the file's heights
-//! are in cells, worked out here; interpolated ones rounded as the documentation says. Tiles are half
-//! as long as with a float for each sample.
+//! Every tile of real terrain arrives unchanged: its bits are the file's heights in cells, computed
+//! here; interpolated heights are rounded as documented. Tiles are half as long as with a float for
+//! each sample.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
     for path in paths {
         let raster = match Raster::open(&path, &OpenOptions::default()) {
             Ok(raster) => raster,
-            // Archives of NumPy are not read, and some formats not without libgdal.
+            // NumPy archives are not read, and some formats need libgdal.
             Err(error)
                 if path.extension().is_some_and(|end| end == "npz")
                     || matches!(error.fault(), RasterError::WantsGdal { .. }) =>
@@ -51,7 +51,7 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
     }
 }
 
-/// Holds all tiles against the file; the mean bytes of those that are no single number.
+/// Checks all tiles against the file. Returns the mean bytes of those that are not a single number.
 fn checked(path: &Path, grid: &HapticGrid<'_>, scale: Scale, level: u8) -> usize {
     let terrain = Terrain::over(*grid, scale, level).expect("terrain");
     let last = terrain.size().map(|cells| (cells - 1) / TILE_CELLS as i32);
@@ -61,7 +61,7 @@ fn checked(path: &Path, grid: &HapticGrid<'_>, scale: Scale, level: u8) -> usize
     for (row, col) in (0..=last[1]).flat_map(|row| (0..=last[0]).map(move |col| (row, col))) {
         let key = TileKey::new(level, col, row);
         let (heights, _) = terrain.tile(key, &mut buffer).expect("there is one");
-        // One number for all of it, also off the field, where no force is rendered.
+        // One number for the whole tile, also off the field, where no force is rendered.
         let flat = matches!(heights, Heights::Flat { .. });
         if let Heights::Samples { bytes, .. } | Heights::Packed { bytes, .. } = heights {
             (sum, tiles) = (sum + bytes.len(), tiles + 1);
@@ -80,7 +80,7 @@ fn checked(path: &Path, grid: &HapticGrid<'_>, scale: Scale, level: u8) -> usize
     sum / tiles.max(1)
 }
 
-/// Holds the samples against the file; where `rendered` states a size, those within it.
+/// Checks the samples against the file; if `rendered` has a size, only those within it.
 fn assert_held(
     tile: &Tile,
     grid: &HapticGrid<'_>,

@@ -7,10 +7,10 @@ use hapterra_core::contact::surface::patch::Patch;
 use hapterra_core::force::SurfaceParams;
 use hapterra_tests::whole_field::{FieldContact, position};
 
-/// Answer of a rule to a HIP: contact or not, and the proxy.
+/// Result of a rule for a HIP: true in contact, and the proxy.
 type Answer = (bool, [f64; 3]);
 
-/// A field as wide as a test's, made by a function.
+/// A field of a test's size, defined by a function.
 struct Field(fn(i32, i32) -> f32);
 
 impl Heights for Field {
@@ -23,7 +23,7 @@ impl Heights for Field {
     }
 }
 
-/// The paper's rule and the product's over a field of 64 × 64 patches.
+/// Returns the paper's rule and the product's over a field of 64 × 64 patches.
 fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Answer>; 2] {
     let mut paper = Paper::<_, f64>::new(Field(height), Start::LastPoint, 20);
     let mut swept = FieldContact::new(64, height);
@@ -45,7 +45,7 @@ fn rolling(x: i32, y: i32) -> f32 {
     ((f64::from(x) * 0.37).sin() + (f64::from(y) * 0.23).cos()) as f32
 }
 
-/// P00, P10, P01, P11 of a twisted patch.
+/// Corners P00, P10, P01, P11 of a twisted patch.
 const CORNERS: [f32; 4] = [0.25, 0.75, 1.5, 0.5];
 
 #[test]
@@ -137,7 +137,7 @@ fn step_2_the_search_goes_on_over_edges_and_vertices() {
     for mut rule in rules(|x, _| 0.1 * x as f32) {
         rule([10.5, 10.5, 3.0]);
         rule([10.5, 10.5, 1.0]);
-        // Diagonally over many patches in one tick.
+        // Diagonally across many patches in one tick.
         let (_, proxy) = rule([17.2, 14.8, 1.2]);
         // The foot of the perpendicular on the plane z = x/10.
         let foot = (17.2 + 0.1 * 1.2) / 1.01;
@@ -175,7 +175,7 @@ fn step_3_the_sign_of_the_way_out_along_the_normal_decides() {
     assert!(both[0] > 100 && both[1] > 100, "{both:?}");
 }
 
-/// The bilinear surface of `rolling`, in f64.
+/// Returns the bilinear surface of `rolling`, in f64.
 fn surface(x: f64, y: f64) -> f64 {
     let (i, j) = (x.floor() as i32, y.floor() as i32);
     let (u, v) = (x - x.floor(), y - y.floor());
@@ -200,7 +200,7 @@ fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
     }
 }
 
-/// Two thin walls, as the paper's two thin peaks seen from the side.
+/// Two thin walls, the paper's two thin peaks in cross-section.
 fn walls(x: i32, _: i32) -> f32 {
     if x == 20 || x == 26 { 40.0 } else { 0.0 }
 }
@@ -216,7 +216,7 @@ fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
         proxy[0] > 19.0 && proxy[0] < 20.0,
         "stopped by the first wall: {proxy:?}"
     );
-    // And stays there until the HIP returns.
+    // It stays there until the HIP returns.
     let rendered = contact.step([40.0, 31.0, 3.0]);
     assert!(position(&rendered.proxy)[0] < 20.0);
     let rendered = contact.step([15.0, 31.0, 3.0]);

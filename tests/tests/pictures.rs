@@ -1,4 +1,4 @@
-//! The pictures on the pages are those that core's examples draw.
+//! The pictures on the pages equal the output of core's examples.
 
 use std::error::Error;
 
@@ -14,7 +14,7 @@ mod stick_slip;
 #[expect(dead_code, reason = "the example's own main")]
 mod textured_force;
 
-/// Pixels that a line may be off: another machine's tangent rounds to the next tenth.
+/// Tolerance of a line, pixels: on another machine a tangent may round to the next tenth.
 const OFF: f64 = 0.11;
 
 fn is_kept(drawn: Result<String, Box<dyn Error>>, example: &str, kept: &str) {
@@ -27,7 +27,7 @@ fn is_kept(drawn: Result<String, Box<dyn Error>>, example: &str, kept: &str) {
     );
 }
 
-/// Returns true if two pictures have the same words, and numbers that are all but the same.
+/// Returns true if two pictures have the same words, and numbers equal within [`OFF`].
 fn is_same(one: &str, other: &str) -> bool {
     let words = |text: &str| -> Vec<String> {
         let words = text.split([' ', ',', '"', '<', '>', '\n']);

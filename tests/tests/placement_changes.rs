@@ -1,5 +1,5 @@
-//! Another view of the terrain while a hand presses on it: the device's own application, a
-//! virtual Phantom, and the engine that keys and commands use.
+//! A change of the placement while a hand presses: the device's own application, a virtual Phantom,
+//! and the engine behind keys and commands.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -24,19 +24,18 @@ use heightfield::{OpenOptions, Raster};
 
 /// Samples along a side.
 const SIZE: u32 = 4097;
-/// A coarse encoder, so that nine levels of a terrain of this size are wide enough for a
-/// hand, mm.
+/// Resolution of a coarse encoder, mm, so that nine levels of this terrain are wide enough for a
+/// hand.
 const RESOLUTION_MM: f64 = 0.5;
-/// The hand presses with this, N: what the motors hold for good, as this hand does not
-/// tremble.
+/// Press of the hand, N: the motors can hold it permanently, as this hand has no tremor.
 const PUSH_N: f64 = 1.2;
-/// Of the spring, N/mm.
+/// Stiffness of the spring, N/mm.
 const STIFFNESS: f32 = SurfaceParams::PREMIUM.stiffness_n_per_mm;
-/// Most that the force changes in a tick, N: all of it goes out in 100 ticks, and the hand
-/// that gives way moves some 0.1 mm.
+/// Largest change of the force in a tick, N: it fades within 100 ticks, and the hand moves about
+/// 0.1 mm.
 const GENTLE_N: f32 = 0.12;
 
-/// Hills of every size: it looks alike at each level.
+/// Returns hills of every size, so that all levels look alike.
 fn hills() -> Raster {
     let raster = Raster::from_fn(SIZE, SIZE, |x, y| {
         let (x, y) = (f64::from(x), f64::from(y));
@@ -49,7 +48,7 @@ fn hills() -> Raster {
     raster.expect("a raster")
 }
 
-/// A session in which a hand presses, and views are changed.
+/// A session in which a hand presses, and the placement changes.
 struct Touching<'t> {
     session: Session<'t>,
     steering: Steering<'t>,
@@ -59,7 +58,7 @@ struct Touching<'t> {
     pedal: Rc<Cell<bool>>,
 }
 
-/// At the smallest scale, level 8, with a hand that presses on the middle for so long.
+/// Plays at the smallest scale, level 8, with a hand that presses on the middle for this time.
 fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>) -> T) -> T {
     let options = PlacementOptions {
         target: Target::Whole,
@@ -70,7 +69,7 @@ fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>
     pressed_at(raster, &options, seconds, play)
 }
 
-/// With a hand that presses on a view's home position for so long.
+/// Plays with a hand that presses on a placement's home position for this time.
 fn pressed_at<T>(
     raster: &Raster,
     options: &PlacementOptions,
@@ -111,7 +110,7 @@ fn pressed_at<T>(
         said: vec![],
         pedal,
     };
-    // Armed, down, and at rest.
+    // Armed, lowered, and at rest.
     touching.run_to(6_000);
     let played = play(&mut touching);
     let tally = touching.session.tally();
@@ -156,7 +155,7 @@ impl Touching<'_> {
         *self.samples.last().expect("samples")
     }
 
-    /// Wants something, and waits until it is done and the force is there again.
+    /// Makes a request, and waits until it is done and the force is back.
     fn steer(&mut self, steer: Steer) -> TickRecord {
         self.steering.steer(steer);
         for _ in 0..200_000 {
@@ -181,14 +180,14 @@ impl Touching<'_> {
     }
 }
 
-/// The arm stays armed, no tick changes the force by more than this, and none makes more of it than
-/// there was at the beginning.
+/// Checks that the arm stays armed, that no tick changes the force by more than `most_n`, and that
+/// no force exceeds the one at the start.
 fn judge(samples: &[TickRecord], most_n: f32) {
-    // The hand is pushed back, and its damping adds to the press while it moves.
+    // The hand is pushed back, and its damping adds to the press during the motion.
     judge_press(samples, most_n, 1.03);
 }
 
-/// The same with so many times the force of the beginning while the hand is pushed back.
+/// Same as `judge`, with a limit of `most_times` the first force while the hand is pushed back.
 fn judge_press(samples: &[TickRecord], most_n: f32, most_times: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
@@ -215,7 +214,7 @@ fn judge_press(samples: &[TickRecord], most_n: f32, most_times: f32) {
     );
 }
 
-/// The ground is rendered again as it was: the press is back, and no more than that.
+/// Checks that the ground is rendered again as before, with the same press.
 fn assert_pressed(sample: &TickRecord, before: &TickRecord, what: &str) {
     assert_rendered(sample, what);
     let share = sample.force_n.length() / before.force_n.length();
@@ -224,19 +223,19 @@ fn assert_pressed(sample: &TickRecord, before: &TickRecord, what: &str) {
 
 fn assert_rendered(sample: &TickRecord, what: &str) {
     assert_eq!(sample.state, ContactState::Touching, "{what}");
-    // The controller acts on every scene, and encoders of half a millimetre give it work.
+    // The passivity controller runs in every scene, and encoders of half a millimetre activate it.
     let others = sample.limits.difference(Limits::ENERGY_DISSIPATED);
     assert_eq!(others, Limits::empty(), "{what}");
 }
 
-/// Returns the ratio of the forces of a press with two springs, N/mm. The hand is a spring, too,
-/// whose end stays where it is.
+/// Returns the ratio of the forces of a press with two springs, N/mm. The hand is a spring as well,
+/// with a fixed end.
 fn in_series(with: f32, of: f32) -> f32 {
     let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
     (give + 1.0 / of) / (give + 1.0 / with)
 }
 
-/// Returns the force that a press has left when the ground has moved to the hand's target.
+/// Returns the share of a press that remains when the ground has moved to the hand's target.
 fn all_the_way() -> f32 {
     let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
     (1.0 / STIFFNESS) / (give + 1.0 / STIFFNESS)
@@ -389,7 +388,7 @@ fn a_tip_set_while_it_presses_makes_no_step() {
         for (wanted_mm, is_ball) in [(2.0, true), (0.5, true), (0.0, false), (1.0, true)] {
             let sample = touching.change(PlacementChange::Tip(wanted_mm));
             assert_rendered(&sample, &format!("by a tip of {wanted_mm} mm"));
-            // A ball rests beside a point's place, where the slope is another.
+            // A ball rests beside a point's position, where the slope differs.
             let share = sample.force_n.length() / first.force_n.length();
             assert!((0.95..1.05).contains(&share), "{wanted_mm} mm: {share}");
             assert_eq!(tip(touching), (wanted_mm, is_ball), "{:?}", touching.said);
@@ -417,7 +416,7 @@ fn clutch_carries_the_terrain_with_the_hand() {
         assert_eq!((open.force_n, open.mode), (Vec3::ZERO, Mode::Armed));
         let later = touching.run(300);
         assert!(later.hip.is_same(&open.hip), "it goes with the hand");
-        // Zoomed meanwhile, it stays open.
+        // During a zoom it stays open.
         touching
             .steering
             .steer(Steer::Change(PlacementChange::Zoom(2.0)));
@@ -426,8 +425,8 @@ fn clutch_carries_the_terrain_with_the_hand() {
         assert_eq!(zoomed.view, 2);
         let closed = touching.steer(Steer::Clutch(false));
         assert_rendered(&closed, "let go");
-        // The ground goes with a hand that gives way, and at most all the way to where that
-        // wants to be. Then two springs share what one had.
+        // The ground moves with a yielding hand, at most to the hand's target. Then two springs
+        // share the force of one.
         let share = closed.force_n.length() / before.force_n.length();
         assert!((all_the_way()..1.0).contains(&share), "{share}");
         judge(&touching.samples[began..], GENTLE_N);
@@ -444,7 +443,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         let open = touching.run(150);
         let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
         assert_eq!((open.limits, open.force_n), (limits, Vec3::ZERO));
-        // What the host did not ask for it leaves alone, and puts views in all the same.
+        // The host leaves a clutch that it did not open, and changes the placement anyway.
         assert!(touching.steering.is_settled());
         for view in 2..=3 {
             let zoomed = touching.change(PlacementChange::Zoom(1.2));
@@ -455,7 +454,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         assert_rendered(&closed, "let go");
         let share = closed.force_n.length() / before.force_n.length();
         assert!((all_the_way()..1.0).contains(&share), "{share}");
-        // Let go while the host has a view put in: that holds it to the end.
+        // Released during a change of the placement: the host then holds the clutch to the end.
         touching.pedal.set(true);
         touching.run(150);
         touching
@@ -494,8 +493,8 @@ fn what_cannot_be_had_changes_nothing_and_is_told() {
     });
 }
 
-/// A geographic grid from 43° to 46° N whose heights rise by a metre a metre on the ground of
-/// WGS 84: to the east along each parallel, or to the north.
+/// Returns a geographic grid from 43° to 46° N whose heights rise by a metre a metre on the ground
+/// of WGS 84, to the east along each parallel, or to the north.
 fn slope_of_degrees(axis: usize) -> Raster {
     const STEP: f64 = 0.002;
     let (a, e2) = (6_378_137.0_f64, 0.006_694_379_990_14);
@@ -514,7 +513,7 @@ fn slope_of_degrees(axis: usize) -> Raster {
         format!("ncols {columns}\nnrows {rows}\nxllcenter 10\nyllcenter 43\ncellsize {STEP}\n");
     for row in (0..rows).rev() {
         let [east, _] = metres(43.0 + f64::from(row) * STEP);
-        // From the middle column on, so that it rises to the east alone there.
+        // From the middle column, so that it rises only to the east there.
         let heights = (0..columns).map(|column| match axis {
             0 => (f64::from(column) - 30.0) * east,
             _ => north_m[row as usize],
@@ -529,14 +528,14 @@ fn slope_of_degrees(axis: usize) -> Raster {
     Raster::open(path, &OpenOptions::default()).expect("opens")
 }
 
-/// Returns the slope of the force of a pressing hand, to the east and to the north.
+/// Returns the slope, east and north, from the force of a pressing hand.
 fn slope_of_force(sample: &TickRecord) -> [f64; 2] {
     let [x, y, z] = sample.force_n.to_array().map(f64::from);
     [-x / z, -y / z]
 }
 
-/// At the southern end 1 mm is a haptic cell; commands bring the northern one under the hand,
-/// where a degree of longitude is 4.7 % shorter, and back.
+/// At the southern end 1 mm is a haptic cell; commands bring the northern end under the hand, where
+/// a degree of longitude is 4.7 % shorter, and back.
 fn a_far_pan(axis: usize) {
     let raster = slope_of_degrees(axis);
     let options = PlacementOptions {
@@ -548,7 +547,7 @@ fn a_far_pan(axis: usize) {
         let first = touching.last();
         assert_rendered(&first, "at the beginning");
         let began = touching.samples.len();
-        // What a change that changes nothing does to a hand on such a slope.
+        // The effect of an empty change on a hand on such a slope.
         touching.change(PlacementChange::Stiffness(1.0));
         let most = most_times(&touching.samples[began..]);
         let began = touching.samples.len();
@@ -589,7 +588,7 @@ fn a_far_pan(axis: usize) {
         assert_pressed(&back, &first, "panned back");
         is_true(&back, "in the south again");
         assert!((scale(touching).0 / m_per_mm - 1.0).abs() < 1e-12);
-        // Beside the hand there is nothing else to be measured: the same tiles serve.
+        // Beside the hand nothing else is measured: the same tiles are used.
         let cells = touching.steering.terrain().clone();
         touching.change(PlacementChange::Stiffness(0.9));
         assert!(touching.steering.terrain().has_tiles_of(&cells));
@@ -598,7 +597,7 @@ fn a_far_pan(axis: usize) {
     });
 }
 
-/// The largest force of some samples, in times the first one's.
+/// Returns the largest force of some samples, relative to the first.
 fn most_times(samples: &[TickRecord]) -> f32 {
     let forces = samples.iter().map(|sample| sample.force_n.length());
     let most = forces.fold(0.0, f32::max) / samples[0].force_n.length();

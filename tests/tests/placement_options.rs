@@ -1,13 +1,13 @@
-//! The part of a terrain under the hand, by options of `run` and `demo`, and what
-//! they say where that cannot be.
+//! The part of a terrain under the hand, by options of `run` and `demo`, and their messages if it
+//! is impossible.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hapterra_tests::hapterra_binary;
 
-/// A grid of 40 × 30 cells of a size, its south-west corner at a place; some holes in the
-/// north-east.
+/// Writes a grid of 40 × 30 cells of this size, its south-west corner at `corner`, with no-data in
+/// the north-east.
 fn grid(folder: &Path, corner: [f64; 2], cell: f64) -> PathBuf {
     let path = folder.join("terrain.asc");
     let [x, y] = corner;
@@ -226,14 +226,14 @@ fn options_that_contradict_each_other_are_refused() {
     }
 }
 
-/// Metres in a degree of longitude at a latitude, on a sphere: what the ellipsoid is off is
-/// less than the figure is rounded to.
+/// Returns the ratio of the lengths of a degree of longitude at two latitudes, on a sphere: the
+/// difference to the ellipsoid is below the rounding of the figure.
 fn narrower(from_deg: f64, to_deg: f64) -> f64 {
     to_deg.to_radians().cos() / from_deg.to_radians().cos()
 }
 
-/// Cells are measured at one place. Where the arm reaches places at which they are off by more
-/// than 0.1 %, `run` and `demo` say by how much and where; `info` says it of the whole file.
+/// Cells are measured at one point. If the arm reaches points where they are off by more than 0.1
+/// %, `run` and `demo` print by how much and where; `info` prints it for the whole file.
 #[test]
 fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -253,18 +253,18 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
     };
     let wanted = |from: f64, to: f64| 100.0 * (narrower(from, to) - 1.0).abs();
     for command in ["run", "demo"] {
-        // All of it is in reach: cells of the middle are too wide in the north.
+        // Everything is in reach: cells of the middle are too wide in the north.
         let all = output_text(&hapterra(command, &file, &["--exaggeration", "9"]));
         let [percent, latitude] = shape(&all).expect("a line");
         // The last row of haptic cells.
         assert!((54.0..54.5).contains(&latitude), "{all}");
         let off = percent - wanted(47.25, latitude);
         assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));
-        // At a scale at which the arm reaches 20 km to each side cells are as they are rendered.
+        // At a scale at which the arm reaches 20 km to each side, cells are correct.
         let near = ["--at", "15,47", "--scale", "5m/mm"];
         let near = output_text(&hapterra(command, &file, &near));
         assert!(near.contains("place ") && shape(&near).is_none(), "{near}");
-        // What is stored is not square anywhere.
+        // Stored cells are not square anywhere.
         let stored = ["--input", "cells=stored", "--exaggeration", "9"];
         let stored = output_text(&hapterra(command, &file, &stored));
         assert!(
@@ -290,7 +290,7 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
     assert!((100.0 * share - percent).abs() < 0.01, "{report:#}");
     let there = report["cell"]["worst_at"][1].as_f64().expect("a latitude");
     assert!((there - latitude).abs() < 0.01, "{report:#}");
-    // A field that is small needs no word.
+    // A small field needs no message.
     let file = grid(folder.path(), [10.0, 40.0], 0.0005);
     std::fs::write(folder.path().join("terrain.prj"), degrees).expect("written");
     let small = output_text(&hapterra("run", &file, &["--exaggeration", "9"]));

@@ -1,9 +1,9 @@
-//! Properties of the tick on small terrains that proptest makes up and, where one
-//! fails, makes as small and plain as it can.
+//! Properties of the tick on small terrains that proptest generates and, after a failure,
+//! simplifies as far as it can.
 //!
-//! The checks of each tick are in `hapterra_tests::invariants`. Failures are
-//! kept in `properties.proptest-regressions` and run first the next time; what
-//! they taught has a test of its own in `regressions.rs`.
+//! The checks of each tick are in `hapterra_tests::invariants`. Failures are kept in
+//! `properties.proptest-regressions` and run first the next time; each has a test of its own in
+//! `regressions.rs`.
 
 use hapterra_core::terrain::MAX_STEP_CELLS;
 use hapterra_tests::scene::hip_path::GRAIN;
@@ -39,7 +39,7 @@ fn gentle() -> impl Strategy<Value = Vec<f32>> {
     vec(height, TILE_SAMPLES)
 }
 
-/// As steep as a tile may be, with holes.
+/// As steep as a tile may be, with no-data.
 fn wild() -> impl Strategy<Value = Vec<f32>> {
     let height = prop_oneof![
         4 => Just(0.0_f32),
@@ -53,7 +53,7 @@ fn wild() -> impl Strategy<Value = Vec<f32>> {
     vec(height, TILE_SAMPLES)
 }
 
-/// A coordinate: on the lines of the grid, between them, or off the field.
+/// A coordinate on grid lines, between them, or off the field.
 fn coordinate() -> impl Strategy<Value = f64> {
     let side = SIDE as i32;
     prop_oneof![
@@ -69,7 +69,7 @@ fn path() -> impl Strategy<Value = Vec<[f64; 3]>> {
         (-3.0..3.0_f64).prop_map(|z| (z / GRAIN).round() * GRAIN),
     ];
     let hip = (coordinate(), coordinate(), height).prop_map(|(x, y, z)| [x, y, z]);
-    // Seen above everything first.
+    // First, above everything.
     vec(hip, 1..30).prop_map(|mut path| {
         path.insert(0, [3.5, 3.5, 1.5 * f64::from(MAX_STEP_CELLS)]);
         path.insert(1, [3.5, 3.5, 4.0]);
@@ -90,7 +90,7 @@ fn holds(scene: &Scene) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 400,
-        // The same cases everywhere: `PROPTEST_RNG_SEED` chooses others.
+        // The same cases everywhere: `PROPTEST_RNG_SEED` selects others.
         rng_seed: std::env::var("PROPTEST_RNG_SEED")
             .ok()
             .and_then(|seed| seed.parse().ok())

@@ -1,4 +1,4 @@
-//! A fixed number of the soak's scenes; `cargo xtask soak MINUTES` for more.
+//! A fixed number of scenes of the stress test; `cargo xtask soak MINUTES` runs more.
 
 use hapterra_tests::scene::run::Surface;
 use hapterra_tests::soak::{Broken, LinkStats, Until, soak};

@@ -1,7 +1,7 @@
-//! Every file decodes to the exact samples that were stored, whatever the layout.
+//! Every file decodes to the exact stored samples, in any layout.
 //!
-//! The shared `dem/variants` are encodings of one 512 × 400 crop of a mountain
-//! range; its samples are there as raw files, so no decoder judges itself.
+//! The shared `dem/variants` are encodings of one 512 × 400 crop of a mountain range; its samples
+//! are also raw files, so no decoder is compared with itself.
 
 use std::path::{Path, PathBuf};
 
@@ -13,14 +13,14 @@ use heightfield::{CellUnit, OpenOptions, PngChannel, Raster, RasterError, Wait, 
 
 const COLUMNS: usize = 512;
 const ROWS: usize = 400;
-/// Marks a hole in `tujunga_i16_holes.raw`.
+/// Marks no-data in `tujunga_i16_holes.raw`.
 const HOLE: i16 = -32768;
 
 fn open(path: &Path) -> Raster {
     Raster::open(path, &OpenOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A raw truth as heights, north row first, holes as NaN.
+/// Returns the heights of a raw file, north row first, no-data as NaN.
 fn truth_i16(folder: &Path, name: &str) -> Vec<f64> {
     let bytes = std::fs::read(folder.join(name)).expect("the truth is there");
     let (samples, _) = bytes.as_chunks::<2>();
@@ -45,21 +45,21 @@ fn truth_f32(folder: &Path) -> Vec<f64> {
         .collect()
 }
 
-/// The 8-bit versions hold (height − 533) × 255 / 1459, which was computed in 16 bits
-/// and ran over: their relief has cliffs that the mountains do not.
+/// Returns a height in the 8-bit versions: (height − 533) × 255 / 1459, with the overflow of their
+/// 16-bit computation, which adds cliffs to the mountains.
 fn to_8_bits(height: f64) -> f64 {
     let wrapped = (height as i16 - 533).wrapping_mul(255);
     f64::from(wrapped.div_euclid(1459) as u8)
 }
 
-/// The north-western `columns × rows` of a truth.
+/// Returns the north-western `columns × rows` of `truth`.
 fn crop(truth: &[f64], columns: usize, rows: usize) -> Vec<f64> {
     let rows = truth.chunks(COLUMNS).take(rows);
     rows.flat_map(|row| row[..columns].iter().copied())
         .collect()
 }
 
-/// The truth's first row is the field's northernmost.
+/// The first row of `truth` is the field's northernmost.
 fn assert_heights(raster: &Raster, truth: &[f64], name: &str) {
     let (columns, rows) = (raster.columns() as usize, raster.rows() as usize);
     assert_eq!(columns * rows, truth.len(), "{name}: {columns} × {rows}");
@@ -73,7 +73,7 @@ fn assert_heights(raster: &Raster, truth: &[f64], name: &str) {
     assert_eq!(raster.summary().holes, holes as u64, "{name}: holes");
 }
 
-/// Returns the expected heights of a variant, from its name and its line in the manifest.
+/// Returns the expected heights of a variant, by its name and its line in the manifest.
 fn expected(folder: &Path, name: &str, description: &str) -> Option<Vec<f64>> {
     let whole = || truth_i16(folder, "tujunga_i16.raw");
     let holes = || truth_i16(folder, "tujunga_i16_holes.raw");
@@ -93,7 +93,7 @@ fn expected(folder: &Path, name: &str, description: &str) -> Option<Vec<f64>> {
     })
 }
 
-/// The manifest's files that are there, each with its description.
+/// Returns the manifest's existing files, each with its description.
 fn variants(folder: &Path) -> Vec<(String, String)> {
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.csv")).expect("the manifest");
     let lines = manifest.lines().filter_map(|line| line.split_once(','));
@@ -194,7 +194,7 @@ fn cells_and_units_come_from_the_file() {
     };
     let raster = open(&folder.join("i16_scale_offset_ft.tif"));
     let rendered = HapticGrid::new(&raster, HapticCells::Stored);
-    // 30 m of the map; UTM shrinks the ground by 0.026 % there.
+    // 30 m of the map; UTM reduces the ground by 0.026 % there.
     let side = rendered.side_m().expect("known");
     assert!((side - 30.007_77).abs() < 1e-4, "{side}");
     assert!(!rendered.is_resampled());
@@ -214,8 +214,8 @@ fn cells_and_units_come_from_the_file() {
     );
 }
 
-/// Columns, rows, holes and height range of the real files, as the sources and
-/// another decoder (GDAL) give them.
+/// Columns, rows, no-data and height range of the real files, from the sources and another decoder
+/// (GDAL).
 #[test]
 fn every_real_file_opens() {
     let Some(folder) = shared("dem/real") else {
@@ -225,7 +225,7 @@ fn every_real_file_opens() {
         ("HI_topo_02.nc", [725, 534], 0, [-7.438, 2.804]),
         ("Kilauea.utm.nc", [857, 793], 20656, [0.0, 1505.0]),
         ("N10W110.hgt.zip", [1201, 1201], 0, [0.0, 9.0]),
-        // GDAL adds a row at either end, without heights.
+        // GDAL adds an empty row at either end.
         (
             "SainteHelens.dem",
             [327, 468],
@@ -289,8 +289,8 @@ fn every_real_file_opens() {
     }
 }
 
-/// Mount St. Helens' summit is at 562.2 km east, 5115.4 km north (UTM 10), and the
-/// quadrangle's first profile and lowest row are at 557.82 and 5108.01 km.
+/// Mount St. Helens' summit is at 562.2 km east, 5115.4 km north (UTM 10), and the quadrangle's
+/// first profile and lowest row are at 557.82 and 5108.01 km.
 #[test]
 fn real_files_are_the_right_way_up() {
     let Some(folder) = shared("dem/real") else {
@@ -319,7 +319,7 @@ fn real_files_are_the_right_way_up() {
     assert_eq!(kilauea.height(428, 792), 1045.0);
 }
 
-/// 64.8 million samples take the bytes of their own type and nothing besides.
+/// 64.8 million samples use the bytes of their own type and no more.
 #[test]
 fn a_large_file_is_held_once_in_its_own_type() {
     let Some(path) = shared("dem/large/globe_g10g_10800x6000_i16_cog.tif") else {
@@ -348,7 +348,7 @@ fn a_large_file_is_held_once_in_its_own_type() {
     );
 }
 
-/// The same tiles at each level, of a file whose coarse levels are its own samples.
+/// Checks for the same tiles at each level, if coarse levels are subsets of the file's samples.
 fn same_tiles(held: &Raster, blocks: &Raster) {
     let scale = Scale::new(1.0, 0.01).expect("a scale");
     for level in 0..3 {
@@ -363,12 +363,12 @@ fn same_tiles(held: &Raster, blocks: &Raster) {
             assert_eq!(tiles.0, tiles.1);
         }
         assert!(tiles.0.is_some() && tiles.1.is_some());
-        // Not all heights are known: none may be ruled out.
+        // Some heights are not known yet, so none may be ruled out.
         assert!(blocks.top() > held.top());
     }
 }
 
-/// Left in their files and read in blocks, all TIFFs are the same as in memory.
+/// All TIFFs read in blocks are the same as in memory.
 #[test]
 fn every_tiff_reads_the_same_in_blocks_as_at_once() {
     let folders = ["dem/real", "dem/variants", "dem/tiff_ok"];
@@ -456,7 +456,7 @@ fn files_too_small_for_a_surface_are_refused() {
     assert_eq!(open(&folder.join("odd_2x2.tif")).columns(), 2);
 }
 
-/// Height fields of the third-party collection open; colours do not.
+/// Height fields of the third-party collection open; colours are refused.
 #[test]
 fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
     let Some(folder) = shared("dem/tiff_ok") else {
@@ -484,7 +484,7 @@ fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
     }
     assert!(opened >= 20, "only {opened} opened");
 
-    // The same samples with and without Zstandard, and in three predictors.
+    // The same samples with and without Zstandard, and with three predictors.
     let plain = open(&folder.join("int16.tif"));
     assert_eq!(
         plain.samples(),

@@ -1,4 +1,4 @@
-//! Regressions that random scenes found, as small as possible, each by the name of its cause.
+//! Regressions found by random scenes, reduced as far as possible, each named after its cause.
 
 use hapterra_core::contact::ContactState;
 use hapterra_tests::invariants::Violation;
@@ -10,7 +10,7 @@ fn field(size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Terrain {
     Terrain::from_fn(Kind::Rough, size, height)
 }
 
-/// Runs a scene with all checks and gives the states of its ticks.
+/// Runs a scene with all checks. Returns the states of its ticks.
 fn run(
     terrain: Terrain,
     path: &[[f64; 3]],
@@ -24,8 +24,8 @@ fn run(
     Ok(seen.iter().map(|seen| seen.output.state).collect())
 }
 
-/// A proxy that stood exactly on the east or north border of the data, and left
-/// it inward, was taken for one that comes out of a hole.
+/// A proxy exactly on the east or north border of the data that moved inward was treated like one
+/// that leaves no-data.
 #[test]
 fn a_proxy_on_the_east_border_leaves_as_on_the_west_one() {
     let terrain = field([6, 6], |x, y| match (x, y) {
@@ -44,8 +44,8 @@ fn a_proxy_on_the_east_border_leaves_as_on_the_west_one() {
     assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
-/// The way from the proxy to the HIP led over a hole into the solid behind it,
-/// and the contact was dropped with all its force at once.
+/// The line from the proxy to the HIP led over no-data into solid ground behind it, and the contact
+/// was dropped with all its force at once.
 #[test]
 fn a_way_over_a_hole_into_the_solid_ends_a_contact_without_a_kick() {
     const N: f32 = f32::NAN;
@@ -63,7 +63,7 @@ fn a_way_over_a_hole_into_the_solid_ends_a_contact_without_a_kick() {
             1.449, N, 1.431, 1.942, 0.395, 1.648, 0.202, 0.417, 0.253, 1.333,
         ],
     ];
-    // Ground to stand on in the east, the holes west of it.
+    // Ground for the contact in the east, no-data west of it.
     let terrain = field([14, 3], |x, y| {
         let row = rows[y as usize];
         if x < 10 { row[x as usize] } else { 0.25 }
@@ -75,7 +75,7 @@ fn a_way_over_a_hole_into_the_solid_ends_a_contact_without_a_kick() {
     run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
-/// The closest point 4·10⁻⁵ cell beyond the edge that the HIP stands over.
+/// The closest point is 4·10⁻⁵ cell beyond the edge under the HIP.
 #[test]
 fn a_minimum_just_beyond_an_edge_is_found() {
     let rows = [
@@ -92,8 +92,8 @@ fn a_minimum_just_beyond_an_edge_is_found() {
     run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
-/// The force that fades is not the last slide's but that of the last tick that had to be searched
-/// for: a tile came between the two.
+/// The force that fades is not that of the last slide but of the last tick with a search: a tile
+/// arrived between the two.
 #[test]
 fn contact_lost_after_a_late_tile_fades_from_its_last_force() {
     let terrain = field([128, 20], |x, _| match x {
@@ -109,8 +109,8 @@ fn contact_lost_after_a_late_tile_fades_from_its_last_force() {
     assert_eq!(states.last(), Some(&ContactState::Releasing));
 }
 
-/// The way from the surface to a HIP 1.1·10⁻⁵ cell below it was so short that
-/// it was passed over as the corner that a way touches on leaving an edge.
+/// The line from the surface to a HIP 1.1·10⁻⁵ cell below it was so short that it was skipped like
+/// the corner that a path touches when it leaves an edge.
 #[test]
 fn a_hip_just_below_a_vertex_is_not_let_through() {
     let rows = [
@@ -134,9 +134,9 @@ fn a_hip_just_below_a_vertex_is_not_let_through() {
     assert_eq!(states.last(), Some(&ContactState::Touching));
 }
 
-/// The place at which the proxy left the surface was known to the last place of
-/// its height above the tile's base: 1.5·10⁻⁵ cell under the surface at 138 cells
-/// its way ended where it began, and the HIP, 0.6 cell above, was pulled down.
+/// The point where the proxy left the surface was exact to the last place of its height above the
+/// tile's base: 1.5·10⁻⁵ cell below the surface at 138 cells, its path ended at its start, and the
+/// HIP, 0.6 cell above, was pulled down.
 #[test]
 fn a_hip_that_leaves_high_ground_is_let_go() {
     let height = |x: i32, y: i32| 140.0 - 0.797_21 * x as f32 - 1.051_4 * y as f32;
@@ -157,8 +157,8 @@ fn a_hip_that_leaves_high_ground_is_let_go() {
     assert!(states[1..].chunks(2).all(|pair| pair == wanted));
 }
 
-/// A piece of the way ended exactly on the border of the data, far below it: what
-/// had come in from outside was taken for ground that was crossed from above.
+/// A part of the path ended exactly on the border of the data, far below it: its entry from outside
+/// was treated as a crossing from above.
 #[test]
 fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
     let terrain = field([128, 64], |_, _| 2.0);
@@ -179,9 +179,9 @@ fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
     );
 }
 
-/// A HIP beside the field goes deep under it, in over its very corner. The look
-/// along that way ended where the field begins, and the way that continued from there
-/// had come from nowhere: it touched from below.
+/// A HIP beside the field moves deep under it, in over its very corner. The search along this path
+/// ended at the border of the field, and the rest of the path had no known start: it made contact
+/// from below.
 #[test]
 fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
     for depth in [50.0, 1e4, 1e8] {
@@ -196,8 +196,8 @@ fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
     }
 }
 
-/// A proxy that could not leave the foot of a spike by rounding was not let go
-/// later either: at rest on level ground it pulled down the HIP above it.
+/// A proxy that rounding kept at the foot of a spike was not released later either: at rest on
+/// level ground it pulled down the HIP above it.
 #[test]
 fn a_hip_straight_above_its_proxy_is_let_go() {
     let mut buffers = Buffers::default();
@@ -212,9 +212,8 @@ fn a_hip_straight_above_its_proxy_is_let_go() {
     }
 }
 
-/// A way that met a saddle of the checkerboard again and again, each time nearer
-/// to the HIP, counted as one from a place to another and back, and the proxy
-/// stayed half-way up the last of them.
+/// A path that met a saddle of the checkerboard again and again, each time nearer to the HIP,
+/// counted as motion to and fro, and the proxy stopped half-way up the last saddle.
 #[test]
 fn a_proxy_leaves_as_often_as_that_leads_nearer() {
     let terrain = field([1500, 40], |x, y| ((x + y) & 1) as f32);
@@ -224,8 +223,8 @@ fn a_proxy_leaves_as_often_as_that_leads_nearer() {
     assert_eq!(states[1..], [ContactState::Touching, ContactState::Free]);
 }
 
-/// A proxy that left a place 10⁻⁶ cell before the foot of a wall, and was held where
-/// it had begun, counted as having come some way: by parts of so short a step it had.
+/// A proxy left a point 10⁻⁶ cell before the foot of a wall and was held where it had begun, but
+/// counted as moved: measured in parts of so short a step it had moved.
 #[test]
 fn a_proxy_held_where_it_left_climbs_on() {
     let terrain = field([8, 8], |x, y| match (x, y) {
@@ -245,8 +244,8 @@ fn a_proxy_held_where_it_left_climbs_on() {
     assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
-/// Of a HIP 0.03 cell off the squared distance was thought to be known better
-/// than the places are that it comes from, and the way over an edge was missed.
+/// For a HIP 0.03 cell away the squared distance was considered more exact than the positions it is
+/// computed from, and the path over an edge was missed.
 #[test]
 fn a_near_hip_finds_the_way_over_an_edge() {
     let rows = [
@@ -278,9 +277,8 @@ fn a_near_hip_finds_the_way_over_an_edge() {
     assert_eq!(states.last(), Some(&ContactState::Touching));
 }
 
-/// Of a HIP 10⁸ cells down a proxy's height above it was known to 8 cells, and a
-/// way down a slope counted as leading no nearer: where it was given up depended
-/// on the window.
+/// For a HIP 10⁸ cells down, a proxy's height above it was exact to 8 cells, and a path down a
+/// slope counted as leading no nearer: its end depended on the window.
 #[test]
 fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     let slope = field([200, 40], |x, _| -0.56 * x as f32);
@@ -293,16 +291,16 @@ fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     assert_eq!(last.proxy[..2], [200.0, 3.0]);
 }
 
-/// A way off a slope of 190 passed over its first step, 6·10⁻⁶ cell long, and hit
-/// the sample at the end of that, 10⁻³ cell above the HIP.
+/// A path off a slope of 190 skipped its first step, 6·10⁻⁶ cell long, and hit the sample at the
+/// end of that step, 10⁻³ cell above the HIP.
 #[test]
 fn a_way_off_a_slope_hits_it_where_it_begins() {
     let mut buffers = Buffers::default();
     Scene::random(778, 38_673).run(&mut buffers).expect("holds");
 }
 
-/// Of a HIP a million cells off everything in a patch was beside its corner: a
-/// proxy was put on a vertex 70,000 cells up, for the valley beyond it.
+/// For a HIP a million cells away all points of a patch were beside its corner: a proxy was placed
+/// on a vertex 70,000 cells up, because of the valley beyond it.
 #[test]
 fn a_far_hip_lifts_no_proxy_to_a_vertex() {
     let mut buffers = Buffers::default();
@@ -310,8 +308,8 @@ fn a_far_hip_lifts_no_proxy_to_a_vertex() {
     scene.run(&mut buffers).expect("holds");
 }
 
-/// A proxy 2·10⁻⁸ cell beside a vertex left for a HIP 16,000 cells up, and hit the
-/// ground of the cell that its way crosses for those 2·10⁻⁸ cell.
+/// A proxy 2·10⁻⁸ cell beside a vertex left for a HIP 16,000 cells up, and hit the ground of the
+/// cell that its path crosses for those 2·10⁻⁸ cell.
 #[test]
 fn a_way_up_is_not_stopped_in_a_hairs_breadth() {
     let mut buffers = Buffers::default();
@@ -319,16 +317,16 @@ fn a_way_up_is_not_stopped_in_a_hairs_breadth() {
     scene.run(&mut buffers).expect("holds");
 }
 
-/// A proxy beside a needle of 10⁶ left an edge and was held beyond it, 32 times, and then
-/// rested on the edge's far side, below the HIP, which it pulled.
+/// A proxy beside a spike of 10⁶ left an edge and was held beyond it, 32 times, and then rested on
+/// the edge's far side, below the HIP, which it pulled.
 #[test]
 fn a_proxy_that_may_leave_no_more_rests_where_it_was_held() {
     let mut buffers = Buffers::default();
     Scene::random(31, 12_943).run(&mut buffers).expect("holds");
 }
 
-/// A path of 60 cells close over the ground takes more than a tick; the HIP moved in each,
-/// and the path was begun anew: for as long as the HIP moved no force was rendered.
+/// A path of 60 cells close over the ground takes several ticks. The HIP moved in each, and the
+/// path began again: while the HIP moved no force was rendered.
 #[test]
 fn a_proxy_in_the_air_arrives_while_the_hip_moves() {
     let cliff = field([140, 20], |x, _| match x {

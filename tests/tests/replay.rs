@@ -1,5 +1,4 @@
-//! Replays against a dense search in `f64` that shares no code
-//! with the loop.
+//! Replays compared with a dense search in `f64` that shares no code with the loop.
 
 use hapterra::replay::{OfflineDevice, Rule, on_native};
 use hapterra::synth::{Kind, Synth};
@@ -12,15 +11,13 @@ use hapterra_tests::random_paths::wander;
 use hapterra_tests::shared;
 use heightfield::{OpenOptions, Raster};
 
-/// Distance of the proxy from the surface, cells: a few roundings of a height
-/// that is stored relative to its tile.
+/// Distance of the proxy from the surface, cells: some roundings of a height relative to its tile.
 const ON_SURFACE: f64 = 2e-5;
-/// By how much some other point near the proxy may be closer to the HIP,
-/// cells.
+/// Largest advantage of another point near the proxy in its distance from the HIP, cells.
 const CLOSEST: f64 = 1e-6;
-/// Range of the search for the other point, cells, and not past the border of the patch that the
-/// proxy is in: on rough ground there is often another local closest point beyond a hump at the
-/// border. A proxy that is wrong by a hundredth of its distance is found out.
+/// Range of the search for the other point, cells, limited to the proxy's patch: on rough ground
+/// there is often another local closest point beyond a hump at the border. It detects a proxy that
+/// is wrong by a hundredth of its distance.
 const NEARBY: f64 = 2e-4;
 /// A proxy this close to a border is on it, cells.
 const ON_BORDER: f64 = 1e-6;
@@ -35,8 +32,8 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Heights of a terrain in cells, from the grid that is rendered (`geographic_scale.rs` holds that
-/// against the ground).
+/// Returns the heights of a terrain in cells, from the rendered grid (`geographic_scale.rs`
+/// compares that with the ground).
 fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     move |x, y| {
         let height = terrain.grid().height(x as u32, y as u32);
@@ -49,15 +46,14 @@ fn render(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     replayer.step(hip.expect("addressable")).expect("rendered")
 }
 
-/// Distance from the nearest border of a patch that a place is not on.
+/// Returns the distance to the nearest border of a patch that the point is not on.
 fn to_border(place: [f64; 2]) -> f64 {
     let gaps = place.map(|x| (x - x.round()).abs());
     let gaps = gaps.into_iter().filter(|gap| *gap > ON_BORDER);
     gaps.fold(f64::INFINITY, f64::min)
 }
 
-/// Wanders over a terrain and judges every answer. Returns how many rows were
-/// in contact.
+/// Wanders over a terrain and checks every result. Returns the number of rows in contact.
 fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let height = heights(&terrain);
@@ -95,7 +91,7 @@ fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
         let displacement_mm: [f64; 3] = std::array::from_fn(|i| proxy[i] - hip[i]);
         let k = f64::from(params.stiffness_n_per_mm);
         let full = (k * length(displacement_mm)).min(f64::from(params.max_force_n));
-        // The force follows the displacement; near a hole it may be faded.
+        // The force follows the displacement; near no-data it may be faded.
         assert!(
             length(force) <= full + FORCE_N,
             "{force:?} {displacement_mm:?}"
@@ -153,7 +149,7 @@ fn on_real_terrains_too_whatever_their_holes() {
     }
 }
 
-/// A replayer by a contact rule.
+/// Opens a replay by a contact rule.
 fn opened<'t>(terrain: &'t Terrain<'t>, rule: Rule) -> OfflineDevice<'t> {
     let params = SurfaceParams::PREMIUM;
     let replayer = on_native(terrain, params).expect("opened");
@@ -163,8 +159,8 @@ fn opened<'t>(terrain: &'t Terrain<'t>, rule: Rule) -> OfflineDevice<'t> {
     }
 }
 
-/// Straight down and up again at places all over: contact on one side of the
-/// surface, none on the other.
+/// Straight down and up again at points across the field: contact on one side of the surface, none
+/// on the other.
 #[test]
 fn contact_begins_and_ends_at_the_surface() {
     let raster = synthetic(Kind::Fractal);
@@ -207,7 +203,7 @@ fn no_force_until_the_hip_has_been_above() {
     assert_eq!(sample.state, ContactState::Touching);
 }
 
-/// A terrain with a hole of 20 × 20 samples in its middle.
+/// Returns a terrain with 20 × 20 no-data samples in its middle.
 fn holed() -> Raster {
     Raster::from_fn(100, 100, |x, y| {
         let hole = (40..60).contains(&x) && (40..60).contains(&y);
@@ -237,8 +233,8 @@ fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
     }
 }
 
-/// Sliding off the edge of a hole lets go gently; coming back in from the side
-/// below the surface does not catch.
+/// A slide over the edge of no-data releases gently; a return from the side below the surface makes
+/// no contact.
 #[test]
 fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
     let raster = holed();

@@ -1,4 +1,4 @@
-//! `hapterra replay` from outside: its format, and how it fails.
+//! `hapterra replay` as a command: its format, and its failures.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -42,7 +42,7 @@ impl Folder {
             .expect("started")
     }
 
-    /// Rows of a replay that succeeds, as text.
+    /// Returns the rows of a successful replay as text.
     fn replayed(&self, more: &[&str]) -> Vec<Vec<String>> {
         let run = self.replay(more);
         assert!(run.status.success(), "{}", output_text(&run));
@@ -55,7 +55,7 @@ impl Folder {
             .collect()
     }
 
-    /// Fails with exit code 1 and leaves nothing behind; returns what it says.
+    /// Checks that a replay fails with exit code 1 and leaves no files. Returns its messages.
     fn fails(&self, more: &[&str]) -> String {
         let run = self.replay(more);
         assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
@@ -92,17 +92,15 @@ fn one_row_a_row_with_the_columns_that_were_promised() {
     assert_eq!(rows.len(), 4);
     let contacts: Vec<_> = rows.iter().map(|row| row[4].as_str()).collect();
     assert_eq!(contacts, ["0", "1", "1", "0"]);
-    // What went in returns as the same number, and out of contact the proxy
-    // is the HIP.
+    // The input returns as the same number, and out of contact the proxy is the HIP.
     let went_in: f64 = "10.123456789012345".parse().expect("a number");
     assert_eq!(number(&rows[3][1]).to_bits(), went_in.to_bits());
     for row in [&rows[0], &rows[3]] {
         assert_eq!(row[1..4], row[5..8]);
         assert!(row[8..11].iter().all(|force| number(force) == 0.0));
     }
-    // The plane rises by 10 units of 1 m on cells of 10 m: 45° at true
-    // proportions. Pressed down by d at a place, the proxy is d/2 up and d/2
-    // west, the force 0.5 N/mm times that.
+    // The plane rises by 10 units of 1 m on cells of 10 m: 45° at true proportions. Pressed down by
+    // d at a point, the proxy is d/2 up and d/2 west, the force 0.5 N/mm times that.
     for row in &rows[1..3] {
         let [x, z] = [number(&row[1]), number(&row[3])];
         let half = 0.5 * (x - z);
@@ -120,7 +118,7 @@ fn scale_stiffness_and_limit_are_as_stated() {
     let folder = Folder::new(press);
     let flat = ["--scale", "2mm/cell", "--exaggeration", "0mm/unit"];
     let replayed = |more: &[&str]| folder.replayed(&[&flat, more].concat());
-    // At no height at all there is a table at zero.
+    // With all heights zero there is a table at zero.
     let rows = replayed(&["--stiffness", "0.125", "--max-force", "5"]);
     assert_eq!(rows[1][4], "0");
     assert_eq!(number(&rows[2][7]), 0.0);
@@ -212,7 +210,7 @@ fn a_device_that_is_not_there_is_an_error_that_says_what_was_looked_for() {
         assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
         output_text(&run)
     };
-    // Port 9 (discard) has no server these days.
+    // Port 9 (discard) normally has no server.
     let tcp = run("tcp:127.0.0.1:9");
     assert!(
         tcp.contains("127.0.0.1:9") && tcp.contains("hint: "),

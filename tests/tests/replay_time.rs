@@ -1,4 +1,4 @@
-//! `hapterra replay` by time: a path is rendered the same however often it has rows, and a recording
+//! `hapterra replay` by time: a path is rendered the same at any density of rows, and a recording
 //! at its own tick rate.
 
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ impl Folder {
         replay(&terrain, &from, &to, more)
     }
 
-    /// Returns the replay of `in.csv` in `out.csv`, and its messages.
+    /// Replays `in.csv` to `out.csv`. Returns the rows and the messages.
     fn replayed(&self, path: &str, more: &[&str]) -> (Vec<Row>, String) {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);
@@ -91,7 +91,7 @@ impl Folder {
         printed
     }
 
-    /// A recording of these rows on the flat terrain at a tick rate.
+    /// Returns a recording of these rows on the flat terrain at a tick rate.
     fn recording(&self, tick_hz: u32, rows: &str, more: &[&str]) -> String {
         self.write("one.csv", "t_s,x_mm,y_mm,z_mm\n0,40,20,1\n");
         let run = self.replay("one.csv", "one_felt.csv", more);
@@ -119,7 +119,7 @@ fn output_text(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }
 
-/// Rows of a motion, so many a second, over some seconds.
+/// Returns the rows of a motion, sampled at this rate for some seconds.
 fn sampled(rate_hz: u32, seconds: f64, place: impl Fn(f64) -> [f64; 3]) -> String {
     let count = (seconds * f64::from(rate_hz)).round() as u32;
     let row = |row: u32| {
@@ -134,8 +134,8 @@ fn path(rows: &str) -> String {
     format!("t_s,x_mm,y_mm,z_mm\n{rows}")
 }
 
-/// Down into the ground at 20 mm/s: the spring's force, and 5 N s/m times 20 mm/s, at most as much
-/// again, from the second tick in contact on.
+/// Checks a motion into the ground at 20 mm/s: the spring's force, and 5 N s/m times 20 mm/s,
+/// limited to the spring's force, from the second tick in contact.
 fn pressed(replayed: &[Row]) -> usize {
     let touching: Vec<_> = replayed.iter().filter(|row| row.contact).collect();
     for row in &touching[1..] {
@@ -161,8 +161,8 @@ fn damping_is_the_same_however_often_a_path_has_rows() {
     }
 }
 
-/// Along x at 50 mm/s, 1 mm deep: the proxy trails by 0.3 mm for friction, and by 1 mm, the way of
-/// 0.02 s, for its viscous part.
+/// Returns a path along x at 50 mm/s, 1 mm deep: the proxy trails by 0.3 mm due to friction, and by
+/// 1 mm, the distance in 0.02 s, due to its viscous part.
 fn drag(t_s: f64) -> [f64; 3] {
     let z = (1.0 - 20.0 * t_s).max(-1.0);
     [10.0 + 50.0 * t_s, 20.0, z]
@@ -212,7 +212,7 @@ fn recording_is_replayed_at_its_own_tick_rate() {
     }
 }
 
-/// A device sends a sample a millisecond whatever its rate, and a link may lose some.
+/// A device sends a sample every millisecond at any tick rate, and a link may lose some.
 #[test]
 fn ticks_between_a_recordings_rows_are_filled_in() {
     let folder = Folder::new();
@@ -239,7 +239,7 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
         printed.contains(expected) && printed.contains("--rows-are-ticks"),
         "{printed}"
     );
-    // Row by row it is rendered at the rate of its settings, as its path alone by its times.
+    // Row by row it is rendered at the rate of its settings; its path alone, by its times.
     let (replayed, printed) = folder.replayed(&recording, &["--rows-are-ticks"]);
     assert_eq!((replayed.len(), replayed[2_400].t_s), (2_401, 2.4));
     assert!(
@@ -282,7 +282,7 @@ fn rows_without_times_are_ticks_and_that_is_said() {
     let (replayed, printed) = folder.replayed(&path(&zero), &damped);
     assert!(replayed == expected);
     assert!(printed.contains("t_s is 0 in all of them"), "{printed}");
-    // Times that are not used are those of the ticks.
+    // If times are not used, rows are ticks.
     let slower = (0..).zip(&places);
     let slower = slower.map(|(row, place)| format!("{},{place}\n", f64::from(row) * 1e-2));
     let slower: String = slower.collect();
@@ -320,7 +320,7 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
         assert!(printed.contains(expected), "{rows}: {printed}");
         assert!(!folder.path("out.csv").exists(), "{rows}");
     }
-    // Perhaps milliseconds, perhaps places to go to.
+    // These may be milliseconds, or target points.
     let (replayed, printed) = folder.replayed(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &PARAMS);
     assert_eq!(replayed.len(), 2_001);
     let remark = "in.csv: 2 times the HIP moves for more than 0.05 s between two rows, 1 s at most";
@@ -350,7 +350,7 @@ fn a_board_of_another_rate_than_a_recording_is_refused() {
     assert_eq!(replayed.len(), 101);
 }
 
-/// Paths and recordings of a review, with the values that it worked out.
+/// Paths and recordings of a review, with the values computed in it.
 #[test]
 fn reviewed_paths_and_recordings_are_replayed_by_time() {
     let Some(cases) = shared("cases/touch") else {

@@ -10,7 +10,7 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
 }
 
-/// The table's rows: an item's number, or another word, and a test.
+/// Returns the table's rows: an item's number, or another word, and a test.
 fn rows(table: &str) -> impl Iterator<Item = (&str, &str)> {
     table
         .lines()
@@ -18,7 +18,7 @@ fn rows(table: &str) -> impl Iterator<Item = (&str, &str)> {
         .map(|row| row.split_once(',').expect("two columns"))
 }
 
-/// Numbers of the page's items on what the machine does.
+/// Returns the numbers of the page's items on the machine's behaviour.
 fn items(page: &str) -> BTreeSet<&str> {
     let numbered = page.lines().filter_map(|line| line.split_once(". **"));
     let numbers = numbered.map(|(number, _)| number);

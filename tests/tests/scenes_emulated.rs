@@ -1,6 +1,5 @@
-//! Scenes of the soak (spikes, holes, teleports, tiles that come late) on this
-//! processor and on the emulated Cortex-M4F: the same bits, and the same work, tick
-//! by tick.
+//! Scenes of the stress test (spikes, no-data, teleports, late tiles) on this processor and on the
+//! emulated Cortex-M4F: the bits and the work must be identical, tick by tick.
 
 use hapterra_core::Vec3;
 use hapterra_tests::instruction_counter::{Counted, CountingBoard};
@@ -30,7 +29,7 @@ fn scenes_on_materials_give_the_same_bits_on_the_emulated_processor() {
     assert!(forces > 3_000, "{forces} ticks with a force");
 }
 
-/// Returns the answers of the board, which must equal those here.
+/// Returns the results of the board, which must equal the host's.
 fn replayed(board: &CountingBoard, scenes: &[(u64, EmulatorScene)]) -> Vec<Vec<Counted>> {
     let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);

@@ -1,5 +1,5 @@
-//! `hapterra run` with several devices on one terrain: each feels what it feels alone, and no end
-//! of one ends another.
+//! `hapterra run` with several devices on one terrain: each renders the same as alone, and the end
+//! of one does not end another.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
@@ -16,7 +16,7 @@ use hapterra_tests::socket_device::{SocketDevice, output_text, signal, terrain};
 use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{greedy_device, hapterra_binary, terrain_file};
 
-/// Serves the terrain in a folder to these devices.
+/// Returns the command that serves the terrain in a folder to these devices.
 fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
@@ -42,7 +42,7 @@ fn texts(owned: &[String]) -> Vec<&str> {
     owned.iter().map(String::as_str).collect()
 }
 
-/// Two devices behind sockets, and the names that lines about them begin with.
+/// Two devices behind sockets, and the names at the start of their lines.
 struct Pair {
     folder: tempfile::TempDir,
     served: [SocketDevice; 2],
@@ -79,10 +79,10 @@ impl Pair {
     }
 }
 
-/// Lines that are heard before one that is waited for, at most.
+/// Most lines that are read before an expected one.
 const MAX_LINES: usize = 60;
 
-/// Reads lines until each of these has begun one.
+/// Reads lines until there was one with each of these beginnings.
 fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     let mut lines = BufReader::with_capacity(1, from);
     let mut missing: Vec<&String> = beginnings.iter().collect();
@@ -99,7 +99,7 @@ fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     lines.into_inner()
 }
 
-/// The rows of a recording without what a tick cost, which is the machine's; and its settings.
+/// Returns the settings and rows of a recording, without the ticks' costs on this machine.
 fn rendered(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
     let text = std::fs::read_to_string(path).expect("a recording");
     let (settings, rows): (Vec<&str>, Vec<&str>) =
@@ -148,7 +148,7 @@ fn two_arms_in_memory_feel_to_the_bit_what_each_feels_alone() {
         let recording = format!("{name}recording      ");
         assert!(printed.contains(&recording), "{printed}");
     }
-    // What is read at the start is no device's.
+    // Reading at the start belongs to no device.
     let at_start = ["reading hills.tif", "planning a path over hills.tif"];
     let is_named =
         |line: &str| line.starts_with('[') || at_start.iter().any(|begin| line.starts_with(begin));
@@ -244,7 +244,7 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
     let mortal = SocketDevice::with(move || {
         let die = move || {
             if is_gone.load(Ordering::Relaxed) {
-                // With its socket, and without a word.
+                // With its socket, and without a message.
                 std::panic::resume_unwind(Box::new(()));
             }
         };
@@ -253,7 +253,7 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
     let pair = Pair::of(mortal);
     let mut child = pair.start();
     gone.store(true, Ordering::Relaxed);
-    // The line that reports it is that of the second device.
+    // The line about it is that of the second device.
     let (err, name) = (child.stderr.take().expect("piped"), pair.name(2));
     let mut lines = BufReader::with_capacity(1, err);
     let mut line = String::new();
@@ -288,7 +288,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let there = format!("tcp:{}", served.address);
-    // There is no listener any more.
+    // The listener no longer exists.
     let absent = {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         format!("tcp:{}", listener.local_addr().expect("a port"))
@@ -364,7 +364,7 @@ fn a_hostile_device_costs_the_other_nothing() {
         format!("[2 {there}] device "),
     ];
     child.stdout = Some(hear(child.stdout.take().expect("piped"), &begun));
-    // Lines of how it goes come from the one that samples.
+    // Progress lines are from the device with samples.
     let goes = format!("[2 {there}] ");
     child.stderr = Some(hear(child.stderr.take().expect("piped"), &[goes]));
     signal(&child, "INT");
@@ -382,8 +382,8 @@ fn a_hostile_device_costs_the_other_nothing() {
     assert_eq!(served.last_end(), SessionEnd::Goodbye, "{printed}");
 }
 
-/// Bytes that a command reads from files in all, as the system counts them: the system's own
-/// files too, whose numbers have more digits at one time than at another.
+/// Returns the bytes that a command reads from all files, counted by the system: this includes the
+/// system's own files, whose numbers vary in length.
 #[cfg(target_os = "linux")]
 fn bytes_read(command: &Command) -> u64 {
     let output = Command::new("sh")
@@ -398,11 +398,11 @@ fn bytes_read(command: &Command) -> u64 {
     read.and_then(|read| read.parse().ok()).expect(&counts)
 }
 
-/// Samples in a row of the terrain that stays in its file.
+/// Samples in a row of the terrain, which stays in its file.
 #[cfg(target_os = "linux")]
 const SIDE: u32 = 2048;
 
-/// Bytes of a row, the least that is read of the file at once.
+/// Bytes of a row, the smallest read of the file.
 #[cfg(target_os = "linux")]
 const ROW_BYTES: u64 = 4 * SIDE as u64;
 
@@ -416,7 +416,7 @@ fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     let read_by = |devices: usize| {
         let mut command = Command::new(hapterra_binary());
         command.args(["run", path, "--input", "in-memory=1MB", "--duration", "8s"]);
-        // What the first run keeps on disk of a file that is two seconds old is read by the second.
+        // Otherwise the second run would read the first run's cache of a file two seconds old.
         command.args(["--cache", "off"]);
         for _ in 0..devices {
             command.args(["--device", "native"]);

@@ -1,4 +1,4 @@
-//! Force shading on real ground: how evenly the force turns, and what it costs in energy.
+//! Force shading on real ground: the rate at which the force turns, and its cost in energy.
 
 use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
@@ -9,25 +9,26 @@ use hapterra_core::scene::TickRecord;
 use hapterra_tests::real_ground;
 use hapterra_tests::whole_field::position;
 
-/// From one HIP to the next, cells.
+/// Distance of two HIPs, cells.
 const STEP: f64 = 0.01;
-/// Length of a way, cells.
+/// Length of a path, cells.
 const ROUND: f64 = 300.0;
-/// The same where many rounds are made.
+/// Distance of two HIPs in tests with many rounds, cells.
 const LONG_STEP: f64 = 0.03;
 
-/// Most that a shaded round gives, mJ, at an even depth of 0.3 mm (`docs/explanation/effects.md`).
+/// Most energy of a shaded round, mJ, at a constant depth of 0.3 mm
+/// (`docs/explanation/effects.md`).
 const MAX_EVEN_MJ: f64 = 0.06;
 /// The same at depths from 0.5 to 1.5 mm.
 const MAX_DEEP_MJ: f64 = 0.14;
 
-/// A closed way of [`ROUND`] over a terrain that is true to scale, a cell a millimetre.
+/// A closed path of [`ROUND`] over a terrain true to scale, with cells of a millimetre.
 struct Circle<'c> {
-    /// Its middle, as shares of the terrain's sides.
+    /// Its centre, as fractions of the terrain's sides.
     middle: [f64; 2],
-    /// Of the angle at each step.
+    /// Distance of two HIPs, cells.
     step: f64,
-    /// Depth of the HIP by the angle, mm.
+    /// Depth of the HIP as a function of the angle, mm.
     depth: &'c dyn Fn(f64) -> f64,
 }
 
@@ -47,7 +48,7 @@ impl Circle<'_> {
                 size[0] * self.middle[0] + radius * angle.cos(),
                 size[1] * self.middle[1] + radius * angle.sin(),
             ];
-            // Nothing over a hole.
+            // Skipped over no-data.
             let ground = terrain.height_mm(at[0], at[1])?;
             let above = if tick == 0 { 1.0 } else { -(self.depth)(angle) };
             let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
@@ -61,7 +62,7 @@ impl Circle<'_> {
         (ROUND / self.step.abs()).round() as u32
     }
 
-    /// Returns the energy of a shaded round, mJ; none where a hole breaks it.
+    /// Returns the energy of a shaded round, mJ; `None` if no-data interrupts it.
     fn given(&self, terrain: &Terrain<'_>) -> Option<f64> {
         let rendered = self.rendered(terrain, Shading::Smooth);
         let is_whole = rendered.len() + 2 >= self.steps() as usize;
@@ -73,8 +74,8 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
 
-/// Largest change of the force's direction from one HIP to the next, degrees, where the proxy
-/// goes no farther than so many cells: over a ridge it goes as far as it is deep, at once.
+/// Returns the largest change of the force's direction from one HIP to the next, degrees, if the
+/// proxy moves by no more than `farthest` cells: over a ridge it moves by its depth at once.
 fn largest_turn(rendered: &[TickRecord], farthest: f32) -> f32 {
     let pairs = rendered.windows(2);
     let near = pairs.filter(|pair| pair[0].proxy.to(&pair[1].proxy).length() <= farthest);
@@ -121,7 +122,7 @@ fn on_real_ground_the_force_turns_a_tenth_as_fast() {
     }
 }
 
-/// Rounds in both directions around five middles: what gives in one direction takes in the other.
+/// Runs rounds in both directions around five centres: a gain in one is a loss in the other.
 fn given_by_rounds(terrain: &Terrain<'_>, depth: &dyn Fn(f64) -> f64) -> Vec<f64> {
     let margins_mm = ROUND / std::f64::consts::TAU + 2.0;
     let has_room = |middle: &[f64; 2]| {

@@ -1,5 +1,5 @@
-//! Content of the quick stress test's scenes, counted: each kind of ground, habit
-//! of the HIP and twin that is promised is there, rendered, and judged.
+//! Counts the content of the quick stress test's scenes: each promised kind of ground, habit of the
+//! HIP and metamorphic test occurs, is rendered, and is checked.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use hapterra_tests::scene::run::{Scene, Surface};
 use hapterra_tests::scene::terrain::{KINDS, Terrain};
 use hapterra_tests::scene::tile_supply::{Buffers, Supply};
 
-/// As `quick_soak.rs`.
+/// Same as in `quick_soak.rs`.
 const SEED: u64 = 2026;
 const SCENES: u64 = 200;
 
@@ -61,7 +61,7 @@ fn names(
         is("unmoved", way == 0.0);
         is("a leap of 10 to 1,000 cells", (10.0..1e3).contains(&way));
         is("a step below 0.01 cell", way > 0.0 && way < 0.01);
-        // One encoder count, or one there and one back, in each axis.
+        // One encoder count, or two in opposite directions, in each axis.
         let count = |d: f64| [0.0, 0.03, 0.06].iter().any(|c| (d - c).abs() < 1e-6);
         let trembles = most > 0.029 && [dx, dy, dz].into_iter().all(count);
         is("trembling by an encoder count", trembles);
@@ -75,7 +75,7 @@ fn names(
     names
 }
 
-/// Counts the samples of a ground that was touched.
+/// Counts the samples of a touched ground.
 fn samples(terrain: &Terrain, counts: &mut Counts) {
     let all = (0..=terrain.size[1])
         .flat_map(|y| (0..=terrain.size[0]).map(move |x| (x, y)))
@@ -156,7 +156,7 @@ fn every_promised_kind_of_scene_is_touched_and_checked() {
     assert_eq!(settings.len(), 3, "{settings:?}");
 }
 
-/// Which materials the scenes of a soak are of, by all the names that fit.
+/// Materials of a stress test's scenes, by all the names that fit.
 #[test]
 fn all_that_is_promised_of_materials_is_drawn() {
     let mut counts = Counts::new();

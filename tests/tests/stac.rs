@@ -1,4 +1,4 @@
-//! A STAC as one terrain: what GDAL makes of its items, and the command for what it does not read.
+//! A STAC as one terrain: items that GDAL reads, and the command for items that it does not read.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,11 +9,11 @@ use hapterra_tests::{hapterra_binary, memory_limit};
 use heightfield::{OpenOptions, Raster, gdal};
 use serde_json::{Value, json};
 
-/// Samples of a tile each way, and the side of a cell, metres.
+/// Side of a tile in samples, and of a cell in metres.
 const SIDE: u32 = 40;
 const CELL: f64 = 30.0;
 
-/// A GeoTIFF of single floats in a UTM zone, its first sample's outer corner at `corner`.
+/// Returns a GeoTIFF of single floats in a UTM zone, its first sample's outer corner at `corner`.
 fn geotiff(corner: [f64; 2], zone: u16, height: impl Fn(u32, u32) -> f32) -> Vec<u8> {
     let places = (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (column, row)));
     let data = places.flat_map(|(column, row)| height(column, row).to_le_bytes());
@@ -22,7 +22,7 @@ fn geotiff(corner: [f64; 2], zone: u16, height: impl Fn(u32, u32) -> f32) -> Vec
     tiff(&data.collect::<Vec<_>>(), &[image])
 }
 
-/// The corner of the tile at a place of the square of tiles, from the north-west.
+/// Returns the corner of a tile in the square of tiles, counted from the north-west.
 fn corner(across: u32, down: u32) -> [f64; 2] {
     let side = f64::from(SIDE) * CELL;
     [
@@ -65,7 +65,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Two tiles beside each other, and their items, which name them by `href`.
+/// Writes two adjacent tiles. Returns their items, which name them by `href`.
 fn tiles(folder: &Path, href: impl Fn(&str) -> String) -> Vec<Value> {
     let each = [0, 1].map(|across| {
         let name = format!("tiles/{across}.tif");
@@ -77,7 +77,7 @@ fn tiles(folder: &Path, href: impl Fn(&str) -> String) -> Vec<Value> {
         .expect("written");
         let id = format!("tile-{across}");
         let mut item = item(&id, &href(&name), corner(across, 0), "2021-04-22T00:00:00Z");
-        // As old versions of GDAL want it.
+        // The form for old versions of GDAL.
         item["stac_extensions"] =
             json!(["https://stac-extensions.github.io/projection/v1.0.0/schema.json"]);
         item["collection"] = json!("tiles");
@@ -87,7 +87,7 @@ fn tiles(folder: &Path, href: impl Fn(&str) -> String) -> Vec<Value> {
     each.into()
 }
 
-/// The same with whole names, which all versions of GDAL find.
+/// Same as `tiles`, with absolute names, which all versions of GDAL find.
 fn absolute(folder: &Path) -> Vec<Value> {
     tiles(folder, |name| folder.join(name).display().to_string())
 }
@@ -107,7 +107,7 @@ fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Runs the command that a refusal names, and opens what it makes.
+/// Runs the command that a refusal names, and opens its output.
 fn built(folder: &Path, refusal: &Output) -> Raster {
     let printed = output_text(refusal);
     assert_eq!(refusal.status.code(), Some(1), "{printed}");
@@ -166,7 +166,7 @@ fn an_item_that_lies_elsewhere_than_its_file_is_named() {
     assert_is_both(&built(place.path(), &output));
 }
 
-/// Names of files that count from the document, and items without a place.
+/// File names relative to the document, and items without a place.
 #[test]
 fn what_gdal_does_not_read_is_refused_with_a_command_that_works() {
     if !has_gdal() {
@@ -215,7 +215,7 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
     assert!(words.contains("no asset of that name"), "{words}");
 }
 
-/// A document of any size ends in an error, in as much address space as the program itself needs.
+/// A document of any size gives an error, within the program's own address space.
 #[test]
 fn documents_that_are_too_large_or_too_deep_end_in_bounded_memory() {
     let place = folder();

@@ -1,4 +1,4 @@
-//! `hapterra info` on the numbers that a file stores, and remarks where a terrain is touched.
+//! `hapterra info` on the numbers that a file stores, and the remarks on contact.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use hapterra_tests::tiffs::{DATA, Values, floats_in_a_strip, tiff};
 
 const SIDE: u32 = 8;
 
-/// A file of the heights 0 to 63 with an overview, and GDAL's notes beside it.
+/// Writes a file of the heights 0 to 63 with an overview, and GDAL's sidecar.
 fn write_noted(folder: &Path) {
     let floats = |side: u32| (0..side * side).flat_map(|at| (at as f32).to_le_bytes());
     let data: Vec<u8> = floats(SIDE).chain(floats(SIDE / 2)).collect();

@@ -1,5 +1,4 @@
-//! A terrain far larger than the device: it holds its window, the host holds
-//! the raster once.
+//! A terrain far larger than the device: the device stores its window, the host the raster, once.
 
 use hapterra::replay::on_native;
 use hapterra::terrain::{Scale, Terrain};
@@ -9,8 +8,7 @@ use heightfield::Raster;
 
 const SIDE: u32 = 4096;
 
-/// Mebibytes this program has had resident at most; `None` where the system
-/// does not tell.
+/// Returns the peak resident memory of this program, MiB; `None` if the system does not report it.
 fn peak_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -32,7 +30,7 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
     let steps = 40_000;
     for i in 0..steps {
         let t = f64::from(i) / f64::from(steps);
-        // From corner to corner, and twice across on the way.
+        // From corner to corner, with two crossings on the way.
         let x = 20.0 + 4050.0 * t;
         let y = 2048.0 + 2000.0 * (t * 9.0).sin();
         let ground = terrain.height_mm(x, y).expect("known");
@@ -49,7 +47,7 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
         "{} tiles sent of {all}, {} again; window {window}",
         tally.tiles, tally.again
     );
-    // It went through far more than it can hold, and fetched far less than all.
+    // It passed over far more tiles than it can store, and requested far fewer than all.
     assert!(tally.tiles > 2 * window && tally.tiles < all / 4);
     assert!(tally.again < tally.tiles / 4);
     if let (Some(before), Some(after)) = (before, peak_mib()) {
@@ -75,7 +73,7 @@ fn coarser_levels_feel_the_same_terrain_with_fewer_tiles() {
             let hip = terrain.scale().to_grid([x, y, ground + above]);
             let sample = replayer.step(hip.expect("addressable")).expect("rendered");
             if i > 0 {
-                // A plane is the same at every level: so is its force.
+                // A plane is the same at every level, and so is its force.
                 let normal = 1.0 / (1.0 + (1.0 / 16.0f64).powi(2) + 0.125f64.powi(2)).sqrt();
                 let expected = 0.5 * normal;
                 let force = f64::from(sample.force_n.length());

@@ -1,4 +1,4 @@
-//! Texture in a replay, by the judge of the soak, and from the command line.
+//! Texture in a replay, checked by the stress test's oracle, and from the command line.
 
 use std::path::Path;
 use std::process::Command;
@@ -15,7 +15,7 @@ use hapterra_tests::whole_field::position;
 use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
-/// HIPs of a way, and from one to the next, mm.
+/// HIPs of a path, and their distance, mm.
 const STEPS: u32 = 4_000;
 const STEP: f64 = 0.02;
 
@@ -32,7 +32,7 @@ const GRATING: Texture = Texture {
     ..GRAIN
 };
 
-/// Ground that is made here, and files of real ground where they are on this machine.
+/// Returns synthetic ground, and the files of real ground on this machine.
 fn rasters() -> Vec<(&'static str, Raster)> {
     let made = Synth::new(Kind::Fractal, 3, 25.0).raster(300, 200);
     let mut all = vec![("fractal", made.expect("raster"))];
@@ -50,9 +50,9 @@ fn rasters() -> Vec<(&'static str, Raster)> {
     all
 }
 
-/// Returns the samples of a HIP on a circle, half a millimetre deep, that sets out from the air. In
-/// the middle it lifts twice and goes fast for some time. A cell is a millimetre, so that the force
-/// is half of the displacement, to the bit.
+/// Returns the samples of a HIP on a circle, half a millimetre deep, that starts in the air. In the
+/// middle it lifts twice and is fast for some time. A cell is a millimetre, so that the force is
+/// exactly half of the displacement.
 fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
     let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
@@ -76,8 +76,8 @@ fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
     rendered.collect()
 }
 
-/// The textured tick as the judge sees it: the displacement is what the same scene without
-/// texture makes.
+/// Returns the textured tick for the oracle: the displacement is that of the same scene without
+/// texture.
 fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
     let rendered = ContactOutput {
         state: textured.state,

@@ -1,5 +1,5 @@
-//! Cost of the whole chain from count to current on the emulated
-//! Cortex-M4F, by count of instructions, and how deep its stack goes.
+//! Cost of the whole chain from count to current on the emulated Cortex-M4F, in instructions, and
+//! the depth of its stack.
 
 use std::time::Duration;
 
@@ -17,12 +17,11 @@ use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
-/// Most that a tick in contact may cost on average: kinematics, contact,
-/// guard, torques, and all the loop does around them. The controller is off; what it adds is in
-/// `bench/instructions-m4f.csv`.
+/// Most instructions of a tick in contact, on average: kinematics, contact, guard, torques, and the
+/// rest of the loop. The controller is off; its cost is in `bench/instructions-m4f.csv`.
 const IN_CONTACT: f64 = 2_500.0;
 
-/// The demonstration's samples on the emulated board, and how it is afterwards.
+/// Returns the demonstration's samples on the emulated board, and its final status.
 fn rendered() -> Option<(Vec<TickRecord>, Status)> {
     let (qemu, image) = emulated_board()?;
     let raster = Synth::new(Kind::Fractal, 1, 30.0)
@@ -42,7 +41,7 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
     let mut plant = lines.plant;
     let ticks = (1e3 * placed.duration_s()) as u32;
     let rendered = std::thread::scope(|scope| {
-        // Until the board goes.
+        // Until the board disconnects.
         scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
         let link = Box::new(lines.link);
         let (scene, patience) = (placed.scene(), Timeouts::EMULATED);
@@ -75,7 +74,7 @@ fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
     let Some((samples, status)) = rendered() else {
         return;
     };
-    // A window of 16 x 16 tiles is moved over it when the board starts.
+    // A window of 16 × 16 tiles is moved over the stack when the board starts.
     let stack = status.stack;
     eprintln!(
         "stack: {} of {} bytes used at most",
@@ -87,7 +86,7 @@ fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
     let mut costs: [(&str, Mean); 4] =
         ["disarmed", "free", "unseeded", "touching"].map(|name| (name, Mean::default()));
     for pair in samples.windows(2) {
-        // A sample tells what the tick before it cost.
+        // A sample reports the cost of the tick before.
         let (sample, cost) = (&pair[0], f64::from(pair[1].cost));
         let kind = match (sample.mode, sample.state) {
             (Mode::Armed, ContactState::Free) => 1,

@@ -1,5 +1,5 @@
-//! A tip of finite radius against a ball on the bilinear surface, in `f64`, that shares no code
-//! with the tiles: the nearest ground to the ball's centre is its radius away.
+//! A tip of finite radius, compared with a ball on the bilinear surface in `f64` without code of
+//! the tiles: the ground nearest to the ball's centre is one radius away.
 
 use std::process::Command;
 
@@ -14,8 +14,8 @@ use hapterra_tests::random_paths::wander;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, shared, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
-/// Distance of a place from the bilinear surface of samples, all in cells: over fine lines of
-/// each patch that is near enough, along each of which the nearest point is known.
+/// Returns the distance of a point from the bilinear surface of samples, all in cells: over dense
+/// lines of each near patch, with the nearest point on each line.
 fn distance(height: &dyn Fn(i64, i64) -> f64, [x, y, z]: [f64; 3], within: f64) -> f64 {
     const LINES: u32 = 32;
     let cells = |at: f64| (at - within).floor() as i64..=(at + within).floor() as i64;
@@ -48,7 +48,7 @@ fn distance(height: &dyn Fn(i64, i64) -> f64, [x, y, z]: [f64; 3], within: f64) 
     least
 }
 
-/// Distance of a place from a straight stretch.
+/// Returns the distance of a point from a line segment.
 fn to_stretch(place: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
     let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -58,7 +58,7 @@ fn to_stretch(place: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
     dot(gap, gap).sqrt()
 }
 
-/// Heights of a terrain's ground in cells, not those of a ball's centre.
+/// Returns the heights of a terrain's ground in cells, not those of a ball's centre.
 fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     let scale = terrain.scale_of_level_0().at_level(terrain.level());
     move |x, y| match (u32::try_from(x), u32::try_from(y)) {
@@ -75,14 +75,14 @@ fn step(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     replayer.step(hip.expect("addressable")).expect("rendered")
 }
 
-/// The terrain that a ball of a radius in cells feels, and a point.
+/// Returns the terrain for a ball with this radius in cells, and for a point.
 fn terrains(raster: &Raster, scale: Scale, radius: f64) -> [Terrain<'_>; 2] {
     let grid = HapticGrid::new(raster, HapticCells::default());
     let ball = grid.with_tip(radius * scale.cell_mm());
     [ball, grid].map(|grid| Terrain::over(grid, scale, 0).expect("terrain"))
 }
 
-/// A walk over a terrain in steps of its cells, as high over a ball's centre as over the ground.
+/// Raises a path to the same height over a ball's terrain as it has over the ground.
 fn raised(path: Vec<[f64; 3]>, [ball, ground]: &[Terrain<'_>; 2]) -> Vec<[f64; 3]> {
     let raise = |[x, y, z]: [f64; 3]| {
         let heights = [ball, ground].map(|terrain| terrain.height_mm(x, y));
@@ -94,7 +94,7 @@ fn raised(path: Vec<[f64; 3]>, [ball, ground]: &[Terrain<'_>; 2]) -> Vec<[f64; 3
     path.into_iter().map(raise).collect()
 }
 
-/// Parts of the radius by which proxies of walks are too far from the ground, or too near, sorted.
+/// Returns the sorted errors of the proxies' distance from the ground, as fractions of the radius.
 fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     let terrains = terrains(raster, scale, radius);
     let [terrain, point] = &terrains;
@@ -116,7 +116,7 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     off
 }
 
-/// The part of the radius that a proxy is off at most.
+/// Largest error of a proxy, as a fraction of the radius.
 const MAX_OFF: f64 = 0.02;
 
 /// Walks over a raster, and checks that the centre is a radius away from the ground.
@@ -135,7 +135,7 @@ fn check_distance(name: &str, raster: &Raster, radius: f64) {
     assert!(share(1.0) < MAX_OFF, "{name}, {radius} cells: {found}");
 }
 
-/// Radii in cells, of a millimetre.
+/// Radii in cells of a millimetre.
 const RADII: [f64; 4] = [0.5, 2.0, 4.0, 8.0];
 
 #[test]
@@ -143,7 +143,7 @@ fn a_ball_touches_real_ground_a_radius_away() {
     for file in [
         "dem/real/bigtujunga.tif",
         "dem/real/mt_everest_90m.tif",
-        // A city of walls.
+        // A city with walls.
         "dem/real/dom1_32_356_5699_1_nw_2020.tif",
     ] {
         let Some(path) = shared(file) else { return };
@@ -154,7 +154,7 @@ fn a_ball_touches_real_ground_a_radius_away() {
     }
 }
 
-/// Predicate by column and row: true for a sample that differs from those around.
+/// Predicate of column and row: true for a sample that differs from its surroundings.
 type Shape<'s> = &'s dyn Fn(u32, u32) -> bool;
 
 #[test]
@@ -176,8 +176,8 @@ fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
     }
 }
 
-/// Of 20 passes over a pole of one sample, 20 cells high, at half of its height, beside it by at
-/// most a part of the radius, those in which it is rendered, by speed in cells a tick. Cells are a
+/// Returns in how many of 20 passes a pole is rendered: one sample, 20 cells high, passed at half
+/// its height and at most a fraction of the radius beside it. Speed is in cells a tick, cells are a
 /// millimetre.
 fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> usize {
     let pole = |x: u32, y: u32| if (x, y) == (60, 30) { 20.0 } else { 0.0 };
@@ -204,8 +204,8 @@ fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32))
     (0..20).filter(is_rendered).count()
 }
 
-/// A tick ends within a ball's pole where it is no longer than that is wide. Of a ball of 2 mm this
-/// is 3 m/s, at which the guard stops an arm.
+/// A step that is no longer than a ball's pole is wide ends within it. For a ball of 2 mm this is 3
+/// m/s, at which the guard stops an arm.
 #[test]
 fn pole_is_rendered_at_steps_of_one_and_a_half_radii() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
@@ -217,17 +217,17 @@ fn pole_is_rendered_at_steps_of_one_and_a_half_radii() {
             );
         }
     }
-    // A point's tick ends beyond it.
+    // A point's steps end beyond it.
     assert!(passes_touching(0.0, 12.0, (0.5, 0.0)) < 10);
 }
 
-/// A longer tick meets the pole, too. Without friction its proxy slides around the pole to a HIP
-/// that is beyond it; with friction it stays where the cone holds it.
+/// A longer step also meets the pole. Without friction its proxy slides around the pole to a HIP
+/// beyond it; with friction it stays where the cone holds it.
 #[test]
 fn friction_holds_a_ball_at_a_pole_at_any_speed() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for speed in [5.0, 12.0, 30.0] {
-            // A tick longer than the window begins the contact anew; 32 haptic cells are a radius.
+            // A step longer than the window restarts the contact; 32 haptic cells are a radius.
             if speed / radius * 32.0 > 512.0 {
                 continue;
             }
@@ -238,7 +238,7 @@ fn friction_holds_a_ball_at_a_pole_at_any_speed() {
     }
 }
 
-/// Steps of the force of more than 0.05 N over a path, by what feels it.
+/// Returns the number of steps of the force above 0.05 N along a path.
 fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
     let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
     let forces = path.iter().map(|hip| step(&mut replayer, *hip).force_n);
@@ -247,7 +247,7 @@ fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
     forces.windows(2).filter(is_step).count()
 }
 
-/// A hand's way along a row of a terrain at 30 mm/s, below the mean of the surface within
+/// Returns a hand's path along a row of a terrain at 30 mm/s, below the mean of the surface within
 /// 1 mm around.
 fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]> {
     const AROUND: usize = 33;
@@ -260,14 +260,14 @@ fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]>
         [east(tick + AROUND), north_mm, mean - deep_mm]
     });
     let mut way: Vec<_> = below.collect();
-    // From the air, where a contact begins, within 200 ticks.
+    // It starts in the air, where a contact begins, and descends within 200 ticks.
     for (tick, hip) in way.iter_mut().take(200).enumerate() {
         hip[2] += 0.2 * (200 - tick) as f64;
     }
     way
 }
 
-/// The same ways from above by the ball of a hand and by a point, each as deep in what it feels.
+/// The same paths with the ball of a hand and with a point, each as deep in its own terrain.
 #[test]
 fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
     let Some(path) = shared("dem/real/dom1_32_356_5699_1_nw_2020.tif") else {
@@ -275,7 +275,7 @@ fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
     };
     let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
     let grid = HapticGrid::new(&raster, HapticCells::default());
-    // As large as a Premium's workspace fits it.
+    // The size at which it fits a Premium's workspace.
     let scale = grid.true_scale(0.23).expect("scale");
     let ball = Terrain::over(grid.with_tip(7.0), scale, 2).expect("terrain");
     let point = Terrain::over(grid, scale, 0).expect("terrain");
@@ -324,7 +324,7 @@ fn runs(folder: &std::path::Path, words: &[&str]) -> String {
     format!("{out}{printed}")
 }
 
-/// Rows without the columns that the guard has its part in.
+/// Returns the rows without the columns that the guard affects.
 fn rendered(text: &str) -> Vec<String> {
     let rows = text.lines().filter(|line| !line.starts_with('#'));
     let part = |row: &str| row.split(',').take(8).collect::<Vec<_>>().join(",");
@@ -439,7 +439,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
     }
 }
 
-/// A run and a demo are for a hand; a replayed path is for comparisons.
+/// `run` and `demo` are for a hand; a replay is for comparisons.
 #[test]
 fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -460,7 +460,7 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
     for (words, more, is_ball) in [
         (&run[..], &[][..], true),
         (&run[..], &["--tip", "0"][..], false),
-        // A stated level is as fine as a point feels it.
+        // A stated level is as fine as for a point.
         (&run[..], &["--level", "0"][..], false),
         (&demo[..], &[][..], true),
         (&replay[..], &[][..], false),
@@ -478,7 +478,7 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
 struct Touched {
     /// Distances from HIP to proxy in contact, sorted, mm.
     penetration_mm: Vec<f64>,
-    /// The longest that the proxy stayed within 0.25 mm while the HIP continued by 3 mm or more, s.
+    /// Longest time that the proxy stayed within 0.25 mm while the HIP moved on by 3 mm or more, s.
     held_s: f64,
 }
 
@@ -497,7 +497,7 @@ impl Touched {
         Self::of(&rows.collect::<Vec<[f64; 8]>>())
     }
 
-    /// Rows have a time, the HIP, whether it touches, and the proxy.
+    /// Rows have a time, the HIP, the contact flag, and the proxy.
     fn of(rows: &[[f64; 8]]) -> Self {
         let apart = |a: &[f64], b: &[f64]| {
             let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
@@ -531,7 +531,7 @@ impl Touched {
     }
 }
 
-/// With the ball that a hand has by default.
+/// With the default ball of a hand.
 #[test]
 fn friction_holds_no_hand_on_ten_real_grounds() {
     for name in [

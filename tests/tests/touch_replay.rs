@@ -1,4 +1,5 @@
-//! Forces of the library for arrays against `replay` on a file of the same heights: the same bits.
+//! Forces of the library for arrays equal those of `replay` on a file of the same heights, to the
+//! bit.
 
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra::replay::{on_native_at, state_name};
@@ -16,7 +17,7 @@ const COLUMNS: u32 = 130;
 const ROWS: u32 = 97;
 const CELL_MM: f64 = 0.7;
 
-/// Rough hills with holes, the northern row first.
+/// Returns rough hills with no-data, the northern row first.
 fn heights() -> Vec<f64> {
     let height = |at: u32| {
         let (x, y) = (f64::from(at % COLUMNS), f64::from(at / COLUMNS));
@@ -27,7 +28,7 @@ fn heights() -> Vec<f64> {
     (0..COLUMNS * ROWS).map(height).collect()
 }
 
-/// A `.npy` file of heights of a type.
+/// Writes and opens a `.npy` file of heights of a type.
 fn npy(descr: &str, samples: impl Iterator<Item = Vec<u8>>) -> Raster {
     let header =
         format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({ROWS}, {COLUMNS}), }}");
@@ -75,8 +76,8 @@ fn name(state: State) -> &'static str {
     }
 }
 
-/// Fails unless both feel the same of a path that wanders about, bit for bit. Returns how many
-/// places were in contact.
+/// Checks that both render the same on a wandering path, bit for bit. Returns the number of
+/// positions in contact.
 fn same(
     terrain: &Terrain<'_>,
     contact: &mut Contact,
@@ -134,7 +135,7 @@ fn forces_over_an_array_are_those_of_a_replay() {
     }
 }
 
-/// From less than a cell to 8 of them; the smallest has haptic cells of half an encoder's count.
+/// Radii from less than a cell to 8 cells; the smallest has haptic cells of half a count.
 #[test]
 fn forces_under_a_tip_are_those_of_a_replay() {
     let heights = heights();

@@ -1,5 +1,5 @@
-//! embassy's USB stack and the link above it against a host that follows a
-//! script, and the product's own client at the other end of the same cable.
+//! embassy's USB stack and the link above it, with a host that follows a script, and with the
+//! product's own client on the same cable.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -23,7 +23,7 @@ use hapterra_tests::usb::{Answer, Port};
 use heightfield::Raster;
 use nusb::descriptors::{ConfigurationDescriptor, DeviceDescriptor};
 
-/// The link's endpoint, in both directions.
+/// The link's endpoint in both directions.
 const LINK: usize = 1;
 
 fn endpoints(found: &Found) -> BulkEndpoints {
@@ -70,7 +70,7 @@ fn a_board_is_enumerated_and_found_by_the_client() {
     };
     assert_eq!(endpoints(&found), expected);
     let configuration = ConfigurationDescriptor::new(&found.configuration).expect("well formed");
-    // 100 mA, and without a supply of its own.
+    // 100 mA, and not self-powered.
     assert_eq!(
         (configuration.max_power(), configuration.attributes()),
         (50, 0x80)
@@ -120,7 +120,7 @@ fn a_request_that_means_nothing_is_refused_and_the_next_one_answered() {
 fn halting_an_endpoint_that_is_not_there_harms_nothing() {
     let (mut board, _) = enumerated();
     for endpoint in [0x05, 0x85, 0x0F, 0x8F] {
-        // Set, ask, clear: whatever the answer, the stack lives.
+        // Set, read, clear: the stack survives any answer.
         let _ = control(&mut board, (0x02, 3, 0, endpoint));
         let _ = control_in(&mut board, (0x82, 0, 0, endpoint), 2);
         let _ = control(&mut board, (0x02, 1, 0, endpoint));
@@ -142,7 +142,7 @@ fn hello() -> Vec<u8> {
         .to_vec()
 }
 
-/// Returns true if the device answers a hello.
+/// Returns true if the device answers an open.
 fn answers(board: &mut Board) -> bool {
     let mut reader = FrameReader::<MAX_FRAME>::new();
     for _ in 0..20 {
@@ -180,7 +180,7 @@ fn a_packet_that_is_too_long_is_never_taken_and_harms_nothing() {
         assert_eq!(babble, Err(Failure::Silence));
     }
     assert!(board.babbles() > 3);
-    // A zero ends what may have been under way.
+    // A zero ends any unfinished frame.
     send_packet(&mut board, LINK, &[0]).expect("taken");
     send_packet(&mut board, LINK, &hello()).expect("taken");
     assert!(answers(&mut board));
@@ -198,7 +198,7 @@ fn nothing_the_device_sends_needs_an_empty_packet_behind_it() {
     }
 }
 
-/// A rough terrain, so that tiles are sent in full, and a session in it.
+/// A rough terrain, whose tiles are sent in full, for a session.
 struct Visit {
     raster: Raster,
     scale: Scale,
@@ -222,7 +222,7 @@ fn link(board: &Rc<RefCell<Board>>, found: &Found) -> Box<Bulk<ScriptedPipes<Boa
     Box::new(Bulk(ScriptedPipes::new(Rc::clone(board), endpoints(found))))
 }
 
-/// The client over the scripted USB in a session; `then` gets both.
+/// Opens a session of the client over the scripted USB; `then` receives both.
 fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
     let visit = Visit::new();
     let terrain = visit.terrain();
@@ -245,14 +245,14 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
     then(&mut session, &board);
 }
 
-/// Continues over a new line.
+/// Resumes the session over a new line.
 fn resume(session: &mut Session<'_>, link: Box<Bulk<ScriptedPipes<Board>>>) -> DeviceHello {
     session
         .resume(link, &|| true, &mut |_| {})
         .expect("resumed")
 }
 
-/// Ticks of the samples that came in so many polls of a millisecond.
+/// Returns the ticks of the samples received in this many polls of a millisecond.
 fn ticks(session: &mut Session<'_>, polls: usize) -> Vec<u32> {
     let mut ticks = vec![];
     for _ in 0..polls {
@@ -277,7 +277,7 @@ fn tiles_go_in_and_samples_come_out() {
         assert!(ticks.len() > 100 && gaps == 0, "{} {gaps}", ticks.len());
         let tally = session.tally();
         assert_eq!((tally.bad_frames, tally.lost, tally.again), (0, 0, 0));
-        // Each takes many packets, packed as it is.
+        // Each needs many packets, even when packed.
         assert!(
             tally.tiles >= 4 && tally.tile_bytes > 4 * 16 * PACKET as u64,
             "{tally:?}"
@@ -285,7 +285,7 @@ fn tiles_go_in_and_samples_come_out() {
     });
 }
 
-/// Sends the first half of a tile's worth of bytes that make no whole frame.
+/// Sends the first half of a tile's worth of bytes, without a whole frame.
 fn half_a_transfer(board: &Rc<RefCell<Board>>) {
     let mut board = board.borrow_mut();
     for _ in 0..30 {

@@ -1,11 +1,11 @@
-//! No test reads the wall clock or sleeps but through `tests/src/timeouts.rs`, which says why.
+//! Only `tests/src/timeouts.rs` reads the wall clock or sleeps in tests, and explains why.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use hapterra_tests::repository;
 
-/// Names that read the wall clock, or wait by it.
+/// Names that read the wall clock or wait for it.
 const CLOCKS: [&str; 10] = [
     "Instant",
     "SystemTime",
@@ -19,10 +19,10 @@ const CLOCKS: [&str; 10] = [
     "set_write_timeout",
 ];
 
-/// The module that does it for all tests.
+/// The module that does this for all tests.
 const MODULE: &str = "tests/src/timeouts.rs";
 
-/// Other files that may, and why no test depends on the machine's speed by that.
+/// Other permitted files, and why their tests do not depend on the machine's speed.
 const ALLOWED: [(&str, &str, &[&str]); 11] = [
     (
         "host-tools/src/bringup/utc.rs",
@@ -84,7 +84,7 @@ const ALLOWED: [(&str, &str, &[&str]); 11] = [
 /// Not searched: the viewer's tests drive a browser, in a workspace of their own.
 const VIEWER: &str = "view";
 
-/// The Rust files under a folder.
+/// Collects the Rust files under a folder.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -98,7 +98,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Returns true if all of a file is a test, or what tests share.
+/// Returns true if a whole file is test code, or shared by tests.
 fn is_of_tests(path: &Path) -> bool {
     let folders = path.parent().into_iter().flat_map(Path::components);
     let is_inside = |name: &str| folders.clone().any(|part| part.as_os_str() == name);
@@ -106,8 +106,8 @@ fn is_of_tests(path: &Path) -> bool {
     is_inside("tests") || stem == "tests" || stem.ends_with("_tests")
 }
 
-/// The lines of a file that only tests run, with their numbers: of a file that is none itself,
-/// those of its modules after `#[cfg(test)]`.
+/// Returns the lines of a file that only tests run, with their numbers: outside test files, those
+/// of modules after `#[cfg(test)]`.
 fn lines_of_tests(path: &Path, text: &str) -> Vec<(usize, String)> {
     let (is_whole, mut is_test, mut is_next) = (is_of_tests(path), false, false);
     let mut lines = vec![];
@@ -123,7 +123,7 @@ fn lines_of_tests(path: &Path, text: &str) -> Vec<(usize, String)> {
     lines
 }
 
-/// The clocks that a line of code names, outside of texts.
+/// Returns the clocks in a line of code, without those in strings.
 fn clocks(code: &str) -> impl Iterator<Item = &'static str> {
     let code: String = code.split('"').step_by(2).collect();
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
@@ -133,7 +133,7 @@ fn clocks(code: &str) -> impl Iterator<Item = &'static str> {
         .filter(move |clock| words.iter().any(|word| word == clock))
 }
 
-/// Uses of the wall clock that are not allowed, in a file of this path in the repository.
+/// Returns the forbidden uses of the wall clock in a file with this path in the repository.
 fn faults(path: &str, text: &str) -> Vec<String> {
     let allowed = ALLOWED.iter().find(|(file, ..)| *file == path);
     let allowed = allowed.map_or(&[][..], |(.., clocks)| clocks);

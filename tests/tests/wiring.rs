@@ -1,12 +1,12 @@
-//! The boards' pages name the pins of their sources. That the images
-//! set them up as the pages say is seen in `tests/images`; that a pin can be what it
-//! is used for is embassy's types' to see to: the images would not compile.
+//! The boards' pages name the pins of their sources. `tests/images` checks that the images set them
+//! up as documented; embassy's types check that a pin supports its use, or the images would not
+//! compile.
 
 use std::collections::BTreeSet;
 
 use hapterra_tests::repository;
 
-/// Names of pins (PA0 to PK15) in a text, each behind `before`.
+/// Returns the names of pins (PA0 to PK15) in a text, each after `before`.
 fn pins(text: &str, before: &str) -> BTreeSet<String> {
     let after = text.split(before).skip(1);
     after
@@ -23,14 +23,14 @@ fn pins(text: &str, before: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// The section of the page under a heading.
+/// Returns the section of the page under a heading.
 fn section<'p>(page: &'p str, heading: &str) -> &'p str {
     let from = page.find(heading).expect("the heading");
     let section = &page[from + heading.len()..];
     section.split("\n## ").next().expect("there is one")
 }
 
-/// Pins in the middle column of a section's table.
+/// Returns the pins in the middle column of a section's table.
 fn wired(page: &str, heading: &str) -> BTreeSet<String> {
     let rows = section(page, heading)
         .lines()
@@ -70,7 +70,7 @@ fn the_wiring_tables_have_the_pins_that_the_images_take() {
     ]);
     let page = page("nucleo-h743zi2");
     assert_eq!(wired(&page, "## Duty cycles"), h743);
-    // This table has only what is other than there.
+    // This table only has the differences.
     let spi = taken(&[
         "nucleo-h743zi2-spi/outputs.rs",
         "nucleo-h743zi2-spi/stop.rs",

@@ -1,8 +1,8 @@
-//! The god-object on triangles (Zilles & Salisbury 1995): it moves straight
-//! toward the HIP; each facet in its way becomes a constraint plane, and its
-//! goal the point nearest to the HIP that satisfies all of them.
+//! The god-object on triangles (Zilles & Salisbury 1995): it moves straight toward the HIP; each
+//! facet that it meets becomes a constraint plane, and its goal is the point nearest to the HIP
+//! that satisfies all planes.
 //!
-//! In f64, so that it cannot fall through a facet by rounding.
+//! In f64, so that rounding cannot let it fall through a facet.
 
 use hapterra::published::Line;
 
@@ -10,9 +10,9 @@ use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
 use crate::variant::{Answer, Haptics, Hip};
 
-/// Facets that may hold it at once.
+/// Largest number of facets that hold it at once.
 const PLANES: usize = 3;
-/// A facet counts as passed when the end of the way is this far below it.
+/// Depth of a path's end below a facet from which the facet counts as passed.
 const BELOW: f64 = 1e-12;
 
 /// The algorithm's state.
@@ -24,7 +24,7 @@ pub struct GodObject<'g> {
 }
 
 impl<'g> GodObject<'g> {
-    /// On a terrain.
+    /// Creates the algorithm on a terrain.
     #[must_use]
     pub const fn new(grid: &'g Grid) -> Self {
         Self {
@@ -35,7 +35,7 @@ impl<'g> GodObject<'g> {
         }
     }
 
-    /// The first facet, not among `known`, that a segment passes downward.
+    /// Returns the first facet, not among `known`, that a segment crosses downward.
     #[inline]
     fn first_hit(
         &self,
@@ -45,7 +45,7 @@ impl<'g> GodObject<'g> {
     ) -> Option<([f64; 3], Facet, Plane)> {
         let way = [0, 1, 2].map(|i| to[i] - from[i]);
         let at = |t: f64| [0, 1, 2].map(|i| from[i] + t * way[i]);
-        // On the diagonal x + y is one more than at the cell's corner.
+        // On the diagonal, x + y is one more than at the cell's corner.
         let (sum, rise) = (from[0] + from[1], way[0] + way[1]);
         let mut entered = 0.0;
         let line = Line::new([from[0], from[1]], [to[0], to[1]]);
@@ -136,8 +136,8 @@ impl Haptics for GodObject<'_> {
     }
 }
 
-/// The point nearest to the HIP on all planes; a plane that would pull the
-/// god-object toward itself from outside is let go.
+/// Returns the point nearest to the HIP on all planes; a plane that would pull the god-object back
+/// is dropped.
 #[inline]
 fn nearest_on(planes: &[Plane], hip: &[f64; 3]) -> [f64; 3] {
     match planes {

@@ -1,5 +1,5 @@
-//! The opponents, each at its best: what it needs to know between ticks it
-//! remembers, and none does work that its own description does not ask for.
+//! The compared methods, each at its best: they keep state between ticks if it helps, and none does
+//! work that its own description does not require.
 
 mod god_object;
 mod paper;

@@ -1,4 +1,4 @@
-//! The paper's algorithm as published, as a variant of the bench.
+//! The paper's algorithm as published, as a variant.
 
 use hapterra::published::{Heights, Paper, Real};
 
@@ -17,7 +17,7 @@ impl Heights for Grid {
     }
 }
 
-/// The HIP in the arithmetic of a baseline.
+/// Conversion of the HIP to the arithmetic of a baseline.
 trait OfHip: Real {
     fn hip(hip: &Hip) -> [Self; 3];
 }

@@ -10,29 +10,29 @@ use super::triangle::Facet;
 use crate::grid::Grid;
 use crate::variant::{Answer, Haptics, Hip};
 
-/// Which call finds the nearest point.
+/// Call that finds the nearest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Project {
     /// `project_local_point`
     Anywhere,
-    /// `project_local_point_with_max_dist`, no farther than the last answer
-    /// and the HIP's motion since allow.
+    /// `project_local_point_with_max_dist`, with the last distance plus the HIP's motion as the
+    /// limit.
     Within,
 }
 
-/// parry's shape and what a tick remembers.
+/// parry's shape, and its state between ticks.
 pub struct Parry<'g> {
     grid: &'g Grid,
     field: HeightField,
     project: Project,
     hip: Option<Hip>,
-    /// Distance from the HIP to the surface, while in contact.
+    /// Distance from the HIP to the surface in contact.
     depth: Option<f32>,
     answer: Answer,
 }
 
 impl<'g> Parry<'g> {
-    /// parry's own copy of a terrain.
+    /// Creates parry's own copy of a terrain.
     #[must_use]
     pub fn new(grid: &'g Grid, project: Project) -> Self {
         let (columns, rows) = (grid.columns + 1, grid.rows + 1);
@@ -53,7 +53,7 @@ impl<'g> Parry<'g> {
         }
     }
 
-    /// parry's frame: y up, the origin in the middle of the field.
+    /// Converts to parry's frame: y up, the origin in the middle of the field.
     #[inline]
     fn local(&self, [x, y, z]: [f32; 3]) -> Vector {
         Vector::new(
@@ -63,14 +63,14 @@ impl<'g> Parry<'g> {
         )
     }
 
-    /// Returns true if the way from the last HIP to this one is free.
+    /// Returns true if the path from the last HIP to this one is free.
     #[inline]
     fn is_free(&self, from: Vector, to: Vector) -> bool {
         let ray = Ray::new(from, to - from);
         self.field.cast_local_ray(&ray, 1.0, false).is_none()
     }
 
-    /// Returns true if the HIP is below the triangles: parry has no call for that.
+    /// Returns true if the HIP is below the triangles: parry has no call for this.
     #[inline]
     fn is_below(&self, hip: &Hip) -> bool {
         let facet = Facet::under(hip.wide[0], hip.wide[1]);

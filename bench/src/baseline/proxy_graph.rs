@@ -1,22 +1,21 @@
-//! The proxy graph (Walker & Salisbury 2003): in contact the proxy lives on
-//! the edges and vertices of the triangulated field only, and moves from one
-//! to the next while that brings it nearer to the HIP.
+//! The proxy graph (Walker & Salisbury 2003): in contact the proxy lies only on edges and vertices
+//! of the triangulated field, and moves from one to the next while that leads nearer to the HIP.
 
 use super::triangle::Facet;
 use crate::grid::Grid;
 use crate::variant::{Answer, Haptics, Hip};
 
-/// Moves in one tick, at most.
+/// Most moves in one tick.
 const MOVES: u32 = 4096;
 
-/// A node: an edge and a place on it; its ends are the vertices.
+/// A node: a point on an edge; the ends of the edge are vertices.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Sample at the start of the edge.
     post: [i32; 2],
     /// Direction of the edge: east, north or north-west, or back.
     to: [i32; 2],
-    /// Place on it, `[0, 1]`.
+    /// Position on it, `[0, 1]`.
     t: f64,
     displacement: [f64; 3],
     squared: f64,
@@ -34,7 +33,7 @@ pub struct ProxyGraph<'g> {
 }
 
 impl<'g> ProxyGraph<'g> {
-    /// On a terrain.
+    /// Creates the algorithm on a terrain.
     #[must_use]
     pub const fn new(grid: &'g Grid) -> Self {
         Self {
@@ -52,7 +51,7 @@ impl<'g> ProxyGraph<'g> {
         inside.then(|| f64::from(self.grid.post(x as usize, y as usize)))
     }
 
-    /// The nearest point of one edge.
+    /// Returns the nearest point of one edge.
     #[inline]
     fn on_edge(&self, post: [i32; 2], to: [i32; 2], hip: &[f64; 3]) -> Option<Node> {
         let end = [post[0] + to[0], post[1] + to[1]];
@@ -75,8 +74,8 @@ impl<'g> ProxyGraph<'g> {
         })
     }
 
-    /// The edges within one move: all at a vertex, or the other two of each
-    /// triangle that shares the edge.
+    /// Returns the nearest point on the edges within one move: all edges at a vertex, or the other
+    /// two of each triangle with this edge.
     #[inline]
     fn nearer(&self, node: &Node, hip: &[f64; 3]) -> Option<Node> {
         let mut best = *node;

@@ -7,12 +7,12 @@ use crate::grid::Grid;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Facet {
     pub(super) cell: [i32; 2],
-    /// The north-eastern half.
+    /// True for the north-eastern half.
     pub(super) upper: bool,
 }
 
 impl Facet {
-    /// The half under a place.
+    /// Returns the half at a point.
     #[inline]
     pub(super) fn under(x: f64, y: f64) -> Self {
         let cell = [x as i32, y as i32];
@@ -20,7 +20,7 @@ impl Facet {
         Self { cell, upper }
     }
 
-    /// Its plane: height at the cell's south-west corner, slopes east and north.
+    /// Returns its plane: height at the cell's south-west corner, slopes east and north.
     #[inline]
     pub(super) fn plane(self, grid: &Grid) -> Plane {
         let [sw, se, nw, ne] = grid.corners(self.cell).map(f64::from);
@@ -38,7 +38,7 @@ impl Facet {
     }
 }
 
-/// z = level + east·x + north·y
+/// The plane z = level + east·x + north·y.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Plane {
     pub(super) east: f64,
@@ -53,7 +53,7 @@ impl Plane {
         self.level + self.east * x + self.north * y - z
     }
 
-    /// Upward, z = 1.
+    /// Returns the upward normal with z = 1.
     #[inline]
     pub(super) fn normal(&self) -> [f64; 3] {
         [-self.east, -self.north, 1.0]

@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-/// Opens every file before anything is measured.
+/// Opens every file before the first measurement.
 fn read(args: &Args) -> Result<Vec<Grid>, Failure> {
     let open = |file: &PathBuf| {
         let raster = Raster::open(file, &OpenOptions::default()).map_err(|error| {
@@ -88,12 +88,12 @@ fn read(args: &Args) -> Result<Vec<Grid>, Failure> {
 }
 
 /// Measures the effects on the files, and on one synthetic terrain. A file that is too small or too
-/// high for them has its other figures all the same.
+/// high for them still has its other figures.
 fn measure_effects(args: &Args, files: &[Grid], effort: Effort) -> Result<Measured, Failure> {
     let synthetic = (!args.files.files_only).then(tick_states::terrain);
     let mut all = Measured::default();
     for grid in files.iter().chain(&synthetic) {
-        // Otherwise printed with the other figures.
+        // Otherwise they are printed with the other figures.
         if args.effects {
             remark(grid);
         }
@@ -115,8 +115,8 @@ fn measure_effects(args: &Args, files: &[Grid], effort: Effort) -> Result<Measur
     }
 }
 
-/// The paper's three sizes, one of them ten times as steep (the paper's own
-/// scale: 10 m cells, 1 m units), and one larger.
+/// Returns the paper's three sizes, one of them ten times as steep (the paper's own scale: 10 m
+/// cells, 1 m units), and a larger one.
 fn synthetic() -> [fn() -> Grid; 5] {
     [
         || Grid::fractal("525 × 525", [525, 525], 1, 1.0),

@@ -32,7 +32,7 @@ pub struct Files {
     pub picture: Option<PathBuf>,
 }
 
-/// Writes a file if one is named, and prints its name.
+/// Writes a file if it has a name, and prints the name.
 pub(super) fn write<E: Display>(
     file: Option<&PathBuf>,
     write: impl FnOnce(&Path) -> Result<(), E>,
@@ -47,7 +47,7 @@ pub(super) fn write<E: Display>(
     report::put(&format!("wrote {}\n", file.display()))
 }
 
-/// A sign of life while something is measured.
+/// Shows progress during a measurement.
 pub(super) fn spinner() -> ProgressBar {
     let spinner = ProgressBar::new_spinner();
     spinner.enable_steady_tick(Duration::from_millis(500));

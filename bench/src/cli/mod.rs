@@ -55,7 +55,7 @@ pub fn main() -> ExitCode {
     }))
 }
 
-/// Warns of figures that are not to be quoted.
+/// Warns that the figures must not be quoted.
 fn warn_without_optimisation() {
     if cfg!(debug_assertions) {
         eprintln!("note: built without full optimisation; for figures: cargo build --release");

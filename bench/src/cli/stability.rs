@@ -135,7 +135,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Every damping with every controller that is asked for.
+/// Returns every damping with each requested controller setting.
 fn dampings(args: &Args) -> Vec<Damping> {
     let mut values = args.damping.clone();
     values.sort_by(|a, b| a.ns_per_m.total_cmp(&b.ns_per_m));

@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let usual = args.kind.usual_amplitude_cells() * args.cell;
     let stated = args.amplitude.map(|height| match args.kind {
-        // Its own amplitude is a slope.
+        // The kind's own amplitude is a slope.
         Kind::Plane => height / Synth::new(Kind::Plane, 0, 1.0).rise(columns, rows),
         _ => height,
     });

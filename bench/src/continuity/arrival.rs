@@ -1,4 +1,4 @@
-//! The product's contact while the next tile comes late.
+//! The product's contact while the next tile is late.
 
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
@@ -16,14 +16,14 @@ use crate::variant::{Answer, Hip};
 
 /// Start of the slide, cells before the next tile.
 const BEFORE: f64 = 1.0;
-/// Cells that the surface moves in a tick from the fallback to a tile that has come: at 1 kHz, a
-/// cell a millimetre.
+/// Motion of the surface in a tick, cells, from the fallback to a tile that arrived: at 1 kHz, with
+/// cells of a millimetre.
 const SETTLED_A_TICK: f32 = SETTLING_MM_S / 1_000.0;
-/// Ticks it slides eastward.
+/// Ticks of the slide eastward.
 const TICKS: u32 = 400;
 
-/// The same way with every tile here, and with the next tile coming when the HIP
-/// is so far beyond its border.
+/// Measures the same path with all tiles, and with a next tile that arrives when the HIP is some
+/// way beyond its border.
 pub(super) fn measure() -> Vec<Row> {
     let late = |beyond: f64| ((BEFORE + beyond) / STEP) as u32;
     let under = Some(FALLBACK);
@@ -40,7 +40,7 @@ pub(super) fn measure() -> Vec<Row> {
     .to_vec()
 }
 
-/// Under both tiles.
+/// The fallback, under both tiles.
 const FALLBACK: Fallback = Fallback {
     wide: CoarseTile {
         first: Cell::new(0, 0),
@@ -49,7 +49,7 @@ const FALLBACK: Fallback = Fallback {
     near: None,
 };
 
-/// The fallback's tile; beyond the field it continues as it ends there.
+/// Returns the fallback's tile; beyond the field it has the border's heights.
 fn coarse(grid: &Grid, fallback: &Fallback) -> Tile {
     let mut tile = Tile::VACANT;
     let side = fallback.wide.spacing() as usize;
@@ -61,7 +61,7 @@ fn coarse(grid: &Grid, fallback: &Fallback) -> Tile {
     tile
 }
 
-/// Returns the answers from the start of the slide on.
+/// Returns the results from the start of the slide.
 fn output(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     let grid = Grid::from_fn("two tiles", [2 * TILE_CELLS, TILE_CELLS], |x, y| {
         (1.5 * (0.2 * x as f64).sin() * (0.17 * y as f64).cos()) as f32
@@ -99,7 +99,7 @@ fn output(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
             velocity: [STEP as f32, 0.0],
         };
         coming.extend(std::iter::from_fn(|| requester.next_request(tick, &hint)));
-        // The tile that the HIP begins over comes at once.
+        // The tile at the start arrives at once.
         let is_here = |key: &TileKey| key.index.col == 0 || tick >= approach + due;
         for key in coming.extract_if(.., |key| is_here(key)) {
             requester.received(key);
@@ -111,7 +111,7 @@ fn output(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     answers.split_off(approach as usize - 1)
 }
 
-/// Down, and after a while to see and to wait, eastward.
+/// Returns the HIPs: down and, after a rest, eastward. Also returns the start of the slide.
 fn hips(grid: &Grid) -> (Vec<Hip>, u32) {
     let start = [TILE_CELLS as f64 - BEFORE, 16.3];
     let mut hips = vec![over(grid, start, 2.0); 20];

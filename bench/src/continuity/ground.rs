@@ -5,7 +5,7 @@ use crate::grid::Grid;
 /// Patches along a side.
 const SIDE: usize = 64;
 
-/// A kind of ground, by its height above the middle of the field.
+/// A kind of ground, as a height above the middle of the field.
 pub(super) struct Ground {
     /// Its name in tables.
     pub(super) name: &'static str,
@@ -14,7 +14,7 @@ pub(super) struct Ground {
 
 /// From the smoothest to the roughest.
 pub(super) const GROUNDS: [Ground; 5] = [
-    // Bilinear as a whole: its patches meet without a crease.
+    // Bilinear as a whole: its patches meet without an edge.
     Ground {
         name: "saddle",
         height: |x, y| 0.05 * x * y,
@@ -23,7 +23,7 @@ pub(super) const GROUNDS: [Ground; 5] = [
         name: "smooth",
         height: |x, y| 1.5 * (0.2 * x).sin() * (0.17 * y).cos(),
     },
-    // Every patch twisted the other way than its neighbours.
+    // Every patch has the opposite twist of its neighbours.
     Ground {
         name: "patch edges",
         height: |x, y| {
@@ -44,7 +44,7 @@ pub(super) const GROUNDS: [Ground; 5] = [
     },
 ];
 
-/// Cells from a line that crosses the grid obliquely.
+/// Returns the distance from a line oblique to the grid, cells.
 fn across(x: f64, y: f64) -> f64 {
     0.92 * x - 0.39 * y + 0.2
 }

@@ -1,9 +1,8 @@
-//! Change of the force when the HIP moves a hundredth of a cell along the
-//! ground: on smooth ground, over ridges, in valleys, across the edges of
-//! patches, and while a tile arrives.
+//! Change of the force when the HIP moves a hundredth of a cell along the ground: on smooth ground,
+//! over ridges, in valleys, across the edges of patches, and while a tile arrives.
 //!
-//! The rendered forces are compared, fading included. The HIP slides 0.1 cell below the surface; its
-//! approach is left out.
+//! The rendered forces are compared, with the edge fade. The HIP slides 0.1 cell below the surface;
+//! its approach does not count.
 
 mod arrival;
 mod ground;
@@ -18,9 +17,9 @@ use ground::{GROUNDS, Ground};
 use row::SIDE;
 pub use row::{DEPTH, Row, STEP};
 
-/// Straight ways over a ground.
+/// Straight paths over a ground.
 const WAYS: usize = 24;
-/// Ticks on each of them.
+/// Ticks of each.
 const TICKS: usize = 1000;
 /// The variants.
 const COMPARED: [&str; 6] = [
@@ -31,7 +30,7 @@ const COMPARED: [&str; 6] = [
     "proxy graph",
     "parry within",
 ];
-/// Every variant on every ground, and the product while a tile arrives.
+/// Measures every variant on every ground, and the product while a tile arrives.
 #[must_use]
 pub fn measure() -> Vec<Row> {
     let mut rows: Vec<Row> = GROUNDS.iter().flat_map(over_ground).collect();
@@ -46,7 +45,7 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
     let window = product::window::<SIDE>(&grid, &mut buffers);
     let mut entries = ours(&window);
     entries.extend(opponents(&grid));
-    // Of the paper's and parry's settings the best, and no copy, which is no contact.
+    // The best of the paper's and of parry's settings, without the copy, which is not a contact.
     entries.retain(|(label, _)| COMPARED.contains(&label.name));
     let row = |(label, variant): &mut (Label, Box<dyn Haptics + '_>)| {
         let rendered: Vec<Vec<Answer>> = ways
@@ -66,13 +65,13 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
     entries.iter_mut().map(row).collect()
 }
 
-/// Down to below the surface, and straight on.
+/// A path to below the surface, and then straight on.
 struct Way {
     hips: Vec<Hip>,
     approach: usize,
 }
 
-/// Straight ways every which way, all of them over the middle of the field.
+/// Returns straight paths in all directions over the middle of the field.
 fn ways(ground: &Ground) -> Vec<Way> {
     let grid = ground.grid();
     let mut random = Random(17);
@@ -105,8 +104,8 @@ mod tests {
         rows.iter().find(is).expect("it is measured").largest
     }
 
-    /// No more than the exact closest point itself changes, which f64 shows; and
-    /// the bounds of docs/explanation/contact.md.
+    /// No more than the change of the exact closest point, computed in f64, and the bounds of
+    /// docs/explanation/contact.md.
     #[test]
     fn the_force_is_as_continuous_as_the_surface() {
         let rows = measure();
@@ -126,7 +125,7 @@ mod tests {
             ("tile 0.2 cell late", 0.15),
             ("tile 0.45 cell late", 0.05),
             ("tile 1 cell late", 0.012),
-            // What the surface moves in a tick, and the way of the HIP.
+            // The motion of the surface in a tick, and of the HIP.
             ("0.2 cell late over a coarse fallback", 0.0531),
             ("0.45 cell late over a coarse fallback", 0.0531),
             ("1 cell late over a coarse fallback", 0.0531),

@@ -4,9 +4,9 @@ use crate::compare::Label;
 use crate::stats::{part, quantiles};
 use crate::variant::Answer;
 
-/// Cells the HIP moves in a tick.
+/// Motion of the HIP in a tick, cells.
 pub const STEP: f64 = 0.01;
-/// Cells the HIP is below the surface.
+/// Depth of the HIP below the surface, cells.
 pub const DEPTH: f64 = 0.1;
 /// Tiles along the side of the product's window.
 pub(super) const SIDE: usize = 8;
@@ -16,18 +16,18 @@ pub(super) const SIDE: usize = 8;
 pub struct Row {
     /// Ground under the HIP.
     pub ground: &'static str,
-    /// Which variant.
+    /// The variant.
     pub label: Label,
     /// Largest change of the displacement in a tick, cells.
     pub largest: f64,
-    /// 99 % of the ticks change it less, cells.
+    /// 99th percentile of this change, cells.
     pub p99: f64,
-    /// Part of the ticks that feel nothing.
+    /// Share of the ticks without a force.
     pub missed: f64,
 }
 
 impl Row {
-    /// Returns the row of successive ticks, in pieces.
+    /// Returns the row of successive ticks, in parts.
     pub(super) fn of(ground: &'static str, label: Label, pieces: &[&[Answer]]) -> Self {
         let changes: Vec<f64> = pieces
             .iter()

@@ -1,4 +1,4 @@
-//! An arm that is armed over the middle of a terrain, and ways of its tip.
+//! An armed arm over the middle of a terrain, and paths of its tip.
 
 use std::fmt;
 
@@ -17,8 +17,7 @@ use crate::grid::Grid;
 use crate::path::Random;
 use crate::variant::Hip;
 
-/// Reason for which nothing can be measured on a terrain: it is too small, or the arm does not
-/// reach it.
+/// Reason why a terrain cannot be measured: it is too small, or the arm does not reach it.
 #[derive(Clone, Debug)]
 pub struct NotMeasured(pub(crate) String);
 
@@ -30,14 +29,14 @@ impl fmt::Display for NotMeasured {
 
 impl std::error::Error for NotMeasured {}
 
-/// Farthest from home, mm.
+/// Largest distance from home, mm.
 const REACH: f64 = 40.0;
 /// Cells kept free at the border of the field.
 const MARGIN: f64 = 4.0;
-/// A way begins so far above the surface, mm, and goes down for so many ticks.
+/// Height at the start of a path, mm, and ticks of its descent.
 const ABOVE: f64 = 2.0;
 const DOWN: usize = 50;
-/// Ticks in which arming is over.
+/// Ticks after which arming is complete.
 const ARMING: usize = 6000;
 
 /// An arm over the middle of a terrain.
@@ -47,23 +46,23 @@ pub(super) struct Arm<'g> {
     pub(super) placement: ArmFrame,
 }
 
-/// The tip's place, mm over the terrain, and what the encoders read there.
+/// A position of the tip, mm over the terrain, with its encoder counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) tip_mm: Vector,
     pub(super) counts: [i32; 3],
 }
 
-/// A way of the tip that begins and ends above the same place: over the ground, and back.
+/// A path of the tip that starts and ends above the same point: over the ground, and back.
 pub(super) struct Way {
     pub(super) name: &'static str,
     pub(super) down: Vec<Place>,
-    /// The compared places.
+    /// The compared positions.
     pub(super) there: Vec<Place>,
 }
 
 impl<'g> Arm<'g> {
-    /// With the home pose close to the surface.
+    /// Creates an arm with the home pose close to the surface.
     pub(super) fn over(grid: &'g Grid) -> Self {
         let [x, y] = [grid.columns, grid.rows].map(|side| 0.5 * side as f64);
         Self {
@@ -75,18 +74,18 @@ impl<'g> Arm<'g> {
         }
     }
 
-    /// Slides 0.4 mm deep at 50 mm/s.
+    /// Returns a slide 0.4 mm deep at 50 mm/s.
     pub(super) fn slide(&self, ticks: usize) -> Result<Way, NotMeasured> {
         self.way("arm slides 0.05", 0.05, ticks, |_| -0.4)
     }
 
-    /// Taps half a millimetre deep every 100 ticks, wandering slowly.
+    /// Returns taps of half a millimetre every 100 ticks on a slow path.
     pub(super) fn tap(&self, ticks: usize) -> Result<Way, NotMeasured> {
         let phase = |tick: usize| tick as f64 * (std::f64::consts::TAU / 100.0);
         self.way("arm taps", 0.02, ticks, |tick| 0.5 * phase(tick).cos())
     }
 
-    /// Goes `step` mm a tick, so high above the surface, for half of the ticks, and back.
+    /// Returns a path of `step` mm a tick at this height, for half of the ticks, and back.
     fn way(
         &self,
         name: &'static str,
@@ -120,7 +119,7 @@ impl<'g> Arm<'g> {
         Ok(Way { name, down, there })
     }
 
-    /// So far above the surface, `off` mm from home.
+    /// Returns the position at a height above the surface, `off` mm from home.
     fn above(&self, off: [f64; 2], height: f64) -> Result<Place, NotMeasured> {
         let home = self.placement.home_mm;
         let [x, y] = [home[0] + off[0], home[1] + off[1]];
@@ -138,7 +137,7 @@ impl<'g> Arm<'g> {
         Encoder::new(&self.model.drive[axis])
     }
 
-    /// The loop that the arm is driven by.
+    /// Creates the loop that drives the arm.
     pub(super) fn open<'t>(
         &self,
         params: SurfaceParams,
@@ -156,7 +155,7 @@ impl<'g> Arm<'g> {
         Ok(haptics)
     }
 
-    /// The forces along the path with surface parameters, and the compared values.
+    /// Returns the forces along the path with surface parameters, and the compared values.
     pub(super) fn render(
         &self,
         params: SurfaceParams,
@@ -175,7 +174,7 @@ impl<'g> Arm<'g> {
     }
 }
 
-/// An arm that is armed at the beginning of a way.
+/// An arm that is armed at the start of a path.
 pub(super) struct Driven<'t> {
     haptics: Box<Haptics<'t, WINDOW>>,
 }
@@ -193,7 +192,7 @@ impl<'t> Driven<'t> {
         for tick in 0..ARMING {
             let sense = GuardInputs {
                 counts,
-                // Pressed after a moment.
+                // The switch is pressed after a moment.
                 dead_man: tick > 10,
                 ..GuardInputs::default()
             };

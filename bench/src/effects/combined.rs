@@ -1,4 +1,4 @@
-//! All effects at once: the surface pushes, and no more than its parts may.
+//! All effects at once: the surface pushes, within the sum of its parts' bounds.
 
 use hapterra_core::force::SurfaceParams;
 
@@ -10,9 +10,9 @@ use super::vector::{degrees, length};
 use crate::compare::Effort;
 use crate::grid::Grid;
 
-/// Degrees between a force that does not pull and the spring.
+/// Largest angle between a force that does not pull and the spring, degrees.
 const MAX_TURN: f64 = 90.0;
-/// Percent of the bound.
+/// The bound, percent.
 const WHOLE: f64 = 100.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
@@ -30,7 +30,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     Ok(errors)
 }
 
-/// Between the force and the way from the HIP to the proxy; no force pulls by less than 90°.
+/// Returns the angles between force and displacement; below 90° no force pulls.
 fn off_degrees(rendered: &[EffectTick]) -> Vec<f64> {
     let rendered = rendered.iter().filter(|record| record.whole);
     let rendered = rendered.filter(|record| length(record.force_n) > 0.0);
@@ -39,7 +39,7 @@ fn off_degrees(rendered: &[EffectTick]) -> Vec<f64> {
         .collect()
 }
 
-/// Each force over the most it may be, percent.
+/// Returns each force as a percentage of its bound.
 fn shares(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<f64> {
     let rendered = rendered.iter().filter(|record| record.whole);
     let share =
@@ -47,8 +47,8 @@ fn shares(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<f64> {
     share.map(|share| 100.0 * share).collect()
 }
 
-/// Shading keeps the size; texture adds its height along the force and at most λ/7.6 across it;
-/// damping and controller add as much again.
+/// Returns the bound: shading keeps the size; texture adds its height along the force and at most
+/// λ/7.6 across it; damping and controller at most double the result.
 fn most_n(params: &SurfaceParams, depth_mm: f64) -> f64 {
     let [amplitude, wavelength] =
         [params.texture.amplitude_mm, params.texture.wavelength_mm].map(f64::from);

@@ -1,5 +1,5 @@
-//! Damping: the force against the documented formula, with the velocity by FOAW in f64 and with the
-//! tip's own; and whether it ever pulls.
+//! Damping: the force compared with the documented formula, with the velocity from FOAW in f64 and
+//! with the tip's own; also a check that it never pulls.
 
 use hapterra::phantom::{ArmFrame, kinematics};
 use hapterra_core::force::SurfaceParams;
@@ -15,7 +15,7 @@ use crate::grid::Grid;
 
 /// Ticks a second.
 const HZ: f64 = 1000.0;
-/// Readings that FOAW looks at.
+/// Readings in FOAW's window.
 const READINGS: usize = 16;
 /// Tolerance of rounding, mN.
 const ROUNDING: f64 = 0.01;
@@ -56,7 +56,7 @@ fn off_mn(
     off.collect()
 }
 
-/// F' = F − b (v·f) f, where b |v·f| counts at most |F|.
+/// Returns F' = F − b (v·f) f, where b |v·f| is limited to |F|.
 fn damped_n(params: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) -> Vector {
     let deep = length(spring_mm);
     if deep == 0.0 {
@@ -81,13 +81,13 @@ fn pulls_mn(rendered: &[EffectTick]) -> Vec<f64> {
     pulls.collect()
 }
 
-/// The tip's velocity in the last tick, mm/s.
+/// Returns the tip's velocity in the last tick, mm/s.
 fn by_path(way: &Way, tick: usize) -> Vector {
     let [from, to] = [tick - 1, tick].map(|tick| way.there[tick].tip_mm);
     minus(to, from).map(|mm| mm * HZ)
 }
 
-/// The tip's velocity by the encoders alone, mm/s, whichever way ties go.
+/// Returns the tip's velocity from the encoders alone, mm/s, for each way to break ties.
 fn by_foaw(arm: &Arm<'_>, way: &Way, tick: usize) -> Vec<Vector> {
     let readings: &[Place] = &way.there[tick + 1 - READINGS..=tick];
     let counts = readings[READINGS - 1].counts;
@@ -132,10 +132,10 @@ mod tests {
         let mut more = params;
         more.damping.ns_per_m *= 1.05;
         assert!(off(&more, &rendered) > 10.0 * ROUNDING);
-        // The velocity of the tick before.
+        // The velocity of the previous tick.
         let late = off_mn(&params, &rendered, |tick| by_foaw(&arm, &way, tick - 1));
         assert!(worst(late) > 10.0 * ROUNDING);
-        // A damper whose part is not bounded by the spring's force.
+        // A damper without the spring's force as its limit.
         let mut pulling = rendered.clone();
         for (tick, rendered) in pulling.iter_mut().enumerate().skip(1) {
             let (spring, deep) = (rendered.spring(), length(rendered.spring()));

@@ -3,22 +3,22 @@
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
 
-/// Effect of a surface besides the spring.
+/// Effect of a surface in addition to the spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// A frictionless surface.
     None,
-    /// It holds the tip back, more at rest than while it slides.
+    /// Friction holds the tip back, at rest more than during a slide.
     Friction,
-    /// The force turns evenly from patch to patch.
+    /// The force turns gradually from patch to patch.
     Shading,
-    /// A micro-relief at random.
+    /// A random micro-relief.
     Grain,
     /// A micro-relief of ridges.
     Grating,
-    /// It takes energy out of a motion against it.
+    /// Damping takes energy from a motion against it.
     Damping,
-    /// The energy leak is dissipated.
+    /// The passivity controller dissipates the energy leak.
     Controller,
     /// All at once, with grain.
     All,
@@ -45,7 +45,7 @@ pub(super) const fn texture(pattern: Pattern) -> Texture {
 }
 
 impl Effect {
-    /// All, in the order of the table.
+    /// All effects, in the order of the table.
     pub const ALL: [Self; 8] = [
         Self::None,
         Self::Friction,
@@ -57,7 +57,7 @@ impl Effect {
         Self::All,
     ];
 
-    /// Its name in tables.
+    /// Returns its name in tables.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -72,8 +72,8 @@ impl Effect {
         }
     }
 
-    /// The surface parameters of a scene with this effect, and no other. The controller is off
-    /// in all others.
+    /// Returns the surface parameters of a scene with only this effect. The controller is off in
+    /// all others.
     pub(super) fn params(self) -> SurfaceParams {
         let of = |effect| self == effect || self == Self::All;
         let mut params = SurfaceParams::PREMIUM;

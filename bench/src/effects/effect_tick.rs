@@ -1,4 +1,4 @@
-//! Record of one tick, as the tick itself reports it.
+//! Record of one tick, from its own report.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::grid::GridPoint;
@@ -16,9 +16,9 @@ pub(super) struct EffectTick {
     pub hip: Vector,
     /// Proxy, cells.
     pub proxy: Vector,
-    /// Newtons.
+    /// Force, N.
     pub force_n: Vector,
-    /// The proxy is on the surface, and nothing limits the force that the scene asks for.
+    /// True if the proxy is on the surface and nothing limits the scene's force.
     pub whole: bool,
 }
 
@@ -42,12 +42,12 @@ impl EffectTick {
         }
     }
 
-    /// From the HIP to the proxy: what the spring stretches by, cells.
+    /// Returns the spring's displacement, from the HIP to the proxy, cells.
     pub(super) fn spring(&self) -> Vector {
         minus(self.proxy, self.hip)
     }
 
-    /// The slopes of the patch that the proxy is inside of; none on its border, where patches meet.
+    /// Returns the slopes of the proxy's patch; `None` on its border, where patches meet.
     pub(super) fn slopes(&self, grid: &Grid) -> Option<[f64; 2]> {
         const BORDER: f64 = 2e-3;
         let [x, y, _] = self.proxy;

@@ -1,5 +1,5 @@
-//! The passivity controller: what a surface gives to a hand that taps on it, in a closed loop with a
-//! virtual arm.
+//! The passivity controller: the energy that a surface gives to a hand that taps on it, in a closed
+//! loop with a virtual arm.
 
 use crate::stability::grasp::Grasp;
 use hapterra::phantom::{ArmFrame, HeldPhantom, PhantomModel, Script};
@@ -12,20 +12,20 @@ use super::row::{Error, Place};
 use super::vector::{Vector, dot, minus};
 use crate::grid::Grid;
 
-/// The stiffness up to which docs/explanation/stability.md states what a tap gives, N/mm.
+/// Largest stiffness for which docs/explanation/stability.md states the energy of a tap, N/mm.
 const STIFFNESS: f32 = 1.5;
-/// Most that a tap may give there, mJ: nothing, to within a hundredth.
+/// Most energy of a tap there, mJ: zero to within a hundredth.
 const MAX_MJ: f64 = 0.01;
-/// The hand, mm/s; from so far above the surface to so far below it, mm.
+/// Speed of the hand, mm/s, and its height above and depth below the surface, mm.
 const SPEEDS: [f64; 3] = [100.0, 200.0, 500.0];
 const ABOVE: f64 = 30.0;
 const BELOW: f64 = 25.0;
 const TAPS: usize = 3;
-/// Between two taps the tip is higher above the surface than this, mm.
+/// Height of the tip between two taps above which they count as separate, mm.
 const APART: f64 = 10.0;
-/// The home pose over the surface, mm.
+/// Height of the home pose over the surface, mm.
 const HOME: f64 = 4.0;
-/// A tick, and from reading the encoders to the amplifiers, s.
+/// A tick, and the delay from the encoders to the amplifiers, s.
 const TICK_S: f64 = 1e-3;
 const LATE_S: f64 = 0.08e-3;
 
@@ -48,7 +48,7 @@ pub(super) fn measure(grid: &Grid) -> Result<Vec<Error>, NotMeasured> {
     Ok(rows)
 }
 
-/// A part of a tick: the surface's force, and how far the tip was above the surface and went.
+/// A part of a tick: the surface's force, and the height and motion of the tip.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     force_n: Vector,
@@ -56,7 +56,7 @@ struct Part {
     above_mm: f64,
 }
 
-/// The work of the force, from one moment high above the surface to the next, mJ.
+/// Returns the work of the force between moments high above the surface, mJ.
 fn given_mj(parts: &[Part]) -> Vec<f64> {
     let (mut taps, mut given) = (Vec::new(), 0.0);
     for part in parts {
@@ -69,7 +69,7 @@ fn given_mj(parts: &[Part]) -> Vec<f64> {
     taps
 }
 
-/// A hand that taps on the middle of a terrain.
+/// Taps with a hand on the middle of a terrain.
 fn tapped(
     grid: &Grid,
     params: SurfaceParams,
@@ -132,7 +132,7 @@ mod tests {
 
     use crate::tick_states::terrain;
 
-    /// A spring pushed in and out; coming out it pushes by so much more.
+    /// Returns a spring that is pushed in and out, with `more` additional stiffness on the way out.
     fn spring(more: f64) -> Vec<Part> {
         let height = |tick: i32| 12.0 * (f64::from(tick) * 0.01).cos();
         let part = |tick: i32| {
@@ -151,7 +151,7 @@ mod tests {
     fn a_surface_that_gives_is_seen() {
         let most = |more: f64| given_mj(&spring(more)).into_iter().fold(f64::MIN, f64::max);
         assert!(most(0.0).abs() < 0.005, "{}", most(0.0));
-        // 72 mJ go in; a five-thousandth more comes out.
+        // 72 mJ are stored; a two-thousandth more is returned.
         assert!(most(0.0005) > MAX_MJ, "{}", most(0.0005));
         assert!(most(-0.0005) < 0.0);
     }

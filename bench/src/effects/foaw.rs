@@ -1,5 +1,5 @@
-//! First-order adaptive windowing with the best-fit slope, in f64, as the paper states it: each
-//! length of the window is tried with all its readings (Janabi-Sharifi, Hayward and Chen 2000).
+//! First-order adaptive windowing with the best-fit slope, in f64, as in the paper (Janabi-Sharifi,
+//! Hayward and Chen 2000): each length of the window is tried with all its readings.
 
 /// Longest window: readings before the newest.
 const WINDOW: usize = 15;
@@ -8,8 +8,8 @@ const NOISE: f64 = 1.0;
 /// Tolerance of the bound for a slope, by rounding.
 const TIE: f64 = 1e-5;
 
-/// Returns the rates of change, counts a reading, by readings of which the last is the newest: with
-/// ties let in, and not.
+/// Returns the rates of change from readings, newest last, in counts a reading: with ties accepted,
+/// and with ties rejected.
 pub(super) fn slopes(readings: &[f64]) -> [f64; 2] {
     [TIE, -TIE].map(|tie| slope(readings, NOISE + tie))
 }
@@ -25,7 +25,7 @@ fn slope(readings: &[f64], noise: f64) -> f64 {
     tried.last().unwrap_or(0.0)
 }
 
-/// The slopes of straight lines through the newest reading that miss none by more than the noise.
+/// Returns the range of slopes through the newest reading that fit all readings within the noise.
 fn allowed(window: &[f64], noise: f64) -> (f64, f64) {
     let newest = window[window.len() - 1];
     let ago = window.iter().rev().enumerate().skip(1);
@@ -38,7 +38,7 @@ fn allowed(window: &[f64], noise: f64) -> (f64, f64) {
     })
 }
 
-/// The slope of the least-squares line.
+/// Returns the slope of the least-squares line.
 fn best_fit(window: &[f64]) -> f64 {
     let middle = 0.5 * (window.len() - 1) as f64;
     let mean = window.iter().sum::<f64>() / window.len() as f64;

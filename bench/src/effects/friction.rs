@@ -1,5 +1,5 @@
-//! Friction: the tangential over the normal force of a proxy that slides, and whether one that
-//! sticks stays.
+//! Friction: the ratio of tangential to normal force of a proxy that slides, and the drift of one
+//! that sticks.
 
 use super::effect::{Effect, FRICTION};
 use super::effect_tick::EffectTick;
@@ -11,19 +11,19 @@ use crate::grid::Grid;
 use crate::path::{self, Random};
 use crate::variant::Hip;
 
-/// Cells a tick, 10 mm/s at 1 kHz, and depth.
+/// Cells a tick (10 mm/s at 1 kHz), and depth.
 const STEP: f64 = 0.01;
 const DEPTH: f64 = 0.3;
-/// Error that docs/explanation/effects.md states for that speed, percent of the coefficient.
+/// Error for that speed in docs/explanation/effects.md, percent of the coefficient.
 const MAX_ABOVE: f64 = 3.1;
 const MAX_BELOW: f64 = 5.0;
-/// Places where the tip is held, and ticks at each.
+/// Points where the tip is held, and ticks at each.
 const PLACES: usize = 40;
 const HELD: usize = 200;
 /// Ticks after which a proxy that has slid sticks: more than 20 ms.
 const SETTLING: usize = 30;
-/// Depth, and amplitude of the HIP's tremor along each axis: within the cone of a static
-/// coefficient of 0.5, whose radius is 0.05 there.
+/// Depth, and amplitude of the HIP's tremor in each axis: within the cone of a static coefficient
+/// of 0.5, whose radius is 0.05 there.
 const HELD_DEPTH: f64 = 0.1;
 const TREMBLE: f64 = 0.025;
 
@@ -64,8 +64,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     rows.into_iter().flatten().collect()
 }
 
-/// Returns the difference of the tangential over the normal force from a coefficient, percent of
-/// that, in each tick in which the proxy slid within a patch.
+/// Returns the difference of the ratio of tangential to normal force from a coefficient, percent of
+/// it, in each tick in which the proxy slid within a patch.
 fn off_percent(grid: &Grid, mu: f64, rendered: &[EffectTick]) -> Vec<f64> {
     let slid = rendered.windows(2).filter(|pair| {
         let both = pair[0].whole && pair[1].whole;
@@ -81,7 +81,7 @@ fn off_percent(grid: &Grid, mu: f64, rendered: &[EffectTick]) -> Vec<f64> {
     off.collect()
 }
 
-/// The farthest that a proxy is from where it was first; none where it was not rendered.
+/// Returns the largest distance of a proxy from its first position; `None` if it was not rendered.
 fn drift(rendered: &[EffectTick]) -> Option<f64> {
     let first = rendered.first()?.proxy;
     let is_rendered = rendered.iter().all(|record| record.whole);
@@ -91,8 +91,8 @@ fn drift(rendered: &[EffectTick]) -> Option<f64> {
     is_rendered.then(|| far.fold(0.0, f64::max))
 }
 
-/// Down along the normal at places inside of patches, and a HIP that trembles there; and where
-/// each of these begins.
+/// Returns HIPs that descend along the normal at points inside patches and tremble there, and the
+/// start of each.
 fn held(grid: &Grid) -> (Vec<Hip>, Vec<usize>) {
     let mut random = Random(23);
     let sky = f64::from(grid.top()) + 2.0;
@@ -123,7 +123,7 @@ fn held(grid: &Grid) -> (Vec<Hip>, Vec<usize>) {
     (hips, from)
 }
 
-/// A place of the surface, and its normal.
+/// Returns a point of the surface, and its normal.
 fn on(grid: &Grid, [x, y]: [f64; 2]) -> (Vector, Vector) {
     const STEP: f64 = 1e-3;
     let slope = |east: f64, north: f64| {
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(drift(&[rendered, rendered, crept]), None);
     }
 
-    /// Ice slips where friction holds.
+    /// A proxy without friction slips where friction would hold.
     #[test]
     fn a_proxy_on_ice_drifts() {
         let grid = terrain();

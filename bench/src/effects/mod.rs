@@ -1,13 +1,13 @@
 //! Cost and error of each effect of a surface.
 //!
 //! - [`Effect`]: the compared effects;
-//! - `time`: the whole tick from encoder counts to currents, all effects in turns;
-//! - `friction`, `shading`, `texture`, `damping`, `energy`, `combined`: one oracle each, in f64,
-//!   by the formulas of docs/explanation/effects.md. No oracle calls what it checks;
-//! - `effect_tick`, `replay`, `arm`: the record of a tick, and its sources: points in lock-step, and
-//!   an armed arm.
+//! - `time`: the whole tick from encoder counts to currents, all effects in turn;
+//! - `friction`, `shading`, `texture`, `damping`, `energy`, `combined`: one oracle each, in f64, by
+//!   the formulas of docs/explanation/effects.md. No oracle calls the code that it checks;
+//! - `effect_tick`, `replay`, `arm`: the record of a tick, and its sources: points in lock-step,
+//!   and an armed arm.
 //!
-//! A cell is a millimetre in the hand here.
+//! Cells are a millimetre in the hand here.
 
 mod arm;
 mod combined;
@@ -32,26 +32,26 @@ pub use arm::NotMeasured;
 pub use effect::Effect;
 pub use row::{Error, Measured, Spread, Time};
 
-/// Cells along the side of the rendered part of a terrain: what a device's window holds, and more than
-/// the arm reaches.
+/// Cells along the side of the rendered part of a terrain: the size of a device's window, and more
+/// than the arm reaches.
 pub const SIDE: usize = 256;
-/// Fewest cells along the side of a terrain that has room for the paths.
+/// Fewest cells along the side of a terrain with room for the paths.
 pub const LEAST_SIDE: usize = 48;
 
-/// Times and errors on the middle of one terrain.
+/// Returns times and errors on the middle of one terrain.
 ///
 /// # Errors
-/// When the terrain is too small, or the arm cannot reach the surface.
+/// If the terrain is too small, or the arm cannot reach the surface.
 pub fn measure(grid: &Grid, effort: Effort) -> Result<Measured, NotMeasured> {
     let errors = errors(grid, effort)?;
     let times = time::measure(&grid.middle(SIDE), effort)?;
     Ok(Measured { times, errors })
 }
 
-/// Errors alone: the same figures in every run.
+/// Returns the errors alone: the same figures in every run.
 ///
 /// # Errors
-/// When the terrain is too small, or the arm cannot reach the surface.
+/// If the terrain is too small, or the arm cannot reach the surface.
 pub fn errors(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
     let size = [grid.columns, grid.rows];
     if size.iter().any(|side| *side < LEAST_SIDE) {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use hapterra_core::force::{Pattern, Texture};
 
-/// Returns the height of a relief of height 1 at a place, and its slopes eastward and northward a
+/// Returns the height of a relief of height 1 at a point, and its slopes eastward and northward a
 /// millimetre.
 pub(super) fn rise(texture: &Texture, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
     match texture.pattern {
@@ -39,7 +39,7 @@ fn grain(texture: &Texture, place: [f64; 2]) -> (f64, [f64; 2]) {
     (height, [east, north])
 }
 
-/// The height that is drawn for a corner: what makes two textures of the same numbers the same.
+/// Returns the random height of a corner: textures with the same numbers are equal.
 fn corner(seed: u32, column: i64, row: i64) -> f64 {
     let number = column * 0x9E37_79B1 + row * 0x85EB_CA77 + i64::from(scrambled(seed));
     f64::from(scrambled(number as u32) as i32) / 2_f64.powi(31)

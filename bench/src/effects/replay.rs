@@ -15,15 +15,15 @@ use crate::variant::Hip;
 
 /// Tiles along the side of the window.
 pub(super) const WINDOW: usize = SIDE / TILE_CELLS;
-/// Ticks that a point may take: more than any does whose tiles are here.
+/// Most ticks of a point: more than any needs whose tiles are stored.
 const MAX_TICKS: usize = 1000;
 
-/// Buffers for a loop's tiles.
+/// Allocates buffers for a loop's tiles.
 pub(super) fn tiles() -> Vec<Tile> {
     buffers::<WINDOW>()
 }
 
-/// A scene over the whole of a grid.
+/// Returns a scene over the whole of a grid.
 pub(super) fn scene(grid: &Grid, params: SurfaceParams, source: Source, home: GridPoint) -> Scene {
     Scene {
         epoch: 1,
@@ -40,10 +40,10 @@ pub(super) fn scene(grid: &Grid, params: SurfaceParams, source: Source, home: Gr
     }
 }
 
-/// A loop that holds all tiles of a scene.
+/// Creates a loop that stores all tiles of a scene.
 ///
 /// # Panics
-/// When there are fewer buffers than [`tiles`] makes, or the field is larger than the window.
+/// If there are fewer buffers than [`tiles`] allocates, or the field is larger than the window.
 pub(super) fn open<'t>(
     grid: &Grid,
     scene: Scene,
@@ -65,7 +65,7 @@ pub(super) fn open<'t>(
     haptics
 }
 
-/// The force at each point with surface parameters.
+/// Returns the force at each point with surface parameters.
 pub(super) fn render(grid: &Grid, params: SurfaceParams, hips: &[Hip]) -> Vec<EffectTick> {
     let mut tiles = tiles();
     let scene = scene(grid, params, Source::Points, GridPoint::default());

@@ -2,17 +2,17 @@
 
 use crate::stats::quantiles;
 
-/// All that was measured on one terrain.
+/// All measurements on one terrain.
 #[derive(Clone, Debug, Default)]
 pub struct Measured {
-    /// Each path and effect.
+    /// Times of each path and effect.
     pub times: Vec<Time>,
-    /// Each effect, by what it promises.
+    /// Errors of each effect, by its promises.
     pub errors: Vec<Error>,
 }
 
 impl Measured {
-    /// Takes the figures of another terrain.
+    /// Appends the figures of another terrain.
     pub fn append(&mut self, other: Self) {
         self.times.extend(other.times);
         self.errors.extend(other.errors);
@@ -30,7 +30,7 @@ pub struct Time {
     pub effect: &'static str,
     /// Nanoseconds a tick: lower quartile, median, upper quartile.
     pub ns: [f64; 3],
-    /// Median over the rounds of its time over that without an effect.
+    /// Median over the rounds of the ratio of its time to that without an effect.
     pub ratio: f64,
 }
 
@@ -45,22 +45,22 @@ pub struct Error {
     pub effect: &'static str,
     /// Its quantity.
     pub what: &'static str,
-    /// In what it is measured.
+    /// Its unit.
     pub unit: &'static str,
     /// The errors.
     pub spread: Spread,
-    /// Largest permitted error, where docs/explanation/effects.md promises one.
+    /// Largest permitted error, if docs/explanation/effects.md has one.
     pub bound: Option<f64>,
-    /// Number of judged errors.
+    /// Number of checked errors.
     pub judged: usize,
 }
 
-/// Distribution of errors; the larger, the worse.
+/// Distribution of errors; larger is worse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Half are below.
     pub median: f64,
-    /// 99 % are below.
+    /// 99th percentile.
     pub p99: f64,
     /// The largest.
     pub worst: f64,
@@ -76,12 +76,12 @@ impl Spread {
     }
 }
 
-/// The place that errors are of: terrain, path and effect.
+/// Origin of errors: terrain, path and effect.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a>(pub &'a str, pub &'static str, pub &'static str);
 
 impl Place<'_> {
-    /// A row of these errors; none where nothing could be judged.
+    /// Returns a row of these errors; `None` if nothing could be checked.
     pub(super) fn error(
         &self,
         (what, unit): (&'static str, &'static str),

@@ -1,4 +1,4 @@
-//! Shading: the direction of the force against that of the documented normal, and how far it turns
+//! Shading: the direction of the force compared with that of the documented normal, and its turn
 //! from one HIP to the next.
 
 use super::effect::Effect;
@@ -15,11 +15,11 @@ const STEP: f64 = 0.01;
 const DEPTH: f64 = 0.02;
 /// Tolerance of a direction by rounding, degrees: that of the stress test's oracle.
 const ROUNDING: f64 = 0.06;
-/// A shaded force turns by so much at most where an unshaded one turns by 60°, degrees.
+/// Largest turn of a shaded force where an unshaded one turns by 60°, degrees.
 const MAX_TURN: f64 = 6.0;
-/// That holds where the proxy goes no farther than this in a tick, cells.
+/// Largest motion of the proxy in a tick for which this holds, cells.
 const FARTHEST: f64 = 0.05;
-/// A force is turned by at most so much, degrees.
+/// Largest angle by which a force is turned, degrees.
 const TURNED: f64 = 60.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
@@ -56,8 +56,8 @@ fn off(grid: &Grid, rendered: &[EffectTick]) -> Vec<f64> {
     off.collect()
 }
 
-/// Degrees between forces that follow each other while the proxy continues evenly: shading does not
-/// move a proxy that leaves a ridge.
+/// Returns the angles between successive forces while the proxy moves evenly, degrees: shading does
+/// not move a proxy that leaves a ridge.
 fn turns(rendered: &[EffectTick]) -> Vec<f64> {
     let goes = |pair: &[EffectTick]| length(minus(pair[1].proxy, pair[0].proxy));
     let pairs = rendered.windows(2);
@@ -66,7 +66,7 @@ fn turns(rendered: &[EffectTick]) -> Vec<f64> {
     pairs.map(turn).collect()
 }
 
-/// A direction, turned toward another.
+/// Returns a direction, turned toward another.
 fn turned(from: Vector, to: Vector) -> Vector {
     if degrees(from, to) <= TURNED {
         return to;
@@ -76,8 +76,8 @@ fn turned(from: Vector, to: Vector) -> Vector {
     plus(from.map(|x| x * cos), cross(axis, from), sin)
 }
 
-/// The slopes eastward and northward that change evenly from patch to patch; none at the border of
-/// the field.
+/// Returns the slopes eastward and northward that change gradually from patch to patch; `None` at
+/// the border of the field.
 fn smoothed(grid: &Grid, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let (column, row) = (x.floor() as usize, y.floor() as usize);
     let is_inside = column > 0 && row > 0 && column + 2 <= grid.columns && row + 2 <= grid.rows;
@@ -95,7 +95,7 @@ fn smoothed(grid: &Grid, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     ])
 }
 
-/// The smoothed slope at a place s of the edge between the middle two of four samples.
+/// Returns the smoothed slope at a point s of the edge between the middle two of four samples.
 fn along(posts: [f64; 4], s: f64) -> f64 {
     let direction = |i: usize| {
         let rise = posts[i + 1] - posts[i];
@@ -113,7 +113,7 @@ fn along(posts: [f64; 4], s: f64) -> f64 {
     rise / run
 }
 
-/// The part of an edge along which the direction changes, by the cosine of the bend.
+/// Returns the fraction of an edge along which the direction changes, from the cosine of the bend.
 fn reach(bend: f64) -> f64 {
     let (gentle, sharp) = (45_f64.to_radians().cos(), 75_f64.to_radians().cos());
     let even = (bend - sharp) / (gentle - sharp);
@@ -139,7 +139,7 @@ mod tests {
             let [x, y, z] = rendered.force_n;
             rendered.force_n = [x * cos + z * sin, y, z * cos - x * sin];
         }
-        // About the axis of the turn a force does not move.
+        // A force along the axis of the turn does not change.
         let least = off(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
         assert!(worst(&wrong) > 0.9 && least > ROUNDING, "{least}");
         let plain = render(&grid, Effect::None.params(), &slide.hips);
@@ -171,10 +171,10 @@ mod tests {
 
     #[test]
     fn a_mean_at_a_sample_and_a_cliff_that_stays() {
-        // Directions of 0 and 45° are mixed at the sample to 22.5°.
+        // Directions of 0 and 45° are blended at the sample to 22.5°.
         let slope = along([0.0, 0.0, 1.0, 2.0], 0.0);
         assert!((slope - 22.5_f64.to_radians().tan()).abs() < 1e-12);
-        // A wall of 84°: a fifth from its foot the ground is level.
+        // A wall of 84°: a fifth of an edge from its foot, the ground is level.
         assert!(along([0.0, 0.0, 0.0, 10.0], 0.799).abs() < 1e-12);
         assert!(along([0.0, 0.0, 0.0, 10.0], 0.9) > 0.0);
         assert!(length(turned([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])) - 1.0 < 1e-12);

@@ -1,4 +1,4 @@
-//! Texture: the rendered height, and the force along the surface, against the documented formulas.
+//! Texture: the rendered height and the force along the surface, and the documented formulas.
 
 use std::f64::consts::TAU;
 
@@ -14,15 +14,15 @@ use crate::compare::Effort;
 use crate::grid::Grid;
 use crate::path;
 
-/// Cells a tick: rendered in full, and amid the fade; and a depth at which neither the height nor the
-/// slope is bounded by the depth.
+/// Cells a tick, rendered in full and half faded; then a depth at which neither the height nor the
+/// slope is limited by the depth.
 const STEPS: [(&str, f64); 2] = [("slide 0.05", 0.05), ("slide 0.18", 0.18)];
 const DEPTH: f64 = 0.3;
-/// Percent of the amplitude: the product's sine is off by 0.05, and places are rounded.
+/// Bound, percent of the amplitude: the product's sine is off by 0.05, and positions are rounded.
 const MAX_HIGH: f64 = 0.06;
-/// Percent of the steepest slope's force: that of the soak's judge.
+/// Bound, percent of the steepest slope's force, as in the stress test's oracle.
 const MAX_ALONG: f64 = 1.0;
-/// Part of an earlier, higher speed that a tick of a millisecond keeps.
+/// Share of an earlier, higher speed that remains after a tick of 1 ms.
 const KEEPS: f64 = 0.9;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
@@ -42,8 +42,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     errors
 }
 
-/// Returns the difference of the force from the formula, tick by tick: along the force without
-/// texture, percent of the amplitude, and across it, percent of what the steepest slope does.
+/// Returns the difference of the force from the formula in each tick: along the untextured force,
+/// percent of the amplitude, and across it, percent of the steepest slope's force.
 fn off_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]> {
     let texture = &params.texture;
     let (amplitude, stiffness) = (
@@ -51,7 +51,7 @@ fn off_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]>
         f64::from(params.stiffness_n_per_mm),
     );
     let mut fade = Fade::new(f64::from(texture.wavelength_mm));
-    // The proxy has a speed in the air, too.
+    // The proxy has a speed in the air as well.
     let shares = rendered
         .iter()
         .map(|record| (record, fade.share(record.proxy)));
@@ -70,12 +70,12 @@ fn off_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]>
     off.collect()
 }
 
-/// The depth from which on the force along the surface grows no more, mm.
+/// Returns the depth from which the force along the surface is constant, mm.
 fn deepest(texture: &Texture) -> f64 {
     f64::from(texture.wavelength_mm).powi(2) / (48.0 * f64::from(texture.amplitude_mm))
 }
 
-/// Returns the addition of a texture to the spring's stretch at a proxy, mm.
+/// Returns the addition of a texture to the spring's displacement at a proxy, mm.
 fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vector {
     let amplitude = f64::from(texture.amplitude_mm);
     let (height, [east, north]) = rise(texture, [proxy[0], proxy[1]]);
@@ -87,10 +87,10 @@ fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vecto
     plus(high, across, -share * depth.min(deepest(texture)))
 }
 
-/// Share of a texture that is rendered, by the proxy's way over the map.
+/// Rendered share of a texture, from the proxy's path over the map.
 struct Fade {
     wavelength: f64,
-    /// Wavelengths a tick.
+    /// Wavelengths a tick, decaying.
     speed: f64,
     before: Option<Vector>,
 }
@@ -105,7 +105,7 @@ impl Fade {
     }
 
     fn share(&mut self, proxy: Vector) -> f64 {
-        // What was nowhere before is as fast as what jumps.
+        // The first position counts as a jump.
         let now = self.before.map_or(1.0, |before| {
             let way = minus(proxy, before);
             (way[0].hypot(way[1]) / self.wavelength).min(1.0)
@@ -158,7 +158,7 @@ mod tests {
                 rendered.proxy[0] += 0.01;
             }
             assert!(worst(&params, &shifted)[0] > 10.0 * MAX_HIGH);
-            // Valleys where there should be ridges.
+            // Valleys in place of ridges.
             let mut inverse = rendered.clone();
             for rendered in &mut inverse {
                 rendered.force_n = minus(rendered.spring(), rendered.force_n);

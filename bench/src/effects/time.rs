@@ -1,4 +1,4 @@
-//! The whole tick, from encoder counts to currents, with each effect: all in turns, in one run.
+//! The whole tick, from encoder counts to currents, with each effect: all in turn, in one run.
 
 use std::hint::black_box;
 
@@ -27,7 +27,7 @@ fn along(arm: &Arm<'_>, way: &Way, effort: Effort) -> Result<Vec<Time>, NotMeasu
         round(&mut driven[index], way)
     });
     driven.iter().try_for_each(Driven::is_armed)?;
-    // The first is without any effect.
+    // The first has no effect.
     let rows = Effect::ALL.iter().zip(&times).map(|(effect, own)| {
         let (ns, ratio) = timing(own, &times[0]);
         Time {
@@ -41,7 +41,7 @@ fn along(arm: &Arm<'_>, way: &Way, effort: Effort) -> Result<Vec<Time>, NotMeasu
     Ok(rows.collect())
 }
 
-/// Nanoseconds a tick over the ground; the way down and the way up do not count.
+/// Returns nanoseconds a tick over the ground, without the approach and the departure.
 fn round(driven: &mut Driven<'_>, way: &Way) -> f64 {
     for place in &way.down {
         driven.tick(place);

@@ -26,17 +26,17 @@ pub(super) fn length(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Of length 1.
+/// Returns the vector scaled to length 1.
 pub(super) fn unit(a: Vector) -> Vector {
     a.map(|x| x / length(a))
 }
 
-/// Between two vectors, degrees.
+/// Returns the angle between two vectors, degrees.
 pub(super) fn degrees(a: Vector, b: Vector) -> f64 {
     length(cross(a, b)).atan2(dot(a, b)).to_degrees()
 }
 
-/// The upward normal of these slopes, of length 1.
+/// Returns the upward normal of these slopes, of length 1.
 pub(super) fn normal([east, north]: [f64; 2]) -> Vector {
     unit([-east, -north, 1.0])
 }

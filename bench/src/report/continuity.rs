@@ -1,12 +1,12 @@
-//! Changes of the force, as a table that Markdown takes.
+//! Changes of the force, as a table in Markdown.
 
 use std::fmt::Write as _;
 
 use crate::compare::Label;
 use crate::continuity::{DEPTH, Row, STEP};
 
-/// A line for each ground, a column for each variant: the largest change of the
-/// stretch in a tick, and what 99 % of the ticks stay below, in cells.
+/// Returns a line for each ground and a column for each variant: the largest change of the
+/// displacement in a tick, and its 99th percentile, in cells.
 #[must_use]
 pub fn continuity(rows: &[Row]) -> String {
     let (mut grounds, mut variants): (Vec<&str>, Vec<&Label>) = (vec![], vec![]);

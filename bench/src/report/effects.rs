@@ -6,8 +6,8 @@ use std::path::Path;
 use super::number;
 use crate::effects::{Error, Measured, Time};
 
-/// The columns of the CSV file. A row of a time is called "tick" and has no errors; a row of an error
-/// has no times.
+/// The columns of the CSV file. A row of a time has the quantity "tick" and no errors; a row of an
+/// error has no times.
 pub const EFFECTS_HEADER: [&str; 14] = [
     "terrain",
     "path",
@@ -25,7 +25,7 @@ pub const EFFECTS_HEADER: [&str; 14] = [
     "times_none",
 ];
 
-/// A block of times for each terrain and path, and one of errors for each terrain.
+/// Returns a block of times for each terrain and path, and one of errors for each terrain.
 #[must_use]
 pub fn effects(measured: &Measured) -> String {
     let mut text = String::new();
@@ -79,7 +79,7 @@ fn error(row: &Error) -> String {
     )
 }
 
-/// Two digits that count.
+/// Formats a value with two significant digits.
 fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
@@ -90,7 +90,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// Four digits that count: the others differ from one machine to the next.
+/// Formats a value with four significant digits: the others differ from one machine to the next.
 fn digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -106,7 +106,7 @@ fn digits(value: f64) -> String {
 /// Writes all rows: times, then errors.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_effects(path: &Path, measured: &Measured) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_path(path)?;
     writer.write_record(EFFECTS_HEADER)?;

@@ -26,12 +26,11 @@ pub const HEADER: [&str; 17] = [
     "extra_bytes_per_sample",
 ];
 
-/// Writes all rows; errors are empty where no force was rendered. The force's changes
-/// come last, as the path "force", their terrain being the ground; they are of
-/// no time.
+/// Writes all rows; errors are empty if no force was rendered. The changes of the force are last,
+/// with the path "force", the ground as their terrain, and no times.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_csv(path: &Path, rows: &[Row], changes: &[continuity::Row]) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_path(path)?;
     writer.write_record(HEADER)?;

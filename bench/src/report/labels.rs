@@ -1,9 +1,9 @@
-//! Names beside their marks, none over another or over a mark of its own kind.
+//! Names beside their marks, without overlap of names or of marks of the same kind.
 
 /// A rectangle of the drawing: left, top, right, bottom.
 pub(super) type Rect = [i32; 4];
 
-/// A mark that wants a name, and how large that is.
+/// A mark that needs a name, with the name's size.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Named {
     /// Middle of the mark.
@@ -20,8 +20,8 @@ impl Named {
         [x - r, y - r, x + r, y + r]
     }
 
-    /// Returns the possible places of the name: right of the mark, left of it, and beside it ever
-    /// farther down and up.
+    /// Returns the possible places of the name: right of the mark, left of it, and beside it
+    /// farther and farther down and up.
     fn places(&self, gap: i32) -> impl Iterator<Item = Rect> + use<> {
         let ((x, y), (width, height)) = (self.at, self.size);
         let aside = self.radius + gap;
@@ -34,8 +34,8 @@ impl Named {
     }
 }
 
-/// Left ends and tops of the names: inside `frame`, over no name and no mark, and
-/// over as few of the `dots` as nearby places allow.
+/// Returns the left ends and tops of the names: inside `frame`, over no name and no mark, and over
+/// as few of the `dots` as nearby places allow.
 pub(super) fn place(named: &[Named], dots: &[Rect], frame: Rect, gap: i32) -> Vec<(i32, i32)> {
     let marks: Vec<Rect> = named.iter().map(Named::mark).collect();
     let mut taken: Vec<Rect> = Vec::new();
@@ -53,7 +53,7 @@ pub(super) fn place(named: &[Named], dots: &[Rect], frame: Rect, gap: i32) -> Ve
             .collect();
         let hidden = |place: &&Rect| dots.iter().filter(|dot| overlap(place, dot)).count();
         let best = free.iter().min_by_key(hidden).copied();
-        // A frame with no room at all: over whatever is there.
+        // Without any room in the frame, the name overlaps.
         taken.push(best.or_else(|| own.places(gap).next()).unwrap_or_default());
     }
     taken.iter().map(|[left, top, ..]| (*left, *top)).collect()

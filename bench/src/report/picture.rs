@@ -1,4 +1,4 @@
-//! Run time against error, every variant a point.
+//! Run time against error, one point for each variant.
 
 use std::path::Path;
 
@@ -15,18 +15,18 @@ use super::labels::{self, Named, Rect};
 use crate::compare::{Family, Row};
 use crate::stats::quantiles;
 
-/// Errors below this are drawn here: nothing finer can be felt or distinguished.
+/// Smaller errors are drawn here: no finer error can be sensed or distinguished.
 const FLOOR: f64 = 1e-9;
-/// Radius of a variant's point, finished pixels.
+/// Radius of a variant's point, pixels of the output.
 const MARK_PX: i32 = 7;
-/// Radius of a terrain's point, finished pixels.
+/// Radius of a terrain's point, pixels of the output.
 const DOT_PX: i32 = 3;
 
-/// Draws one panel for each path on which something is rendered. Small points are
-/// terrains, the large one with the name their median.
+/// Draws one panel for each path on which a force is rendered. Small points are terrains, the large
+/// one with the name their median.
 ///
 /// # Errors
-/// When the picture cannot be laid out or written.
+/// If the layout fails or the file cannot be written.
 pub fn draw(rows: &[Row], file: &Path) -> Result<(), PictureError> {
     let panels = ["slide 0.01", "slide 0.5", "tapping", "random"];
     let mut canvas = Canvas::new(1900, 1300);
@@ -116,7 +116,7 @@ fn panel(area: &Area<'_>, path: &str, points: &[Points<'_>]) -> Result<(), Pictu
     names(&mut chart, points)
 }
 
-/// The names beside the large points.
+/// Returns the names beside the large points.
 fn names(
     chart: &mut Chart<'_, Logarithmic, Logarithmic>,
     points: &[Points<'_>],

@@ -46,7 +46,7 @@ pub const STREAMING_HEADER: [&str; 35] = [
 /// Writes all rows.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn write_streaming(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_path(path)?;
     for row in rows {
@@ -55,7 +55,7 @@ pub fn write_streaming(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
     Ok(writer.flush()?)
 }
 
-/// The head of the table: two lines.
+/// Returns the two heading lines of the table.
 #[must_use]
 pub fn streaming_head() -> String {
     let [slow, usual, fast] = SPEEDS;
@@ -88,7 +88,7 @@ pub fn streaming_head() -> String {
     )
 }
 
-/// Columns of the table, side by side.
+/// Joins the columns of a line.
 fn line(columns: [String; 18]) -> String {
     let [
         terrain,
@@ -117,7 +117,7 @@ fn line(columns: [String; 18]) -> String {
     )
 }
 
-/// A row as a line of the table.
+/// Returns a row as a line of the table.
 #[must_use]
 pub fn streaming(row: &Row) -> String {
     let sum = |a: Option<u64>, b: Option<u64>| Some(a? + b.unwrap_or(0));
@@ -148,7 +148,7 @@ pub fn streaming(row: &Row) -> String {
     ])
 }
 
-/// A figure with so many decimals; a dash where there is none.
+/// Formats a figure with this many decimals, or a dash if there is none.
 fn shown<T: Figure>(value: Option<T>, decimals: usize) -> String {
     value.map_or("–".to_owned(), |value| {
         format!("{:.decimals$}", value.number())
@@ -157,7 +157,7 @@ fn shown<T: Figure>(value: Option<T>, decimals: usize) -> String {
 
 /// A number of a row.
 trait Figure {
-    /// As a float, which holds every count of a row exactly.
+    /// Returns it as a float, which represents every count of a row exactly.
     fn number(self) -> f64;
 }
 
@@ -205,7 +205,7 @@ mod tests {
             line.contains("whole") && line.contains("– – – / – – –"),
             "{line}"
         );
-        // What stands above a column is as wide as the column.
+        // A heading is as wide as its column.
         let head = streaming_head();
         let bars = |line: &str| -> Vec<usize> {
             let at = line.chars().enumerate().filter(|(_, c)| *c == '|');

@@ -13,9 +13,9 @@ use plotters_backend::text_anchor::HPos;
 
 use crate::streaming::{RATES, Reading, Row, SPEEDS};
 
-/// Radius of a point, finished pixels.
+/// Radius of a point, pixels of the output.
 const DOT_PX: i32 = 5;
-/// Place of a zero in the drawing: logarithms have no zero.
+/// Position of a zero on the logarithmic axis.
 const FLOOR: f64 = 0.1;
 /// Samples along the axis.
 const SAMPLES: std::ops::Range<f64> = 5e5..2e10;
@@ -27,11 +27,11 @@ struct Panel {
     figure: fn(&Row) -> Option<f64>,
 }
 
-/// Draws a panel for each figure against the samples, and a line for each latency; what is read as
-/// a whole has a line of its own. All at the faster link.
+/// Draws a panel for each figure against the samples, and a line for each latency; files read as a
+/// whole have a line of their own. All figures are for the faster link.
 ///
 /// # Errors
-/// When the picture cannot be laid out or written.
+/// If the layout fails or the file cannot be written.
 pub fn draw_streaming(rows: &[Row], file: &Path) -> Result<(), PictureError> {
     let mut canvas = Canvas::new(1900, 1250);
     {
@@ -71,7 +71,7 @@ fn panels() -> [Panel; 6] {
     ]
 }
 
-/// The latencies that there are, each once.
+/// Returns the latencies of the rows, each once.
 fn latencies(rows: &[Row]) -> Vec<u32> {
     let mut all: Vec<u32> = rows.iter().map(|row| row.latency_ms).collect();
     all.sort_unstable();

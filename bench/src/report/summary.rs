@@ -1,4 +1,4 @@
-//! Summary of the figures: ours over the opponents, and the paper's own.
+//! Summary of the figures: the product relative to the other methods, and the paper's own figures.
 
 use std::fmt::Write as _;
 
@@ -6,11 +6,11 @@ use crate::compare::{PLAIN, Row};
 
 /// The product's default.
 const OURS: &str = "hapterra swept";
-/// The paper's Table 1: average haptic updates a second, and for the closest
-/// point or the collision alone, on a 2.4 GHz Pentium 4.
+/// The paper's Table 1: average haptic updates a second, and for the closest point or the collision
+/// alone, on a 2.4 GHz Pentium 4.
 const TABLE_1: [(&str, f64); 2] = [("average update", 968e3), ("closest point alone", 200e3)];
 
-/// Returns the speed-up over the opponents, terrain by terrain.
+/// Returns the speed-up over the other methods, terrain by terrain.
 #[must_use]
 pub fn summary(rows: &[Row]) -> String {
     let mut text = String::from("\nhow many times faster than the opponent is hapterra swept?\n");
@@ -75,7 +75,7 @@ pub fn summary(rows: &[Row]) -> String {
     text
 }
 
-/// Terrains in the order measured.
+/// Returns the terrains in the order of measurement.
 fn terrains(rows: &[Row]) -> impl Iterator<Item = &str> {
     let mut seen: Vec<&str> = Vec::new();
     for row in rows {

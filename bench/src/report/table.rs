@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::compare::Row;
 
-/// One block for each terrain and path, its variants in the order measured.
+/// Returns one block for each terrain and path, with its variants in the order of measurement.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::new();
@@ -65,7 +65,7 @@ fn degrees(angle: f64) -> String {
     }
 }
 
-/// Three digits or so.
+/// Formats a value with about three digits.
 pub(super) fn number(ns: f64) -> String {
     match ns {
         ns if ns < 10.0 => format!("{ns:.2}"),

@@ -6,25 +6,25 @@ use super::contact_loop::HOME;
 use hapterra::phantom::kinematics::jacobian;
 use hapterra::phantom::{ArmFrame, PhantomModel};
 
-/// Properties of the arm at the tip, up and down, in the home pose.
+/// Properties of the arm at the tip, vertically, in the home pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtTip {
     /// Viscous friction, N·s/m.
     pub damping_ns_per_m: f64,
     /// Coulomb friction, N.
     pub coulomb_n: f64,
-    /// The tip's displacement for one count of the encoder that moves it most, mm.
+    /// Displacement of the tip for one count of the encoder that moves it most, mm.
     pub count_mm: f64,
 }
 
 impl AtTip {
-    /// Of a model.
+    /// Computes them for a model.
     #[must_use]
     pub fn new(model: &PhantomModel) -> Self {
         let ArmFrame { home_mm } = HOME;
         let joints = HOME.joints_at(model, home_mm).unwrap_or_default();
         let up = jacobian(model, joints)[2];
-        // The joint that moves the tip up and down; the others hardly do in this pose.
+        // The joint that moves the tip vertically; the others hardly do in this pose.
         let most = (0..3).max_by(|a, b| up[*a].abs().total_cmp(&up[*b].abs()));
         let joint = most.unwrap_or_default();
         let lever_m = up[joint].abs();
@@ -37,15 +37,15 @@ impl AtTip {
         }
     }
 
-    /// Colgate and Schenkel 1997: a virtual wall is passive up to 2b/T, N/mm, where the arm's
-    /// own damping is all that there is.
+    /// Returns the bound of Colgate and Schenkel 1997, N/mm: a virtual wall is passive up to 2b/T
+    /// with only the arm's own damping.
     #[must_use]
     pub fn by_damping(&self, rate: TickRate) -> f64 {
         1e-3 * 2.0 * self.damping_ns_per_m * f64::from(rate.hz())
     }
 
-    /// Abbott and Okamura 2005: the friction takes up what an encoder's counts create up to
-    /// 2·fc/Δ, N/mm; with it the wall is passive up to the smaller of both bounds.
+    /// Returns the bound of Abbott and Okamura 2005, N/mm: friction dissipates the energy from an
+    /// encoder's counts up to 2·fc/Δ; with it the wall is passive up to the smaller of both bounds.
     #[must_use]
     pub fn by_friction(&self) -> f64 {
         2.0 * self.coulomb_n / self.count_mm

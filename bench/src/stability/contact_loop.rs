@@ -15,27 +15,27 @@ use hapterra_core::tick::{Board, Command, Haptics};
 use super::surface_work::SurfaceWork;
 use hapterra::phantom::{ArmFrame, Encoder, HeldPhantom, PhantomModel, kinematics};
 
-/// Tiles to a side of the loop's window, and cells of the plane, of 4 mm.
+/// Tiles along a side of the loop's window, and size of the plane's cells, mm.
 const WINDOW: usize = 4;
 const CELLS: i32 = 64;
 pub(super) const CELL_MM: f64 = 4.0;
-/// The plane's height, and the place of the arm's home pose: in its middle, close above it.
+/// The plane's height, and the position of the arm's home pose: in its middle, close above it.
 pub(super) const PLANE_MM: f64 = 20.0;
 pub(super) const HOME: ArmFrame = ArmFrame {
     home_mm: [128.0, 128.0, 24.0],
 };
-/// Largest force, N: that of every other scene.
+/// Largest force, N, as in every other scene.
 const MAX_N: f32 = SurfaceParams::PREMIUM.max_force_n;
 
 /// Record of one tick.
 pub(super) struct Step {
     /// Report of the tick.
     pub(super) sample: TickRecord,
-    /// Height of the tip by its encoders at the beginning of it, mm.
+    /// Height of the tip by its encoders at the start of the tick, mm.
     pub(super) read_up_mm: f64,
-    /// True place of the tip after it, east, north and up, mm.
+    /// True position of the tip after the tick, east, north and up, mm.
     pub(super) tip_mm: [f64; 3],
-    /// Energy from the surface to the arm meanwhile, mJ: the work of its part of the motors'
+    /// Energy from the surface to the arm in the tick, mJ: the work of its part of the motors'
     /// torques.
     pub(super) given_mj: f64,
 }
@@ -46,14 +46,14 @@ pub(super) struct LoopSettings {
     pub(super) stiffness_n_per_mm: f64,
     pub(super) damping: Damping,
     pub(super) texture: Texture,
-    /// From reading the encoders to the amplifiers, s.
+    /// Delay from the encoders to the amplifiers, s.
     pub(super) delay_s: f64,
-    /// When the clutch is held, and let go again, s after the script's beginning.
+    /// Times at which the clutch is held and released, s after the script's start.
     pub(super) clutch_s: Option<[f64; 2]>,
 }
 
-/// Runs an arm in an arming hand until its script ends, and shows every tick with the time since
-/// the script began, s. Ends early when `look` asks for it.
+/// Runs an arm in an arming hand until its script ends, and calls `look` for every tick with the
+/// time since the script's start, s. Ends early if `look` requests it.
 pub(super) fn run(
     settings: &LoopSettings,
     mut arm: HeldPhantom,
@@ -64,7 +64,7 @@ pub(super) fn run(
     let slots = std::array::from_fn(|_| {
         std::array::from_fn(|_| spare.pop().unwrap_or_else(|| unreachable!("a tile a slot")))
     });
-    // What the plant's amplifiers take comes on top.
+    // The amplifiers' lag in the plant is added to this.
     let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
     let board = Board {
         rate: settings.rate,
@@ -144,15 +144,15 @@ pub(super) fn run(
 #[derive(Clone, Copy, Default)]
 struct Sent {
     currents_a: [f64; 3],
-    /// The surface's part of it; the rest holds the arm's weight.
+    /// The surface's part of them; the rest holds the arm's weight.
     of_surface_a: [f64; 3],
 }
 
-/// The time that a board takes from its encoders to its amplifiers.
+/// The delay of a board from its encoders to its amplifiers.
 struct Wire {
-    /// On its way: what the motors have, then what comes later.
+    /// Commands in transit: the motors' present ones, then later ones.
     sent: VecDeque<Sent>,
-    /// For so much of a tick the motors still have what they had before, s.
+    /// Part of a tick during which the motors still have the previous commands, s.
     late_s: f64,
     tick_s: f64,
     work: SurfaceWork,
@@ -169,8 +169,8 @@ impl Wire {
         }
     }
 
-    /// Takes what a tick sends, and moves the arm for as long as it lasts; gives what the
-    /// surface gave to the arm meanwhile, mJ.
+    /// Sends a tick's commands, and moves the arm for the duration of the tick. Returns the energy
+    /// from the surface to the arm, mJ.
     fn carry(&mut self, sent: Sent, arm: &mut HeldPhantom) -> f64 {
         self.sent.push_back(sent);
         let before = self.sent.pop_front().unwrap_or(sent);
@@ -214,14 +214,14 @@ fn fill(tile: &mut Tile, key: TileKey, size: FieldSize) {
     let _ = tile.fill_from(key, 0, size, |_, _| (PLANE_MM / CELL_MM) as f32);
 }
 
-/// Height of the tip by its encoders, mm.
+/// Returns the height of the tip by its encoders, mm.
 fn read_up_mm(arm: &HeldPhantom, counts: [i32; 3]) -> f64 {
     let model = arm.plant().model();
     let q = std::array::from_fn(|axis| Encoder::new(&model.drive[axis]).angle_rad(counts[axis]));
     HOME.to_terrain_mm(model, kinematics::tip(model, q))[2]
 }
 
-/// True place of the tip, mm, its height over the terrain's datum.
+/// Returns the true position of the tip, mm, its height over the terrain's datum.
 fn tip_mm(arm: &HeldPhantom) -> [f64; 3] {
     let plant = arm.plant();
     HOME.to_terrain_mm(plant.model(), plant.tip_m())

@@ -1,12 +1,12 @@
-//! A press while force comes in: in the ramp after arming, and while the clutch closes.
+//! A press while the force ramps up: in the ramp after arming, and while the clutch closes.
 //!
-//! The hand presses with 1 N from the first moment with force on, for ten seconds after it is in.
-//! Two figures judge it, both of the true tip and the true torques:
+//! The hand presses with 1 N from the first moment with force, until ten seconds after the end of
+//! the ramp. Two figures rate the press, both from the true tip and the true torques:
 //!
-//! - the *swing*: how far the tip goes back in while the surface becomes stiffer, which pushes it
-//!   out, and how far it moves from then on;
-//! - the *energy given*: the work of the surface, more than a spring does that becomes stiffer
-//!   by the same share.
+//! - the *swing*: the return of the tip into the surface while the rising stiffness pushes it out,
+//!   and its motion from then on;
+//! - the *energy given*: the work of the surface, less that of a spring whose stiffness rises
+//!   equally.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Limits, WORKING_SHARE};
@@ -19,21 +19,21 @@ use hapterra::phantom::{HeldPhantom, OutOfReach, Script};
 const PRESS_N: f64 = 1.0;
 /// Speed at which the hand begins to press, mm/s.
 const BEGIN_MM_S: f64 = 60.0;
-/// The tip begins so far above the surface, mm.
+/// Height of the tip above the surface at the start, mm.
 const ABOVE_MM: f64 = 0.2;
-/// Time that force takes to come in: in the ramp, and while the clutch closes, s.
+/// Duration of the ramp, and of the clutch's closing, s.
 const RAMP_S: f64 = 2.0;
 const CLOSING_S: f64 = 0.5;
-/// Time for which is looked at after that, s.
+/// Time of observation after that, s.
 const AFTER_S: f64 = 10.0;
-/// Swings are looked for from so long after the hand has begun to press with all of it on, s.
+/// Swings count from this time after the hand has started to press with full force, s.
 const SETTLES_S: f64 = 0.25;
 /// The guard's clamp, N.
 const CLAMP_N: f64 = (WORKING_SHARE * SurfaceParams::PREMIUM.max_force_n) as f64;
-/// And in so long a time each, s.
+/// Window of a swing, s.
 const WINDOW_S: f64 = 0.25;
 
-/// Which way force comes in.
+/// Kind of ramp of the force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
     /// The ramp after arming.
@@ -47,17 +47,17 @@ pub enum Entry {
 pub struct Entered {
     /// The largest swing from half of the force on, mm.
     pub swing_mm: f64,
-    /// The most energy that had been given at any moment, mJ.
+    /// The most energy given at any moment, mJ.
     pub given_mj: f64,
 }
 
 impl Entered {
-    /// Most that the tip may swing, mm, and most energy that may be given, mJ.
+    /// Largest permitted swing, mm, and energy given, mJ.
     pub const MAX_SWING_MM: f64 = 0.3;
     /// See [`Self::MAX_SWING_MM`].
     pub const MAX_GIVEN_MJ: f64 = 0.05;
 
-    /// Returns true if force came in well.
+    /// Returns true if both are within the limits.
     #[must_use]
     pub fn is_good(&self) -> bool {
         self.swing_mm <= Self::MAX_SWING_MM && self.given_mj <= Self::MAX_GIVEN_MJ
@@ -65,11 +65,11 @@ impl Entered {
 }
 
 impl Setting {
-    /// A press from the first moment on in which force comes in; none where the guard switched the
-    /// force off.
+    /// Presses from the first moment of the ramp on. Returns `None` if the guard switched the force
+    /// off.
     ///
     /// # Errors
-    /// [`OutOfReach`] where the hand would have to leave the arm's reach.
+    /// [`OutOfReach`] if the hand would have to leave the arm's reach.
     pub fn enters(self, entry: Entry) -> Result<Option<Entered>, OutOfReach> {
         let [east, north, _] = HOME.home_mm;
         let wall_mm = PRESS_N / self.stiffness_n_per_mm;
@@ -103,21 +103,21 @@ impl Setting {
     }
 }
 
-/// Watches a press.
+/// Observes a press.
 struct Judge {
     entry: Entry,
     stiffness_n_per_mm: f64,
     tick_s: f64,
-    /// Ticks since force began to come in, less those by which it acts late.
+    /// Ticks since the ramp began, less the delay of the force.
     ticks: f64,
-    /// Share of the force, and where the surface is, mm.
+    /// Share of the force, and height of the surface, mm.
     share: f64,
     plane_mm: f64,
     has_begun: bool,
     /// Energy given, mJ.
     excess_mj: f64,
     stored_mj: Option<f64>,
-    /// The hand has pressed for a while, s.
+    /// Time from which swings count, s.
     rests_s: f64,
     block: Block,
     seen: Entered,
@@ -151,7 +151,7 @@ impl Judge {
         }
         let depth_mm = (self.plane_mm - step.tip_mm[2]).max(0.0);
         let stretched_n = self.stiffness_n_per_mm * depth_mm;
-        // The guard clamps after the clutch's share, and before that of the ramp.
+        // The guard clamps after the clutch's share, but before the ramp's.
         let most_n = match self.entry {
             Entry::Ramp => CLAMP_N,
             Entry::Clutch => {
@@ -159,9 +159,9 @@ impl Judge {
             }
         };
         let spring_n = stretched_n.min(most_n);
-        // Beyond the clamp the force stays as it is.
+        // Beyond the clamp the force is constant.
         let stored_mj = spring_n * (stretched_n - 0.5 * spring_n) / self.stiffness_n_per_mm;
-        // What a stiffer spring holds more at the same depth is meant to be given.
+        // The additional energy of a stiffer spring at the same depth is intended.
         let more_mj = self.stored_mj.map_or(0.0, |before| stored_mj - before);
         self.stored_mj = Some(stored_mj);
         self.excess_mj += step.given_mj + self.share * more_mj;
@@ -175,7 +175,7 @@ impl Judge {
         }
     }
 
-    /// Moves share and surface on.
+    /// Updates the share and the surface.
     fn follow(&mut self, step: &Step) {
         let sample = &step.sample;
         let over_s = match self.entry {
@@ -188,7 +188,7 @@ impl Judge {
             }
             Entry::Clutch => {
                 if sample.limits.contains(Limits::CLUTCH_OPEN) {
-                    // The surface goes with the tip.
+                    // The surface moves with the tip.
                     let hip_mm = f64::from(sample.hip.cell()[2]) + f64::from(sample.hip.frac().z);
                     self.plane_mm = PLANE_MM + step.read_up_mm - CELL_MM * hip_mm;
                     self.has_begun = true;
@@ -204,12 +204,12 @@ impl Judge {
     }
 }
 
-/// The places of the tip in a quarter of a second.
+/// The range of the tip in a quarter of a second.
 struct Block {
     ticks: u32,
     low_mm: [f64; 3],
     high_mm: [f64; 3],
-    /// Depth of its return.
+    /// Largest downward motion after a high point.
     fell_mm: f64,
 }
 
@@ -221,8 +221,8 @@ impl Block {
         fell_mm: 0.0,
     };
 
-    /// Takes a place; the swing so far, which for a surface that becomes stiffer is no motion
-    /// outwards.
+    /// Adds a position. Returns the swing up to now; with a rising stiffness, outward motion does
+    /// not count.
     fn swing_mm(&mut self, tip_mm: [f64; 3], becomes_stiffer: bool) -> f64 {
         self.ticks += 1;
         let bounds = self.low_mm.iter_mut().zip(&mut self.high_mm);

@@ -4,12 +4,12 @@ use hapterra::phantom::HandModel;
 
 /// A grasp, from the loosest to the tightest.
 ///
-/// Identification studies give 10 to 1,000 N/m and 0.5 to 5 N·s/m towards the target for
-/// fingers on a stylus, wrists more; light and firm are a stated choice at the ends of that,
-/// and normal is [`HandModel::default`].
+/// Identification studies give 10 to 1,000 N/m and 0.5 to 5 N·s/m towards the target for fingers on
+/// a stylus, wrists more; light and firm are a stated choice at the ends of this range, and normal
+/// is [`HandModel::default`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grasp {
-    /// Two fingertips that hardly hold: the first to be unstable.
+    /// Two fingertips with little hold: the first grasp to be unstable.
     Light,
     /// A relaxed precision grip.
     Normal,
@@ -18,10 +18,10 @@ pub enum Grasp {
 }
 
 impl Grasp {
-    /// All, from the loosest to the tightest.
+    /// All grasps, from the loosest to the tightest.
     pub const ALL: [Self; 3] = [Self::Light, Self::Normal, Self::Firm];
 
-    /// Its name, in tables.
+    /// Returns its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

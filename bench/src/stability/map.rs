@@ -1,4 +1,4 @@
-//! Many trials, and the table of them.
+//! Many trials, and their table.
 
 use std::io::{self, Write};
 use std::sync::Mutex;
@@ -14,14 +14,14 @@ use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{Press, Setting, Trial, Verdict};
 use hapterra::phantom::{OutOfReach, PhantomModel};
 
-/// A rate, a damping, and the friction of the arm as a part of the model's.
+/// A rate, a damping, and the arm's friction as a fraction of the model's.
 pub type Column = (TickRate, Damping, f64);
 
 /// Trials of every stiffness in every grasp with every damping at every rate.
 pub struct Map {
     /// The arm at its tip.
     pub at_tip: AtTip,
-    /// By rate, damping, grasp and stiffness, in the order in which they were asked for.
+    /// By rate, damping, grasp and stiffness, in the requested order.
     pub trials: Vec<Trial>,
 }
 
@@ -36,14 +36,14 @@ pub struct Plan {
     pub dampings: Vec<Damping>,
     /// Micro-relief of the surface.
     pub texture: Texture,
-    /// From reading the encoders to the amplifiers, s.
+    /// Delay from the encoders to the amplifiers, s.
     pub delay_s: f64,
-    /// Friction of the arm's joints, as parts of the model's.
+    /// Friction of the arm's joints, as fractions of the model's.
     pub arm_frictions: Vec<f64>,
 }
 
 impl Plan {
-    /// All that is tried.
+    /// Returns the settings of all trials.
     fn settings(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
         for (rate, damping, arm_friction) in self.columns() {
@@ -62,7 +62,7 @@ impl Plan {
         settings
     }
 
-    /// Every rate with every damping and every friction of the arm.
+    /// Returns every rate with every damping and every friction of the arm.
     fn columns(&self) -> impl Iterator<Item = Column> {
         let dampings = |rate| self.dampings.iter().map(move |damping| (rate, *damping));
         let columns = self.rates.iter().flat_map(move |rate| dampings(*rate));
@@ -72,11 +72,11 @@ impl Plan {
         })
     }
 
-    /// Tries all of it on all processors. `on_trial` hears of every one that is done, of how
-    /// many, and says whether to continue; none where it did not.
+    /// Runs all trials on all processors. `on_trial` receives the total number after each, and
+    /// returns true to continue. Returns `None` if it stopped.
     ///
     /// # Errors
-    /// [`OutOfReach`] as a trial.
+    /// [`OutOfReach`] from a trial.
     pub fn map(
         &self,
         on_trial: &(dyn Fn(usize) -> bool + Sync),
@@ -121,7 +121,7 @@ impl Plan {
 }
 
 impl Map {
-    /// Trials of one rate, damping, friction of the arm and grasp, by stiffness.
+    /// Returns the trials of one rate, damping, friction of the arm and grasp, by stiffness.
     pub fn of(&self, column: Column, grasp: Grasp) -> impl Iterator<Item = &Trial> {
         let trials = self.trials.iter();
         trials.filter(move |Trial { setting, .. }| {
@@ -129,7 +129,7 @@ impl Map {
         })
     }
 
-    /// Rates that were tried, each with every damping and every friction of the arm.
+    /// Returns the rates of the trials, each with every damping and every friction of the arm.
     #[must_use]
     pub fn columns(&self) -> Vec<Column> {
         let settings = self.trials.iter().map(|trial| trial.setting);
@@ -138,7 +138,7 @@ impl Map {
         columns
     }
 
-    /// Rates that were tried.
+    /// Returns the rates of the trials.
     #[must_use]
     pub fn rates(&self) -> Vec<TickRate> {
         let mut rates: Vec<_> = self.columns().iter().map(|(rate, ..)| *rate).collect();
@@ -146,8 +146,8 @@ impl Map {
         rates
     }
 
-    /// Highest stiffness up to which every press was as good as this, N/mm; none where the
-    /// lowest was not.
+    /// Returns the highest stiffness up to which every press was at least this good, N/mm; `None`
+    /// if the lowest was worse.
     #[must_use]
     pub fn up_to(&self, column: Column, grasp: Grasp, verdict: Verdict) -> Option<f64> {
         let count_mm = self.at_tip.count_mm;
@@ -156,7 +156,7 @@ impl Map {
         })
     }
 
-    /// Highest stiffness up to which force came in well on every way, N/mm.
+    /// Returns the highest stiffness up to which every ramp of the force was good, N/mm.
     #[must_use]
     pub fn enters_up_to(&self, column: Column, grasp: Grasp) -> Option<f64> {
         let is_good = |entered: &Option<Entered>| entered.is_some_and(|entered| entered.is_good());
@@ -176,10 +176,10 @@ impl Map {
         last.map(|trial| trial.setting.stiffness_n_per_mm)
     }
 
-    /// Rows as text, with a header.
+    /// Writes the rows as text, with a header.
     ///
     /// # Errors
-    /// Of the writer.
+    /// The error of the writer.
     pub fn write_csv(&self, to: &mut dyn Write) -> io::Result<()> {
         let taps = TAP_SPEEDS_M_S.map(|speed| {
             format!(
@@ -239,7 +239,7 @@ impl Map {
         Ok(())
     }
 
-    /// The limits as a table for a terminal.
+    /// Returns the limits as a table for a terminal.
     #[must_use]
     pub fn summary(&self) -> String {
         let AtTip { count_mm, .. } = self.at_tip;
@@ -273,7 +273,7 @@ impl Map {
     }
 }
 
-/// Returns true if the passivity controller acts.
+/// Returns true if the passivity controller is on.
 const fn is_controlled(damping: Damping) -> bool {
     matches!(damping.controller, Controller::On)
 }

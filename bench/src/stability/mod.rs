@@ -1,19 +1,18 @@
-//! Largest stable stiffness of a surface: the tick of the boards in a
-//! closed loop with a virtual Premium 1.5 and a person's hand, over stiffness, tick rate and
-//! grasp.
+//! Largest stable stiffness of a surface: the tick of the boards in a closed loop with a virtual
+//! Premium 1.5 and a person's hand, over stiffness, tick rate and grasp.
 //!
 //! - [`grasp`]: how the hand holds the tip;
 //! - `contact_loop`: the tick and the arm, step by step;
 //! - `surface_work`: the energy that the surface gives;
 //! - [`tap`]: taps at a stated speed;
 //! - [`trial`]: results of a press and of taps: limit cycle, and energy from the surface;
-//! - [`entry`]: presses while force comes in;
-//! - [`bounds`]: stiffness that theory says is passive;
-//! - [`map`]: many trials, and the table of them;
+//! - [`entry`]: presses while the force ramps up;
+//! - [`bounds`]: stiffness that is passive in theory;
+//! - [`map`]: many trials, and their table;
 //! - [`picture`]: the table as a picture.
 //!
-//! Friction of the surface is left out: it reduces limit cycles. `hapterra run` warns by the
-//! results of the trials: [`hapterra::stability`].
+//! Friction of the surface is left out: it reduces limit cycles. The warnings of `hapterra run` use
+//! the results: [`hapterra::stability`].
 
 pub mod bounds;
 mod contact_loop;

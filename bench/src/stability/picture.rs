@@ -1,5 +1,5 @@
-//! The table as a picture: what the surface gives in a tap, by stiffness, a chart a rate; and
-//! how the press was.
+//! The table as a picture: the energy from the surface in a tap by stiffness, one chart for each
+//! rate, and the result of the press.
 
 use plotters::coord::combinators::IntoLogRange;
 use plotters::drawing::IntoDrawingArea;
@@ -19,18 +19,18 @@ const WIDTH_PX: i32 = 1600;
 const HEADER_PX: i32 = 110;
 const CHART_PX: i32 = 420;
 const MARGIN_PX: i32 = 30;
-/// Range of energy in the drawing, mJ: what is smaller or larger lies on the edge.
+/// Range of energy in the drawing, mJ: values outside lie on the edge.
 const GIVEN_MJ: std::ops::Range<f64> = 0.01..100.0;
-/// The speed of the taps that are drawn: the place in [`TAP_SPEEDS_M_S`].
+/// Speed of the taps in the drawing, as an index into [`TAP_SPEEDS_M_S`].
 const DRAWN: usize = 1;
 const COLOURS: [RGBColor; 3] = [SERIES[1], SERIES[0], SERIES[2]];
 
-/// Draws it.
+/// Draws the table.
 ///
 /// # Errors
-/// As `plotters`.
+/// Any error of `plotters`.
 pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
-    // A row a rate, a column a damping; of a single damping, the rates in two columns.
+    // A row for each rate, a column for each damping; with one damping, the rates in two columns.
     let columns = map.columns();
     let across = match columns.len() / map.rates().len() {
         1 => 2,
@@ -130,7 +130,7 @@ fn chart(
     Ok(())
 }
 
-/// A trial in the chart; where the guard switched the force off, at the top.
+/// Returns the position of a trial in the chart: at the top if the guard switched the force off.
 fn place(trial: &Trial) -> (f64, f64) {
     let given_mj = trial.taps[DRAWN].map_or(GIVEN_MJ.end, |taps| taps.given_mj);
     let given_mj = given_mj.clamp(GIVEN_MJ.start, GIVEN_MJ.end);

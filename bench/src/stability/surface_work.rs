@@ -1,27 +1,27 @@
-//! The energy that a surface gives to the arm: the work of what the motors really make.
+//! The energy from a surface to the arm: the work of the motors' real torques.
 
 use hapterra::phantom::{Amplifier, HeldPhantom, MAX_SUBSTEP_S, PhantomModel};
 
-/// The surface's part of the motors' torques. It follows its part of the commands with the
-/// lag of the amplifiers' current loops, as the whole does.
+/// The surface's part of the motors' torques. It follows its part of the commands with the lag of
+/// the amplifiers' current loops, as the total does.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceWork {
     of_surface: [Amplifier; 3],
 }
 
 impl SurfaceWork {
-    /// On an arm without currents.
+    /// Creates it for an arm without currents.
     pub(super) fn new(model: &PhantomModel) -> Self {
         Self {
             of_surface: model.drive.map(Amplifier::new),
         }
     }
 
-    /// Moves the arm for a time with these commands, of which the surface's part is
-    /// `of_surface_a`; gives the work of that part, mJ.
+    /// Moves the arm for a time with these commands, of which the surface's part is `of_surface_a`.
+    /// Returns the work of that part, mJ.
     ///
-    /// The steps are those of the plant's own integration, with the torque in the middle of
-    /// each: so the sum is as exact as the motion.
+    /// The steps are those of the plant's own integration, with the torque in the middle of each,
+    /// so the sum is as exact as the motion.
     pub(super) fn step(
         &mut self,
         currents_a: [f64; 3],
@@ -75,7 +75,7 @@ mod tests {
         let script = Script::start(home_mm).wait(1.0);
         let mut arm = HeldPhantom::new(model, hand, HOME, script).expect("in reach");
         let mut work = SurfaceWork::new(&model);
-        // Of all three currents, changed before the current loops have settled.
+        // For all three currents, changed before the current loops have settled.
         let mut given_mj = 0.0;
         for tick in 0..40 {
             let current_a = if tick % 2 == 0 { 1.0 } else { -0.2 };
@@ -92,7 +92,7 @@ mod tests {
             (given_mj / moves_mj - 1.0).abs() < 1e-3,
             "{given_mj} and {moves_mj} mJ"
         );
-        // Only what is the surface's counts.
+        // Only the surface's part counts.
         let mut other = HeldPhantom::new(model, hand, HOME, Script::start(home_mm).wait(1.0));
         let other = other.as_mut().expect("in reach");
         let none = SurfaceWork::new(&model).step([1.0; 3], [0.0; 3], 5e-3, other);

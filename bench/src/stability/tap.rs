@@ -1,21 +1,20 @@
-//! Taps: from rest high above the surface down to it, at a stated speed where the tip touches
-//! it, and back.
+//! Taps: from rest high above the surface down to it, with a stated speed at contact, and back.
 
 use super::contact_loop::{HOME, PLANE_MM};
 use super::grasp::Grasp;
 use super::trial::Setting;
 use hapterra::phantom::{OutOfReach, Script};
 
-/// Speeds of the tip where it touches the surface, m/s.
+/// Speeds of the tip at contact, m/s.
 pub const TAP_SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.5];
 
-/// A tap begins so far above the surface, mm: a way to speed up on.
+/// Height above the surface at the start of a tap, mm: room to accelerate.
 const ABOVE_MM: f64 = 80.0;
-/// And aims so far below it, mm.
+/// Depth of the tap's target below the surface, mm.
 const BELOW_MM: f64 = 25.0;
-/// Between two taps the tip is higher above it than this, mm.
+/// Height of the tip between two taps above which they count as separate, mm.
 const APART_MM: f64 = 10.0;
-/// And the hand rests so long up there, s.
+/// Rest of the hand between two taps, s.
 const REST_S: f64 = 1.0;
 /// Taps of each speed.
 const TAPS: usize = 3;
@@ -23,21 +22,20 @@ const TAPS: usize = 3;
 /// Outcome of a few taps of one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Taps {
-    /// Largest energy that the surface gave to the arm in one tap, mJ. A passive surface gives
-    /// nothing.
+    /// Most energy from the surface to the arm in one tap, mJ; zero for a passive surface.
     pub given_mj: f64,
-    /// Slowest and fastest that the tip was when a tap first touched the surface, m/s.
+    /// Slowest and fastest speed of the tip at the first contact of a tap, m/s.
     pub touched_m_s: [f64; 2],
 }
 
 impl Grasp {
-    /// Returns the speed of a hand's target at which its tip touches the surface at a speed, one of
-    /// [`TAP_SPEEDS_M_S`].
+    /// Returns the speed of a hand's target at which its tip reaches the surface with a speed, one
+    /// of [`TAP_SPEEDS_M_S`].
     ///
-    /// A normal or firm hand moves as it aims, but for the last of the three: it slows down
-    /// already, since it comes to rest 25 mm below the surface. A light grasp swings on the way, at
-    /// 2 Hz, and is slower or faster than it aims. Found by trials; the tests see that the speed
-    /// is met.
+    /// A normal or firm hand moves at its target's speed, except at the last of the three: it
+    /// already slows down, since it stops 25 mm below the surface. A light grasp swings at 2 Hz
+    /// during the motion, and is slower or faster than its target. Found by trials; the tests check
+    /// that the speed is met.
     fn aim_m_s(self, speed_m_s: f64) -> f64 {
         let factors = match self {
             Self::Light => [1.095, 1.172, 0.664],
@@ -51,7 +49,7 @@ impl Grasp {
 }
 
 impl Setting {
-    /// Taps at a speed; none where the guard switches the force off.
+    /// Runs taps at a speed. Returns `None` if the guard switches the force off.
     pub(super) fn taps(self, speed_m_s: f64) -> Result<Option<Taps>, OutOfReach> {
         let [east, north, _] = HOME.home_mm;
         let (above, below) = (PLANE_MM + ABOVE_MM, PLANE_MM - BELOW_MM);
@@ -78,7 +76,7 @@ impl Setting {
                 touched_m_s[1] = speed_m_s.max(touched_m_s[1]);
                 is_apart = false;
             }
-            // Whatever is still on its way to the motors belongs to the tap.
+            // Commands in transit to the motors still belong to the tap.
             if !is_apart && up_mm > PLANE_MM + APART_MM {
                 most_mj = given_mj.max(most_mj);
                 given_mj = 0.0;

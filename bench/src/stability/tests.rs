@@ -1,4 +1,4 @@
-//! Theory of a sampled spring, beside the trials.
+//! Theory of a sampled spring, compared with the trials.
 
 use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
@@ -21,7 +21,7 @@ const UNDAMPED: Damping = Damping {
     controller: Controller::Off,
 };
 
-/// From the encoders to the amplifiers, at the latencies that were tried, s.
+/// Delay from the encoders to the amplifiers, at the latencies of the trials, s.
 const SHORT_S: f64 = 1e-6 * (SHORT_US - CURRENT_LOOP_US) as f64;
 const LONG_S: f64 = 1e-6 * (LONG_US - CURRENT_LOOP_US) as f64;
 
@@ -110,7 +110,7 @@ fn stiff_surface_is_unstable_in_light_grasp_until_rate_rises() {
     for grasp in Grasp::ALL {
         let soft = tried(1000, 0.5, grasp);
         assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
-        // It was touched: an arm that is not armed is still, too.
+        // A check for contact: an arm that is not armed is still as well.
         let is_rendered =
             { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.given_mj > 0.0));
         assert!(is_rendered, "{soft:?}");
@@ -131,7 +131,7 @@ const LAG_S: f64 = 0.238e-3 / 2.18;
 #[test]
 fn a_tap_touches_the_surface_at_the_speed_that_it_is_called_by() {
     for grasp in Grasp::ALL {
-        // A light grasp is held back by the arm's friction at rest, now more and now less.
+        // The arm's friction at rest holds a light grasp back by a varying amount.
         let off = match grasp {
             Grasp::Light => 0.05,
             Grasp::Normal | Grasp::Firm => 0.015,
@@ -154,9 +154,9 @@ fn a_tap_touches_the_surface_at_the_speed_that_it_is_called_by() {
 
 #[test]
 fn what_a_tap_gives_is_what_the_age_of_the_force_says() {
-    // The force of a tick is half a tick old on average, and as much older as it gets to the
-    // amplifiers late and the current loops lag. In proportion to that it is too little on the
-    // way in and too much on the way out.
+    // The force of a tick is half a tick old on average, plus the delay to the amplifiers and the
+    // lag of the current loops. In proportion to this age it is too small on the way in and too
+    // large on the way out.
     let given = |hz: u32, delay_s| {
         let age_s = 0.5 / f64::from(hz) + delay_s + LAG_S;
         let given_mj = tapped(set(hz, 1.0, Grasp::Normal, delay_s, UNDAMPED), 0.2).given_mj;
@@ -179,7 +179,7 @@ fn what_a_tap_gives_is_what_the_age_of_the_force_says() {
 
 #[test]
 fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
-    // The last two of these lines ask for more than 1,000 N/s.
+    // The last two of these lines would need more than 1,000 N/s.
     for (hz, stiffness, delay_s, speeds) in [
         (1000, 0.5, 80e-6, &TAP_SPEEDS_M_S[..]),
         (4000, 1.0, 80e-6, &TAP_SPEEDS_M_S[..]),
@@ -206,7 +206,7 @@ fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
 
 #[test]
 fn warning_before_a_surface_agrees_with_the_trials() {
-    // The next stiffness of the command's own list is held still no more.
+    // At the next stiffness in the command's own list it is no longer still.
     let next = |still: f32| match still {
         1.0 => 1.5,
         1.5 => 2.0,
@@ -233,8 +233,8 @@ fn warning_before_a_surface_agrees_with_the_trials() {
     }
 }
 
-/// The highest and steepest grain there is, on which a light grasp is rocked most of all that
-/// were tried.
+/// The highest and steepest grain there is, which moves a light grasp more than any other in the
+/// trials.
 #[test]
 fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
     let texture = Texture {
@@ -263,7 +263,7 @@ fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
             }
         }
     }
-    // What an even surface bears is too much here: a hand that slides sideways is rocked.
+    // The limit of an even surface is too much here: the texture rocks a hand that slides.
     let (hz, without, _) = STILL_N_PER_MM[0];
     let whole = at(hz, without.into(), SHORT_S, UNDAMPED);
     assert_eq!(whole, Verdict::Unstable);
@@ -317,11 +317,11 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
     assert!(none.is_none(), "interrupted");
 }
 
-/// Stiffnesses that are tried while force comes in, N/mm.
+/// Stiffnesses of the trials with a ramp of the force, N/mm.
 const ENTERED_N_PER_MM: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 4.0];
 
-/// Holds every stiffness, in the ramp and while the clutch closes, to a table: ticks a second, and
-/// up to which stiffness force comes in well in the ramp, and through the clutch, N/mm.
+/// Checks a table of the tick rate and the stiffnesses up to which the force ramps up well, after
+/// arming and as the clutch closes, N/mm.
 fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
     for (hz, ramp, clutch) in table {
         for stiffness in ENTERED_N_PER_MM {
@@ -376,7 +376,7 @@ fn force_comes_in_on_a_tenth_of_the_friction() {
     }
 }
 
-/// Beyond the limits in energy, no swing is above 0.3 mm on a board with converters.
+/// Beyond the limits in energy, no swing exceeds 0.3 mm on a board with converters.
 #[test]
 fn little_friction_makes_small_swings_only() {
     for hz in [1000, 10_000] {

@@ -11,37 +11,37 @@ use super::map::Column;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use hapterra::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
 
-/// The press, N, and how long it is held; what is looked at is its last second.
+/// The press, N, and its duration; only its last second counts.
 const PRESS_N: f64 = 1.0;
 const HELD_S: f64 = 2.5;
 const LOOKED_AT_S: f64 = 1.0;
-/// The tip swings by more than this, mm: no hand holds it.
+/// Swing of the tip from which it counts as unstable, mm: no hand holds it.
 const UNSTABLE_MM: f64 = 1.0;
 
 /// Setting of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// Number of times that the loop ticks.
+    /// Tick rate of the loop.
     pub rate: TickRate,
     /// The surface's stiffness, N/mm.
     pub stiffness_n_per_mm: f64,
-    /// Its damping, and whether the passivity controller acts.
+    /// Its damping, with the passivity controller on or off.
     pub damping: Damping,
     /// Its micro-relief.
     pub texture: Texture,
-    /// Who holds the tip.
+    /// Grasp of the tip.
     pub grasp: Grasp,
-    /// From reading the encoders to the amplifiers, s.
+    /// Delay from the encoders to the amplifiers, s.
     pub delay_s: f64,
-    /// Friction of the arm's joints, as a part of the model's.
+    /// Friction of the arm's joints, as a fraction of the model's.
     pub arm_friction: f64,
 }
 
 /// Outcome of a press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Press {
-    /// The tip swung by so much and so often in the last second: eastward, northward or up,
-    /// whichever is most.
+    /// Swing of the tip in the last second, along the axis with the largest: eastward, northward or
+    /// up.
     Held {
         /// From end to end, mm.
         swing_mm: f64,
@@ -59,10 +59,10 @@ pub struct Trial {
     pub setting: Setting,
     /// The press.
     pub press: Press,
-    /// Taps at each of [`TAP_SPEEDS_M_S`]; none where the guard switched the force off.
+    /// Taps at each of [`TAP_SPEEDS_M_S`]; `None` if the guard switched the force off.
     pub taps: [Option<Taps>; 3],
-    /// A press from the beginning of the ramp on, and one from the closing of the clutch on;
-    /// none where the guard switched the force off.
+    /// A press from the start of the ramp, and one from the closing of the clutch; `None` if the
+    /// guard switched the force off.
     pub entries: [Option<Entered>; 2],
 }
 
@@ -73,12 +73,12 @@ pub enum Verdict {
     Still,
     /// It swings: a limit cycle.
     LimitCycle,
-    /// It swings by more than a millimetre, or the guard has switched the force off.
+    /// It swings by more than a millimetre, or the guard switched the force off.
     Unstable,
 }
 
 impl Verdict {
-    /// Its name, in tables.
+    /// Returns its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -90,7 +90,7 @@ impl Verdict {
 }
 
 impl Press {
-    /// Returns the verdict, where an encoder count is `count_mm` of the tip's path.
+    /// Returns the verdict; an encoder count is `count_mm` of the tip's path.
     #[must_use]
     pub fn verdict(&self, count_mm: f64) -> Verdict {
         match *self {
@@ -102,21 +102,21 @@ impl Press {
 }
 
 impl Setting {
-    /// From the beginning of a tick until its force acts: the delay, and the lag of the
-    /// amplifiers' current loops, s.
+    /// Returns the delay of a force after the start of its tick, with the lag of the amplifiers'
+    /// current loops, s.
     pub(super) fn late_s(self) -> f64 {
         self.delay_s + PhantomModel::premium_1_5().drive[0].motor.current_lag_s
     }
 
-    /// Rate, damping and the arm's friction.
+    /// Returns rate, damping and the arm's friction.
     pub(super) const fn column(self) -> Column {
         (self.rate, self.damping, self.arm_friction)
     }
 
-    /// Presses and taps.
+    /// Runs the presses and taps.
     ///
     /// # Errors
-    /// [`OutOfReach`] where the hand would have to leave the arm's reach.
+    /// [`OutOfReach`] if the hand would have to leave the arm's reach.
     pub fn tried(self) -> Result<Trial, OutOfReach> {
         let press = self.press()?;
         let mut taps = [None; 3];
@@ -183,7 +183,7 @@ impl Setting {
     }
 }
 
-/// Returns the amplitude and frequency of the places of a second along the axis of the largest
+/// Returns the amplitude and frequency of the positions of a second along the axis of the largest
 /// swing.
 fn swings(places_mm: &[[f64; 3]]) -> Press {
     let along = |axis: usize| {
@@ -191,7 +191,7 @@ fn swings(places_mm: &[[f64; 3]]) -> Press {
         let low = coordinates.clone().fold(f64::INFINITY, f64::min);
         let high = coordinates.clone().fold(f64::NEG_INFINITY, f64::max);
         let middle = 0.5 * (low + high);
-        // A swing goes through the middle twice.
+        // A swing crosses the middle twice.
         let sides = coordinates.map(|coordinate| coordinate > middle);
         let crossings = sides.clone().zip(sides.skip(1)).filter(|(a, b)| a != b);
         (high - low, crossings.count())
@@ -214,7 +214,7 @@ mod tests {
             let places: Vec<_> = (0..1000)
                 .map(|tick| {
                     let mut place = [1.0, 2.0, 3.0];
-                    // A swing of 20 ticks up to 0.5 mm, and less along another axis.
+                    // A swing of 20 ticks up to 0.5 mm, and less in another axis.
                     place[axis] += if tick % 20 < 10 { 0.25 } else { -0.25 };
                     place[(axis + 1) % 3] += if tick % 4 < 2 { 0.01 } else { -0.01 };
                     place

@@ -1,4 +1,4 @@
-//! One terrain, read one way, over one latency: what a process of its own measures, so that its
+//! One terrain, one kind of reading and one latency: measured by a process of its own, so that its
 //! memory is that of this case alone.
 
 use std::path::Path;
@@ -24,15 +24,15 @@ pub(super) struct Case {
     pub(super) terrain: String,
     /// The file: a path, or a URL.
     pub(super) source: String,
-    /// Place where the ways of the HIP are written down.
+    /// File of the HIP's paths.
     pub(super) ways: String,
     /// Reading of the file.
     pub(super) reading: Reading,
     /// Delay of the server, ms.
     pub(super) latency_ms: u32,
-    /// Halvings in the search for the fastest speed.
+    /// Steps of the bisection for the fastest speed.
     pub(super) halvings: u32,
-    /// True if virtual time stands still while a block is read.
+    /// True if virtual time stops while a block is read.
     pub(super) stands_while_reading: bool,
 }
 
@@ -48,7 +48,7 @@ impl Case {
         }
     }
 
-    /// The pace at which this case runs in the place of `pace`.
+    /// Returns the pace of this case in place of `pace`.
     const fn pace(&self, pace: Pace) -> Pace {
         match self.stands_while_reading {
             true => Pace::Standing,
@@ -68,10 +68,10 @@ impl Case {
         Raster::open(&self.source, &options).map_err(|error| NotMeasured(error.to_string()))
     }
 
-    /// Measures everything, and hands out a row for each link.
+    /// Measures everything, and calls `done` with a row for each link.
     ///
     /// # Errors
-    /// When the file cannot be read, the arm does not reach the ways, or a session ends.
+    /// If the file cannot be read, the arm does not reach the paths, or a session ends.
     pub(super) fn measure(&self, mut done: impl FnMut(Row)) -> Result<(), NotMeasured> {
         let ways = HipPaths::read(Path::new(&self.ways))?;
         let hand = Hand::over(&ways);
@@ -81,7 +81,7 @@ impl Case {
             hand: &hand,
             kb_per_s,
         });
-        // Before the many devices of the motions, which are kept to the program's end.
+        // Before the motions, whose many devices are kept until the program ends.
         let rows: Vec<Row> = benches.iter().map(Bench::first).collect::<Result<_, _>>()?;
         for (bench, mut row) in benches.iter().zip(rows) {
             if self.reading == Reading::Blocks {
@@ -93,10 +93,10 @@ impl Case {
     }
 }
 
-/// A raster as a terrain true to scale, at the size in the hand that is measured.
+/// Returns a raster as a terrain true to scale, at the measured size in the hand.
 ///
 /// # Errors
-/// When it cannot be rendered so.
+/// If it cannot be rendered at this scale.
 pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
     let grid = HapticGrid::new(raster, HapticCells::default());
     let scale = grid
@@ -123,8 +123,8 @@ struct Motion {
 }
 
 impl Bench<'_> {
-    /// Opens the file, touches it in real time, and where it is read in blocks moves over the
-    /// straight way once: what the row says of times, memory and traffic.
+    /// Opens the file, touches it in real time, and if it is read in blocks moves over the straight
+    /// path once: the row's times, memory and traffic.
     fn first(&self) -> Result<Row, NotMeasured> {
         let case = self.case;
         let meter = match case.is_remote() {
@@ -157,7 +157,7 @@ impl Bench<'_> {
         Ok(row)
     }
 
-    /// Measures held and missing tiles.
+    /// Measures speeds without missing tiles, and missing tiles.
     fn motions(&self, row: &mut Row) -> Result<(), NotMeasured> {
         let HipPaths { straight, turning } = self.ways;
         row.straight_cells = Some(straight.cells() as u32);
@@ -186,7 +186,7 @@ impl Bench<'_> {
         self.underlaid(row)
     }
 
-    /// Measures ticks over a fallback, and holes.
+    /// Measures ticks over a fallback, and ticks without terrain.
     fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
         let HipPaths { straight, turning } = self.ways;
         let fastest = self.motion(straight, run::SPEEDS[1], Late::Fallback, false)?;
@@ -208,12 +208,12 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// Returns the bytes on the link in a tick of a millisecond.
+    /// Returns the bytes on the link in a tick of 1 ms.
     const fn bytes_a_tick(&self) -> usize {
         self.kb_per_s as usize
     }
 
-    /// A session of its own, with nothing known of the file before.
+    /// Runs a motion in a session of its own, with no data of the file cached.
     fn motion(
         &self,
         way: &HipPath,
@@ -246,7 +246,7 @@ impl Motion {
 }
 
 impl Row {
-    /// A row of which only the opening is known.
+    /// Returns a row with only the figures of the opening.
     fn of_opening(
         case: &Case,
         kb_per_s: u32,
@@ -256,7 +256,7 @@ impl Row {
         let raster = terrain.raster();
         Self {
             terrain: case.terrain.clone(),
-            // Some formats are read as a whole whatever is asked for.
+            // Some formats are always read as a whole.
             reading: match raster.is_known_whole() {
                 true => Reading::Whole,
                 false => case.reading,
@@ -304,13 +304,13 @@ fn ms_since(began: Instant) -> f64 {
     1e3 * began.elapsed().as_secs_f64()
 }
 
-/// To a hundredth.
+/// Rounds to a hundredth.
 fn round(value: f64) -> f64 {
     (100.0 * value).round() / 100.0
 }
 
-/// Asks the system to forget what it keeps of a file in memory, so that it is read from the disk.
-/// If the system keeps them, the file is read from memory.
+/// Requests that the system drops its cache of a file, so that it is read from the disk. If the
+/// system keeps the cache, the file is read from memory.
 #[cfg(unix)]
 fn forget(path: &Path) {
     use rustix::fs::{Advice, fadvise};

@@ -1,8 +1,8 @@
-//! The chain that is measured: terrain, client, a line of some rate, and the device's application.
+//! The measured chain: terrain, client, a line of some rate, and the device's application.
 //!
-//! Time is the number of ticks, of a millisecond each. What the host does takes none of it, as if
-//! it were done beside the device; how long it takes is measured apart. Where something is on its
-//! way from elsewhere, a tick takes no less than a millisecond of this machine's time.
+//! Time is the number of ticks of a millisecond each. Work of the host takes no such time, as if it
+//! ran beside the device; its duration is measured separately. During a transfer from a server, a
+//! tick takes at least a millisecond of this machine's time.
 
 use std::time::{Duration, Instant};
 
@@ -26,14 +26,14 @@ use super::link::Line;
 const WINDOW: usize = 16;
 /// A tick.
 const TICK: Duration = Duration::from_millis(1);
-/// Between two looks at whether a block is read.
+/// Interval between two checks for a block.
 const LOOK: Duration = Duration::from_micros(100);
 
-/// A device in this program's memory, which it keeps to its end.
+/// A device in this program's memory, which is never freed.
 pub(super) type Board = Device<StoppedClock, WINDOW>;
 
-/// A device with the calibration of a Premium 1.5, whose arm is not armed: the contact is worked
-/// out and told, and no current flows.
+/// Creates a device with the calibration of a Premium 1.5, whose arm is not armed: it computes and
+/// reports the contact, and no current flows.
 pub(super) fn board() -> Board {
     Device::new(
         Box::leak(Box::new(TileBuffers::VACANT)),
@@ -44,10 +44,10 @@ pub(super) fn board() -> Board {
     )
 }
 
-/// A tile of the field that was sent; the one of its fallback does not count.
+/// A tile of the field that was sent; those of the fallback do not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SentTile {
-    /// The tick in which the host put it onto the line.
+    /// The tick in which the host sent it.
     pub(super) tick: u64,
     /// Bytes of its frame.
     pub(super) bytes: usize,
@@ -56,12 +56,12 @@ pub(super) struct SentTile {
 /// Pace of the ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pace {
-    /// No faster than a thousand a second.
+    /// At most a thousand a second.
     Real,
-    /// As fast as this machine goes, but while something is on its way from elsewhere.
+    /// As fast as this machine runs, except during a transfer from a server.
     Virtual,
-    /// As fast as this machine goes; it stands still while a block is read. What is counted does
-    /// not depend on the machine.
+    /// As fast as this machine runs; time stops while a block is read, so that counts do not depend
+    /// on the machine.
     Standing,
 }
 
@@ -75,15 +75,15 @@ pub(super) struct Chain<'t> {
     now: u64,
     began: Instant,
     reader: Box<FrameReader<MAX_FRAME>>,
-    /// Tiles so far.
+    /// Tiles sent up to now.
     pub(super) tiles: Vec<SentTile>,
-    /// Time of the host for answers to requests for tiles.
+    /// Time that the host needed to answer requests for tiles.
     pub(super) host: Vec<Duration>,
 }
 
 impl<'t> Chain<'t> {
-    /// A session that begins with the next tick: a scene of a terrain whose reads do not wait, over
-    /// a line that carries `bytes_a_tick` each way.
+    /// Creates a session that begins with the next tick: a scene of a terrain whose reads do not
+    /// wait, over a line that carries `bytes_a_tick` each way.
     pub(super) fn new(
         terrain: &'t Terrain<'t>,
         scene: Scene,
@@ -109,12 +109,12 @@ impl<'t> Chain<'t> {
         }
     }
 
-    /// Sets the pace of the ticks from now on.
+    /// Sets the pace of the ticks.
     pub(super) const fn set_pace(&mut self, pace: Pace) {
         self.pace = pace;
     }
 
-    /// Ticks so far.
+    /// Returns the ticks up to now.
     pub(super) const fn now(&self) -> u64 {
         self.now
     }
@@ -124,10 +124,10 @@ impl<'t> Chain<'t> {
         self.client.tally()
     }
 
-    /// Runs a tick with what the encoders read, and tells what samples the host has got.
+    /// Runs a tick with these inputs, and calls `take` with the samples that arrive at the host.
     ///
     /// # Errors
-    /// When host and device do not understand each other.
+    /// If host and device do not understand each other.
     pub(super) fn tick(
         &mut self,
         sense: GuardInputs,
@@ -173,7 +173,7 @@ impl<'t> Chain<'t> {
         heard
     }
 
-    /// Finds the tiles of the field among what the host says; returns how many there are.
+    /// Searches the host's bytes for tiles of the field. Returns their number.
     fn count_tiles(&mut self, mut bytes: &[u8]) -> usize {
         let before = self.tiles.len();
         while !bytes.is_empty() {
@@ -196,7 +196,7 @@ impl<'t> Chain<'t> {
         self.tiles.len() - before
     }
 
-    /// Lets a tick last a millisecond, where it has to.
+    /// Lets a tick last a millisecond, if necessary.
     fn wait(&mut self) {
         let is_reading = || self.terrain.raster().is_reading();
         if self.pace == Pace::Standing {

@@ -1,4 +1,4 @@
-//! A made terrain as a cloud-optimised GeoTIFF: deflated blocks, overviews, the index first.
+//! A synthetic terrain as a cloud-optimised GeoTIFF: deflated blocks, overviews, the index first.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -9,9 +9,9 @@ use super::relief::{BLOCK, CELL_M, Place, Relief};
 
 /// Tags of a directory.
 const TAGS: u16 = 15;
-/// Bytes of a directory, its lists of blocks apart.
+/// Bytes of a directory without its lists of blocks.
 const DIRECTORY: u32 = 2 + 12 * TAGS as u32 + 4;
-/// Bytes before the first directory: the head, and the place on the ground.
+/// Bytes before the first directory: the header and the georeference.
 const HEAD: u32 = 8 + 9 * 8 + 20 * 2;
 
 /// Position and length of each block in the file.
@@ -31,7 +31,7 @@ struct Image {
 /// blocks, those of the smallest overview first.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub(super) fn write(path: &Path, side: u32, relief: &mut Relief) -> io::Result<u64> {
     let images = images(side);
     let mut list = HEAD + DIRECTORY * images.len() as u32;
@@ -40,7 +40,7 @@ pub(super) fn write(path: &Path, side: u32, relief: &mut Relief) -> io::Result<u
         lists.push(list);
         list += 8 * image.blocks.len() as u32;
     }
-    // Each block that there is, once: where it is and how long.
+    // Position and length of each distinct block.
     let (mut stored, mut order, mut end) = (Stored::new(), vec![], list);
     for place in images.iter().rev().flat_map(|image| &image.blocks) {
         if !stored.contains_key(place) {
@@ -73,13 +73,13 @@ pub(super) fn write(path: &Path, side: u32, relief: &mut Relief) -> io::Result<u
     Ok(end.into())
 }
 
-/// Bytes that the file of a terrain takes at most, whatever deflate makes of its blocks.
+/// Returns an upper bound of a terrain's file size, for any compression of its blocks.
 pub(super) fn most_bytes(side: u32) -> u64 {
     let images = images(side);
     let blocks: Vec<&Place> = images.iter().flat_map(|image| &image.blocks).collect();
     let index = blocks.len() * 8 + images.len() * DIRECTORY as usize;
     let distinct = BTreeSet::from_iter(blocks).len();
-    // Deflate may make what cannot be packed longer by less than a hundredth.
+    // Deflate adds less than a hundredth to data that cannot be compressed.
     let block = 4 * u64::from(BLOCK) * u64::from(BLOCK);
     u64::from(HEAD) + index as u64 + distinct as u64 * (block + block / 100)
 }
@@ -101,17 +101,17 @@ fn images(side: u32) -> Vec<Image> {
     images
 }
 
-/// A projected map in metres of which no more is known, pixels being areas: a file that knows its
-/// place needs no world file beside it, and its cells are of one size everywhere.
+/// A projected map in metres without further parameters, with areas as pixels: a georeferenced file
+/// needs no world file, and its cells have one size everywhere.
 const GEO_KEYS: [u16; 20] = [
     1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32767, 3076, 0, 1, 9001,
 ];
 
-/// Returns the head before the directories; all of them say that the place is here.
+/// Returns the header before the directories, with the georeference that they share.
 fn head() -> Vec<u8> {
     let mut bytes = b"II*\0".to_vec();
     bytes.extend(HEAD.to_le_bytes());
-    // Size of a cell; column and row of a corner, and where that is.
+    // Size of a cell; column and row of a corner, and its position.
     let place = [
         CELL_M,
         CELL_M,
@@ -128,11 +128,11 @@ fn head() -> Vec<u8> {
     bytes
 }
 
-/// A directory whose two lists of blocks are at `list`.
+/// Writes a directory whose two lists of blocks are at `list`.
 fn directory(image: &Image, list: u32, is_overview: bool, stored: &Stored, next: u32) -> Vec<u8> {
     let (short, long) = (3_u16, 4_u16);
     let count = image.blocks.len() as u32;
-    // One number is in the tag itself.
+    // A single number is in the tag itself.
     let [offsets, lengths] = match image.blocks.as_slice() {
         [only] => stored[only],
         _ => [list, list + 4 * count],
@@ -159,7 +159,7 @@ fn directory(image: &Image, list: u32, is_overview: bool, stored: &Stored, next:
     // Floats.
     tag(339, short, 1, 3);
     let double = 12;
-    // Cells of an overview are larger; the place of an overview is not used.
+    // Cells of an overview are larger; its georeference is not used.
     tag(33550, double, 3, 8);
     tag(33922, double, 6, 32);
     tag(34735, short, GEO_KEYS.len() as u32, 80);
@@ -197,7 +197,7 @@ mod tests {
             let expected = f64::from(synth.height(column % PERIOD, row % PERIOD));
             assert!((height - expected).abs() < 0.006, "{column} {row}");
         }
-        // An overview, and no hole in it.
+        // An overview, without no-data.
         for (column, row) in [(1, 1), (55, 55), (110, 3)] {
             let mut heights = [f64::NAN];
             assert!(

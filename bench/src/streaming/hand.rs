@@ -1,4 +1,4 @@
-//! The arm that is moved along a way: encoder counts for places of the HIP.
+//! The arm that moves along a path: encoder counts for positions of the HIP.
 
 use hapterra::phantom::{ArmFrame, Encoder, PhantomModel};
 use hapterra::place::Reach;
@@ -16,16 +16,16 @@ const DEPTH: f64 = 10.0;
 /// Height of the HIP above the surface before the first contact, cells.
 const ABOVE: f64 = 30.0;
 
-/// Substitute for a late tile.
+/// Replacement for a late tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Late {
-    /// Nothing: there is a hole.
+    /// None: it is no-data.
     Hole,
-    /// The fallback of all that the arm reaches.
+    /// The fallback of the whole reach of the arm.
     Fallback,
 }
 
-/// A Premium 1.5 whose tip is led exactly where it is to be.
+/// A Premium 1.5 whose tip moves exactly along a path.
 pub(super) struct Hand {
     model: PhantomModel,
     placement: ArmFrame,
@@ -33,7 +33,7 @@ pub(super) struct Hand {
 }
 
 impl Hand {
-    /// An arm with the middle of the ways at the tip in its home pose.
+    /// Creates an arm whose tip in the home pose is at the middle of the paths.
     pub(super) fn over(ways: &HipPaths) -> Self {
         let model = PhantomModel::premium_1_5();
         let encoders = std::array::from_fn(|joint| Encoder::new(&model.drive[joint]));
@@ -46,10 +46,10 @@ impl Hand {
         }
     }
 
-    /// The scene of a terrain under this arm.
+    /// Returns the scene of a terrain under this arm.
     ///
     /// # Errors
-    /// When the home is farther than positions reach.
+    /// If the home is beyond the range of positions.
     pub(super) fn scene(&self, terrain: &Terrain<'_>, late: Late) -> Result<Scene, NotMeasured> {
         let home = terrain.scale().to_grid(self.placement.home_mm);
         let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
@@ -67,18 +67,18 @@ impl Hand {
         })
     }
 
-    /// Returns the inputs with the HIP below a place on the surface.
+    /// Returns the inputs with the HIP below a point of the surface.
     ///
     /// # Errors
-    /// When the arm does not reach it.
+    /// If the arm does not reach it.
     pub(super) fn below(&self, place: [f64; 3]) -> Result<GuardInputs, NotMeasured> {
         self.sense(place, -DEPTH)
     }
 
-    /// The same above it.
+    /// Returns the inputs with the HIP above a point of the surface.
     ///
     /// # Errors
-    /// When the arm does not reach it.
+    /// If the arm does not reach it.
     pub(super) fn above(&self, place: [f64; 3]) -> Result<GuardInputs, NotMeasured> {
         self.sense(place, ABOVE)
     }

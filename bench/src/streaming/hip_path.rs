@@ -8,29 +8,29 @@ use hapterra::terrain::Terrain;
 use super::relief::PERIOD;
 use super::{CELL_MM, NotMeasured};
 
-/// Cells between the way and the border of a field, and that of the square which repeats: more
-/// than a tile and the margin around the HIP.
+/// Cells between a path and the border of a field, or of the square that repeats: more than a tile
+/// and the margin around the HIP.
 const FROM_BORDER: u32 = 130;
-/// Cells of the straight way where the field has room for it.
+/// Cells of the straight path, if the field has room for it.
 const STRAIGHT: u32 = 2800;
-/// Cells along the side of the square that the turning way crosses, where there is room.
+/// Side of the square that the turning path crosses, cells, if there is room.
 const TURNING: u32 = 1400;
-/// Fewest cells of a way.
+/// Fewest cells of a path.
 const LEAST: u32 = 200;
-/// The turning way turns by a right angle after so many cells: less than what a HIP of 2,000
-/// cells a second covers in the time that the device looks ahead.
+/// Cells after which the turning path turns by a right angle: fewer than a HIP at 2,000 cells a
+/// second covers in the time of the device's prediction.
 const LEG: u32 = 150;
 /// Names of the paths in files.
 const NAMES: [&str; 2] = ["straight", "turning"];
 
-/// Places on the surface, a cell apart along the way.
+/// Points on the surface, a cell apart along the path.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HipPath {
     /// Cells east and north of the south-west sample, and height in cells.
     places: Vec<[f64; 3]>,
 }
 
-/// The two ways of a terrain.
+/// The two paths over a terrain.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HipPaths {
     /// Along a row of tiles, from west to east.
@@ -40,12 +40,12 @@ pub(super) struct HipPaths {
 }
 
 impl HipPath {
-    /// Its length, cells.
+    /// Returns its length, cells.
     pub(super) fn cells(&self) -> f64 {
         (self.places.len() - 1) as f64
     }
 
-    /// The place on the surface so many cells along the way; its end beyond that.
+    /// Returns the point on the surface at this distance along the path, cells, or its end.
     pub(super) fn at(&self, cells: f64) -> [f64; 3] {
         let along = cells.clamp(0.0, self.cells());
         let first = (along.floor() as usize).min(self.places.len() - 2);
@@ -54,7 +54,7 @@ impl HipPath {
         std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * part)
     }
 
-    /// The surface under a line of places.
+    /// Returns the surface under a line of points.
     fn over(
         terrain: &Terrain<'_>,
         places: impl Iterator<Item = [u32; 2]>,
@@ -75,11 +75,11 @@ impl HipPath {
 }
 
 impl HipPaths {
-    /// The ways over a terrain: in the middle of it, or where a made terrain of any size has the
-    /// same samples.
+    /// Returns the paths over a terrain: in its middle, or where synthetic terrains of any size
+    /// have the same samples.
     ///
     /// # Errors
-    /// When the terrain is too small, or has a hole there.
+    /// If the terrain is too small, or has no data there.
     pub(super) fn over(terrain: &Terrain<'_>, is_made: bool) -> Result<Self, NotMeasured> {
         let size = terrain.size().map(|patches| patches as u32 + 1);
         let room = size[0].min(size[1]).saturating_sub(2 * FROM_BORDER);
@@ -107,7 +107,7 @@ impl HipPaths {
         })
     }
 
-    /// The cell in the middle of all places.
+    /// Returns the cell in the middle of all points.
     pub(super) fn middle(&self) -> [f64; 3] {
         let all = || self.straight.places.iter().chain(&self.turning.places);
         std::array::from_fn(|axis| {
@@ -116,10 +116,10 @@ impl HipPaths {
         })
     }
 
-    /// Writes both down, a place a line.
+    /// Writes both paths, one point a line.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub(super) fn write(&self, path: &Path) -> std::io::Result<()> {
         let mut text = String::new();
         for (name, way) in NAMES.iter().zip([&self.straight, &self.turning]) {
@@ -131,10 +131,10 @@ impl HipPaths {
         std::fs::write(path, text)
     }
 
-    /// Reads what [`HipPaths::write`] has written.
+    /// Reads the file from [`HipPaths::write`].
     ///
     /// # Errors
-    /// When the file is not there, or is another.
+    /// If the file is missing or invalid.
     pub(super) fn read(path: &Path) -> Result<Self, NotMeasured> {
         let wrong = |why: String| NotMeasured(format!("{}: {why}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
@@ -156,8 +156,8 @@ impl HipPaths {
     }
 }
 
-/// The south-west corner of the ways in the square around the middle of a made terrain, whose
-/// rows are counted from the north: the same samples in a terrain of any size that has the room.
+/// Returns the south-west corner of the paths around the middle of a synthetic terrain, whose rows
+/// count from the north: the same samples in a terrain of any size with room for them.
 fn in_the_square([columns, rows]: [u32; 2], long: u32) -> [u32; 2] {
     let first = |count: u32| count / 2 / PERIOD * PERIOD + FROM_BORDER;
     [first(columns), rows - 1 - first(rows) - long]

@@ -1,4 +1,4 @@
-//! A line of so many bytes a tick, without an error and without a way to go.
+//! A line with a rate in bytes a tick, without errors and without delay.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// An idle line.
+    /// Creates an idle line.
     pub(super) fn new(bytes_a_tick: usize) -> Self {
         Self {
             bytes_a_tick,
@@ -17,17 +17,17 @@ impl Line {
         }
     }
 
-    /// Bytes that it carries in a tick.
+    /// Returns the bytes that it carries in a tick.
     pub(super) const fn bytes_a_tick(&self) -> usize {
         self.bytes_a_tick
     }
 
-    /// Puts bytes onto the line, behind those that wait.
+    /// Appends bytes to those that wait.
     pub(super) fn send(&mut self, bytes: &[u8]) {
         self.waiting.extend(bytes);
     }
 
-    /// Sends a tick's bytes to a reader, which returns the number of bytes it took; the rest
+    /// Sends a tick's bytes to a reader, which returns the number of bytes it accepted; the rest
     /// waits.
     pub(super) fn carry(&mut self, mut take: impl FnMut(&[u8]) -> usize) {
         let mut left = self.bytes_a_tick.min(self.waiting.len());
@@ -56,7 +56,7 @@ mod tests {
         line.send(&sent[..40]);
         while came.len() < sent.len() {
             let before = came.len();
-            // Takes seven at a time, and nothing in every third tick.
+            // Accepts seven at a time, and nothing in every third tick.
             line.carry(|bytes| {
                 let taken = if ticks % 3 == 2 {
                     0

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A row of the table. Times are of this machine, all others are counts: the same in every run where
-/// nothing is elsewhere.
+/// A row of the table. Times depend on this machine; all other figures are counts, the same in
+/// every run if the file is on disk.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Name of the terrain.
     pub terrain: String,
-    /// Reading of the file: `blocks` when they are touched, or `whole` before the session.
+    /// Reading of the file: `blocks` on demand, or `whole` before the session.
     pub reading: Reading,
     /// Latency of a web server, ms; 0 for a file on disk.
     pub latency_ms: u32,
@@ -18,73 +18,73 @@ pub struct Row {
     pub samples: u64,
     /// Opening the file, ms.
     pub open_ms: f64,
-    /// From there until the host hears of the first contact, ms.
+    /// Time from there until the host receives the first contact, ms.
     pub first_force_ms: f64,
-    /// Most memory that the process had so far, 10⁶ bytes, the device in it included; none where the
-    /// system does not tell.
+    /// Peak memory of the process up to then, 10⁶ bytes, with the device in it; `None` if the
+    /// system does not report it.
     pub peak_mb: Option<f64>,
-    /// Requests to the server, or reads of a file, while it was opened.
+    /// Requests to the server, or reads of a file, during the opening.
     pub open_requests: Option<u64>,
-    /// Bytes that these brought.
+    /// Bytes of these.
     pub open_bytes: Option<u64>,
-    /// Requests or reads from there on: a touch, and the straight way at [`USUAL`] cells a second.
+    /// Requests or reads from then on: a touch, and the straight path at [`USUAL`] cells a second.
     ///
     /// [`USUAL`]: super::USUAL
     pub way_requests: Option<u64>,
-    /// Bytes that these brought.
+    /// Bytes of these.
     pub way_bytes: Option<u64>,
-    /// Cells of the straight way; this and what follows is empty where only the first force was measured.
+    /// Cells of the straight path; empty, like the next figures, without a measured motion.
     pub straight_cells: Option<u32>,
-    /// Cells of the turning way.
+    /// Cells of the turning path.
     pub turning_cells: Option<u32>,
-    /// Tiles sent for a touch and the straight way at [`USUAL`](super::USUAL) cells a second.
+    /// Tiles sent for a touch and the straight path at [`USUAL`](super::USUAL) cells a second.
     pub tiles: Option<u64>,
-    /// Bytes of their frames, mean.
+    /// Mean bytes of their frames.
     pub tile_bytes_mean: Option<f64>,
-    /// Bytes of their frames, which 99 % do not exceed.
+    /// 99th percentile of the bytes of their frames.
     pub tile_bytes_p99: Option<u64>,
-    /// Tiles a second while the HIP outruns the link, 20,000 cells a second on the straight way.
+    /// Tiles a second while the HIP outruns the link, 20,000 cells a second on the straight path.
     pub tiles_per_s: Option<f64>,
-    /// Time of the host for a tick that requests tiles, ms: mean of the same run as the tiles.
+    /// Mean time of the host for a tick that requests tiles, ms, in the same run.
     pub host_ms_mean: Option<f64>,
-    /// The same at worst.
+    /// Largest such time, ms.
     pub host_ms_worst: Option<f64>,
-    /// Fastest HIP without a missing tick on the straight way, cells a second.
+    /// Fastest HIP without a missing tick on the straight path, cells a second.
     pub held_straight: Option<f64>,
-    /// The same on the turning way.
+    /// The same on the turning path.
     pub held_turning: Option<f64>,
-    /// Without a fallback: ticks whose terrain was missing, of the straight way at 500 cells a second.
+    /// Without a fallback: ticks with missing terrain, on the straight path at 500 cells a second.
     pub missing_straight_500: Option<u32>,
     /// At 2,000 cells a second.
     pub missing_straight_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub missing_straight_5000: Option<u32>,
-    /// Of the turning way at 500 cells a second.
+    /// On the turning path at 500 cells a second.
     pub missing_turning_500: Option<u32>,
     /// At 2,000 cells a second.
     pub missing_turning_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub missing_turning_5000: Option<u32>,
-    /// With a fallback: ticks on it, or a tile that settled from it, of the straight way at
-    /// 500 cells a second.
+    /// With a fallback: ticks on it or on a tile that blends from it, on the straight path at 500
+    /// cells a second.
     pub coarse_straight_500: Option<u32>,
     /// At 2,000 cells a second.
     pub coarse_straight_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub coarse_straight_5000: Option<u32>,
-    /// Of the turning way at 500 cells a second.
+    /// On the turning path at 500 cells a second.
     pub coarse_turning_500: Option<u32>,
     /// At 2,000 cells a second.
     pub coarse_turning_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub coarse_turning_5000: Option<u32>,
-    /// With a fallback: ticks that had nothing to feel, in these six motions and one of 20,000 cells a
+    /// With a fallback: ticks without any terrain, in these six motions and one of 20,000 cells a
     /// second.
     pub holes_underlaid: Option<u32>,
 }
 
 impl Row {
-    /// Ticks over a fallback, as [`Row::missing`] has them without one.
+    /// Returns the ticks over a fallback, in the order of [`Row::missing`].
     #[must_use]
     pub const fn coarse(&self) -> [[Option<u32>; 3]; 2] {
         [
@@ -101,7 +101,7 @@ impl Row {
         ]
     }
 
-    /// Missing ticks of the straight way and of the turning one, at the speeds of
+    /// Returns the missing ticks of the straight and the turning path, at the speeds of
     /// [`SPEEDS`](super::SPEEDS).
     #[must_use]
     pub const fn missing(&self) -> [[Option<u32>; 3]; 2] {
@@ -124,15 +124,15 @@ impl Row {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reading {
-    /// Blocks of it, when they are touched.
+    /// In blocks, on demand.
     #[default]
     Blocks,
-    /// All of it, into memory, before anything is rendered.
+    /// As a whole into memory, before the rendering.
     Whole,
 }
 
 impl Reading {
-    /// Its name in tables.
+    /// Returns its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,10 +1,10 @@
-//! Use of memory by a process, and bytes that it reads.
+//! Memory of a process, and the bytes that it reads.
 
 use std::io::{self, BufRead as _, Write as _};
 
 use super::NotMeasured;
 
-/// Requests or reads, and bytes that they brought.
+/// Requests or reads, and their bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Traffic {
     /// The number.
@@ -16,12 +16,12 @@ pub(super) struct Traffic {
 /// Query on standard output, which is answered on standard input.
 pub(super) const QUESTION: &str = "seen?";
 
-/// Who counts what is read.
+/// Counter of the traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Meter {
-    /// The system: what this process has read.
+    /// The system, for reads of this process.
     System,
-    /// The server, which the process that started this one asks.
+    /// The server, queried through the parent process.
     Server,
 }
 
@@ -29,7 +29,7 @@ impl Meter {
     /// Returns the traffic of reads; `None` if it is unknown.
     ///
     /// # Errors
-    /// When the process that started this one does not answer.
+    /// If the parent process does not answer.
     pub(super) fn traffic(self) -> Result<Option<Traffic>, NotMeasured> {
         match self {
             Self::System => Ok(read_by_this_process()),
@@ -58,7 +58,7 @@ fn asked() -> Result<Traffic, NotMeasured> {
     }
 }
 
-/// Calls of `read` and its like, and their bytes, from any file; Linux tells.
+/// Returns the calls of `read` and the like, and their bytes, from any file, as reported by Linux.
 fn read_by_this_process() -> Option<Traffic> {
     let text = std::fs::read_to_string("/proc/self/io").ok()?;
     Some(Traffic {
@@ -67,7 +67,7 @@ fn read_by_this_process() -> Option<Traffic> {
     })
 }
 
-/// Most memory that this process has had, bytes; Linux tells.
+/// Returns the peak memory of this process, bytes, as reported by Linux.
 pub(super) fn peak_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     Some(1024 * number_behind(&text, "VmHWM:")?)

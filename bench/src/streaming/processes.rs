@@ -16,14 +16,14 @@ use super::{NotMeasured, Plan, SIDES, cog};
 #[cfg(feature = "remote")]
 use super::server::Server;
 
-/// A file with no more samples than this is measured as a whole, too: 800 MB of them.
+/// Most samples of a file that is also measured as a whole: 800 MB of them.
 const MAX_WHOLE: u64 = 200_000_000;
 /// Prefix of a row on standard output of a case's process.
 const ROW: &str = "row ";
-/// Prefix of the reason for its end.
+/// Prefix of the reason for a failure.
 const WHY: &str = "why ";
 
-/// A terrain that is measured.
+/// A measured terrain.
 struct Subject<'p> {
     name: String,
     path: PathBuf,
@@ -31,11 +31,11 @@ struct Subject<'p> {
     plan: &'p Plan,
 }
 
-/// Measures the made terrains of a plan and some files; `tell` hears what is begun, `done` gets
-/// each row. A terrain that cannot be measured is reported by `warn`, and the next one is measured.
+/// Measures the synthetic terrains of a plan and some files. `tell` receives each start, `done`
+/// each row. A terrain that cannot be measured is reported to `warn`, and the next one is measured.
 ///
 /// # Errors
-/// When there is no room for the made terrains, or no folder.
+/// If there is no room for the synthetic terrains, or no folder.
 pub fn measure(
     plan: &Plan,
     files: &[PathBuf],
@@ -76,17 +76,17 @@ pub fn measure(
         if let Err(why) = subject.measure(folder.path(), tell, done) {
             warn(&format!("{}: {why}", subject.name));
         }
-        // The next one wants its room.
+        // The next one needs its room.
         let _ = std::fs::remove_file(&subject.path);
     }
     Ok(())
 }
 
-/// The exponent of ten of the smallest made terrain.
+/// The exponent of ten of the smallest synthetic terrain.
 const SIDES_FROM: u32 = 6;
 
-/// Checks that the disk has room for a made terrain. Where the system does not tell, writing
-/// decides.
+/// Checks that the disk has room for a synthetic terrain. If the system does not report it, the
+/// write will show.
 fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
     let needed = cog::most_bytes(side);
     let folder = path.parent().unwrap_or(path);
@@ -104,7 +104,7 @@ fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
 }
 
 impl Subject<'_> {
-    /// All cases of the terrain.
+    /// Measures all cases of the terrain.
     fn measure(
         &self,
         folder: &Path,
@@ -177,8 +177,8 @@ impl Subject<'_> {
         Err(NotMeasured(text))
     }
 
-    /// The ways over the terrain, how many samples it has, and whether it is read as a whole
-    /// anyway.
+    /// Returns the paths over the terrain, its number of samples, and true if it is always read as
+    /// a whole.
     fn ways(&self) -> Result<(HipPaths, u64, bool), NotMeasured> {
         let options = Case::options(Reading::Blocks);
         let raster = Raster::open(&self.path, &options);
@@ -230,11 +230,10 @@ fn answer(to: Option<&mut ChildStdin>, seen: Traffic) -> std::io::Result<()> {
     writeln!(to, "{} {}", seen.requests, seen.bytes)
 }
 
-/// Measures the case that a process was started for, and writes what comes of it to standard
-/// output.
+/// Measures the case of this process, and writes the rows or the failure to standard output.
 ///
 /// # Errors
-/// When the case is not understood; what goes wrong with it is written.
+/// If the case cannot be parsed; a failed measurement is written instead.
 pub fn measure_case(case: &str) -> Result<(), NotMeasured> {
     let case: Case = read(case)?;
     let measured = case.measure(|row| match written(&row) {
@@ -247,7 +246,7 @@ pub fn measure_case(case: &str) -> Result<(), NotMeasured> {
     Ok(())
 }
 
-/// A value as a line of CSV.
+/// Returns a value as a line of CSV.
 fn written(value: &impl serde::Serialize) -> Result<String, NotMeasured> {
     let mut writer = csv::WriterBuilder::new()
         .has_headers(false)
@@ -262,7 +261,7 @@ fn written(value: &impl serde::Serialize) -> Result<String, NotMeasured> {
     Ok(String::from_utf8_lossy(&line).trim_end().to_owned())
 }
 
-/// The value that [`written`] made a line of.
+/// Parses a line from [`written`].
 fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, NotMeasured> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

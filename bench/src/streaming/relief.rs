@@ -1,9 +1,9 @@
-//! The relief of the made terrains: one square of mountains that repeats, in compressed blocks.
+//! The relief of the synthetic terrains: a square of mountains that repeats, in compressed blocks.
 //!
-//! A terrain of 10¹⁰ samples takes 40 GB. The hand moves inside one square of [`PERIOD`] samples, so
-//! a made terrain repeats that square, and its file stores each block of it once: the index
-//! of a file names the same bytes in many places. What the program reads, keeps and sends does
-//! not know of it. Where two squares meet there is a cliff, which no way of the HIP crosses.
+//! A terrain of 10¹⁰ samples has 40 GB. The hand moves inside one square of [`PERIOD`] samples, so
+//! a synthetic terrain repeats that square, and its file stores each block of it once: the file's
+//! index has the same offset in many places. The program reads, stores and sends it like any other.
+//! Between two squares there is a cliff, which no path of the HIP crosses.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};
@@ -14,20 +14,20 @@ use hapterra::synth::{Kind, Synth};
 
 /// Side of the square that repeats, samples.
 pub(super) const PERIOD: u32 = 3072;
-/// Side of a block of a file, samples: what `gdal_translate -of COG` makes.
+/// Side of a block of a file, samples, as in the output of `gdal_translate -of COG`.
 pub(super) const BLOCK: u32 = 512;
 /// Side of a cell on the ground, metres.
 pub(super) const CELL_M: f64 = 10.0;
-/// Heights are multiples of a centimetre, metres.
+/// Resolution of heights, metres.
 const STEP_M: f64 = 0.01;
 
-/// Names the content of a block: how often the field was halved, and where in the square the
-/// block begins, column and row.
+/// Content of a block: the number of halvings of the field, and the block's first column and row in
+/// the square.
 pub(super) type Place = (u32, [u32; 2]);
 
 /// The square, and its blocks as files store them.
 pub(super) struct Relief {
-    /// The square itself, and after it each overview of it.
+    /// The square itself, and then each of its overviews.
     images: Vec<Image>,
     packed: BTreeMap<Place, Vec<u8>>,
 }
@@ -39,7 +39,7 @@ struct Image {
 }
 
 impl Relief {
-    /// Mountains with heights of whole centimetres.
+    /// Creates mountains with heights in whole centimetres.
     pub(super) fn new() -> Self {
         let cells = Kind::Fractal.usual_amplitude_cells();
         let synth = Synth::new(Kind::Fractal, 17, cells * CELL_M);
@@ -56,16 +56,16 @@ impl Relief {
         }
     }
 
-    /// The content of the block at a column and row of blocks, in an image halved so often.
+    /// Returns the block's content, by its column and row in an image after these halvings.
     pub(super) fn place(halvings: u32, block: [u32; 2]) -> Place {
         let side = PERIOD >> halvings;
         (halvings, block.map(|index| index * BLOCK % side))
     }
 
-    /// The bytes of a block.
+    /// Returns the bytes of a block.
     ///
     /// # Errors
-    /// None that a vector in memory would make.
+    /// None from a vector in memory.
     pub(super) fn packed(&mut self, place: Place) -> io::Result<&[u8]> {
         if !self.packed.contains_key(&place) {
             let bytes = self.pack(place)?;
@@ -98,7 +98,7 @@ impl Image {
         self.heights[row * self.side as usize + column]
     }
 
-    /// The means of four samples each.
+    /// Returns the means of four samples each.
     fn halved(&self) -> Self {
         let side = self.side / 2;
         let mean = |column: u32, row: u32| {

@@ -1,4 +1,4 @@
-//! Runs along a way: the first contact, a motion at one speed, and the fastest that is held.
+//! Runs along a path: the first contact, a motion, and the fastest speed without a missing tick.
 
 use hapterra_core::contact::ContactState;
 
@@ -8,27 +8,27 @@ use super::hand::Hand;
 use super::hip_path::HipPath;
 use super::tick_counts::{TickCounts, lacks_terrain};
 
-/// Ticks after which nothing more is expected: a server has had its 10 s of silence by then.
+/// Ticks after which a wait fails: more than a server's 10 s time-out.
 const LONGEST: u64 = 30_000;
-/// Ticks for which the hand rests before it moves, so that all within the margin is there.
+/// Ticks of rest before the motion, so that all tiles within the margin arrive.
 const REST: u32 = 400;
-/// Ticks in which the hand comes up to its speed, evenly.
+/// Ticks in which the hand accelerates evenly to its speed.
 const START: f64 = 100.0;
 /// Ticks after the motion in which its last samples arrive.
 const AFTER: u32 = 300;
-/// Slowest and fastest speed that is tried, cells a second. At the fastest the tip moves at
-/// 1 m/s, beyond which the guard lets less force through.
+/// Slowest and fastest speed of the trials, cells a second. At the fastest the tip moves at 1 m/s,
+/// beyond which the guard reduces the force.
 pub(super) const SPEEDS: [f64; 2] = [100.0, 20_000.0];
 
-/// Taps on the beginning of a way until there is a contact.
+/// Taps on the start of a path until there is a contact.
 ///
 /// # Errors
-/// When there is none, or the session ends.
+/// If there is none, or the session ends.
 pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &HipPath) -> Result<(), NotMeasured> {
     let (above, below) = (hand.above(way.at(0.0))?, hand.below(way.at(0.0))?);
     let mut is_touching = false;
     while !is_touching {
-        // A contact begins where the HIP comes down onto ground that is there.
+        // A contact begins where the HIP comes down onto ground in the window.
         let sense = if chain.now().is_multiple_of(2) {
             above
         } else {
@@ -45,13 +45,12 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &HipPath) -> Result
     Ok(())
 }
 
-/// Moves along a way at so many cells a second, after a touch and a rest, and up to that speed
-/// within a tenth of a second. Where `to_a_hole`, the
-/// motion ends at the first tick that lacks its terrain. Returns the counts and the ticks
-/// in which the motion began and ended.
+/// Moves along a path at this many cells a second, after a touch and a rest, with a tenth of a
+/// second to reach the speed. With `to_a_hole`, the motion ends at the first tick without its
+/// terrain. Returns the counts and the ticks in which the motion began and ended.
 ///
 /// # Errors
-/// When the session ends, or samples get lost.
+/// If the session ends, or samples are lost.
 pub(super) fn travel(
     chain: &mut Chain<'_>,
     hand: &Hand,
@@ -92,7 +91,7 @@ pub(super) fn travel(
     Ok((counts, [began, ended]))
 }
 
-/// Cells that are covered so many ticks after the hand began to move, at a speed in cells a tick.
+/// Returns the cells covered this many ticks after the start, at a speed in cells a tick.
 fn covered(ticks: f64, speed: f64) -> f64 {
     match ticks < START {
         true => 0.5 * speed * ticks * ticks / START,
@@ -100,7 +99,7 @@ fn covered(ticks: f64, speed: f64) -> f64 {
     }
 }
 
-/// Ticks that the hand takes for so many cells: the other way round.
+/// Returns the ticks that the hand needs for this many cells: the inverse of [`covered`].
 fn duration(cells: f64, speed: f64) -> f64 {
     let start = covered(START, speed);
     match cells < start {
@@ -109,14 +108,14 @@ fn duration(cells: f64, speed: f64) -> f64 {
     }
 }
 
-/// The fastest speed that `holds`, by halving between the slowest and the fastest `steps` times, in
-/// ratios. Zero where not even the slowest does.
+/// Returns the fastest speed that `holds`, by `steps` bisections between the slowest and the
+/// fastest, in ratios; zero if the slowest does not hold.
 ///
-/// Halving finds one border between speeds that hold and speeds that do not; where a faster
-/// one holds again by chance, it may be missed.
+/// Bisection finds one border between speeds that hold and speeds that do not; a faster one that
+/// holds by chance may be missed.
 ///
 /// # Errors
-/// Those of `holds`.
+/// The errors of `holds`.
 pub(super) fn fastest<E>(
     steps: u32,
     mut holds: impl FnMut(f64) -> Result<bool, E>,

@@ -1,4 +1,4 @@
-//! A web server on this machine that answers late: what a far terrain is behind.
+//! A web server on this machine with a delay, in place of a distant one.
 
 use std::fs::File;
 use std::io::{self, Cursor, Read as _, Seek as _, SeekFrom};
@@ -28,10 +28,10 @@ struct Shared {
 }
 
 impl Server {
-    /// A server on a free port of the loopback address.
+    /// Starts a server on a free port of the loopback address.
     ///
     /// # Errors
-    /// When there is no port.
+    /// If no port is free.
     pub(super) fn of(folder: &Path) -> io::Result<Self> {
         let http = tiny_http::Server::http(("127.0.0.1", 0)).map_err(io::Error::other)?;
         let http = Arc::new(http);
@@ -49,7 +49,7 @@ impl Server {
         let listener = std::thread::spawn(move || {
             for request in listens.incoming_requests() {
                 let shared = answers.clone();
-                // Answers that wait do not hold back others.
+                // An answer that waits does not delay others.
                 std::thread::spawn(move || shared.answer(request));
             }
         });
@@ -61,18 +61,18 @@ impl Server {
         })
     }
 
-    /// The URL of a file of the folder.
+    /// Returns the URL of a file of the folder.
     pub(super) fn url(&self, name: &str) -> String {
         format!("{}/{name}", self.url)
     }
 
-    /// Every answer comes so much later than it is asked for.
+    /// Sets the delay of every answer.
     pub(super) fn set_latency_ms(&self, latency_ms: u32) {
         let latency = latency_ms.into();
         self.shared.latency_ms.store(latency, Ordering::Relaxed);
     }
 
-    /// Requests so far, and bytes of files that were sent.
+    /// Returns the requests up to now, and the bytes of files that were sent.
     pub(super) fn traffic(&self) -> Traffic {
         Traffic {
             requests: self.shared.requests.load(Ordering::Relaxed),
@@ -85,7 +85,7 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.http.unblock();
         if let Some(listener) = self.listener.take() {
-            // It does nothing but hand requests on.
+            // It only passes requests on.
             let _ = listener.join();
         }
     }
@@ -104,7 +104,7 @@ impl Shared {
             };
             Response::from_data([]).with_status_code(status)
         });
-        // A program that has what it wanted may be gone.
+        // A program that has all it needs may have disconnected.
         let _ = request.respond(response);
     }
 
@@ -155,7 +155,7 @@ fn header(name: &str, value: &str) -> Option<Header> {
     Header::from_bytes(name, value).ok()
 }
 
-/// The bytes that `bytes=FROM-TO` or `bytes=FROM-` asks for, of so many; the end is not in it.
+/// Returns the range in `bytes=FROM-TO` or `bytes=FROM-`, of `len` bytes, without its end.
 fn range(asked: &str, len: u64) -> io::Result<[u64; 2]> {
     let wrong = || io::Error::from(io::ErrorKind::InvalidInput);
     let ends = asked.strip_prefix("bytes=").ok_or_else(wrong)?;

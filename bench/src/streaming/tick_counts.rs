@@ -4,14 +4,14 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
 
-/// Counts of ticks. Every tick that the device tells of is counted once.
+/// Counts of ticks. Every tick that the device reports is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TickCounts {
-    /// Ticks of the hand's motion, in all of which the HIP is below the surface.
+    /// Ticks of the hand's motion; in all of them the HIP is below the surface.
     pub(super) ticks: u32,
-    /// Ticks whose terrain was not on the device yet, and nothing coarser either.
+    /// Ticks whose terrain was not on the device yet, nor any coarser one.
     pub(super) missing: u32,
-    /// Ticks over a fallback, or over a tile that settles from it.
+    /// Ticks over a fallback, or over a tile that blends from it.
     pub(super) coarse: u32,
     /// Ticks without a contact, though nothing was missing.
     pub(super) free: u32,
@@ -29,7 +29,7 @@ impl TickCounts {
     }
 }
 
-/// Returns true if terrain near the HIP was not on the device: a hole in the rendered surface.
+/// Returns true if terrain near the HIP was not on the device: no-data in the rendered surface.
 pub(super) fn lacks_terrain(sample: &TickRecord) -> bool {
     sample.limits.contains(Limits::TERRAIN_MISSING)
 }

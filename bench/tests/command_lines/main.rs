@@ -1,5 +1,5 @@
-//! Every command line of README.md and the book: it is one that the programs take, and where it needs
-//! neither a board nor a server, it is run.
+//! Every command line of README.md and the book is parsed by its program, and run if it needs
+//! neither a board nor a server.
 
 mod run;
 
@@ -17,7 +17,7 @@ const PROGRAMS: [&str; 3] = ["hapterra", "hapterra-lab", "cargo"];
 struct Line {
     page: PathBuf,
     text: String,
-    /// In a block: whole, and to be typed as it is.
+    /// True in a block: a whole line, to be typed unchanged.
     is_block: bool,
 }
 
@@ -38,7 +38,7 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// The command lines of a page: lines of blocks, and code inside of text.
+/// Returns the command lines of a page: lines of blocks, and code in text.
 fn lines(page: &Path, text: &str) -> Vec<Line> {
     let line = |text: &str, is_block| Line {
         page: page.to_owned(),
@@ -69,8 +69,8 @@ fn lines(page: &Path, text: &str) -> Vec<Line> {
     found
 }
 
-/// Words of a line, up to a comment or a second command; `[FILE]` is as FILE, and cargo that runs
-/// `hapterra-lab` is as that program.
+/// Returns the words of a line, up to a comment or a second command; `[FILE]` counts as FILE, and
+/// cargo that runs `hapterra-lab` as that program.
 fn words(text: &str) -> Vec<String> {
     let words = shlex::split(text).unwrap_or_default();
     let ends = |word: &String| ["|", "&&", ">", "<"].contains(&word.as_str());
@@ -83,15 +83,15 @@ fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// Returns true if a word stands for one of the user's, as FILE.
+/// Returns true if a word is a placeholder, such as FILE.
 fn is_placeholder(word: &str) -> bool {
     let is_upper = |c: char| c.is_ascii_uppercase() || "_.…,|=".contains(c);
     word.contains(char::is_uppercase) && word.chars().all(is_upper) || word.contains('…')
 }
 
-/// Parses a line of `hapterra` or `hapterra-lab`; the error is the program's text.
+/// Parses a line of `hapterra` or `hapterra-lab`; the error is the program's message.
 fn parsed(command: clap::Command, words: &[String], is_block: bool) -> Result<(), String> {
-    // The list is printed while this is parsed, and the program ends.
+    // Parsing this option prints the list and ends the program.
     if words.iter().any(|word| word == "--formats") {
         return Ok(());
     }
@@ -113,7 +113,7 @@ fn parsed(command: clap::Command, words: &[String], is_block: bool) -> Result<()
     }
 }
 
-/// Checks that a line of cargo names commands and options of xtask, packages and folders that exist.
+/// Checks that a line of cargo names existing commands and options of xtask, packages and folders.
 fn cargo(words: &[String]) -> Result<(), String> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     if let ["cargo", "xtask", command, ref more @ ..] = words[..] {
@@ -147,10 +147,10 @@ fn cargo(words: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The manifest of the workspace.
+/// Returns the manifest of a package in the workspace.
 ///
 /// # Errors
-/// It has no such package.
+/// If there is no such package.
 fn manifest_of(name: &str) -> Result<PathBuf, String> {
     let locked = include_str!("../../../Cargo.lock");
     let manifest = repository().join("Cargo.toml");

@@ -9,7 +9,7 @@ use hapterra_tests::timeouts::end_of;
 
 use super::{Line, lines, pages, words};
 
-/// Words of lines that need what a test does not have.
+/// Words of lines that a test cannot run.
 const ELSEWHERE: [&str; 8] = [
     "usb",
     "tcp:",
@@ -20,7 +20,7 @@ const ELSEWHERE: [&str; 8] = [
     "band=2",
     "worldcover",
 ];
-/// Commands that are run: the others ask for a board or a viewer, or take minutes.
+/// Commands that are run: the others need a board or a viewer, or take minutes.
 const RUN: [&str; 10] = [
     "info",
     "run",
@@ -34,8 +34,8 @@ const RUN: [&str; 10] = [
     "help",
 ];
 
-/// Files by the names that the pages have: a terrain at 7.5 to 7.9° east and 45.8 to 46.2° north, and
-/// a path over it.
+/// Writes files with the names on the pages: a terrain at 7.5 to 7.9° east and 45.8 to 46.2° north,
+/// and a path over it.
 fn files(folder: &Path) {
     let mut terrain =
         "ncols 40\nnrows 40\nxllcorner 7.5\nyllcorner 45.8\ncellsize 0.01\n".to_owned();
@@ -64,7 +64,7 @@ fn files(folder: &Path) {
     run(folder, &rendered.map(str::to_owned)).expect("a recording");
 }
 
-/// Runs the words of a line; the error is what it writes on standard error.
+/// Runs the words of a line; the error is its standard error.
 fn run(folder: &Path, words: &[String]) -> Result<(), String> {
     let program = match words[0].as_str() {
         "hapterra" => hapterra_binary(),
@@ -80,7 +80,7 @@ fn run(folder: &Path, words: &[String]) -> Result<(), String> {
     output.status.success().then_some(()).ok_or(printed)
 }
 
-/// The words to run a line with; none where it needs what a test does not have.
+/// Returns the words to run a line with; `None` if a test cannot run it.
 fn runnable(line: &Line) -> Option<Vec<String>> {
     let mut words = words(&line.text);
     let is_elsewhere = |word: &String| ELSEWHERE.iter().any(|part| word.contains(part));

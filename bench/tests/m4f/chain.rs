@@ -18,20 +18,19 @@ use hapterra_tests::scene::materials::Materials;
 use super::contact::{GridSamples, rough, scene, with_params};
 use super::table::{Row, Target, Tick};
 
-/// Ticks on the way down, which do not count.
+/// Ticks of the descent, which do not count.
 const APPROACH: usize = 50;
 
-/// Tiles that settle come before this tick.
+/// The tick before which tiles arrive and begin to blend.
 const LATE: Option<usize> = Some(APPROACH);
-/// Height of the fallback above the tiles, by how much a tick moves the surface, and how long tiles
-/// settle, ticks.
+/// Height of the fallback above the tiles, motion of the surface in a tick, and ticks of a blend.
 const UNDER_MM: f64 = 3.0;
 const STEP_MM: f64 = 0.05;
 const SETTLES: usize = 60;
-/// Times that they do.
+/// Number of blends.
 const RUNS: u32 = 20;
 
-/// A field in cells of a millimetre, and a fallback that is off.
+/// A field in cells of a millimetre, and a fallback with an error.
 struct Under<'g>(GridSamples<'g>);
 
 impl Samples for Under<'_> {
@@ -51,7 +50,7 @@ struct Arm<'g> {
     placement: ArmFrame,
 }
 
-/// All of them.
+/// Returns all rows.
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let grid = terrain();
     let arm = Arm::over(&grid);
@@ -60,7 +59,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let mut at = [0.0, 0.0];
     let mut slide = |speed: f64| {
         heading += random.between(-0.05, 0.05);
-        // Within 40 mm of home: turned back at the border of that.
+        // Within 40 mm of home: turned back at this border.
         if f64::hypot(at[0], at[1]) > 40.0 {
             heading = f64::atan2(-at[1], -at[0]);
         }
@@ -121,7 +120,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let damping = (&sliding[..], with_params(arm.scene(), damped));
     let controlled = |scene| with_params(scene, |params| with_controller(params, Controller::On));
     let all = with_params(with_params(rough(arm.scene()), smooth), damped);
-    // Slower than half a cell a tick, at which it has faded.
+    // Slower than half a cell a tick, at which the texture has faded.
     let coarse = |params| {
         let mut params = grained(params);
         params.texture.wavelength_mm = 8.0;
@@ -314,8 +313,8 @@ impl<'g> Arm<'g> {
         }
     }
 
-    /// The materials of these surface parameters, in squares of five samples: sliding, one is
-    /// nearly always on its way in.
+    /// Returns the materials of these surface parameters, in squares of five samples: during a
+    /// slide the material almost always changes.
     fn classes(&self, all_params: &[SurfaceParams]) -> Materials {
         let table: Vec<Material> = all_params.iter().map(Material::of).collect();
         let size = [self.grid.columns as i32, self.grid.rows as i32];
@@ -345,13 +344,13 @@ impl<'g> Arm<'g> {
             source: Source::Encoders,
             ..scene(self.grid)
         };
-        // The rows that name it have it.
+        // Only the rows that name the controller have it.
         with_params(arm, |params| with_controller(params, Controller::Off))
     }
 
-    /// Slides over the fallback, which is [`UNDER_MM`] off, at half a cell a tick, once in each
-    /// of several directions, and counts the ticks from the one in which tiles come until they
-    /// have settled; as many where none comes.
+    /// Slides over the fallback, which is [`UNDER_MM`] off, at half a cell a tick, once in each of
+    /// several directions. Counts the ticks from the arrival of tiles to the end of the blend, or
+    /// as many without tiles.
     fn settling(
         &self,
         board: &CountingBoard,
@@ -405,8 +404,8 @@ impl<'g> Arm<'g> {
         Row::new(name, target, there)
     }
 
-    /// Runs the counts, a way down to the first of them before, and counts the
-    /// ticks in which the proxy is in `state`: nearly all of them.
+    /// Runs the counts after a descent to the first of them, and counts the ticks in which the
+    /// proxy is in `state`: nearly all of them.
     fn row(
         &self,
         board: &CountingBoard,
@@ -418,7 +417,7 @@ impl<'g> Arm<'g> {
         self.row_on(board, name, target, (counts, scene, None), state)
     }
 
-    /// The same on materials, where there are some.
+    /// Same as `row`, on materials if there are some.
     fn row_on(
         &self,
         board: &CountingBoard,

@@ -1,5 +1,5 @@
-//! The states of the contact alone: the same paths of the HIP as in the counts
-//! on the host, and the long sweeps.
+//! The states of the contact alone: the same paths of the HIP as for the counts on the host, and
+//! the long sweeps.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::SurfaceParams;
@@ -20,10 +20,10 @@ pub(crate) const ROUGH: Friction = Friction {
     dynamic_mu: 0.3,
     viscous_s: 0.001,
 };
-/// The states that are counted on them, too.
+/// The states that are also counted on rough surfaces.
 const IN_CONTACT: [&str; 4] = ["first contact", "sliding", "sliding fast", "resting"];
 
-/// Targets by state.
+/// Returns the target of a state.
 fn target(state: &str) -> Target {
     let of = |median, p99| Target {
         median,
@@ -34,7 +34,7 @@ fn target(state: &str) -> Target {
         "unmoved" => of(Some(80), None),
         "free high" | "free low" => of(Some(200), None),
         "sliding" => of(Some(300), Some(1500)),
-        // The same without friction, and 2,500 instructions.
+        // The target without friction, plus 2,500 instructions.
         "first contact, rough" => of(None, Some(2_391 + 2_500)),
         "sliding, rough" => of(None, Some(1_488 + 2_500)),
         "sliding fast, rough" => of(None, Some(2_373 + 2_500)),
@@ -43,7 +43,7 @@ fn target(state: &str) -> Target {
     }
 }
 
-/// All of them.
+/// Returns all rows.
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let grid = terrain();
     let mut rows: Vec<Row> = STATES
@@ -81,7 +81,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         tiles(size(&wide)),
         scene(&wide),
     ));
-    // Farther than it reaches the tiles are not there: the way is held up.
+    // Beyond it the tiles are missing, and the path stops.
     let long = Grid::fractal("5120 × 64", [5120, 64], 6, 1.0);
     let near = tiles(FieldSize::new(512, 64));
     let (state, steps) = ("sweep 5000, held up", far(&long));
@@ -127,7 +127,7 @@ impl Samples for GridSamples<'_> {
     }
 }
 
-/// All but the first of them count.
+/// Returns steps that all count except the first.
 fn every(hips: &[Hip]) -> Vec<Step> {
     let step = |(tick, hip): (usize, &Hip)| Step {
         hip: *hip,
@@ -136,7 +136,7 @@ fn every(hips: &[Hip]) -> Vec<Step> {
     hips.iter().enumerate().map(step).collect()
 }
 
-/// Down at the western end, then 5,000 cells east at once, and back.
+/// Returns a path down at the western end, then 5,000 cells east at once, and back.
 fn far(grid: &Grid) -> Vec<Step> {
     let sky = f64::from(grid.top()) + 2.0;
     let mut random = path::Random(16);
@@ -159,7 +159,7 @@ fn size(grid: &Grid) -> FieldSize {
     FieldSize::new(grid.columns as i32, grid.rows as i32)
 }
 
-/// The same on a rough surface.
+/// Returns the scene with a rough surface.
 pub(crate) fn rough(scene: Scene) -> Scene {
     with_params(scene, |params| SurfaceParams {
         friction: ROUGH,
@@ -167,7 +167,7 @@ pub(crate) fn rough(scene: Scene) -> Scene {
     })
 }
 
-/// The same under other surface parameters.
+/// Returns the scene with other surface parameters.
 pub(crate) fn with_params(
     scene: Scene,
     change: impl FnOnce(SurfaceParams) -> SurfaceParams,
@@ -176,7 +176,7 @@ pub(crate) fn with_params(
     Scene { params, ..scene }
 }
 
-/// A scene of points over the field.
+/// Returns a scene of points over the field.
 pub(crate) fn scene(grid: &Grid) -> Scene {
     Scene {
         epoch: 1,

@@ -1,4 +1,4 @@
-//! The parts of the count on the emulated Cortex-M4F, and of the cycles (`tests/images`).
+//! The parts of the counts on the emulated Cortex-M4F, also for the cycles (`tests/images`).
 
 pub(crate) mod chain;
 pub(crate) mod contact;

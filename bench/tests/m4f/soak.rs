@@ -1,5 +1,5 @@
-//! Ticks of the soak's scenes: every kind of terrain, every habit of the HIP, tiles
-//! that are held and tiles that come late.
+//! Ticks of the stress test's scenes: every kind of terrain, every habit of the HIP, stored tiles
+//! and late tiles.
 
 use std::sync::Mutex;
 use std::thread;
@@ -11,29 +11,29 @@ use hapterra_tests::scene::terrain::{KINDS, Kind};
 
 use super::table::{Row, Table, Target, Tick};
 
-/// The scenes are those of this seed, from number 0.
+/// Seed of the scenes, which start with number 0.
 const SEED: u64 = 2026;
-/// Scenes, of some 550 ticks each, behind the kept table: five minutes on two cores.
+/// Scenes, of about 550 ticks each, for the stored table: five minutes on two cores.
 pub(crate) const ALL: u64 = 10_000;
-/// Scenes when the tests are run: half a minute. A path has some fifteen habits of
-/// the HIP out of ten, and there are 14 kinds of terrain, so each is among them
-/// hundreds of times, or some fifty.
+/// Scenes of a test run: half a minute. A path has about fifteen of ten habits of the HIP, and
+/// there are 14 kinds of terrain, so each habit occurs hundreds of times, each kind at least about
+/// fifty.
 pub(crate) const PART: u64 = 1000;
-/// Scenes that the emulated processor replays at once.
+/// Scenes that the emulated processor replays in one run.
 const BATCH: usize = 20;
-/// Scenes of every kind of terrain at least.
+/// Least number of scenes of every kind of terrain.
 const OF_EACH: usize = 30;
-/// Most instructions that a tick of the contact may take on any scene: with the
-/// chain around it a tick at 10 kHz then fits a processor of 168 MHz.
+/// Most instructions of a tick of the contact on any scene: with the chain around it, a tick at 10
+/// kHz then fits a processor of 168 MHz.
 const MOST: u32 = 12_000;
 
-/// The settings of a scene, and what its ticks cost.
+/// The settings of a scene, and the costs of its ticks.
 struct CountedScene {
     kind: Kind,
     ticks: Vec<Tick>,
 }
 
-/// A row over all scenes, and one for each kind of terrain among them.
+/// Returns a row over all scenes, and one for each kind of terrain among them.
 pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
     let counted = count(board, scenes, Surface::Smooth);
     let target = Target {
@@ -56,8 +56,8 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
     rows
 }
 
-/// Rows over the scenes whose bits the emulated processor is compared by, without materials and on
-/// them.
+/// Returns rows over the scenes that compare the emulated processor with the host, without
+/// materials and on them.
 pub(crate) fn compared_rows(board: &CountingBoard) -> Vec<Row> {
     let row = |name: &str, scenes: Vec<(u64, EmulatorScene)>| {
         let counted = count_recorded(board, scenes).into_iter();
@@ -73,7 +73,7 @@ pub(crate) fn compared_rows(board: &CountingBoard) -> Vec<Row> {
     ]
 }
 
-/// A row over scenes with friction, a fourth as many.
+/// Returns a row over scenes with friction, a fourth as many.
 fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
     let counted = count(board, scenes, Surface::Rough);
     let target = Target {
@@ -89,7 +89,7 @@ fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
     }
 }
 
-/// Replays the scenes on all cores, and those that are known to have the costliest ticks.
+/// Replays the scenes on all cores, and those with the costliest known ticks.
 fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedScene> {
     let [smooth, rough] = Table::kept_scenes();
     let mut costliest = match surface {
@@ -119,14 +119,13 @@ fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedSce
     counted.into_inner().expect("no panic inside")
 }
 
-/// Replays so many scenes in one run of the emulated processor, which must answer
-/// as this one does.
+/// Replays scenes in one run of the emulated processor, whose results must equal the host's.
 fn count_batch(board: &CountingBoard, numbers: &[u64], surface: Surface) -> Vec<CountedScene> {
     let random = |number: &u64| (*number, EmulatorScene::random(SEED, *number, surface));
     count_recorded(board, numbers.iter().map(random).collect())
 }
 
-/// The same, of scenes with their numbers: all of them on materials, or none.
+/// Same as `count_batch` for recorded scenes: all of them on materials, or none.
 fn count_recorded(board: &CountingBoard, scenes: Vec<(u64, EmulatorScene)>) -> Vec<CountedScene> {
     let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);

@@ -1,4 +1,4 @@
-//! The table of counts: what is kept, what was meant, what is now.
+//! The table of counts: the stored ones, the targets, and the present ones.
 
 use std::fmt;
 
@@ -6,16 +6,16 @@ use hapterra_tests::cycles::Cycles;
 use hapterra_tests::instruction_counter::Counted;
 use hapterra_tests::repository;
 
-/// The kept table, in the repository.
+/// The stored table, in the repository.
 const TABLE: &str = "bench/instructions-m4f.csv";
-/// More than this share above the kept count is a regression, and more than
-/// [`LEEWAY`] instructions: another compiler may take a few.
+/// A count above the stored one by more than this share, and by more than [`LEEWAY`] instructions,
+/// is a regression: another compiler may need a few more.
 const TOLERANCE: f64 = 0.05;
 const LEEWAY: f64 = 10.0;
-/// Minimum work of the ticks from which the cost of a unit is computed: in shorter ones what every
-/// tick takes would count as much as the units.
+/// Least work of the ticks from which the cost of a unit is computed: in shorter ones the constant
+/// part would weigh as much as the units.
 const UNITS: u32 = 8;
-/// The shares of the ticks that take no more.
+/// The quantiles of the ticks.
 const SHARES: [f64; 3] = [0.5, 0.99, 1.0];
 /// The columns, after the state's name.
 const COUNTS: [&str; 3] = ["median", "p99", "max"];
@@ -37,26 +37,26 @@ const COLUMNS: [&str; 12] = [
 /// Target, instructions a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Target {
-    /// For the usual tick.
+    /// For the median tick.
     pub(crate) median: Option<u32>,
-    /// For all but one in a hundred.
+    /// For the 99th percentile.
     pub(crate) p99: Option<u32>,
-    /// For the worst.
+    /// For the costliest tick.
     pub(crate) max: Option<u32>,
 }
 
 /// Cost of one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
-    /// Instructions, the call and the return included.
+    /// Instructions, with the call and the return.
     pub(crate) instructions: u32,
-    /// Cycles on the boards' chips, where they are worked out.
+    /// Cycles on the boards' chips, if they are computed.
     pub(crate) cycles: Cycles,
-    /// Units of work; 0 where more than the contact was counted.
+    /// Work units; 0 if more than the contact was counted.
     pub(crate) units: u32,
-    /// The number of its scene in the soak.
+    /// The number of its scene in the stress test.
     pub(crate) scene: Option<u64>,
-    /// Its place among the ticks of its scene.
+    /// Its index among the ticks of its scene.
     pub(crate) index: usize,
 }
 
@@ -64,21 +64,21 @@ pub(crate) struct Tick {
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
     pub(crate) state: String,
-    /// Instructions: median, 99th percentile, most.
+    /// Instructions: median, 99th percentile, maximum.
     pub(crate) counts: [u32; 3],
     /// Targets.
     target: [Option<u32>; 3],
-    /// The ticks with the least and the most instructions a unit of work.
+    /// The ticks with the fewest and the most instructions a work unit.
     per_unit: Option<[Tick; 2]>,
     worst: Tick,
-    /// Cycles where they are worked out: of an STM32G474 and of an STM32H743, the same three each.
+    /// Cycles, if computed, of an STM32G474 and of an STM32H743, with the same three quantiles.
     pub(crate) cycles: [[u32; 3]; 2],
-    /// The kept row is over more ticks: only its largest count binds this one.
+    /// True if the stored row covers more ticks: only its largest count limits this one.
     is_part: bool,
 }
 
 impl Tick {
-    /// One of the whole chain, by its place among the ticks of its run.
+    /// Returns a tick of the whole chain, with its index among the ticks of its run.
     pub(crate) fn of(counted: &Counted, index: usize) -> Self {
         Self {
             instructions: counted.instructions,
@@ -114,11 +114,11 @@ impl fmt::Display for Tick {
 }
 
 impl Row {
-    /// Over the columns of a row on screen.
+    /// Titles of a row's columns on the screen.
     pub(crate) const TITLES: &str =
         "state                              median     p99     max   target";
 
-    /// From its ticks.
+    /// Computes a row from its ticks.
     pub(crate) fn new(state: &str, target: Target, mut ticks: Vec<Tick>) -> Self {
         assert!(ticks.len() >= 100, "{state}: {} ticks", ticks.len());
         let long = || ticks.iter().filter(|tick| tick.units >= UNITS).copied();
@@ -143,7 +143,7 @@ impl Row {
         }
     }
 
-    /// The row of some of the ticks that the kept table's row is over.
+    /// Marks the row as covering a part of the stored row's ticks.
     pub(crate) fn of_a_part(self) -> Self {
         Self {
             is_part: true,
@@ -151,7 +151,7 @@ impl Row {
         }
     }
 
-    /// Its cells, as [`COLUMNS`] names them.
+    /// Returns its cells, in the order of [`COLUMNS`].
     fn record(&self) -> Vec<String> {
         let of = |number: Option<u32>| number.map(|n| n.to_string()).unwrap_or_default();
         let per_unit = |i: usize| {
@@ -192,16 +192,16 @@ impl fmt::Display for Row {
     }
 }
 
-/// The one that such a share of what is sorted does not exceed.
+/// Returns the quantile of a sorted list.
 fn at<T>(sorted: &[T], share: f64) -> &T {
     &sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
-/// The kept table: by state, its median, 99th percentile and largest count.
+/// The stored table: the median, 99th percentile and largest count of each state.
 pub(crate) struct Table(Vec<(String, [f64; 3])>);
 
 impl Table {
-    /// Reads it.
+    /// Reads the stored table.
     pub(crate) fn kept() -> Self {
         let mut table =
             csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
@@ -213,8 +213,8 @@ impl Table {
         Self(rows.collect())
     }
 
-    /// The scenes of the stress test whose ticks are the costliest of all and of each kind: without
-    /// friction, and with.
+    /// Returns the scenes of the stress test with the costliest ticks of all and of each kind:
+    /// without friction, and with.
     pub(crate) fn kept_scenes() -> [Vec<u64>; 2] {
         let mut table =
             csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
@@ -227,7 +227,7 @@ impl Table {
         [smooth, rough].map(|named| named.into_iter().map(|(_, scene)| scene).collect())
     }
 
-    /// Writes it anew.
+    /// Writes the table.
     pub(crate) fn write(rows: &[Row]) {
         let mut table =
             csv::Writer::from_path(repository().join(TABLE)).expect("the table can be written");
@@ -237,8 +237,8 @@ impl Table {
         }
     }
 
-    /// A sentence for each count that is more than the table allows, or than a target
-    /// that the table meets.
+    /// Returns a message for each count above the table's allowance, or above a target that the
+    /// table meets.
     pub(crate) fn worse(&self, rows: &[Row]) -> Vec<String> {
         rows.iter().flat_map(|row| self.worse_row(row)).collect()
     }

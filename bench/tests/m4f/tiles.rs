@@ -1,5 +1,5 @@
-//! Filling a buffer with a tile, in each form in which tiles travel, and with bytes that
-//! are made to take long.
+//! The filling of a buffer with a tile, in each form of transfer, and with bytes that take as long
+//! as possible.
 
 use hapterra_core::terrain::TILE_SAMPLES;
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
@@ -14,7 +14,7 @@ use super::table::{Row, Target, Tick};
 const TILES: usize = 100;
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
-/// All of them.
+/// Returns all rows.
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let mut random = Random(31);
     // 1/30 of a cell a metre; heights to 1/1,024 m.
@@ -56,7 +56,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     ]
 }
 
-/// Hills with something on top, packed by one of the steps.
+/// Returns hills with an addition, packed with one of the steps.
 fn packed(steps: &[Step], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
     let mut tile = |_| {
         let heights: [f32; SAMPLES] = std::array::from_fn(|i| {
@@ -71,7 +71,7 @@ fn packed(steps: &[Step], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
     (0..TILES).map(&mut tile).collect()
 }
 
-/// Cells of a step that a slope may have.
+/// Returns the size of a slope's step, cells.
 fn unit(steps: &[Step]) -> f64 {
     match steps {
         [Step::Cells(cells)] => *cells,
@@ -79,8 +79,8 @@ fn unit(steps: &[Step]) -> f64 {
     }
 }
 
-/// Two lines, holes in runs of one, and long numbers: each sample takes as many steps as
-/// bytes can make it take. It ends with too few bytes, which shows at the end only.
+/// Returns two lines, no-data in runs of one, and long numbers: each sample takes the most steps
+/// possible. It has too few bytes, which is detected only at the end.
 fn hostile(random: &mut Random) -> Vec<u8> {
     let mut bytes = vec![2 | 4 | 27 << 3, 0, 0, 0, 0x40];
     for _ in 0..2 {

@@ -1,18 +1,18 @@
-//! An analogue-to-digital converter of the chips (RM0440 21, RM0433 25): its regulator, enable,
-//! the channels that are connected to it, and an injected sequence that the program starts.
+//! An analogue-to-digital converter of the chips (RM0440 21, RM0433 25): its regulator, enable, the
+//! connected channels, and an injected sequence that the program starts.
 //!
-//! Modelled: of CR DEEPPWD, ADVREGEN with its start-up time, ADCAL, ADEN, JADSTART; of ISR
-//! ADRDY, JEOC, JEOS; JQDIS of CFGR; JSQR and JDR; on an H743 PCSEL; on a G474 that the first
-//! conversion after a millisecond without one is wrong (ES0430).
+//! Modelled: of CR DEEPPWD, ADVREGEN with its start-up time, ADCAL, ADEN, JADSTART; of ISR ADRDY,
+//! JEOC, JEOS; JQDIS of CFGR; JSQR and JDR; on an H743 PCSEL; on a G474 the wrong first conversion
+//! after a millisecond without one (ES0430).
 //!
-//! Not modelled: what a calibration corrects, sampling times and prescalers (a sequence takes
+//! Not modelled: the corrections of a calibration, sampling times and prescalers (a sequence takes
 //! the longest that the slower chip's can take), DIFSEL, offsets, oversampling, resolutions,
 //! queues, triggers, interrupts, DMA, the regular sequence, BOOST, LDORDY, ADDIS and JADSTP.
 
 const ISR: u32 = 0x00;
 const CR: u32 = 0x08;
 const CFGR: u32 = 0x0C;
-/// Which channels are connected: an H743's alone.
+/// The connected channels, on an H743 only.
 const PCSEL: u32 = 0x1C;
 const JSQR: u32 = 0x4C;
 const JDR1: u32 = 0x80;
@@ -29,15 +29,15 @@ const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 /// Bit of CFGR: no queue of injected sequences. With a queue the program cannot start one.
 const JQDIS: u32 = 1 << 31;
-/// Time that a sequence takes, ns: three conversions of the slower chip in its slower revision,
-/// an H743 of revision V, whose converter halves its clock once more.
+/// Duration of a sequence, ns: three conversions of the slower chip in its slower revision, an H743
+/// of revision V, whose converter halves its clock again.
 const SEQUENCE_NS: u64 = 75_000;
-/// The time without a conversion after which the next one is wrong on a G474, ns: a tenth less
-/// than the millisecond of ES0430, which a chip's own clock and temperature may make of it.
+/// Time without a conversion after which the next one is wrong on a G474, ns: a tenth less than the
+/// millisecond of ES0430, for the tolerance of a chip's clock and its temperature.
 const STALE_NS: u64 = 900_000;
-/// Reading of a wrong conversion.
+/// Result of a wrong conversion.
 const WRONG: u32 = 0xFFF;
-/// Time that the regulator takes to start, ns: a G474's 20 µs, an H743's 10.
+/// Start-up time of the regulator, ns: a G474's 20 µs, an H743's 10.
 const REGULATOR_NS: [u64; 2] = [20_000, 10_000];
 
 /// The converter, and the voltages at its channels.
@@ -45,20 +45,20 @@ pub struct Adc {
     registers: [u32; 64],
     /// Bits of a conversion: 12 on a G474, 16 on an H743.
     bits: u32,
-    /// Since when the regulator has been on, ns.
+    /// The time at which the regulator was switched on, ns.
     regulator_ns: Option<u64>,
-    /// Until when a sequence is under way, ns.
+    /// The time at which the present sequence ends, ns.
     busy_until_ns: Option<u64>,
-    /// When the last sequence ended, ns.
+    /// The time at which the last sequence ended, ns.
     ended_ns: Option<u64>,
-    /// The first conversion of the sequence under way is wrong.
+    /// True if the first conversion of the present sequence is wrong.
     first_is_wrong: bool,
-    /// Readings of 12 bits at the channels, by their numbers.
+    /// 12-bit readings at the channels, by their numbers.
     pub levels: [u16; 20],
 }
 
 impl Adc {
-    /// A converter in reset, whose conversions have so many bits.
+    /// Creates a converter in reset with this number of bits.
     #[must_use]
     pub fn new(bits: u32) -> Self {
         let mut registers = [0; 64];
@@ -79,7 +79,7 @@ impl Adc {
         self.bits == 16
     }
 
-    /// Follows the regulator's bits, and takes the enable back where there is no regulator.
+    /// Follows the regulator's bits, and clears the enable without a regulator.
     fn follow_regulator(&mut self, control: u32, now_ns: u64) -> u32 {
         let is_on = control & (ADVREGEN | DEEPPWD) == ADVREGEN;
         self.regulator_ns = match self.regulator_ns {
@@ -103,20 +103,20 @@ impl Adc {
         &mut self.registers[(offset / 4) as usize]
     }
 
-    /// A register that the core reads.
+    /// Returns a register for the core.
     pub fn read(&mut self, offset: u32, now_ns: u64) -> u32 {
         self.finish(now_ns);
         *self.register(offset)
     }
 
-    /// A write of the core's.
+    /// Writes a register from the core.
     pub fn write(&mut self, offset: u32, value: u32, mask: u32, now_ns: u64) {
         self.finish(now_ns);
         let written = *self.register(offset) & !mask | value & mask;
         match offset {
-            // What is written as set is cleared.
+            // Writing a one clears a bit.
             ISR => *self.register(ISR) &= !(value & mask),
-            // A calibration is done at once.
+            // A calibration finishes at once.
             CR => {
                 let written = self.follow_regulator(written, now_ns);
                 *self.register(CR) = written & !(ADCAL | JADSTART);
@@ -134,7 +134,7 @@ impl Adc {
         }
     }
 
-    /// Ends a sequence whose time is up.
+    /// Ends a sequence that is due.
     fn finish(&mut self, now_ns: u64) {
         let Some(until_ns) = self.busy_until_ns.filter(|until_ns| now_ns >= *until_ns) else {
             return;
@@ -161,7 +161,7 @@ mod tests {
     const ON: u32 = ADVREGEN | ADEN;
     const UP_NS: u64 = 20_000;
 
-    /// Its regulator is up at [`UP_NS`].
+    /// Returns a converter whose regulator is ready at [`UP_NS`].
     fn with_regulator(bits: u32) -> Adc {
         let mut adc = Adc::new(bits);
         adc.write(CR, ADVREGEN, u32::MAX, 0);

@@ -1,4 +1,4 @@
-//! An arm that presses on a plane, on every board that there is an image of.
+//! An arm that presses on a plane, on every board with an image.
 
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::scene::{Scene, Source};
@@ -7,7 +7,7 @@ use heightfield::Raster;
 use crate::device::{Device, Plane, machines};
 use crate::machine::{Machine, Stop};
 
-/// A level plane, on which every board's arm is pressed.
+/// A level plane for every board's arm.
 pub struct Bench {
     /// The plane to press.
     pub plane: Plane,
@@ -22,7 +22,7 @@ impl Default for Bench {
 }
 
 impl Bench {
-    /// 20 mm high, under a home at 30 mm.
+    /// Creates a plane 20 mm high, under a home at 30 mm.
     ///
     /// # Panics
     /// Never: the sizes are fixed.
@@ -35,7 +35,7 @@ impl Bench {
         }
     }
 
-    /// The terrain.
+    /// Returns the terrain.
     ///
     /// # Panics
     /// Never: the sizes are fixed.
@@ -44,7 +44,7 @@ impl Bench {
         Terrain::new(&self.raster, self.scale, 0).expect("terrain")
     }
 
-    /// The scene over it.
+    /// Returns the scene over it.
     ///
     /// # Panics
     /// Never: the home is near.
@@ -57,10 +57,10 @@ impl Bench {
         terrain.scene(self.plane.params, Source::Encoders, home)
     }
 
-    /// Presses 3 mm deep and holds still.
+    /// Presses 3 mm deep and keeps still.
     ///
     /// # Panics
-    /// When the board does not arm.
+    /// If the board does not arm.
     #[must_use]
     pub fn press<'t>(&self, machine: Machine, terrain: &'t Terrain<'t>) -> Device<'t> {
         let mut device = Device::arm(machine, terrain, self.scene(terrain));
@@ -70,17 +70,17 @@ impl Bench {
         device.run_ms(40);
         let mut machine = device.machine.borrow_mut();
         assert!(machine.is_enabled(), "{}: pressed", machine.chip.board);
-        // What comes now comes between two ticks.
+        // The test continues between two ticks.
         assert_eq!(machine.run_ticks(1), Stop::Asked);
         let _ = machine.take_effects();
         drop(machine);
         device
     }
 
-    /// Presses on every board and does something to it.
+    /// Presses on every board and calls `then`.
     ///
     /// # Panics
-    /// When a board does not arm.
+    /// If a board does not arm.
     pub fn on_each(&self, mut then: impl FnMut(&mut Device<'_>)) {
         for machine in machines() {
             let terrain = self.terrain();

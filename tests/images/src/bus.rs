@@ -25,18 +25,18 @@ const PORTS: u32 = 11;
 const H743_RCC: u32 = 0x5802_4400;
 const PLL1ON: u32 = 1 << 24;
 const PLLCKSELR: u32 = 0x28;
-/// CRS_CR: the clock recovery runs.
+/// CRS_CR: the clock recovery is on.
 const CRS_CEN: u32 = 1 << 5;
-/// DBGMCU_IDC of an H743, and what it reads on one of revision V.
+/// DBGMCU_IDC of an H743, and its value on one of revision V.
 const H743_IDC: (u32, u32) = (0x5C00_1000, 0x2003_6450);
 /// DWT's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
 
-/// Time that a sector takes to be erased, ns: twice the watchdog's time. A real
-/// H743 takes seconds, which would be as many minutes here.
+/// Duration of a sector's erase, ns: twice the watchdog's time. A real H743 takes seconds, which
+/// would be as many minutes here.
 const ERASE_NS: u64 = 100_000_000;
 
-/// A write to something that moves the arm: its commands or the enable pin.
+/// A write that affects the arm: a command or the enable pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// The command of an axis (0 to 2): a converter code or a compare count.
@@ -45,7 +45,7 @@ pub enum Effect {
     Enable(bool),
 }
 
-/// Every pin is analogue but the debugger's, on both chips.
+/// Returns the ports after a reset: all pins except the debugger's are analogue on both chips.
 fn ports_after_reset(gpio: u32) -> HashMap<u32, u32> {
     let analogue = (0..PORTS).map(|port| (gpio + 0x400 * port + MODER, u32::MAX));
     let debuggers = [
@@ -67,29 +67,29 @@ pub struct Bus {
     pub nvic: Nvic,
     /// The independent watchdog.
     pub watchdog: Watchdog,
-    /// Converter on the SPI of a board that has one.
+    /// Converter on the SPI, on a board that has one.
     pub converter: Converter,
     /// Converter that reads the current monitors.
     pub adc: Adc,
     /// The USB peripheral, plugged in.
     pub usb: Cable,
-    /// Sectors that are being erased: address and bytes.
+    /// Sectors in the process of being erased: address and bytes.
     pub erased: Vec<(u32, u32)>,
-    /// Until when the flash is busy, ns.
+    /// The time until which the flash is busy, ns.
     busy_until_ns: u64,
     /// The supply.
     pub supply: Supply,
-    /// Bits that option bytes have cleared, of those that the chip is sold with.
+    /// Option bits that were cleared, of those set at delivery.
     pub cleared_options: Option<(u32, u32)>,
     /// True if a debugger has halted the core.
     pub is_halted: bool,
     /// True if the core has locked up.
     pub is_locked_up: bool,
-    /// A memory with a double error, of those of [`BreakAt::memories`].
+    /// A memory with a double error, as an index into [`BreakAt::memories`].
     pub failing_memory: Option<usize>,
-    /// The level that the enable pin is held at from outside.
+    /// The level that is forced on the enable pin from outside.
     pub enable_held_at: Option<bool>,
-    /// A command's pin (axis 0 to 2) and the 12-bit reading that it is held at from outside.
+    /// A command's pin (axis 0 to 2) and the 12-bit reading that is forced on it from outside.
     pub command_held_at: Option<(usize, u16)>,
     /// True if the oscillator of USB follows the host's start-of-frames.
     pub usb_clock_follows: bool,
@@ -97,14 +97,14 @@ pub struct Bus {
     read_back: Adc,
     /// Time since power-up.
     pub now_ns: u64,
-    /// Runs while a test measures.
+    /// Runs during a measurement.
     pub stopwatch: Option<Stopwatch>,
-    /// Effects on commands and enable pin, in order, since they were last taken.
+    /// Effects on commands and enable pin since the last read, in order.
     pub effects: Vec<Effect>,
 }
 
 impl Bus {
-    /// After a reset.
+    /// Creates the peripherals after a reset.
     #[must_use]
     pub fn new(chip: &'static Chip, cause: Reset) -> Self {
         let usb: Box<dyn Peripheral> = match chip.usb {
@@ -174,7 +174,7 @@ impl Bus {
         self.raise_interrupts();
     }
 
-    /// Peripherals' lines become pending interrupts.
+    /// Makes asserted lines of peripherals pending interrupts.
     pub fn raise_interrupts(&mut self) {
         for (timer, at) in self.timers.iter().zip(self.chip.timers) {
             if let Some(interrupt) = at.interrupt.filter(|_| timer.is_asserting()) {
@@ -190,7 +190,7 @@ impl Bus {
         self.follow_break();
     }
 
-    /// TIM15 is ITR0 of TIM1.
+    /// Applies the gate: TIM15 is ITR0 of TIM1.
     fn follow_gate(&mut self) {
         let level = self
             .timer_named("TIM15")
@@ -230,14 +230,14 @@ impl Bus {
         }
     }
 
-    /// Returns true if duty cycles leave the chip, on a board that commands by them.
+    /// Returns true if duty cycles leave the chip, on a board with duty-cycle commands.
     #[must_use]
     pub fn drives_duty_cycles(&mut self) -> Option<bool> {
         self.duty_outputs()
             .map(|outputs| outputs == Outputs::Pulses)
     }
 
-    /// Returns the outputs at the pins of the duty cycles, on a board that commands by them.
+    /// Returns the outputs at the pins of the duty cycles, on a board with duty-cycle commands.
     #[must_use]
     pub fn duty_outputs(&mut self) -> Option<Outputs> {
         self.follow_gate();
@@ -253,7 +253,7 @@ impl Bus {
         found.and_then(|i| self.timers.get_mut(i))
     }
 
-    /// Sets the revision of an H743, as DBGMCU_IDC.REV_ID tells it.
+    /// Sets the revision of an H743, as in DBGMCU_IDC.REV_ID.
     pub fn set_revision(&mut self, revision: u16) {
         let (register, v) = H743_IDC;
         self.words
@@ -275,8 +275,8 @@ impl Bus {
         }
     }
 
-    /// Lets an axis's encoder (0 to 2) play its channels for a while, and returns how far
-    /// its timer has counted. `levels` gives channels A and B at a time in ns.
+    /// Plays the channels of an axis's encoder (0 to 2) for a while. Returns the counts of its
+    /// timer. `levels` returns channels A and B at a time in ns.
     pub fn play_encoder(
         &mut self,
         axis: usize,
@@ -294,7 +294,7 @@ impl Bus {
         self.inputs.insert(pin, high);
     }
 
-    /// The level of a pin, as a pull-down outside makes it where nothing drives.
+    /// Returns the level of a pin, with an external pull-down if nothing drives it.
     #[must_use]
     pub fn output(&self, (port, pin): (u32, u32)) -> bool {
         let register = |offset| self.plain(self.chip.gpio + 0x400 * port + offset);
@@ -302,7 +302,7 @@ impl Bus {
         drives && register(ODR) >> pin & 1 == 1
     }
 
-    /// Returns the commands of axes 1 to 3, as the registers have them.
+    /// Returns the commands of axes 1 to 3 in the registers.
     #[must_use]
     pub fn commands(&mut self) -> [i32; 3] {
         match self.chip.commands {
@@ -313,7 +313,7 @@ impl Bus {
         }
     }
 
-    /// The code of a current on this board, not yet rounded.
+    /// Returns the code of a current on this board, not rounded.
     #[must_use]
     pub fn code(&mut self, current_a: f64) -> f64 {
         let largest = match self.chip.commands {
@@ -323,7 +323,7 @@ impl Bus {
         self.chip.commands.code(current_a, largest)
     }
 
-    /// The timer at an address, and the offset into it.
+    /// Returns the timer at an address, and the offset in it.
     fn timer(&mut self, address: u32) -> Option<(&mut Timer, u32)> {
         let mut all = self.timers.iter_mut().zip(self.chip.timers);
         all.find(|(_, at)| (at.base..at.base + 0x70).contains(&address))
@@ -354,7 +354,7 @@ impl Bus {
             .then(|| address - base)
     }
 
-    /// The converter that reads the commands back sees what is at their pins.
+    /// Updates the inputs of the converter that reads the commands back.
     fn follow_commands(&mut self) {
         let (Commands::Converters(at), Some((_, channels))) =
             (self.chip.commands, self.chip.read_back)
@@ -368,14 +368,14 @@ impl Bus {
         }
     }
 
-    /// The level at a pin: what a driven one puts out, else what is there from outside.
+    /// Returns the level at a pin: its output if it is driven, else the external level.
     fn level(&self, pin: (u32, u32)) -> bool {
         let held = self.enable_held_at.filter(|_| pin == self.chip.enable);
         let from_outside = || self.inputs.get(&pin).copied().unwrap_or(false);
         held.unwrap_or_else(|| self.output(pin) || from_outside())
     }
 
-    /// Sets what the current monitors of axes 1 to 3 show, A, as 12-bit readings.
+    /// Sets the readings of the current monitors of axes 1 to 3, A, as 12-bit values.
     pub fn set_monitors(&mut self, currents_a: [f64; 3]) {
         let (_, _, channels) = self.chip.monitors;
         for (channel, current_a) in channels.into_iter().zip(currents_a) {
@@ -393,7 +393,7 @@ impl Bus {
         self.words.get(&address).copied().unwrap_or(0)
     }
 
-    /// A word that the core reads.
+    /// Returns a word for the core.
     pub fn read(&mut self, address: u32) -> u32 {
         self.touch(address);
         if let Some((timer, offset)) = self.timer(address) {
@@ -429,8 +429,8 @@ impl Bus {
         }
     }
 
-    /// CRS_ISR: SYNCOKF, or ERRF and SYNCMISS. With a start-of-frame each millisecond the
-    /// flags are set again as soon as they were cleared.
+    /// Returns CRS_ISR: SYNCOKF, or ERRF and SYNCMISS. With a start-of-frame each millisecond the
+    /// flags are set again as soon as they are cleared.
     fn recovery_status(&self) -> u32 {
         let runs = self.plain(self.chip.recovery.0) & CRS_CEN != 0;
         match (runs, self.usb_clock_follows) {
@@ -440,12 +440,12 @@ impl Bus {
         }
     }
 
-    /// Returns true if this is the register that says that a frame is out.
+    /// Returns true for the register that reports the end of a frame.
     fn is_sent(&self, address: u32) -> bool {
         matches!(self.chip.commands, Commands::Serial { sent, .. } if sent.0 == address)
     }
 
-    /// Returns true if this is the register with what returned from the SPI.
+    /// Returns true for the register with the data received by the SPI.
     fn is_back(&self, address: u32) -> bool {
         matches!(self.chip.commands, Commands::Serial { back, .. } if back == address)
     }
@@ -478,7 +478,7 @@ impl Bus {
         value
     }
 
-    /// A write of the core's, in the bytes of `mask`.
+    /// Writes a word from the core, in the bytes of `mask`.
     pub fn write(&mut self, address: u32, value: u32, mask: u32) {
         self.touch(address);
         let enabled = self.output(self.chip.enable);
@@ -511,14 +511,14 @@ impl Bus {
         }
     }
 
-    /// Reports an access of the core to the stopwatch, if one runs.
+    /// Reports an access of the core to the stopwatch, if it runs.
     fn touch(&self, address: u32) {
         if let Some(stopwatch) = &self.stopwatch {
             stopwatch.touch(address);
         }
     }
 
-    /// An axis has a new command: the third is the last one of a tick.
+    /// Records a new command of an axis: the third is the last one of a tick.
     fn reach(&mut self, axis: usize, code: i32) {
         self.effects.push(Effect::Command(axis, code));
         if let Some(stopwatch) = self.stopwatch.as_ref().filter(|_| axis == 2) {
@@ -545,7 +545,7 @@ impl Bus {
         }
     }
 
-    /// The chip's flash says that a word of it could not be read.
+    /// Sets the flash's status for a word that cannot be read.
     pub fn report_unreadable(&mut self, address: u32) {
         let flash = &self.chip.flash;
         let (register, bits) = match flash.unreadable {
@@ -562,7 +562,7 @@ impl Bus {
         *self.words.entry(register).or_default() |= bits;
     }
 
-    /// Returns true if the flash still says that a word of it could not be read.
+    /// Returns true if the flash's status still reports a word that cannot be read.
     #[must_use]
     pub fn reports_unreadable(&self) -> bool {
         let (register, bit) = match self.chip.flash.unreadable {
@@ -574,12 +574,12 @@ impl Bus {
         self.plain(register) & bit != 0
     }
 
-    /// Registers of the flash's in which what is written as set is cleared.
+    /// Handles registers of the flash in which writing a one clears a bit.
     fn clear(&mut self, address: u32, value: u32) -> bool {
         let register = match self.chip.flash.unreadable {
             Unreadable::Nmi { register, .. } if register == address => register,
             Unreadable::BusFault { status, clear } if clear == address => status.0,
-            // Its bits are the hardware's.
+            // Its bits are set by hardware.
             Unreadable::BusFault { status, .. } => return status.0 == address,
             Unreadable::Nmi { .. } => return false,
         };
@@ -587,8 +587,8 @@ impl Bus {
         true
     }
 
-    /// The bits of a register that cannot be written: the comparator's, once PVDL is set, and
-    /// the source and the prescaler of an H743's PLL1 while that is on.
+    /// Returns the write-protected bits of a register: the comparator's after PVDL is set, and the
+    /// source and prescaler of an H743's PLL1 while that is on.
     fn locked(&self, address: u32) -> u32 {
         let pll_is_on = self.plain(H743_RCC) & PLL1ON != 0;
         if self.chip.is_m7 && address == H743_RCC + PLLCKSELR && pll_is_on {
@@ -607,7 +607,7 @@ impl Bus {
             return;
         }
         if address == self.chip.comparator.exti[2] {
-            // What is set is cleared by writing it.
+            // Writing a one clears a bit.
             *self.words.entry(address).or_default() &= !(value & mask);
             return;
         }

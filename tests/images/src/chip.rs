@@ -3,7 +3,7 @@
 use crate::shutdown::{BreakAt, Freeze};
 use crate::supply::{Comparator, ResetFlags};
 
-/// A timer at an address, with its kernel clock and, if it is used, interrupt.
+/// A timer at an address, with its kernel clock and its interrupt, if used.
 #[derive(Clone, Copy, Debug)]
 pub struct TimerAt {
     /// Name in the manual.
@@ -14,19 +14,18 @@ pub struct TimerAt {
     pub interrupt: Option<usize>,
 }
 
-/// A status that follows a request: when some bits of a register are set, others read as
-/// set, too.
+/// A status that follows a request: if some bits of a register are set, others read as set.
 #[derive(Clone, Copy, Debug)]
 pub struct Follows {
-    /// The register that is read.
+    /// The register.
     pub address: u32,
-    /// Bits looked at.
+    /// Bits of the request.
     pub of: u32,
-    /// Bits that follow.
+    /// Bits of the status.
     pub ready: u32,
 }
 
-/// Which USB peripheral the chip has.
+/// USB peripheral of a chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UsbKind {
     /// The device-only one, with packet memory.
@@ -46,41 +45,41 @@ pub enum UsbKind {
 /// Commands to the amplifiers of axes 1 to 3, and the code of a current.
 #[derive(Clone, Copy, Debug)]
 pub enum Commands {
-    /// Converters on the chip: their data registers, 12 bits, the middle is zero, and
-    /// 256 and 3840 are the ends of the range.
+    /// Converters on the chip: their data registers, 12 bits; the middle is zero, and 256 and 3840
+    /// are the ends of the range.
     Converters([u32; 3]),
     /// Compare registers, and the register with the largest count: 50 % is zero,
     /// 15 % and 85 % are the ends of the range.
     DutyCycles([u32; 3], u32),
-    /// A quad converter on SPI in two's complement: the transmit and receive registers,
-    /// the status register's end-of-transfer bit, and the pin that frames.
+    /// A quad converter on SPI in two's complement: the transmit and receive registers, the status
+    /// register's end-of-transfer bit, and the frame pin.
     Serial {
-        /// Register that bytes are written to.
+        /// Register for bytes to send.
         data: u32,
-        /// Register that bytes are read from.
+        /// Register of bytes received.
         back: u32,
-        /// Status register and the bit that says that a frame is out.
+        /// Status register and its end-of-frame bit.
         sent: (u32, u32),
         /// Low during a frame: port and number.
         sync: (u32, u32),
     },
 }
 
-/// Reaction of a chip to a load of a word of flash that cannot be read.
+/// Reaction of a chip to the load of a flash word that cannot be read.
 #[derive(Clone, Copy, Debug)]
 pub enum Unreadable {
-    /// It loads anything, sets the bit `failed`, and `second` where that is in the
-    /// second bank, and raises the NMI. Writing a bit clears it.
+    /// It loads any value, sets the bit `failed`, and `second` for the second bank, and raises the
+    /// NMI. Writing a bit clears it.
     Nmi {
         /// The register.
         register: u32,
         /// Its bit.
         failed: u32,
-        /// Which bank.
+        /// Its bit for the second bank.
         second: u32,
     },
-    /// It answers with a bus fault, and sets a bit of the status register, which
-    /// the register after it clears.
+    /// It raises a bus fault, and sets a bit of the status register, which the next register
+    /// clears.
     BusFault {
         /// The register and its bit.
         status: (u32, u32),
@@ -89,13 +88,12 @@ pub enum Unreadable {
     },
 }
 
-/// Flash of a chip: its sectors, and where the calibrations
-/// are in it.
+/// Flash of a chip: its sectors, and the location of the calibrations.
 #[derive(Clone, Copy, Debug)]
 pub struct Flash {
-    /// Control register, and the bit that begins an erase.
+    /// Control register, and the bit that starts an erase.
     pub control: (u32, u32),
-    /// Status register, and the bits that are set meanwhile.
+    /// Status register, and its bits that are set during an erase.
     pub status: (u32, u32),
     /// Address and bytes of the sector that a control word names.
     pub sector: fn(u32) -> (u32, u32),
@@ -103,13 +101,13 @@ pub struct Flash {
     pub calibrations: ([u32; 2], u32),
     /// First address of the second bank.
     pub second_bank: u32,
-    /// Bytes of a word, which has a check of its own.
+    /// Bytes of a word, the unit of the error correction.
     pub word: u32,
     /// Reaction to a word that cannot be read.
     pub unreadable: Unreadable,
 }
 
-/// Amperes at the ends of every board's range.
+/// Current at the ends of every board's range, A.
 const FULL_SCALE_A: f64 = 5.5;
 
 /// A chip.
@@ -123,13 +121,13 @@ pub struct Chip {
     pub variable: &'static str,
     /// True if the core is a Cortex-M7.
     pub is_m7: bool,
-    /// Core clock.
+    /// Core clock, Hz.
     pub core_hz: u64,
-    /// The fastest core clock of the data sheet.
+    /// The fastest core clock in the data sheet, Hz.
     pub core_at_most_hz: u64,
-    /// Clock of the timers.
+    /// Clock of the timers, Hz.
     pub timer_hz: u64,
-    /// Memories that code and data may be in: address and bytes.
+    /// Memories for code and data: address and bytes.
     pub memories: &'static [(u32, u32)],
     /// The timers in use.
     pub timers: &'static [TimerAt],
@@ -141,15 +139,15 @@ pub struct Chip {
     pub watchdog: u32,
     /// The reset flags.
     pub reset_flags: ResetFlags,
-    /// The comparator that watches the supply.
+    /// The comparator of the supply.
     pub comparator: Comparator,
-    /// Register with the brown-out level of the option bytes, the field's first bit, and
-    /// the highest level.
+    /// Register with the brown-out level of the option bytes, the field's first bit, and the
+    /// highest level.
     pub brown_out_level: (u32, u32, u32),
     /// Register and bit that switch an external clock on.
     pub external_clock: (u32, u32),
-    /// The clock recovery of USB's oscillator, and the synchronisation source that is the
-    /// start-of-frame of the USB that is used.
+    /// The clock recovery of USB's oscillator, and the synchronisation source for the
+    /// start-of-frame of the USB in use.
     pub recovery: (u32, u32),
     /// Peripherals that a halted core stops.
     pub freeze: Freeze,
@@ -157,7 +155,7 @@ pub struct Chip {
     pub output_break: Option<BreakAt>,
     /// Ready bits.
     pub follows: &'static [Follows],
-    /// Registers that read these bits as set, whatever was written.
+    /// Registers in which these bits always read as set.
     pub set: &'static [(u32, u32)],
     /// Fields that copy another field: register, from bit, to bit, width.
     pub copies: &'static [(u32, u32, u32, u32)],
@@ -167,33 +165,32 @@ pub struct Chip {
     pub usb_interrupt: usize,
     /// The haptic tick's interrupt.
     pub tick_interrupt: usize,
-    /// Pins: port and number.
+    /// Enable pin: port and number.
     pub enable: (u32, u32),
-    /// Opens when pressed: high then.
+    /// Emergency stop, high when pressed.
     pub emergency_stop: (u32, u32),
-    /// Closed to ground while held.
+    /// Dead-man switch, closed to ground while held.
     pub dead_man: (u32, u32),
-    /// Closed to ground while held.
+    /// Clutch, closed to ground while held.
     pub clutch: (u32, u32),
-    /// Changes in each tick that leaves the amplifiers on.
+    /// Heartbeat, which toggles in each tick with the amplifiers on.
     pub heartbeat: (u32, u32),
-    /// High for a while from each mark on.
+    /// Mark pin, high for a while after each mark.
     pub mark: (u32, u32),
     /// The status LED.
     pub led: (u32, u32),
     /// Low while an amplifier is ready, axes 1 to 3.
     pub ready: [(u32, u32); 3],
-    /// Closed to ground where the current monitors are wired.
+    /// Closed to ground if the current monitors are wired.
     pub monitors_fitted: (u32, u32),
     /// The converter that reads the current monitors: its address, its bits, and the
     /// channels of axes 1 to 3.
     pub monitors: (u32, u32, [usize; 3]),
-    /// The converter that reads the commands of axes 1 to 3 back at their pins, and its
-    /// channels there.
+    /// The converter that reads the commands of axes 1 to 3 back at their pins, and its channels.
     pub read_back: Option<(u32, [usize; 3])>,
     /// The flash with the calibrations.
     pub flash: Flash,
-    /// Place where the commands of axes 1 to 3 are.
+    /// Registers of the commands of axes 1 to 3.
     pub commands: Commands,
 }
 
@@ -209,7 +206,7 @@ const fn follows(address: u32, of: u32, ready: u32) -> Follows {
     Follows { address, of, ready }
 }
 
-/// Each of four causes of a reset, with the pin's flag.
+/// Returns the flags of four causes of a reset, each with the pin's flag.
 const fn with_pin([a, b, c, d]: [u32; 4], pin: u32) -> [u32; 4] {
     [a | pin, b | pin, c | pin, d | pin]
 }
@@ -248,7 +245,7 @@ pub static G474: Chip = Chip {
     encoders: ["TIM2", "TIM3", "TIM4"],
     gpio: 0x4800_0000,
     watchdog: 0x4000_3000,
-    // RCC_CSR: BORRSTF (a power-up's, too), IWDGRSTF, SFTRSTF; PINRSTF with each; RMVF.
+    // RCC_CSR: BORRSTF (also after a power-up), IWDGRSTF, SFTRSTF; PINRSTF with each; RMVF.
     reset_flags: ResetFlags {
         register: 0x4002_1094,
         of: with_pin([1 << 27, 1 << 29, 1 << 28, 1 << 27], 1 << 26),
@@ -276,14 +273,14 @@ pub static G474: Chip = Chip {
     },
     output_break: None,
     follows: &[
-        // RCC_CR: HSI, PLL. Nothing is on the pins of an external clock.
+        // RCC_CR: HSI, PLL. There is no external clock.
         follows(0x4002_1000, 1 << 8, 1 << 10),
         follows(0x4002_1000, 1 << 24, 1 << 25),
         // RCC_CRRCR: HSI48; RCC_CSR: LSI.
         follows(0x4002_1098, 1 << 0, 1 << 1),
         follows(0x4002_1094, 1 << 0, 1 << 1),
     ],
-    // FLASH_OPTR.DBANK: two banks, as the chip is sold.
+    // FLASH_OPTR.DBANK: two banks, the setting at delivery.
     set: &[(0x4002_2020, 1 << 22)],
     // RCC_CFGR: SWS follows SW.
     copies: &[(0x4002_1008, 0, 2, 2)],
@@ -341,7 +338,7 @@ pub static H743: Chip = Chip {
         (0x0800_0000, 2048 * KIB),
         (0x2000_0000, 128 * KIB),
         (0x2400_0000, 512 * KIB),
-        // ITCM: the core finds it there without a bus.
+        // ITCM, which the core accesses without a bus.
         (0x0000_0000, 64 * KIB),
         (0x1FF0_0000, 128 * KIB),
     ],
@@ -392,7 +389,7 @@ pub static H743: Chip = Chip {
         memories: [1 << 3, 1 << 13, 1 << 14, 1 << 15],
     }),
     follows: &[
-        // RCC_CR: HSI, CSI, HSI48, the PLLs. Nothing is on the pins of an external clock.
+        // RCC_CR: HSI, CSI, HSI48, the PLLs. There is no external clock.
         follows(0x5802_4400, 1 << 0, 1 << 2),
         follows(0x5802_4400, 1 << 7, 1 << 8),
         follows(0x5802_4400, 1 << 12, 1 << 13),
@@ -450,7 +447,7 @@ pub static H743: Chip = Chip {
     commands: Commands::DutyCycles([0x4001_0034, 0x4001_0038, 0x4001_003C], 0x4001_002C),
 };
 
-/// The same with a converter on SPI4.
+/// The same board with a converter on SPI4.
 pub static H743_SPI: Chip = Chip {
     board: "nucleo-h743zi2-spi",
     variable: "HAPTERRA_H743_SPI_ELF",
@@ -464,12 +461,11 @@ pub static H743_SPI: Chip = Chip {
     ..H743
 };
 
-/// All of them.
+/// All chips.
 pub static CHIPS: [&Chip; 3] = [&G474, &H743, &H743_SPI];
 
 impl Commands {
-    /// The code of a current, not yet rounded. `largest`: the largest count of
-    /// duty cycles.
+    /// Returns the code of a current, not rounded. `largest` is the largest count of duty cycles.
     #[must_use]
     pub fn code(&self, current_a: f64, largest: u32) -> f64 {
         let fraction = current_a / FULL_SCALE_A;

@@ -1,33 +1,32 @@
-//! A quad converter on SPI, as the data sheet of the AD5754R describes it, and the wires
-//! to it.
+//! A quad converter on SPI, by the data sheet of the AD5754R, and the wires to it.
 //!
-//! Its timing is the data sheet's (rev. G, table 4): SYNC has to be high for 100 ns after a
-//! frame that writes and for 200 ns after one that reads; a frame that comes sooner is
-//! lost. The outputs take 10 µs to power up, and a code that is written meanwhile is lost,
-//! too. What a frame asks to read returns during the frame after it.
+//! Its timing is the data sheet's (rev. G, table 4): SYNC must be high for 100 ns after a frame
+//! that writes and for 200 ns after one that reads; an earlier frame is lost. The outputs take 10
+//! µs to power up, and a code written in this time is lost as well. The result of a read returns in
+//! the next frame.
 //!
-//! The emulated core's time moves on every 200 instructions (1.6 µs), unless a test asks for
-//! less: two frames with less between them have nothing between them here, so a test of
-//! these times looks after every instruction.
+//! The emulated core's time advances every 200 instructions (1.6 µs), unless a test sets fewer: two
+//! frames within this time have no gap here, so a test of the gaps advances time with every
+//! instruction.
 
-/// Registers, as a frame's first byte has them.
+/// Registers, in a frame's first byte.
 const DATA: u8 = 0b000;
 const RANGE: u8 = 0b001;
 const POWER: u8 = 0b010;
-/// Asks for a register instead of writing it.
+/// Marks a read of a register.
 const READ: u8 = 1 << 7;
-/// The channel that stands for all.
+/// The channel number for all channels.
 const ALL: u8 = 0b100;
-/// ±10 V.
+/// The range ±10 V.
 const BIPOLAR_10_V: u16 = 0b100;
 /// The end-of-transfer bit of the SPI's status.
 const EOT: u32 = 1 << 3;
 /// Bytes of a frame.
 const FRAME: usize = 3;
-/// Time for which SYNC has to be high after a frame that writes and after one that reads, ns.
+/// Time that SYNC must be high after a frame that writes and after one that reads, ns.
 const HIGH_AFTER_WRITE_NS: u64 = 100;
 const HIGH_AFTER_READ_NS: u64 = 200;
-/// Time that the outputs take to power up, ns.
+/// Power-up time of the outputs, ns.
 const POWER_UP_NS: u64 = 10_000;
 
 /// The converter, and the wires to it.
@@ -36,33 +35,32 @@ pub struct Converter {
     codes: [u16; 4],
     ranges: [u16; 4],
     powered: u16,
-    /// Since when the outputs have power, ns.
+    /// The time at which the outputs were powered, ns.
     powered_ns: u64,
     is_selected: bool,
-    /// When SYNC rose, ns, and whether the frame before it asked for a register.
+    /// The time at which SYNC rose, ns, and true if the frame before it was a read.
     rose: Option<(u64, bool)>,
-    /// SYNC fell too soon: the frame is lost.
+    /// True if SYNC fell too early, so that the frame is lost.
     is_lost: bool,
     frame: Vec<u8>,
     /// Request of the last frame.
     asked: u16,
-    /// Bytes that returned and were not read yet.
+    /// Bytes received and not read yet.
     back: Vec<u8>,
-    /// True if the SPI's clock has failed: frames do not go out.
+    /// True if the SPI's clock has failed: no frames are sent.
     pub is_cut: bool,
-    /// True if the wire back is broken: ones are read, by the pull-up.
+    /// True if the return wire is broken: the pull-up makes all bits ones.
     pub is_silent: bool,
-    /// Time for which SYNC was high at least, after a frame that writes and after one that asks
-    /// for a register, ns; zero before there were any.
+    /// Shortest time that SYNC was high after a frame that writes and after one that reads, ns;
+    /// zero before the first.
     pub shortest_high_ns: (u64, u64),
-    /// Frames that were lost because SYNC was high for too short a time, or because the
-    /// outputs were not powered up yet.
+    /// Frames that were lost because SYNC was high too briefly, or the outputs were not powered up
+    /// yet.
     pub lost: u32,
 }
 
 impl Converter {
-    /// Codes of the first three channels: nothing unless they have power and
-    /// their range.
+    /// Returns the codes of the first three channels: zero unless they have power and their range.
     #[must_use]
     pub fn codes(&self) -> [i32; 3] {
         let [a, b, c, _] = self.codes.map(|code| i32::from(code.cast_signed()));
@@ -71,15 +69,15 @@ impl Converter {
         if on { [a, b, c] } else { [0; 3] }
     }
 
-    /// The supply goes and returns: all registers are as after power-up.
+    /// Cycles the supply: all registers are as after power-up.
     pub fn forget(&mut self) {
         self.codes = [0; 4];
         self.ranges = [0; 4];
         self.powered = 0;
     }
 
-    /// The chip was reset, and the converter was not: it keeps its registers, and with them
-    /// its outputs. Nothing ties CLR to the chip's reset here. Time begins anew.
+    /// Returns the converter after a reset of the chip: it keeps its registers and its outputs, as
+    /// CLR is not tied to the chip's reset here. Time restarts from zero.
     #[must_use]
     pub fn after_reset(self) -> Self {
         Self {
@@ -90,14 +88,14 @@ impl Converter {
         }
     }
 
-    /// The SPI's status.
+    /// Returns the SPI's status.
     #[must_use]
     pub fn status(&self, others: u32) -> u32 {
         let sent = self.frame.len() >= FRAME && !self.is_cut;
         others | if sent { EOT } else { 0 }
     }
 
-    /// A byte is clocked out, and one returns.
+    /// Sends a byte and receives one.
     pub fn take(&mut self, byte: u8) {
         let [high, low] = self.asked.to_be_bytes();
         let back = [0, high, low].get(self.frame.len()).copied();
@@ -106,7 +104,7 @@ impl Converter {
         self.frame.push(byte);
     }
 
-    /// A byte that returned, the first first.
+    /// Returns the oldest byte received.
     pub fn give(&mut self) -> u8 {
         match self.back.is_empty() {
             true => 0,
@@ -114,8 +112,8 @@ impl Converter {
         }
     }
 
-    /// The level of SYNC: a frame takes effect when it rises. Gives the channel
-    /// (0 to 2) that has a new code.
+    /// Sets the level of SYNC: a frame takes effect when it rises. Returns the channel (0 to 2)
+    /// with a new code.
     pub fn select(&mut self, is_selected: bool, now_ns: u64) -> Option<(usize, i32)> {
         let falls = is_selected && !self.is_selected;
         let rises = !is_selected && self.is_selected;
@@ -191,7 +189,7 @@ impl Converter {
 mod tests {
     use super::*;
 
-    /// Sends a frame that begins at a time and returns what returned.
+    /// Sends a frame that begins at a time. Returns the data received.
     fn send(converter: &mut Converter, frame: [u8; 3], at_ns: u64) -> u16 {
         converter.select(true, at_ns);
         frame.iter().for_each(|byte| converter.take(*byte));

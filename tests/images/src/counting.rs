@@ -1,9 +1,9 @@
-//! The counting image (`firmware/boards/mps2-an386-counts`) in the emulated core, each block of its
-//! ticks given to the model of cycles. QEMU counts the same image's instructions, and could follow
-//! it only through a log of every block, which takes hours.
+//! The counting image (`firmware/boards/mps2-an386-counts`) in the emulated core, with the model of
+//! cycles for each block of its ticks. QEMU counts the instructions of the same image, but could
+//! follow it only through a log of every block, which takes hours.
 //!
-//! Modelled: the two memories; the calls of semihosting that the image makes, on files in one folder;
-//! registers that hold what was written. Nothing counts time: instructions are counted here.
+//! Modelled: the two memories; the image's semihosting calls, on files in one folder; registers
+//! that store written values. There is no time: only instructions are counted.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -17,21 +17,21 @@ use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn};
 
 use crate::elf::Image;
 
-/// Memories, and where registers are: address and bytes.
+/// Memories and the area of the registers: address and bytes.
 const CODE: (u32, u32) = (0, 0x40_0000);
 const OTHERS: [(u32, u32); 3] = [
     (0x2000_0000, 0x40_0000),
     (0x4000_0000, 0x10_0000),
     (0xE000_0000, 0x10_0000),
 ];
-/// `bkpt #0xab`, a call of semihosting, as [`Image::instructions`] gives it, and `nop`.
+/// `bkpt #0xab`, a semihosting call, as in [`Image::instructions`], and `nop`.
 const CALL: u32 = 0xBEAB_0000;
 const NOP: [u8; 2] = [0x00, 0xBF];
-/// The image's functions that are a tick, and all that are its own.
+/// The image's functions that are a tick, and the prefix of its own functions.
 const TICKS: [&str; 2] = ["mps2_an386_counts4tick", "mps2_an386_counts4step"];
 const OWN: &str = "mps2_an386_counts";
-/// Functions that take most of the time between two ticks, and that no tick calls: the count of
-/// instructions would differ.
+/// Functions that take most of the time between two ticks and that no tick calls: otherwise the
+/// count of instructions would differ.
 const APART: [&str; 6] = [
     "FrameReader",
     "counts5files6Frames",
@@ -43,7 +43,7 @@ const APART: [&str; 6] = [
 
 type Core<'a> = Unicorn<'a, ()>;
 
-/// Whose a block is.
+/// Owner of a block.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
     /// The function that is a tick.
@@ -54,7 +54,7 @@ enum Owner {
     Shared,
 }
 
-/// Code without a branch before its end.
+/// Code without a branch except at its end.
 struct Block {
     owner: Owner,
     /// True if an H743 has it in flash.
@@ -63,19 +63,19 @@ struct Block {
     code: Vec<Instruction>,
 }
 
-/// A run, as far as it has come.
+/// State of a run.
 struct Run {
     image: Image,
     /// Blocks by half of their address.
     blocks: Vec<Option<Rc<Block>>>,
-    /// The block that is executed, and the tick that it belongs to.
+    /// The present block, and the tick that it belongs to.
     now: Option<Rc<Block>>,
     tick: Option<Tick>,
     ended: Vec<Cycles>,
 }
 
-/// Runs the counting image in a folder to its end, and returns what each tick took: from the entry
-/// of the function that is one, until another function of the image continues.
+/// Runs the counting image in a folder to its end. Returns the cycles of each tick, from the entry
+/// of its function until another function of the image continues.
 ///
 /// # Panics
 /// If the image fails.
@@ -133,7 +133,7 @@ pub fn follow(image: &Path, folder: &Path) -> Vec<Cycles> {
     std::mem::take(&mut run.ended)
 }
 
-/// Gives blocks that begin from one address to another to the run.
+/// Adds the blocks that start in an address range to the run.
 fn watch(core: &mut Core<'_>, run: &Rc<RefCell<Run>>, from: u64, to: u32) {
     let into = Rc::clone(run);
     let executes = move |core: &mut Core<'_>, address: u64, bytes: u32| {
@@ -143,7 +143,7 @@ fn watch(core: &mut Core<'_>, run: &Rc<RefCell<Run>>, from: u64, to: u32) {
     hook.expect("a hook");
 }
 
-/// Loads the image, and returns where it calls the host.
+/// Loads the image. Returns the addresses of its semihosting calls.
 fn load(core: &mut Core<'_>, image: &Image) -> Vec<u32> {
     for segment in image.segments.iter().filter(|s| !s.bytes.is_empty()) {
         let loaded = core.mem_write(segment.loaded.into(), &segment.bytes);
@@ -152,7 +152,7 @@ fn load(core: &mut Core<'_>, image: &Image) -> Vec<u32> {
     let calls = image.instructions().filter(|(_, code)| *code == CALL);
     let calls: Vec<u32> = calls.map(|(address, _)| address).collect();
     for address in &calls {
-        // The host is called in front of it.
+        // A hook calls the host before this instruction.
         core.mem_write(u64::from(*address), &NOP).expect("code");
     }
     calls
@@ -179,7 +179,7 @@ impl Run {
         self.now = Some(next);
     }
 
-    /// Decodes a block that is executed for the first time.
+    /// Decodes a block at its first execution.
     fn read(&mut self, core: &Core<'_>, address: u32, bytes: u32) -> Rc<Block> {
         let code = core.mem_read_as_vec(address.into(), bytes as usize + 2);
         let code = code.expect("code");
@@ -207,10 +207,10 @@ impl Run {
     }
 }
 
-/// The host's files, as the image sees them.
+/// The host's files for the image.
 struct Files {
     folder: PathBuf,
-    /// By handle, from 1 on.
+    /// By handle, from 1.
     open: Vec<File>,
     exit: Option<u32>,
 }
@@ -224,7 +224,7 @@ impl Files {
         }
     }
 
-    /// Does what the image asks for (Arm's "Semihosting for AArch32 and AArch64", 2025Q1): an
+    /// Performs a semihosting call (Arm's "Semihosting for AArch32 and AArch64", 2025Q1): an
     /// operation in R0, with a block of words at R1.
     fn call(&mut self, core: &mut Core<'_>) {
         let register = |register| core.reg_read(register).expect("a register") as u32;
@@ -237,7 +237,7 @@ impl Files {
         };
         let words = |core: &Core<'_>| [0, 1, 2].map(|i| word(core, i));
         let result = match operation {
-            // SYS_OPEN: name, mode, length of the name. Modes from 4 on write.
+            // SYS_OPEN: name, mode, length of the name. Modes from 4 write.
             0x01 => {
                 let [name, mode, length] = words(core);
                 let name = core
@@ -254,7 +254,7 @@ impl Files {
             }
             // SYS_CLOSE
             0x02 => 0,
-            // SYS_WRITE and SYS_READ: handle, buffer, length. What is left undone is returned.
+            // SYS_WRITE and SYS_READ: handle, buffer, length. They return the number of bytes left.
             0x05 => {
                 let [handle, from, length] = words(core);
                 let bytes = core
@@ -270,7 +270,7 @@ impl Files {
                 core.mem_write(to.into(), &bytes[..read]).expect("memory");
                 length - read as u32
             }
-            // SYS_EXIT_EXTENDED: why, and the code.
+            // SYS_EXIT_EXTENDED: reason and code.
             0x20 => {
                 self.exit = Some(word(core, 1));
                 core.emu_stop().expect("stops");

@@ -1,4 +1,4 @@
-//! A board that is powered up and plugged in, with an arm that a test moves.
+//! A board that is powered and plugged in, with an arm that a test moves.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -23,11 +23,11 @@ use crate::elf::Image;
 use crate::machine::Machine;
 use crate::supply::Reset;
 
-/// Counts that the arm moves in a tick: a third of a metre a second.
+/// Counts of the arm's motion in a tick: a third of a metre a second.
 const COUNTS_PER_TICK: i32 = 12;
 
-/// The machines whose images there are: `cargo xtask test` builds and names
-/// them. A visible line for each that is missing.
+/// Returns the machines with an image, which `cargo xtask test` builds and names. Prints a message
+/// for each missing one.
 #[must_use]
 pub fn machines() -> Vec<Machine> {
     let image = |chip: &&'static Chip| {
@@ -43,11 +43,11 @@ pub fn machines() -> Vec<Machine> {
     CHIPS.iter().filter_map(image).collect()
 }
 
-/// Opens a scene over `raster`, a millimetre a cell, on every board there is an image
-/// for. The HIP's home is at `home_mm`.
+/// Opens a scene over `raster`, a millimetre a cell, on every board with an image. The HIP's home
+/// is at `home_mm`.
 ///
 /// # Panics
-/// When the scene cannot be.
+/// If the scene is invalid.
 pub fn on_each_board(
     raster: &Raster,
     home_mm: [f64; 3],
@@ -62,7 +62,7 @@ pub fn on_each_board(
     }
 }
 
-/// Rough ground, and a home above its middle.
+/// Returns rough ground, and a home above its middle.
 #[must_use]
 pub fn rough_ground() -> (Raster, [f64; 3]) {
     let raster = Raster::from_fn(257, 257, |x, y| ((x * y) % 7) as f32);
@@ -75,7 +75,7 @@ pub struct Device<'t> {
     pub machine: Rc<RefCell<Machine>>,
     session: Session<'t>,
     endpoints: BulkEndpoints,
-    /// Place where the encoders are.
+    /// The encoders' counts.
     pub counts: [i32; 3],
     /// The latest sample.
     pub latest: Option<TickRecord>,
@@ -92,11 +92,11 @@ pub struct Device<'t> {
 }
 
 impl<'t> Device<'t> {
-    /// Powers the board up with the arm in its zero pose, plugs it in and opens
-    /// a session in `scene`.
+    /// Powers up the board with the arm in its zero pose, plugs it in and opens a session in
+    /// `scene`.
     ///
     /// # Panics
-    /// When any of it fails.
+    /// If any of this fails.
     #[must_use]
     pub fn open(mut machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
         let found = enumerate(&mut machine).expect("enumerated");
@@ -104,7 +104,7 @@ impl<'t> Device<'t> {
         let endpoints = endpoints(&found);
         let pipes = ScriptedPipes::new(Rc::clone(&machine), endpoints);
         let link = Box::new(Bulk(pipes));
-        // No verdict depends on how fast this machine is.
+        // No result depends on the speed of this machine.
         let (session, hello) =
             Session::open(terrain, scene, None, link, Timeouts::EMULATED).expect("a session");
         let mut device = Self {
@@ -123,19 +123,18 @@ impl<'t> Device<'t> {
         device
     }
 
-    /// As [`Self::open`], then calibrates, says that this is the zero pose, asks
-    /// to arm and presses the dead-man switch: the amplifiers are on, and force
-    /// is coming in.
+    /// Same as [`Self::open`]; then calibrates, zeroes, requests arming and presses the dead-man
+    /// switch: the amplifiers are on, and the force ramps up.
     ///
     /// # Panics
-    /// When the amplifiers do not come on.
+    /// If the amplifiers do not switch on.
     #[must_use]
     pub fn arm(machine: Machine, terrain: &'t Terrain<'t>, scene: Scene) -> Self {
         let mut device = Self::open(machine, terrain, scene);
         let calibration = Calibration::PREMIUM_1_5;
         device.request(Request::SetCalibration { calibration });
         device.run_ms(10);
-        // The board may have found one when it started.
+        // The board may have found a fault when it started.
         let seen = device.guard.and_then(|report| report.fault);
         device.request(Request::ClearFault { seen });
         device.request(Request::Zero { counts: [0; 3] });
@@ -151,10 +150,10 @@ impl<'t> Device<'t> {
         device
     }
 
-    /// Waits until all of the force has come in.
+    /// Waits until the force is ramped up.
     ///
     /// # Panics
-    /// When that does not happen.
+    /// If that does not happen.
     pub fn wait_for_full_force(&mut self) {
         let armed = (0..300).any(|_| {
             self.run_ms(10);
@@ -163,20 +162,19 @@ impl<'t> Device<'t> {
         assert!(armed, "{:?}", self.guard);
     }
 
-    /// Pulls the cable and resets the chip, as its watchdog does. Memory keeps
-    /// what it holds.
+    /// Pulls the cable and resets the chip, like its watchdog. Memory keeps its content.
     ///
     /// # Panics
-    /// When the machine is borrowed already.
+    /// If the machine is already borrowed.
     #[must_use]
     pub fn reset(self) -> Machine {
         self.reset_by(Reset::Watchdog)
     }
 
-    /// Pulls the cable and resets the chip. Memory keeps what it holds.
+    /// Pulls the cable and resets the chip. Memory keeps its content.
     ///
     /// # Panics
-    /// When the machine is borrowed already.
+    /// If the machine is already borrowed.
     #[must_use]
     pub fn reset_by(self, cause: Reset) -> Machine {
         let Self {
@@ -189,10 +187,10 @@ impl<'t> Device<'t> {
         machine
     }
 
-    /// Asks for the status.
+    /// Queries the status.
     ///
     /// # Panics
-    /// When there is no answer.
+    /// If there is no answer.
     pub fn ask_status(&mut self) -> Status {
         self.status = None;
         self.session.ask(HostRequest::Status);
@@ -200,24 +198,24 @@ impl<'t> Device<'t> {
         self.status.clone().expect("an answer")
     }
 
-    /// Asks for something to be done.
+    /// Sends a request.
     pub fn request(&mut self, request: Request) {
         self.session.request(request);
     }
 
-    /// Sends bytes that are none of the session's.
+    /// Sends bytes from outside the session.
     ///
     /// # Panics
-    /// When the board does not take them.
+    /// If the board does not accept them.
     pub fn send(&mut self, bytes: &[u8]) {
         let pipes = ScriptedPipes::new(Rc::clone(&self.machine), self.endpoints);
         Bulk(pipes).send(bytes).expect("taken");
     }
 
-    /// Lets time pass, the host answering.
+    /// Lets time pass while the host answers.
     ///
     /// # Panics
-    /// When the link breaks.
+    /// If the link breaks.
     pub fn run_ms(&mut self, ms: u64) {
         let end_ns = self.machine.borrow().bus().now_ns + ms * 1_000_000;
         while self.machine.borrow().bus().now_ns < end_ns {
@@ -235,7 +233,7 @@ impl<'t> Device<'t> {
         }
     }
 
-    /// Moves the arm to these counts, no faster than a hand does.
+    /// Moves the arm to these counts, no faster than a hand.
     pub fn move_to(&mut self, counts: [i32; 3]) {
         while self.counts != counts {
             for (now, then) in self.counts.iter_mut().zip(counts) {
@@ -253,22 +251,22 @@ impl<'t> Device<'t> {
     }
 }
 
-/// The link's endpoints, found as the real program finds them.
+/// Returns the link's endpoints, searched as in the real program.
 fn endpoints(found: &Found) -> BulkEndpoints {
     let configuration = ConfigurationDescriptor::new(&found.configuration);
     let configuration = configuration.expect("a configuration descriptor");
     BulkEndpoints::find(&configuration).expect("the link's endpoints")
 }
 
-/// An inclined plane under the arm, and what it is like to press it, in f64
-/// from the counts on, sharing no code with the device.
+/// An inclined plane under the arm, and its force on a press, in f64 from the counts on, without
+/// code of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// The arm.
     pub model: PhantomModel,
-    /// Place where the terrain lies.
+    /// Position of the terrain.
     pub place: ArmFrame,
-    /// Rise east and north, millimetres a millimetre.
+    /// Slope east and north.
     pub slope: [f64; 2],
     /// Height above the origin, mm.
     pub height_mm: f64,
@@ -277,7 +275,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// A level plane at this height, rendered for a Premium 1.5 with its preset's surface parameters.
+    /// Creates a level plane at this height for a Premium 1.5, with its preset's parameters.
     #[must_use]
     pub fn level(home_mm: [f64; 3], height_mm: f64) -> Self {
         Self {
@@ -296,7 +294,7 @@ impl Plane {
         (up - surface) * self.normal()[2]
     }
 
-    /// Unit normal: east, north, up.
+    /// Returns the unit normal: east, north, up.
     #[must_use]
     pub fn normal(&self) -> [f64; 3] {
         let [a, b] = self.slope;
@@ -304,10 +302,10 @@ impl Plane {
         [-a / length, -b / length, 1.0 / length]
     }
 
-    /// Counts nearest to a tip `depth_mm` under the plane at an east and north.
+    /// Returns the counts nearest to a tip `depth_mm` under the plane at an east and north.
     ///
     /// # Panics
-    /// When the arm does not reach.
+    /// If the arm does not reach it.
     #[must_use]
     pub fn counts_at(&self, [east, north]: [f64; 2], depth_mm: f64) -> [i32; 3] {
         let surface = self.height_mm + self.slope[0] * east + self.slope[1] * north;
@@ -317,7 +315,7 @@ impl Plane {
         std::array::from_fn(|axis| Encoder::new(&self.model.drive[axis]).counts(q[axis]))
     }
 
-    /// Motor currents (A) of axes 1 to 3 with the arm at these counts.
+    /// Returns the motor currents (A) of axes 1 to 3 with the arm at these counts.
     #[must_use]
     pub fn currents_a(&self, counts: [i32; 3]) -> [f64; 3] {
         let q: [f64; 3] = std::array::from_fn(|axis| {
@@ -329,7 +327,7 @@ impl Plane {
             .clamp(0.0, self.params.max_force_n.into());
         let force = ArmFrame::turn_to_device(self.normal().map(|n| n * newtons));
         let jacobian = kinematics::jacobian(&self.model, q);
-        // What holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.
+        // The torque that holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.
         let record = Calibration::PREMIUM_1_5;
         let held = [
             0.0,

@@ -7,7 +7,7 @@ use object::LittleEndian;
 use object::elf::{FileHeader32, PT_LOAD, STT_FUNC};
 use object::read::elf::{FileHeader, ProgramHeader, Sym};
 
-/// A run of bytes and where it is loaded and runs.
+/// A run of bytes, with its load and run addresses.
 #[derive(Clone, Debug)]
 pub struct Segment {
     /// Address it runs at.
@@ -16,14 +16,14 @@ pub struct Segment {
     pub loaded: u32,
     /// Bytes in memory.
     pub size: u32,
-    /// Its bytes in the file; the rest of `size` is not set by it.
+    /// Its bytes in the file; the rest of `size` is not initialised by it.
     pub bytes: Vec<u8>,
 }
 
-/// A function of the image, or what else bears a name.
+/// A function of the image, or another symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Function {
-    /// Its first byte; of a function without the Thumb bit.
+    /// Its first byte; for a function, without the Thumb bit.
     pub address: u32,
     /// Its length in bytes.
     pub size: u32,
@@ -35,7 +35,7 @@ pub struct Image {
     pub segments: Vec<Segment>,
     functions: BTreeMap<String, Function>,
     symbols: BTreeMap<String, Function>,
-    /// Place where code (true) and data in it (false) begin.
+    /// Start addresses of code (true) and data in it (false).
     mapping: BTreeMap<u32, bool>,
 }
 
@@ -43,7 +43,7 @@ impl Image {
     /// Reads the ELF at `path`.
     ///
     /// # Panics
-    /// When it is none, or cannot be read: a test has nothing else to do.
+    /// If it is not an ELF or cannot be read: the test cannot continue.
     #[must_use]
     pub fn read(path: &Path) -> Self {
         let bytes = std::fs::read(path).expect("the image can be read");
@@ -88,12 +88,12 @@ impl Image {
         }
     }
 
-    /// All functions by their (mangled) names.
+    /// Returns all functions by their (mangled) names.
     pub fn functions(&self) -> impl Iterator<Item = (&str, Function)> {
         self.functions.iter().map(|(name, f)| (name.as_str(), *f))
     }
 
-    /// Functions whose name has all of `parts` in it.
+    /// Returns the functions whose name contains all of `parts`.
     #[must_use]
     pub fn functions_like(&self, parts: &[&str]) -> Vec<Function> {
         let fits = |name: &str| parts.iter().all(|part| name.contains(part));
@@ -101,29 +101,29 @@ impl Image {
         all.map(|(_, function)| function).collect()
     }
 
-    /// The first function whose name has all of `parts` in it.
+    /// Returns the first function whose name contains all of `parts`.
     ///
     /// # Panics
-    /// When there is none: the test relies on a function of its own.
+    /// If there is none: the test needs one.
     #[must_use]
     pub fn function_like(&self, parts: &[&str]) -> Function {
         let found = self.functions_like(parts);
         *found.first().expect("a function of its own")
     }
 
-    /// The function that the link calls for every message it sends.
+    /// Returns the function that the link calls for every message it sends.
     #[must_use]
     pub fn message_encoder(&self) -> Function {
         self.function_like(&["link", "tx_queue", "in_session"])
     }
 
-    /// A function of core's that panics and takes only a source location.
+    /// Returns a function of core's that panics and takes only a source location.
     #[must_use]
     pub fn panicking(&self) -> Function {
         self.function_like(&["panic_const_rem_by_zero"])
     }
 
-    /// The name of the function that holds `address`.
+    /// Returns the name of the function at `address`.
     #[must_use]
     pub fn at(&self, address: u32) -> &str {
         self.functions()
@@ -131,13 +131,13 @@ impl Image {
             .map_or("?", |(name, _)| name)
     }
 
-    /// The value of a symbol, as a linker script gives them.
+    /// Returns the value of a symbol, as set by a linker script.
     #[must_use]
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).map(|symbol| symbol.address)
     }
 
-    /// The first symbol with all of these in its name.
+    /// Returns the first symbol whose name contains all of these.
     #[must_use]
     pub fn symbol_like(&self, parts: &[&str]) -> Option<Function> {
         let fits = |name: &str| parts.iter().all(|part| name.contains(part));
@@ -145,7 +145,7 @@ impl Image {
         all.find_map(|(name, symbol)| fits(name).then_some(*symbol))
     }
 
-    /// Every instruction with its address; a short one in the upper half-word.
+    /// Returns every instruction with its address; a short one is in the upper half-word.
     pub fn instructions(&self) -> impl Iterator<Item = (u32, u32)> {
         let starts: Vec<_> = self.mapping.iter().map(|(a, code)| (*a, *code)).collect();
         let ends: Vec<_> = starts.iter().skip(1).map(|(a, _)| *a).collect();

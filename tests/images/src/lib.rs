@@ -8,11 +8,10 @@
 //!   time ── timers ── nvic ┘
 //! ```
 //!
-//! [`machine::Machine`] is the core with its exceptions; [`bus::Bus`] what it
-//! finds at its peripherals' addresses. Only what the images use is modelled,
-//! as the chips' reference manuals (RM0440, RM0433) and the architecture's
-//! (ARM DDI 0403E) describe it; each module names its registers. A register that nothing models reads back what
-//! was written last.
+//! [`machine::Machine`] is the core with its exceptions; [`bus::Bus`] the peripherals at their
+//! addresses. Only the parts that the images use are modelled, by the reference manuals of the
+//! chips (RM0440, RM0433) and of the architecture (ARM DDI 0403E); each module names its registers.
+//! A register without a model reads back its last written value.
 //!
 //! This shows the effects of the image's instructions. It cannot show electrical faults, or
 //! faults of the silicon or of these models.

@@ -1,9 +1,9 @@
-//! The interrupt controller and the few system registers the images use.
+//! The interrupt controller and the few system registers that the images use.
 //!
-//! Modelled: the registers that enable, disable, raise and take back interrupts, their
-//! priorities with four bits, and the reset by AIRCR. Not modelled: priority groups, the active
-//! bits, STIR, SysTick. Of the memory protection unit the regions, as `machine/protection` says.
-//! Other registers of the page read back what was written; the faults and the data cache take theirs
+//! Modelled: the registers that enable, disable, set and clear interrupts, their priorities with
+//! four bits, and the reset by AIRCR. Not modelled: priority groups, the active bits, STIR,
+//! SysTick. The memory protection unit has only its regions, see `machine/protection`. Other
+//! registers of the page read back their written values; the faults and the data cache read theirs
 //! from there.
 
 use std::collections::HashMap;
@@ -15,21 +15,20 @@ const ICER: u32 = 0x180;
 const ISPR: u32 = 0x200;
 const ICPR: u32 = 0x280;
 const IPR: u32 = 0x400;
-/// Application interrupt and reset control: the key in its upper half, and the bit that
-/// resets the chip.
+/// Application interrupt and reset control: the key in its upper half, and the reset bit.
 const AIRCR: u32 = 0xD0C;
 const KEY: u32 = 0x05FA;
 const SYSRESETREQ: u32 = 1 << 2;
-/// The memory protection unit: on, the region that is meant, its base, with the number of another
-/// region where bit 4 is set, and its attributes.
+/// The memory protection unit: its enable, the selected region, the base, with another region's
+/// number if bit 4 is set, and the attributes.
 const MPU_CTRL: u32 = 0xD94;
 const MPU_RNR: u32 = 0xD98;
 const MPU_RBAR: u32 = 0xD9C;
 const MPU_RASR: u32 = 0xDA0;
 const VALID: u32 = 1 << 4;
-/// Regions of a Cortex-M7; an M4 has half of them.
+/// Regions of a Cortex-M7; an M4 has half as many.
 const REGIONS: usize = 16;
-/// Most interrupts there can be.
+/// Largest number of interrupts.
 const INTERRUPTS: usize = 240;
 
 /// Enables, pending bits and priorities of all interrupts.
@@ -40,7 +39,7 @@ pub struct Nvic {
     /// Base and attributes of each region.
     regions: [(u32, u32); REGIONS],
     other: HashMap<u32, u32>,
-    /// The program has asked for a reset.
+    /// True if the program has requested a reset.
     pub asks_for_reset: bool,
 }
 
@@ -58,7 +57,7 @@ impl Default for Nvic {
 }
 
 impl Nvic {
-    /// The word at an offset into the page.
+    /// Returns the word at an offset in the page.
     #[must_use]
     pub fn read(&self, offset: u32) -> u32 {
         let bits = |from: u32, of: &[bool; INTERRUPTS]| {
@@ -82,7 +81,7 @@ impl Nvic {
         }
     }
 
-    /// Writes `value` under `mask` (all bytes that the access has).
+    /// Writes `value` under `mask` (the bytes of the access).
     pub fn write(&mut self, offset: u32, value: u32, mask: u32) {
         let each = |from: u32| {
             let first = (offset - from) / 4 * 32;
@@ -98,7 +97,7 @@ impl Nvic {
                 let first = (offset - IPR) as usize;
                 for (i, byte) in value.to_le_bytes().into_iter().enumerate() {
                     if mask >> (8 * i) & 0xFF != 0 {
-                        // Four bits are implemented: the rest reads zero.
+                        // Only four bits are implemented: the others read as zero.
                         self.priority[first + i] = byte & 0xF0;
                     }
                 }
@@ -128,7 +127,7 @@ impl Nvic {
         self.regions[self.region_number()]
     }
 
-    /// Base and attributes of every region of the memory protection unit, which are zero while it
+    /// Returns base and attributes of every region of the memory protection unit, or zeros while it
     /// is off.
     #[must_use]
     pub fn regions(&self) -> [(u32, u32); REGIONS] {
@@ -145,8 +144,8 @@ impl Nvic {
         self.pending[interrupt] = true;
     }
 
-    /// The interrupt that would be taken at execution priority `current`, and
-    /// its own.
+    /// Returns the interrupt that would be taken at execution priority `current`, and its own
+    /// priority.
     #[must_use]
     pub fn deliverable(&self, current: i16) -> Option<(usize, u8)> {
         let ready = (0..INTERRUPTS).filter(|i| self.enabled[*i] && self.pending[*i]);
@@ -155,30 +154,30 @@ impl Nvic {
         (i16::from(priority) < current).then_some((first, priority))
     }
 
-    /// Any that is enabled and pending: what wakes a sleeping core.
+    /// Returns true if any enabled interrupt is pending, which wakes a sleeping core.
     #[must_use]
     pub fn has_pending(&self) -> bool {
         (0..INTERRUPTS).any(|i| self.enabled[i] && self.pending[i])
     }
 
-    /// Returns true if an interrupt is let through.
+    /// Returns true if an interrupt is enabled.
     #[must_use]
     pub fn is_enabled(&self, interrupt: usize) -> bool {
         self.enabled[interrupt]
     }
 
-    /// Returns true if an interrupt is let through and has not been taken.
+    /// Returns true if an interrupt is enabled and pending.
     #[must_use]
     pub fn waits(&self, interrupt: usize) -> bool {
         self.enabled[interrupt] && self.pending[interrupt]
     }
 
-    /// It is taken: no longer pending.
+    /// Takes an interrupt, which is then no longer pending.
     pub fn take(&mut self, interrupt: usize) {
         self.pending[interrupt] = false;
     }
 
-    /// Every enabled interrupt and its priority.
+    /// Returns every enabled interrupt and its priority.
     #[must_use]
     pub fn enabled(&self) -> Vec<(usize, u8)> {
         let on = (0..INTERRUPTS).filter(|i| self.enabled[*i]);

@@ -1,17 +1,17 @@
-//! A timer's two encoder inputs: the digital filter of each channel, and what the edges
-//! behind it count (RM0440, 29.4; RM0433, 43.3).
+//! A timer's two encoder inputs: the digital filter of each channel, and the count of the filtered
+//! edges (RM0440, 29.4; RM0433, 43.3).
 
 /// The digital filter of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Filter {
     /// Clocks of the timer from one sample to the next.
     clocks: u64,
-    /// Samples in a row that make a level count.
+    /// Consecutive samples after which a level is valid.
     samples: u32,
 }
 
 impl Filter {
-    /// The filter that ICxF and CKD choose.
+    /// Returns the filter selected by ICxF and CKD.
     #[must_use]
     pub fn of(icf: u32, ckd: u32) -> Self {
         let divided = 1 << ckd.min(2);
@@ -28,16 +28,16 @@ impl Filter {
     }
 }
 
-/// One channel behind its filter.
+/// One channel after its filter.
 struct Channel {
     filter: Filter,
     level: bool,
-    /// Samples in a row that were other than the level.
+    /// Consecutive samples that differ from the level.
     others: u32,
 }
 
 impl Channel {
-    /// Takes a sample, if one is due; whether the level has changed.
+    /// Takes a sample if one is due. Returns true if the level has changed.
     fn sample(&mut self, clock: u64, level: bool) -> bool {
         if !clock.is_multiple_of(self.filter.clocks) {
             return false;
@@ -55,8 +55,8 @@ impl Channel {
     }
 }
 
-/// Counts every edge of both channels for so many milliseconds of a clock of `hz`.
-/// `levels` gives the channels A and B at a time in ns. A before B counts up.
+/// Counts every edge of both channels for this time with a clock of `hz`. `levels` returns channels
+/// A and B at a time in ns. A before B counts up.
 pub fn count(
     filters: [Filter; 2],
     hz: u64,
@@ -87,7 +87,7 @@ pub fn count(
 mod tests {
     use super::*;
 
-    /// Forwards, 250 ns a count.
+    /// Returns a forward motion of 250 ns a count.
     fn forwards(ns: f64) -> [bool; 2] {
         let count = (ns / 250.0) as u64 % 4;
         [matches!(count, 1 | 2), matches!(count, 2 | 3)]
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_pulse_across_the_other_channels_edge_is_drift_without_a_filter() {
-        // Channel A is low and channel B changes once, in the middle of a pulse on A.
+        // Channel A is low, and channel B changes once, in the middle of a pulse on A.
         let disturbed = |ns: f64| [(500e3 - 400.0..500e3 + 400.0).contains(&ns), ns > 500e3];
         let counted = |icf| count([Filter::of(icf, 0); 2], 100_000_000, 1, disturbed);
         assert_eq!(counted(0), 3);

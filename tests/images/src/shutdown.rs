@@ -1,11 +1,10 @@
-//! Shutdown in hardware: the break of TIM1, and the peripherals that a halted core stops.
+//! Shutdown in hardware: the break of TIM1, and the peripherals that stop with a halted core.
 //!
-//! Modelled as RM0433 has it: of TIM1 CEN of CR1, the gate, the compare modes of CCMR1 and CCMR2, the
-//! enables of CCER (38.4.7 to 38.4.11), and (38.3.16, 38.3.28, 38.4.20) BKE, BKP, OSSI and MOE
-//! of BDTR, BKINE of AF1, BIF of SR; of SYSCFG_CFGR (12.3.3) PVDL, which also locks the
-//! comparator's settings, CM7L, and the bits for double errors of flash and RAM; of DBGMCU (60.5.8) the bits that
-//! stop the watchdog and TIM1 with the core, and of the G474's (RM0440, 47.16) the
-//! watchdog's.
+//! Modelled by RM0433: of TIM1 CEN of CR1, the gate, the compare modes of CCMR1 and CCMR2, the
+//! enables of CCER (38.4.7 to 38.4.11), and (38.3.16, 38.3.28, 38.4.20) BKE, BKP, OSSI and MOE of
+//! BDTR, BKINE of AF1, BIF of SR; of SYSCFG_CFGR (12.3.3) PVDL, which also locks the comparator's
+//! settings, CM7L, and the bits for double errors of flash and RAM; of DBGMCU (60.5.8) the bits
+//! that stop the watchdog and TIM1 with the core, and on the G474 (RM0440, 47.16) the watchdog's.
 //!
 //! Not modelled: the break's filter, idle levels other than low, polarities other than high,
 //! complementary outputs and their dead time, the second break, OSSR, AOE, LOCK, the preload of
@@ -20,18 +19,18 @@ const CCMR: [u32; 2] = [0x18, 0x1C];
 const CCER: u32 = 0x20;
 const BDTR: u32 = 0x44;
 const AF1: u32 = 0x60;
-/// Of CR1: it counts.
+/// Bit of CR1: the counter is enabled.
 const CEN: u32 = 1 << 0;
-/// Of a channel's byte of CCMR: the channel is an output, in PWM mode 1.
+/// Bits of a channel's byte of CCMR: the channel is an output, in PWM mode 1.
 const CHANNEL: u32 = 0x73;
 const PWM_1: u32 = 6 << 4;
-/// Of BDTR: the outputs are held at their idle level while MOE is not set.
+/// Bit of BDTR: the outputs have their idle level while MOE is not set.
 const OSSI: u32 = 1 << 10;
-/// Of BDTR: break enable, break polarity (set: high), main output enable.
+/// Bits of BDTR: break enable, break polarity (set: high), main output enable.
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
 const MOE: u32 = 1 << 15;
-/// Of SR: a break came. Of AF1: the pin is a source of it.
+/// Bit of SR: a break occurred. Bit of AF1: the pin is a source of it.
 const BIF: u32 = 1 << 7;
 const BKINE: u32 = 1 << 0;
 
@@ -51,27 +50,26 @@ pub struct BreakAt {
 /// Registers and bits that stop parts of the chip while the core is halted.
 #[derive(Clone, Copy, Debug)]
 pub struct Freeze {
-    /// The watchdog's.
+    /// Bit of the watchdog.
     pub watchdog: (u32, u32),
-    /// That of the timer of embassy's time.
+    /// Bit of the timer of embassy's time.
     pub clock: (u32, u32),
-    /// That of TIM15, which gates TIM1.
+    /// Bit of TIM15, which gates TIM1.
     pub gate: Option<(u32, u32)>,
-    /// TIM1's.
+    /// Bit of TIM1.
     pub outputs: Option<(u32, u32)>,
 }
 
 /// The levels of a break's sources.
 #[derive(Clone, Copy, Debug)]
 pub struct Sources {
-    /// The pin's level, where it bears the break's function.
+    /// The pin's level, if it has the break's function.
     pub pin: Option<bool>,
-    /// The comparator, a lockup or a double error, where they are let through.
+    /// The comparator, a lockup or a double error, if enabled.
     pub system: bool,
 }
 
-/// Applies the break to its timer. It wins over a write that would switch the
-/// outputs on.
+/// Applies the break to its timer. It has priority over a write that would switch the outputs on.
 pub fn follow(timer: &mut Timer, sources: Sources) {
     let bdtr = timer.get(BDTR);
     let by_pin = sources.pin.is_some_and(|high| high == (bdtr & BKP != 0));
@@ -89,14 +87,14 @@ pub enum Outputs {
     Pulses,
     /// They are driven low.
     Low,
-    /// They stand at whichever level they were at: an amplifier reads a broken wire.
+    /// They keep their last level: an amplifier detects a broken wire.
     Standing,
-    /// Nothing, on one of them at least: what is outside decides.
+    /// At least one of them is not driven: its level depends on the outside.
     Floating,
 }
 
-/// Returns the timer's outputs. `is_stopped`: the halted core stops it, which is to its
-/// outputs as if MOE were not set.
+/// Returns the timer's outputs. `is_stopped` is true if the halted core stops it, which for its
+/// outputs equals MOE not set.
 #[must_use]
 pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {
     let each = |is: &dyn Fn(u32) -> bool| (0..3).all(is);
@@ -126,7 +124,7 @@ pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {
 mod tests {
     use super::*;
 
-    /// Makes duty cycles on three channels.
+    /// Returns a timer with duty cycles on three channels.
     fn timer() -> Timer {
         let mut timer = Timer::new(1);
         let set = [

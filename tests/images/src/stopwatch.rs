@@ -1,5 +1,5 @@
-//! Time of the haptic interrupt, by the model of cycles over every instruction that it
-//! executes and every peripheral that it reads or writes.
+//! Time of the haptic interrupt, from the model of cycles for every instruction that it executes
+//! and every peripheral that it accesses.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -8,37 +8,37 @@ use hapterra_tests::cycles::instruction::{Instruction, decode};
 use hapterra_tests::cycles::{Cycles, Tick};
 use unicorn_engine::Unicorn;
 
-/// From here on a chip has its flash.
+/// Start address of a chip's flash.
 const FLASH: u32 = 0x0800_0000;
 /// First and last addresses of code, in ITCM and in flash.
 const CODE: [(u64, u64); 2] = [(0, 0xFFFF), (0x0800_0000, 0x081F_FFFF)];
 
-/// The figures of interrupts, one after the other.
+/// The figures of successive interrupts.
 #[derive(Debug, Default)]
 pub struct Figures {
-    /// From the interrupt's first instruction until the command of axis 3.
+    /// From the interrupt's first instruction to the command of axis 3.
     pub to_output: Vec<Cycles>,
     /// Of the whole interrupt.
     pub whole: Vec<Cycles>,
 }
 
-/// Follows the interrupt.
+/// The measurement of an interrupt in progress.
 #[derive(Debug, Default)]
 struct Following {
     /// The handler's first instruction.
     entry: u32,
     tick: Option<Tick>,
-    /// Executed when it is known what follows.
+    /// Counted when the next address is known.
     pending: Option<Instruction>,
     figures: Figures,
 }
 
-/// Shared between the core's hooks, and the code that sees the end of an interrupt.
+/// The measurement, shared by the core's hooks and the code that detects the end of an interrupt.
 #[derive(Clone, Debug)]
 pub struct Stopwatch(Rc<RefCell<Following>>);
 
 impl Stopwatch {
-    /// Follows the handler at `entry` on this core.
+    /// Starts to follow the handler at `entry` on this core.
     pub(crate) fn start(core: &mut Unicorn<'static, ()>, entry: u32) -> Self {
         let following = Following {
             entry,
@@ -60,25 +60,25 @@ impl Stopwatch {
         stopwatch
     }
 
-    /// The core loads or stores at an address.
+    /// Records a load or store at an address.
     pub(crate) fn touch(&self, address: u32) {
         if let Some(tick) = &mut self.0.borrow_mut().tick {
             tick.touch(address);
         }
     }
 
-    /// The command of axis 3 has been written.
+    /// Records that the command of axis 3 was written.
     pub(crate) fn output(&self) {
         let mut following = self.0.borrow_mut();
         let cycles = following.tick.as_ref().map(Tick::cycles);
         following.figures.to_output.extend(cycles);
     }
 
-    /// The interrupt has ended.
+    /// Records the end of the interrupt.
     pub(crate) fn end(&self) {
         let mut following = self.0.borrow_mut();
         if let Some(instruction) = following.pending.take() {
-            // Its return leads elsewhere.
+            // It returns to another address.
             following.execute_pending(instruction, 0);
         }
         if let Some(tick) = following.tick.take() {
@@ -86,7 +86,7 @@ impl Stopwatch {
         }
     }
 
-    /// Returns the figures so far.
+    /// Returns the figures up to now.
     #[must_use]
     pub fn take(&self) -> Figures {
         std::mem::take(&mut self.0.borrow_mut().figures)

@@ -1,36 +1,34 @@
-//! The comparator that watches a chip's supply (PVD), on its line of EXTI, and why a chip
-//! was reset.
+//! The comparator of a chip's supply (PVD), on its line of EXTI, and the cause of a chip's reset.
 //!
-//! Modelled as RM0440 (6.2.3, 15.5) and RM0433 (6.5.3, 20.6) have it: PVDE, PLS and PVDO of
-//! PWR, and of EXTI the rising edge's choice, the mask and the pending bit of line 16. The
-//! hysteresis (100 mV) is not modelled.
+//! Modelled by RM0440 (6.2.3, 15.5) and RM0433 (6.5.3, 20.6): PVDE, PLS and PVDO of PWR, and of
+//! EXTI the rising edge, the mask and the pending bit of line 16. The hysteresis (100 mV) is not
+//! modelled.
 
 use std::collections::HashMap;
 
-/// Voltage of a board's regulator, millivolts.
+/// Voltage of a board's regulator, mV.
 pub const NOMINAL_MV: u32 = 3_300;
-/// EXTI's line of the comparator.
+/// The comparator's line of EXTI.
 const LINE: u32 = 1 << 16;
 
 /// Registers of a chip's comparator.
 #[derive(Clone, Copy, Debug)]
 pub struct Comparator {
-    /// Control register, the bit that switches it on, and the first of the level's
-    /// three bits.
+    /// Control register, its enable bit, and the first of the level's three bits.
     pub control: (u32, u32, u32),
-    /// Status register, and the bit that says that the supply is low.
+    /// Status register, and its bit for a low supply.
     pub status: (u32, u32),
     /// EXTI's rising edge, mask and pending registers.
     pub exti: [u32; 3],
-    /// The levels, millivolts.
+    /// The levels, mV.
     pub levels_mv: [u32; 7],
     /// Its interrupt.
     pub interrupt: usize,
 }
 
-/// The supply of a chip, as its comparator sees it.
+/// The supply of a chip, as measured by its comparator.
 pub struct Supply {
-    /// Its voltage, millivolts.
+    /// Its voltage, mV.
     pub mv: u32,
     was_low: bool,
 }
@@ -45,7 +43,7 @@ impl Default for Supply {
 }
 
 impl Supply {
-    /// Returns true if the comparator is on and says that the supply is low.
+    /// Returns true if the comparator is on and detects a low supply.
     #[must_use]
     pub fn is_low(&self, at: &Comparator, words: &HashMap<u32, u32>) -> bool {
         let (control, on, level) = at.control;
@@ -54,7 +52,7 @@ impl Supply {
         control & on != 0 && level.is_some_and(|level| self.mv < *level)
     }
 
-    /// Takes a look. Returns whether the interrupt is asserted.
+    /// Updates the comparator. Returns true if the interrupt is asserted.
     pub fn follow(&mut self, at: &Comparator, words: &mut HashMap<u32, u32>) -> bool {
         let is_low = self.is_low(at, words);
         let rose = is_low && !self.was_low;
@@ -70,16 +68,16 @@ impl Supply {
     }
 }
 
-/// Reason for which a chip was reset.
+/// Cause of a chip's reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
-    /// Power came up: memory is empty.
+    /// Power-up: memory is empty.
     PowerUp,
     /// The watchdog was not fed.
     Watchdog,
-    /// The program asked for it.
+    /// The program requested it.
     Software,
-    /// The supply was below the brown-out level, and memory kept what it held.
+    /// The supply was below the brown-out level, and memory kept its content.
     BrownOut,
 }
 
@@ -88,8 +86,8 @@ pub enum Reset {
 pub struct ResetFlags {
     /// Its address.
     pub register: u32,
-    /// The flags of a power-up, a watchdog's, a program's and a brown-out's reset. Each
-    /// reset also pulls the pin.
+    /// The flags of a reset by power-up, watchdog, program and brown-out. Each reset also pulls the
+    /// pin.
     pub of: [u32; 4],
     /// The bit that clears them all.
     pub clear: u32,

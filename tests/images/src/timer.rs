@@ -1,11 +1,10 @@
-//! A timer of the chips: counting up, moved by an encoder, or standing still.
+//! A timer of the chips: counting up, driven by an encoder, or stopped.
 //!
-//! Modelled: CEN, URS, OPM and CKD of CR1, MMS of CR2 where it gives CEN to other timers, the encoder
-//! mode on both channels and the gated mode of SMCR, UG of EGR, the
-//! flags and interrupts of the update and of the four compare matches, the input filters of
-//! CCMR1, CNT, PSC, ARR and the compare registers. What a timer does to its pins is in
-//! `shutdown`. Not modelled: counting down, repetition, the other slave modes and triggers,
-//! capture, DMA, and every preload: what is written counts at once.
+//! Modelled: CEN, URS, OPM and CKD of CR1, MMS of CR2 for CEN as output to other timers, the
+//! encoder mode on both channels and the gated mode of SMCR, UG of EGR, the flags and interrupts of
+//! the update and of the four compare matches, the input filters of CCMR1, CNT, PSC, ARR and the
+//! compare registers. The timer's pins are in `shutdown`. Not modelled: counting down, repetition,
+//! the other slave modes and triggers, capture, DMA, and every preload: writes take effect at once.
 
 use crate::quadrature::{Filter, count};
 
@@ -19,9 +18,9 @@ const CCMR1: u32 = 0x18;
 /// The counter.
 const CNT: u32 = 0x24;
 const PSC: u32 = 0x28;
-/// The auto-reload register: it counts from 0 to this.
+/// The auto-reload register: the counter counts from 0 to its value.
 pub const ARR: u32 = 0x2C;
-/// Alternate functions: the break's pin is one of its sources after a reset.
+/// Alternate functions: after a reset the break's pin is one of its sources.
 const AF1: u32 = 0x60;
 /// The first of four compare registers.
 pub const CCR1: u32 = 0x34;
@@ -30,12 +29,12 @@ pub const CCR1: u32 = 0x34;
 const CEN: u32 = 1 << 0;
 const URS: u32 = 1 << 2;
 const OPM: u32 = 1 << 3;
-/// CR2.MMS: CEN is what other timers are triggered by.
+/// CR2.MMS: CEN is the trigger output to other timers.
 const GIVES_CEN: (u32, u32) = (7 << 4, 1 << 4);
-/// SMCR: it counts while its trigger is high, and the trigger is ITR0.
+/// SMCR: the timer counts while its trigger is high; the trigger is ITR0.
 const SMS_TS: u32 = 0x77;
 const GATED: u32 = 5;
-/// Bit of SR: the counter went round.
+/// Bit of SR: the counter overflowed.
 const UIF: u32 = 1 << 0;
 
 /// One timer.
@@ -50,7 +49,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// A stopped timer with a kernel clock of `hz`.
+    /// Creates a stopped timer with a kernel clock of `hz`.
     #[must_use]
     pub fn new(hz: u64) -> Self {
         let mut timer = Self {
@@ -65,7 +64,7 @@ impl Timer {
         timer
     }
 
-    /// A register.
+    /// Returns a register.
     #[must_use]
     pub fn get(&self, offset: u32) -> u32 {
         self.registers.get((offset / 4) as usize).map_or(0, |r| *r)
@@ -77,14 +76,13 @@ impl Timer {
         }
     }
 
-    /// Sets the count, as an encoder does.
+    /// Sets the count, as driven by an encoder.
     pub fn feed(&mut self, count: u16) {
         self.set(CNT, count.into());
     }
 
-    /// Lets an encoder play its two channels at the inputs, through their filters, and
-    /// returns how far it has counted: nothing where it does not follow an encoder on
-    /// both channels' edges.
+    /// Plays an encoder's two channels at the inputs, through their filters. Returns the counts:
+    /// zero unless the timer is in encoder mode on both channels' edges.
     pub fn play(&mut self, ms: u64, levels: impl FnMut(f64) -> [bool; 2]) -> i32 {
         if self.get(SMCR) & 7 != 3 || self.get(CR1) & CEN == 0 {
             return 0;
@@ -98,10 +96,10 @@ impl Timer {
         counted
     }
 
-    /// A write of the core's.
+    /// Writes a register from the core.
     pub fn write(&mut self, offset: u32, value: u32, mask: u32) {
         match offset {
-            // Flags are cleared by writing zero.
+            // Writing a zero clears a flag.
             SR => self.set(SR, self.get(SR) & (value | !mask)),
             EGR => {
                 if value & 1 != 0 {
@@ -126,13 +124,13 @@ impl Timer {
         self.get(SMCR) & SMS_TS != GATED || self.trigger
     }
 
-    /// The level that it gives to other timers, as far as it gives its CEN.
+    /// Returns its trigger output, if that is CEN.
     #[must_use]
     pub fn triggers(&self) -> bool {
         self.get(CR2) & GIVES_CEN.0 == GIVES_CEN.1 && self.get(CR1) & CEN != 0
     }
 
-    /// Lets time pass up to `now_ns`, setting flags on the way.
+    /// Lets time pass up to `now_ns`, and sets flags.
     pub fn advance(&mut self, now_ns: u64) {
         let passed_ns = now_ns - self.now_ns;
         self.now_ns = now_ns;
@@ -145,7 +143,7 @@ impl Timer {
         self.step(clocks / a_count);
     }
 
-    /// Lets time pass up to `now_ns` without counting: the halted core stops it.
+    /// Lets time pass up to `now_ns` without counting, while a halted core stops the timer.
     pub fn stand_still(&mut self, now_ns: u64) {
         self.now_ns = now_ns;
     }

@@ -1,31 +1,31 @@
 //! The independent watchdog.
 //!
 //! Modelled: start, feeding, prescaler and reload. Its oscillator is as slow as the data sheets
-//! allow, so a reset comes as late as it ever does. Not modelled: the lock of prescaler and
-//! reload (KR = 0x5555), the busy bits of SR, the window.
+//! allow, so a reset is as late as possible. Not modelled: the lock of prescaler and reload (KR =
+//! 0x5555), the busy bits of SR, the window.
 
 const KR: u32 = 0x00;
 const PR: u32 = 0x04;
 const RLR: u32 = 0x08;
-/// The low-speed oscillator that drives it, at its slowest: 29.5 kHz on a G474, 29.4 on an
-/// H743, over all temperatures. Its fastest is 34 kHz.
+/// Slowest frequency of its low-speed oscillator: 29.5 kHz on a G474, 29.4 on an H743, over all
+/// temperatures. The fastest is 34 kHz.
 const LSI_HZ: u64 = 29_400;
-/// The same at its fastest.
+/// Fastest frequency of this oscillator.
 const FASTEST_LSI_HZ: u64 = 34_000;
 
-/// The watchdog and when it was fed.
+/// The watchdog and the time of its last feeding.
 #[derive(Default)]
 pub struct Watchdog {
     running: bool,
     prescaler: u32,
     reload: u32,
     fed_ns: u64,
-    /// Number of times that it was fed.
+    /// Number of feedings.
     pub feedings: u64,
 }
 
 impl Watchdog {
-    /// Reads a register; no status says busy.
+    /// Returns a register; the status is never busy.
     #[must_use]
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
@@ -35,7 +35,7 @@ impl Watchdog {
         }
     }
 
-    /// A write of the core's.
+    /// Writes a register from the core.
     pub fn write(&mut self, offset: u32, value: u32, now_ns: u64) {
         match (offset, value) {
             (KR, 0xCCCC) => (self.running, self.fed_ns) = (true, now_ns),
@@ -46,23 +46,23 @@ impl Watchdog {
         }
     }
 
-    /// Begins to count anew, as if the core had fed it.
+    /// Restarts the count, as after a feeding.
     pub fn restart(&mut self, now_ns: u64) {
         self.fed_ns = now_ns;
     }
 
-    /// It does not count for a while.
+    /// Stops the count for a while.
     pub fn stand_still(&mut self, ns: u64) {
         self.fed_ns += ns;
     }
 
-    /// The longest time between two feedings, ns.
+    /// Returns the longest time between two feedings, ns.
     #[must_use]
     pub fn timeout_ns(&self) -> u64 {
         self.cycles() * 1_000_000_000 / LSI_HZ
     }
 
-    /// The shortest time without a feeding after which it may reset the chip, ns.
+    /// Returns the shortest time without a feeding after which it may reset the chip, ns.
     #[must_use]
     pub fn soonest_ns(&self) -> u64 {
         self.cycles() * 1_000_000_000 / FASTEST_LSI_HZ

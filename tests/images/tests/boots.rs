@@ -1,5 +1,5 @@
-//! A board's report after a reset: why, how the program before
-//! ended, and its calibration. And how much of its stack it needs.
+//! A board's report after a reset: the cause, the end of the last program, and its calibration.
+//! Also the depth of its stack.
 
 use hapterra::terrain::Terrain;
 use hapterra_core::guard::Fault;
@@ -14,13 +14,13 @@ use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
 use hapterra_tests::usb::Port;
 
-/// Does something with every board, over rough ground.
+/// Runs a test on every board, over rough ground.
 fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, then);
 }
 
-/// Opens a board, lets something be done to it, and asks it after a reset of that kind.
+/// Opens a board, calls `disturb`, and queries it after a reset of this kind.
 fn after_reset(cause: Reset, mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(Machine, Status)> {
     let mut all = vec![];
     on_each(|machine, terrain, scene| {
@@ -33,8 +33,8 @@ fn after_reset(cause: Reset, mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(M
     all
 }
 
-/// Breaks what the link calls, runs, the host reading, until that has reset the chip in
-/// the way that is named, and puts the code back.
+/// Breaks a function of the link, runs with a reading host until this kind of reset, and restores
+/// the code.
 fn run_until_reset(device: &Device<'_>, by: Stop, break_it: impl FnOnce(&mut Machine, Function)) {
     let mut machine = device.machine.borrow_mut();
     let at = machine.image.message_encoder();
@@ -147,8 +147,7 @@ fn a_stored_calibration_is_there_after_the_reset() {
     }
 }
 
-/// Stores a calibration, with the press of the dead-man switch that it takes, and gives
-/// the answer.
+/// Stores a calibration, with the dead-man press that it requires. Returns the answer.
 fn store(device: &mut Device<'_>) -> Result<(), Refusal> {
     let calibration = Calibration::PREMIUM_1_5;
     device.request(Request::SetCalibration { calibration });
@@ -178,12 +177,12 @@ fn full_memory_is_erased_at_the_next_start() {
                 .borrow_mut()
                 .patch(area, &record.repeat(places));
         }
-        // The link continuing shows that the watchdog is fed.
+        // A link that still works shows that the watchdog is fed.
         assert_eq!(store(&mut device), Err(Refusal::MemoryFull), "{board}");
         device.run_ms(300);
         let full = device.machine.borrow().bytes(areas[0], PLACE);
         assert_eq!(full, record, "{board}: nothing was erased");
-        // The start takes as long as the erase, and ends well.
+        // The start takes as long as the erase, and succeeds.
         let mut again = Device::open(device.reset(), terrain, scene);
         let status = again.ask_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
@@ -197,7 +196,7 @@ fn full_memory_is_erased_at_the_next_start() {
 const NMI: u32 = 2;
 const BUS_FAULT: u32 = 5;
 
-/// A word in the middle of a place's record, of its area's first byte.
+/// Returns a word in the middle of a record, by the first byte of its area.
 fn middle(machine: &Machine, place: u32) -> u32 {
     let (areas, _) = machine.chip.flash.calibrations;
     areas[0] + place * PLACE as u32 + 2 * machine.chip.flash.word
@@ -210,7 +209,7 @@ fn what_was_being_written_when_the_power_went_leaves_the_record_before() {
         let mut device = Device::open(machine, terrain, scene);
         assert_eq!(store(&mut device), Ok(()), "{board}");
         let cut = middle(&device.machine.borrow(), 1);
-        // Half of a word, and nothing behind it.
+        // Half of a word, and nothing after it.
         device.machine.borrow_mut().patch(cut, &[0x5A]);
         device.machine.borrow_mut().make_unreadable(cut);
         let mut again = Device::open(device.reset(), terrain, scene);

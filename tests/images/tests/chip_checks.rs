@@ -1,4 +1,4 @@
-//! Checks of the images on their chips before and while they run.
+//! Checks by the images on their chips, before and while they run.
 
 use hapterra_core::wire::frame::encode;
 use hapterra_core::wire::status::UsbClock;

@@ -1,5 +1,4 @@
-//! Loaded and reserved segments lie in the chip's memories, as
-//! probe-rs's registry lists them.
+//! Loaded and reserved segments lie in the chip's memories, as listed in probe-rs's registry.
 
 use std::ops::Range;
 
@@ -14,7 +13,7 @@ fn target(machine: &Machine) -> Target {
     found.expect("probe-rs knows the chip")
 }
 
-/// Ranges of RAM, neighbours joined.
+/// Returns the ranges of RAM, with neighbours joined.
 fn ram(target: &Target) -> Vec<Range<u64>> {
     joined(target, |region| match region {
         MemoryRegion::Ram(ram) => Some(ram.range.clone()),
@@ -80,10 +79,10 @@ fn the_stack_lies_at_the_beginning_of_a_ram_and_nothing_static_below_it() {
         let (chip, target) = (machine.chip, target(&machine));
         let top = machine.word(chip.memories[0].0);
         let end = machine.image.symbol("_stack_end").expect("the stack's end");
-        // How much is really used is measured elsewhere.
+        // The real depth of the stack is measured elsewhere.
         assert!(end + 8192 <= top, "{}: {end:#x} to {top:#x}", chip.board);
         assert!(holds(&ram(&target), end, (top - end) as usize));
-        // The words below the stack are no RAM, so an overrun has nothing to write to.
+        // Below the stack there is no RAM, so an overrun cannot write anywhere.
         assert!(!holds(&ram(&target), end - 4, 4), "{}", chip.board);
         for segment in &machine.image.segments {
             assert!(
@@ -102,7 +101,7 @@ fn the_emulated_chip_has_the_memories_of_the_real_one() {
         let target = target(&machine);
         let real: Vec<_> = [flash(&target), ram(&target)].concat();
         for (start, bytes) in machine.chip.memories {
-            // System memory is not for programs: the registry may leave it out.
+            // System memory is not for programs: the registry may omit it.
             let system = (0x1FF0_0000..0x2000_0000).contains(start);
             let there = system || holds(&real, *start, *bytes as usize);
             assert!(there, "{}: {start:#x}", machine.chip.board);

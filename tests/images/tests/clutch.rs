@@ -7,12 +7,12 @@ use hapterra_core::wire::request::Request;
 use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::device::Device;
 
-/// Limits by the clutch.
+/// Limits set by the clutch.
 const OF_CLUTCH: Limits = Limits::CLUTCH_INPUT
     .union(Limits::CLUTCH_OPEN)
     .union(Limits::CLUTCH_MOVES);
 
-/// Closes the switch, or opens it.
+/// Closes or opens the switch.
 fn switch(device: &Device<'_>, closed: bool) {
     let mut machine = device.machine.borrow_mut();
     let pin = machine.chip.clutch;
@@ -42,7 +42,7 @@ fn a_switch_that_is_closed_lets_the_force_out_and_opened_it_comes_in_again() {
         assert_eq!(limits(device), Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN);
         assert_eq!(latest(device).force_n.length(), 0.0);
         assert!(device.ask_status().health.sense.clutch);
-        // The host holds it, too: both have to let go.
+        // The host holds it as well: both must release it.
         let hold = |hold| Request::Clutch { hold };
         device.request(hold(ClutchHold::WithHand));
         device.run_ms(20);
@@ -77,7 +77,7 @@ fn a_switch_that_bounces_or_sticks_adds_no_force() {
         switch(device, true);
         device.run_ms(2_000);
         assert_eq!(latest(device).force_n.length(), 0.0, "stuck");
-        // Pulled up: a broken wire is a switch that is let go.
+        // Pulled up: a broken wire counts as a released switch.
         switch(device, false);
         device.run_ms(700);
         assert_eq!(limits(device), Limits::empty());

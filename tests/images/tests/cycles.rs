@@ -1,7 +1,7 @@
-//! Cycles of single ticks on the boards' chips, at most, beside the kept table `bench/cycles.csv`
-//! (docs/reference/cycles.md). `cargo xtask cycles` runs this over all counted scenes; after a change that is
-//! meant, `cargo xtask cycles --write`. Run as a test, it takes the scenes by which the emulated
-//! processor is compared.
+//! Upper bounds of the cycles of single ticks on the boards' chips, compared with the stored table
+//! `bench/cycles.csv` (docs/reference/cycles.md). `cargo xtask cycles` runs this over all counted
+//! scenes; after an intended change, `cargo xtask cycles --write`. As a test, it uses the scenes
+//! that compare the emulated processor with the host.
 
 #[path = "../../../bench/tests/m4f/mod.rs"]
 #[allow(dead_code)] // The counts of instructions use others of them.
@@ -13,11 +13,11 @@ use hapterra_tests::repository;
 use m4f::table::Row;
 use m4f::{chain, contact, soak};
 
-/// The kept table, in the repository.
+/// The stored table, in the repository.
 const TABLE: &str = "bench/cycles.csv";
-/// More than this share above the kept figure is a regression, as for instructions.
+/// A figure above the stored one by more than this share is a regression, as for instructions.
 const TOLERANCE: f64 = 1.05;
-/// The columns: cycles, of an STM32G474 and of an STM32H743.
+/// The columns: cycles of an STM32G474 and of an STM32H743.
 const TITLES: [&str; 8] = [
     "state",
     "max instructions",
@@ -29,7 +29,7 @@ const TITLES: [&str; 8] = [
     "h743 max",
 ];
 
-/// A row's cells.
+/// Returns a row's cells.
 fn record(row: &Row) -> Vec<String> {
     let figures = row.cycles.as_flattened().iter();
     let figures = row.counts[2..].iter().chain(figures);
@@ -37,7 +37,7 @@ fn record(row: &Row) -> Vec<String> {
     cells.chain(figures.map(ToString::to_string)).collect()
 }
 
-/// Writes the table anew.
+/// Writes the table.
 fn write(rows: &[Row]) {
     let mut table =
         csv::Writer::from_path(repository().join(TABLE)).expect("the table can be written");
@@ -47,7 +47,7 @@ fn write(rows: &[Row]) {
     }
 }
 
-/// A sentence for each figure in one of these columns that is more than the table allows.
+/// Returns a message for each figure in these columns above the table's allowance.
 fn worse(rows: &[Row], columns: &[usize]) -> Vec<String> {
     let mut table = csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
     let kept: Vec<_> = table.records().map(|row| row.expect("a row")).collect();
@@ -78,7 +78,7 @@ fn no_compared_scene_takes_more_cycles_than_it_did() {
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 
-/// `cargo xtask cycles` runs it; `--write` writes the table.
+/// `cargo xtask cycles` runs this; `--write` writes the table.
 #[test]
 #[ignore = "takes minutes: cargo xtask cycles"]
 fn no_state_of_the_tick_takes_more_cycles_than_it_did() {
@@ -102,7 +102,7 @@ fn no_state_of_the_tick_takes_more_cycles_than_it_did() {
     if wanted == "write" {
         return write(&rows);
     }
-    // The table's rows of the stress test are over a part of them.
+    // The table's rows of the stress test cover a part of the scenes.
     let is_bound = |i: &usize| wanted != "all" || TITLES[*i].contains("max");
     let columns: Vec<usize> = (1..TITLES.len()).filter(is_bound).collect();
     let worse = worse(&rows, &columns);

@@ -1,17 +1,17 @@
-//! The encoders' inputs, as the boards' own images set them up: the fastest motion that
-//! is not a fault is counted, and a disturbance shorter than the filter is not.
+//! The encoders' inputs, as the boards' own images set them up: the fastest motion without a fault
+//! is counted, and a disturbance shorter than the filter is not.
 
 use hapterra_image_tests::device::machines;
 use hapterra_image_tests::machine::{Machine, Stop};
 
 /// Counts a second beyond which the guard reports a fault.
 const FASTEST: f64 = 128_000.0;
-/// Longest disturbance that is never counted, ns: of the board with the shorter filter.
+/// Longest disturbance that is never counted, ns, on the board with the shorter filter.
 const DISTURBANCE_NS: f64 = 1_800.0;
 
-/// Channels of an encoder that turns at `speed` counts a second, forwards or back.
-/// `skew` shifts channel B by so many counts: a real disc's channels are not a quarter
-/// of a line apart.
+/// Returns the channels of an encoder that turns at `speed` counts a second, forwards or back.
+/// `skew` shifts channel B by this many counts: a real disc's channels are not exactly a quarter of
+/// a line apart.
 fn turning(speed: f64, skew: f64) -> impl Fn(f64) -> [bool; 2] {
     move |ns| {
         let at = ns * 1e-9 * speed;
@@ -60,8 +60,8 @@ fn a_disturbance_shorter_than_the_filter_is_not_counted() {
         for axis in 0..3 {
             for speed in [1_000.0, -10_000.0, FASTEST] {
                 let clean = turning(speed, 0.0);
-                // On channel A about every edge of channel B, the worst place: there a
-                // pulse is four counts of drift.
+                // On channel A around every edge of channel B, the worst case: there a pulse is
+                // four counts of drift.
                 let disturbed = |ns: f64| {
                     let [a, b] = clean(ns);
                     let later = clean(ns + DISTURBANCE_NS / 2.0)[1];

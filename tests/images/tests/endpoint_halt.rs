@@ -1,5 +1,5 @@
-//! Halts of endpoints, as a host may ask for them at any time: the boards' own images go
-//! on, and lose at most what was in the endpoint.
+//! Halts of endpoints, which a host may request at any time: the boards' own images continue, and
+//! lose at most the content of the endpoint.
 
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
@@ -12,7 +12,7 @@ use hapterra_tests::usb::host::{
 };
 use hapterra_tests::usb::{Answer, Handshake, MOMENTS_A_MS, Port};
 
-/// Standard requests to an endpoint: type, number, and for the halt's feature the value.
+/// Standard requests to an endpoint: type, number, and the value for the halt's feature.
 const CLEAR_HALT: (u8, u8, u16) = (0x02, 1, 0);
 const SET_HALT: (u8, u8, u16) = (0x02, 3, 0);
 const GET_STATUS: (u8, u8, u16) = (0x82, 0, 0);
@@ -53,8 +53,8 @@ fn is_hello(content: &[u8]) -> bool {
     matches!(message, Ok(ToHost::Hello(_)))
 }
 
-/// Sends a hello in one packet; whether an answer comes. With the wrong toggle, either is
-/// thrown away.
+/// Sends an open in one packet. Returns true if an answer arrives. With a wrong toggle, either is
+/// dropped.
 fn answers(machine: &mut Machine) -> bool {
     send_packet(machine, LINK, &hello()).expect("taken");
     let mut reader = FrameReader::<MAX_FRAME>::new();
@@ -74,7 +74,7 @@ fn answers(machine: &mut Machine) -> bool {
     false
 }
 
-/// Reads until the device has had nothing to say for 5 ms.
+/// Reads until the device has sent nothing for 5 ms.
 fn drain(machine: &mut Machine) {
     let mut silent = 0;
     while silent < 5 * MOMENTS_A_MS {
@@ -91,7 +91,7 @@ fn clearing_no_halt_hangs_nothing_and_resets_the_toggle() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");
-        // An odd and an even number of packets before it: both toggles.
+        // An odd and an even number of packets before it, for both toggles.
         for packets in 1..4 {
             for address in ADDRESSES {
                 for _ in 0..packets {
@@ -139,7 +139,7 @@ fn an_endpoint_that_is_not_in_use_stays_so() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");
-        // No configuration any more.
+        // Removes the configuration.
         control(&mut machine, (0x00, 9, 0, 0)).expect("done");
         for address in [0x01, 0x81, 0x05, 0x8F] {
             ask(&mut machine, CLEAR_HALT, address).expect("done");

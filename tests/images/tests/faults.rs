@@ -1,5 +1,5 @@
-//! Faults in the boards' own images: each ends in no current and
-//! amplifiers off, in a number of ticks that is stated here.
+//! Faults in the boards' own images: each ends with zero current and the amplifiers off, within a
+//! number of ticks stated here.
 
 use hapterra_core::guard::Fault;
 use hapterra_image_tests::bench::Bench;
@@ -10,25 +10,25 @@ use hapterra_image_tests::elf::Function;
 use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
 
-/// Branches to itself: what a task that hangs does.
+/// A branch to itself, as in a hanging task.
 const HANG: [u8; 2] = [0xFE, 0xE7];
-/// No instruction: a hard fault.
+/// An invalid instruction, for a hard fault.
 const UNDEFINED: [u8; 2] = [0x00, 0xDE];
-/// The watchdog's time with its oscillator at its slowest, and what its feeding adds to it, ms.
+/// The watchdog's time at its oscillator's slowest, and the time that its feeding adds, ms.
 const WATCHDOG_MS: u64 = 50;
 const CHECK_MS: u64 = 10;
-/// Longest time between two feedings that the tick bears, ms.
+/// Longest time between two feedings that the tick accepts, ms.
 const STALL_MS: u64 = 40;
-/// Longest that amplifiers are on after a task hangs: until the next feeding at
-/// most, and 40 ms from there.
+/// Longest time with the amplifiers on after a task hangs: to the next feeding at most, and 40 ms
+/// more.
 const OFF_MS: u64 = CHECK_MS + STALL_MS + 1;
 
-/// Command for no current: rounded as the drivers round.
+/// Returns the command for zero current, rounded as in the drivers.
 fn idle(machine: &Machine) -> i32 {
     (machine.bus().code(0.0) + 0.5) as i32
 }
 
-/// Whole ticks that pass until the amplifiers are off, `at_most` so many.
+/// Returns the whole ticks until the amplifiers are off, `at_most` at most.
 fn ticks_until_off(machine: &mut Machine, at_most: usize) -> usize {
     for ticks in 1..=at_most {
         assert_eq!(machine.run_ticks(1), Stop::Asked);
@@ -39,8 +39,8 @@ fn ticks_until_off(machine: &mut Machine, at_most: usize) -> usize {
     panic!("{}: still on after {at_most} ticks", machine.chip.board);
 }
 
-/// The amplifiers were switched off before anything else was done to them, and
-/// left with zero commands.
+/// Checks that the amplifiers were switched off before any other change, and left with zero
+/// commands.
 fn assert_off_came_first(machine: &mut Machine) {
     let idle = idle(machine);
     let effects = machine.take_effects();
@@ -59,15 +59,15 @@ fn assert_off_came_first(machine: &mut Machine) {
     assert!(!after.contains(&Effect::Enable(true)), "stays off");
 }
 
-/// The fault that is reported to the host.
+/// Checks that this fault is reported to the host.
 fn assert_told(device: &mut Device<'_>, fault: Fault) {
     device.run_ms(40);
     let told = device.latest.and_then(|sample| sample.fault);
     assert_eq!(told, Some(fault));
 }
 
-/// Asserts that a fault switches the amplifiers off in one tick, and they stay off after `undo`;
-/// this fault is reported to the host.
+/// Checks that a fault switches the amplifiers off in one tick, that they stay off after `undo`,
+/// and that this fault is reported to the host.
 fn assert_trips_in_one_tick(
     device: &mut Device<'_>,
     fault: Fault,
@@ -124,20 +124,20 @@ fn a_converter_that_gets_no_frames_takes_two_ticks() {
             return;
         }
         machine.bus().converter.is_cut = true;
-        // The tick in which it is found out has read its inputs already.
+        // The tick that detects it has already read its inputs.
         assert_eq!(ticks_until_off(&mut machine, 3), 2);
         drop(machine);
         assert_told(device, Fault::Hardware);
     });
 }
 
-/// Milliseconds until the amplifiers are off and until the watchdog resets a chip
-/// in which a function hangs; none if it never does.
+/// Returns the milliseconds until the amplifiers are off and until the watchdog resets a chip with
+/// a hanging function; `None` if it never does.
 fn ms_until_reset(machine: &mut Machine, function: Function) -> Option<(Option<u64>, u64)> {
     machine.patch(function.address, &HANG);
     let before_ns = machine.bus().now_ns;
     let ms = |machine: &Machine| (machine.bus().now_ns - before_ns) / 1_000_000;
-    // Something for the USB stack to do.
+    // Work for the USB stack.
     machine.bus().usb.bus_reset();
     let mut off = None;
     let stop = machine.run_until(3 * WATCHDOG_MS, |m| {
@@ -155,11 +155,11 @@ fn assert_in_time(machine: &mut Machine, ms: u64) {
         (watchdog.soonest_ns(), watchdog.timeout_ns())
     };
     assert!(latest_ns <= WATCHDOG_MS * 1_000_000, "{latest_ns} ns");
-    // The tick comes first, with a tick or two to spare.
+    // The tick is first, with a tick or two to spare.
     let spare_ns = soonest_ns.saturating_sub(STALL_MS * 1_000_000);
     assert!(spare_ns >= 2_000_000, "{soonest_ns} ns at the soonest");
     assert!(ms <= WATCHDOG_MS + CHECK_MS, "reset after {ms} ms");
-    // The reset lets go of every pin, and the pull-down outside acts.
+    // The reset releases every pin, and the external pull-down acts.
     machine.reset(Reset::Watchdog);
     assert!(!machine.is_enabled());
 }
@@ -192,7 +192,7 @@ fn a_task_that_hangs_ends_in_the_watchdogs_reset() {
             let mut machine = device.machine.borrow_mut();
             match ms_until_reset(&mut machine, *task) {
                 Some((off, reset)) => {
-                    // The tick sees it first.
+                    // The tick detects it first.
                     let off = off.expect("not left to the reset");
                     println!("{board}: off after {off} ms, reset after {reset} ms");
                     assert!(off <= OFF_MS, "{board}: off after {off} ms");
@@ -219,10 +219,9 @@ fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
     });
 }
 
-/// Runs until the amplifiers are off: at once, and nothing is done after it but the
-/// program's reset.
+/// Runs until the amplifiers are off, at once, and checks that only the program's reset follows.
 fn assert_off_at_once_and_for_good(machine: &mut Machine) {
-    // The link sends what the host reads.
+    // The link sends when the host reads.
     let stop = machine.run_until(50, |m| {
         let _ = m.bus().usb.take_in(1);
         !m.is_enabled()
@@ -256,8 +255,8 @@ fn a_panic_switches_the_amplifiers_off_before_anything_else() {
     });
 }
 
-/// A reset lets go of the enable line, and an amplifier takes its time to follow: so what it
-/// is commanded matters. A start may also take long.
+/// A reset releases the enable line, and an amplifier follows with a delay, so its command matters.
+/// A start may also take long.
 #[test]
 fn start_after_crash_commands_no_current_first() {
     Bench::new().on_each(|device| {
@@ -266,7 +265,7 @@ fn start_after_crash_commands_no_current_first() {
         let commands = machine.bus().commands();
         let idle = idle(&machine);
         assert_ne!(commands, [idle; 3], "{board}: it presses");
-        // What was cut off has to be erased at the next start.
+        // An interrupted write must be erased at the next start.
         let (areas, _) = machine.chip.flash.calibrations;
         machine.patch(areas[0], &[0x5A]);
         let at = machine.image.message_encoder();
@@ -274,7 +273,7 @@ fn start_after_crash_commands_no_current_first() {
         assert_off_at_once_and_for_good(&mut machine);
         machine.restore(at);
         machine.reset(Reset::Software);
-        // To clear its memory takes the emulated core a few of them.
+        // Clearing its memory takes the emulated core a few of them.
         assert_eq!(machine.run_ms(10), Stop::Time, "{board}");
         assert_eq!(machine.bus().commands(), [idle; 3], "{board}");
         assert_eq!(machine.run_ms(20), Stop::Time, "{board}");

@@ -1,14 +1,14 @@
-//! A core that a debugger halts while force is out, and that runs again before the watchdog
-//! resets it: `probe-rs` halts it on every attach and every detach.
+//! A core that a debugger halts while force is on, and that resumes before the watchdog resets it:
+//! `probe-rs` halts it at every attach and detach.
 
 use hapterra_core::guard::Fault;
 use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::machine::Stop;
 
-/// Halts with force out, ms: from two periods to just below the watchdog's time.
+/// Halts with force on, ms: from two periods to just below the watchdog's time.
 const HALTS_MS: [u64; 4] = [2, 5, 20, 44];
-/// From the end of a halt until the amplifiers are off, at most, ns: the tick is due, and it
+/// Longest time from the end of a halt until the amplifiers are off, ns: the tick is due, and
 /// switches off before it reads an encoder.
 const OFF_NS: u64 = 20_000;
 
@@ -23,7 +23,7 @@ fn the_first_tick_after_a_halt_has_no_force() {
             let is_idle = |code: i32| (f64::from(code) - idle).abs() < 1.0;
             let held = machine.bus().commands();
             assert!(!held.into_iter().all(is_idle), "{board}: force is out");
-            // The supervisor has just fed it: the halt ends before the watchdog does.
+            // The supervisor has just fed it, so the halt ends before the watchdog's time.
             machine.feed_watchdog();
             assert_eq!(machine.halt_ms(ms), Stop::Time, "{board}");
             assert_eq!(machine.bus().commands(), held, "{board}: halted");
@@ -62,13 +62,13 @@ fn a_halt_is_noticed_although_the_debugger_stops_the_clock() {
         let mut machine = device.machine.borrow_mut();
         let board = machine.chip.board;
         machine.attach_debugger();
-        // One look of the supervisor.
+        // One check of the supervisor.
         assert_eq!(machine.run_ms(15), Stop::Time, "{board}");
         assert!(
             machine.is_enabled(),
             "{board}: attaching alone does nothing"
         );
-        // The halt comes between two ticks.
+        // The halt is between two ticks.
         assert_eq!(machine.run_ticks(1), Stop::Asked, "{board}");
         machine.feed_watchdog();
         assert_eq!(machine.halt_ms(20), Stop::Time, "{board}");

@@ -1,5 +1,5 @@
-//! Time of the haptic interrupt in the boards' own images, by the model of cycles
-//! (docs/reference/cycles.md), and what the page, the build and the images make of it.
+//! Time of the haptic interrupt in the boards' own images, from the model of cycles
+//! (docs/reference/cycles.md), compared with the page, the build and the images.
 
 #[path = "../../../firmware/build/tick_rate.rs"]
 #[allow(dead_code)] // Only the table.
@@ -19,7 +19,7 @@ const HOME_MM: [f64; 3] = [100.0, 100.0, 75.0];
 
 /// A board's row of the page.
 struct Row {
-    /// Cycles until the last output, and of the whole interrupt.
+    /// Cycles to the last output, and of the whole interrupt.
     cycles: [u32; 2],
     /// The same in µs.
     us: [u32; 2],
@@ -46,7 +46,7 @@ impl Row {
     }
 }
 
-/// The most cycles on a board's chip.
+/// Returns the most cycles on a board's chip.
 fn most(chip: &Chip, each: &[Cycles]) -> u32 {
     let cycles = each
         .iter()
@@ -54,7 +54,7 @@ fn most(chip: &Chip, each: &[Cycles]) -> u32 {
     cycles.max().expect("some ticks")
 }
 
-/// Slides over rough ground, pressing by a millimetre and a half.
+/// Slides over rough ground at a depth of a millimetre and a half.
 #[test]
 fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
     let plane = Plane::level(HOME_MM, 55.0);
@@ -110,7 +110,7 @@ fn the_fastest_tick_that_the_build_takes_ends_in_time() {
             .cycles
             .map(|cycles| cycles.div_ceil(core_hz / 1_000_000));
         assert_eq!(said.us, us, "{board}");
-        // The converter on SPI takes its frames' time beside the core's.
+        // The converter on SPI adds its frames' time to the core's.
         let frames_us = if board == "nucleo-h743zi2-spi" { 15 } else { 0 };
         let in_time = |hz: u32| (us[1] + frames_us) * hz <= 1_000_000;
         let rates = (1..=10).map(|khz| 1_000 * khz);
@@ -120,13 +120,13 @@ fn the_fastest_tick_that_the_build_takes_ends_in_time() {
     }
 }
 
-/// Units of work of the counted ticks, and of each at 2 kHz or faster.
+/// Returns the work units of the counted ticks, and of each tick at 2 kHz or faster.
 fn counted_work() -> u32 {
     work_per_tick(TickRate::new(10_000).expect("a rate"))
 }
 
-/// The most cycles that a row of the kept table has whose name is one of these, or begins with one
-/// that ends in `*`.
+/// Returns the most cycles of the stored table's rows whose names are in the list, or begin with an
+/// entry that ends in `*`.
 fn kept(names: &[&str], is_m7: bool) -> u32 {
     let table = std::fs::read_to_string(repository().join("bench/cycles.csv")).expect("the table");
     let column = if is_m7 { 0 } else { 3 };
@@ -146,8 +146,8 @@ fn kept(names: &[&str], is_m7: bool) -> u32 {
     rows.map(|(_, cycles)| cycles).max().expect("a row")
 }
 
-/// Up to which rate the costliest ticks end in time: those of the counted scenes, and the contact
-/// of the stress test's with all effects and materials around it, with the board's own part.
+/// The rate up to which the costliest ticks end in time: those of the counted scenes, and the
+/// stress test's contact with all effects and materials around it, with the board's own part.
 #[test]
 fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
     let mut in_time_khz = [u32::MAX; 2];
@@ -165,8 +165,8 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
         let costliest = whole.max(contact + around);
         let us = (costliest + own).div_ceil(core_hz / 1_000_000) + frames_us;
         println!("{board}: {us} µs at most");
-        // A tick of 1 kHz may do more work, each unit of which costs as much at most. So do those
-        // of the scenes on materials.
+        // A tick at 1 kHz may do more work, and each unit costs at most the same. This also applies
+        // to the scenes on materials.
         let slow = TickRate::new(1_000).expect("a rate");
         let more = u64::from(contact) * u64::from(work_per_tick(slow)) / u64::from(counted_work());
         let materials = kept(&["compared scenes on materials"], is_m7);
@@ -192,13 +192,13 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
     }
 }
 
-/// Compares the loop's data with the lines of the model of cycles for an H743's AXI SRAM.
+/// Compares the loop's data with the lines in the model of cycles for an H743's AXI SRAM.
 #[test]
 fn the_loops_data_are_within_the_lines_of_the_model() {
     for machine in machines().into_iter().filter(|machine| machine.chip.is_m7) {
         let haptic_loop = machine.image.symbol_like(&["application", "LOOP"]);
         let bytes = haptic_loop.expect("the loop").size;
-        // Two rows of a patch, each on two lines at most; queues, and what else is static.
+        // Two rows of a patch, each on two lines at most; queues, and other static data.
         let lines = u64::from(bytes / 32 + 1) + 4 * u64::from(counted_work()) + 64;
         assert!(lines <= H743_DATA_LINES, "{}: {lines}", machine.chip.board);
     }

@@ -1,6 +1,5 @@
-//! The way into the loader in the chip's ROM, and back, in the boards' own images. In the
-//! ROM's place is a program that does nothing: what is tested is in which state the chip
-//! reaches it.
+//! The start of the loader in the chip's ROM, and the return from it, in the boards' own images.
+//! The ROM has a program that does nothing: the test checks the state of the chip at its start.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -15,12 +14,12 @@ use hapterra_tests::timeouts;
 use hapterra_tests::usb::host::{ScriptedPipes, enumerate};
 use nusb::descriptors::ConfigurationDescriptor;
 
-/// The stack that the ROM's vectors name.
+/// The stack in the ROM's vectors.
 const ROM_STACK: u32 = 0x2000_0800;
-/// Branches to itself.
+/// A branch to itself.
 const HANG: [u8; 2] = [0xFE, 0xE7];
 
-/// Returns the address of the ROM's vectors, and the bit that switches the oscillator of USB on:
+/// Returns the address of the ROM's vectors, and the bit that switches on the oscillator of USB:
 /// AN2606, and the reference manuals.
 fn rom(machine: &Machine) -> (u32, (u32, u32)) {
     match machine.chip.is_m7 {
@@ -29,7 +28,7 @@ fn rom(machine: &Machine) -> (u32, (u32, u32)) {
     }
 }
 
-/// Puts a program into the ROM and returns where it begins.
+/// Puts a program into the ROM. Returns its start address.
 fn fill_rom(machine: &mut Machine) -> u32 {
     let (vectors, _) = rom(machine);
     let begin = vectors + 0x100;
@@ -43,7 +42,7 @@ fn is_at(machine: &Machine, address: u32) -> bool {
     machine.place().starts_with(&format!("{address:#x} "))
 }
 
-/// Asks a board on USB to enter its loader and runs it until it resets itself.
+/// Requests over USB that a board enters its loader, and runs it until it resets itself.
 fn ask_to_enter(mut machine: Machine) -> Machine {
     let found = enumerate(&mut machine).expect("enumerated");
     let configuration = ConfigurationDescriptor::new(&found.configuration).expect("well formed");
@@ -60,7 +59,7 @@ fn ask_to_enter(mut machine: Machine) -> Machine {
     machine
 }
 
-/// Registers that a reset sets and the start-up code of a program changes.
+/// Checks the registers that a reset sets and a program's start-up code changes.
 fn assert_as_after_a_reset(machine: &Machine) {
     let board = machine.chip.board;
     assert!(!machine.is_enabled(), "{board}");
@@ -85,7 +84,7 @@ fn board_enters_its_loader_before_any_setup() {
         assert_as_after_a_reset(&machine);
         let on = machine.take_effects().contains(&Effect::Enable(true));
         assert!(!on, "{board}: the amplifiers were on");
-        // Once: the next reset starts the program.
+        // Only once: the next reset starts the program.
         machine.reset(Reset::Software);
         enumerate(&mut machine).expect("the program");
     }

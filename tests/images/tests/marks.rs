@@ -4,8 +4,8 @@ use hapterra_core::scene::{MARK_GAP_MS, MARK_PULSE_MS};
 use hapterra_core::wire::request::Request;
 use hapterra_image_tests::device::{Device, on_each_board, rough_ground};
 
-/// Lets some milliseconds pass. Returns for each how many it really was so far, and whether the
-/// mark pin is high then.
+/// Lets this many milliseconds pass. Returns for each the time up to it, and true if the mark pin
+/// is high.
 fn levels(device: &mut Device<'_>, count: usize) -> Vec<(f64, bool)> {
     let pin = device.machine.borrow().chip.mark;
     let mut level = || {
@@ -34,7 +34,7 @@ fn each_mark_raises_the_pin_for_ten_ticks_from_its_tick_on() {
             device.request(Request::Mark);
         }
         seen.extend(levels(&mut device, 150));
-        // Each edge lies between two looks, which are a millisecond or two apart.
+        // Each edge lies between two checks, which are a millisecond or two apart.
         let pairs = seen.windows(2).filter(|pair| pair[0].1 != pair[1].1);
         let edges: Vec<_> = pairs.map(|pair| [pair[0].0, pair[1].0]).collect();
         assert_eq!(edges.len(), 6, "{board}: three pulses {edges:?}");

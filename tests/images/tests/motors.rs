@@ -1,5 +1,5 @@
-//! Motor temperatures of a board after a start: those that it kept in its RAM continue
-//! after a reset, and everything else is hot.
+//! Motor temperatures of a board after a start: a reset keeps those in RAM; otherwise all motors
+//! count as hot.
 
 use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
@@ -16,7 +16,7 @@ use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
 use heightfield::Raster;
 
-/// Returns the RAM of a board whose motors were never used.
+/// Returns the RAM of a board with unused motors.
 fn cold() -> Copies {
     let tiles = Box::leak(Box::new(TileBuffers::<4>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));
@@ -36,7 +36,7 @@ fn on_each(mut then: impl FnMut(Machine, &Plane, &Terrain<'_>, Scene)) {
     });
 }
 
-/// Returns the place where the image keeps the copies.
+/// Returns the address of the copies in the image.
 fn place(machine: &Machine) -> u32 {
     let symbol = machine.image.symbol_like(&["motor_memory", "COPIES"]);
     symbol.expect("the copies").address
@@ -88,7 +88,7 @@ fn a_damaged_ram_takes_the_motors_to_be_hot() {
 fn a_reset_under_load_keeps_the_motors_temperatures() {
     on_each(|mut machine, plane, terrain, scene| {
         let board = machine.chip.board;
-        // It has been up for long, and its motors are cold.
+        // It has run for long, and its motors are cold.
         reset_with(&mut machine, &cold(), Reset::Watchdog);
         let mut device = Device::arm(machine, terrain, scene);
         let begun = device.ask_status().health.winding_c;
@@ -123,7 +123,7 @@ fn a_reset_under_load_keeps_the_motors_temperatures() {
             kept.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
             "{board}: {before} {after}"
         );
-        // Each axis has its own: the one that pushed is the warmest.
+        // Each axis has its own temperature: the one that pushed is the warmest.
         assert!(after.y > after.x + 1.0, "{board}: {after}");
     });
 }

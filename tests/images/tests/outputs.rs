@@ -1,5 +1,4 @@
-//! Outputs of the boards' own images to the amplifiers, and the amplifiers' feedback
-//! back.
+//! Outputs of the boards' own images to the amplifiers, and the amplifiers' feedback.
 
 use hapterra_core::guard::{Blockers, Fault};
 use hapterra_core::wire::request::Request;
@@ -19,7 +18,7 @@ fn plane() -> Plane {
     Plane::level(HOME_MM, 20.0)
 }
 
-/// Changes the machine before it starts, then arms it in its home pose.
+/// Changes the machine before its start, then arms it in its home pose.
 fn on_each_armed(before: impl Fn(&mut Machine), mut then: impl FnMut(&mut Device<'_>)) {
     on_each_board(&ground(), HOME_MM, |mut machine, terrain, scene| {
         before(&mut machine);
@@ -37,7 +36,7 @@ fn has_converter(machine: &Machine) -> bool {
     matches!(machine.chip.commands, Commands::Serial { .. })
 }
 
-/// Whole ticks that pass until the amplifiers are off, and the report to the host.
+/// Returns the whole ticks until the amplifiers are off, and the fault reported to the host.
 fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
     let mut machine = device.machine.borrow_mut();
     let board = machine.chip.board;
@@ -64,10 +63,10 @@ fn no_frame_to_the_converter_comes_too_soon() {
             device.move_to(plane().counts_at([100.0, 100.0], 3.0));
             device.run_ms(40);
             assert!(device.commands().iter().any(|code| *code != 0));
-            // Time continues with each instruction: what lies between two frames counts.
+            // Time advances with each instruction, because the gap between two frames matters.
             let mut machine = device.machine.borrow_mut();
             machine.slice = 1;
-            // To the end of a tick, so that the three that follow are whole.
+            // To the end of a tick, so that the next three are whole.
             assert_eq!(machine.run_ticks(1), Stop::Asked);
             let _ = machine.take_effects();
             assert_eq!(machine.run_ticks(3), Stop::Asked);
@@ -75,8 +74,8 @@ fn no_frame_to_the_converter_comes_too_soon() {
             assert!(sent >= 9, "{sent} commands");
             let bus = machine.bus();
             assert_eq!(bus.converter.lost, 0);
-            // And the test sees what it is for: the data sheet's least, and no more than a
-            // frame's length above it.
+            // The measured gaps are at least the data sheet's, and at most a frame's length above
+            // it.
             let (after_write_ns, after_read_ns) = bus.converter.shortest_high_ns;
             assert!((100..1_000).contains(&after_write_ns), "{after_write_ns}");
             assert!((200..1_000).contains(&after_read_ns), "{after_read_ns}");
@@ -93,7 +92,7 @@ fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
         let mut device = Device::open(machine, terrain, scene);
         let blocked = |device: &mut Device<'_>| {
             device.run_ms(150);
-            // The guard's own report may have been sent before the session was open.
+            // The guard's own report may have been sent before the session opened.
             let report = device.ask_status().health.report;
             report.blockers.contains(Blockers::OUTPUTS_NOT_AS_SET)
         };
@@ -102,7 +101,7 @@ fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
         assert!(blocked(&mut device));
         device.machine.borrow().bus().converter.is_silent = false;
         assert!(!blocked(&mut device), "set up anew");
-        // It was without its supply for a moment.
+        // It lost its supply for a moment.
         device.machine.borrow().bus().converter.forget();
         assert!(!blocked(&mut device), "set up anew");
         assert_eq!(device.commands(), [0; 3]);
@@ -209,7 +208,7 @@ fn measured_currents_are_told_in_milliamperes() {
     }
 }
 
-/// Codes that full scale may have, and that a converter's or an amplifier's range allows.
+/// Returns the codes that full scale may have within the range of a converter or an amplifier.
 fn range(machine: &Machine) -> std::ops::RangeInclusive<i32> {
     match machine.chip.commands {
         // 0.2 V and 3.1 V of 3.3 V.

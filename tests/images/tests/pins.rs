@@ -1,5 +1,5 @@
-//! The images set up every pin as the board's page says, alternate function
-//! included, and no other: read from the chip's registers after a reset.
+//! The images set up every pin on the board's page, with its alternate function, and no other pin:
+//! read from the chip's registers after a reset.
 
 use std::collections::BTreeMap;
 
@@ -12,10 +12,10 @@ const MODER: u32 = 0x00;
 const PUPDR: u32 = 0x0C;
 const AFRL: u32 = 0x20;
 
-/// Pins and their modes, as a page has them.
+/// Pins and their modes, as on a page.
 type Pins = BTreeMap<String, String>;
 
-/// Returns the table of a page after a heading: rows of what, pin, signal, mode.
+/// Returns the table of a page after a heading: rows of use, pin, signal, mode.
 fn table(page: &str, heading: &str) -> Pins {
     let from = page.find(heading).expect("the heading");
     let section = &page[from + heading.len()..];
@@ -72,7 +72,7 @@ fn mode(machine: &Machine, port: u32, pin: u32) -> String {
     mode + pulled
 }
 
-/// All pins and how they are set up.
+/// Returns all pins with their modes.
 fn modes(machine: &Machine) -> Pins {
     let pins = ('A'..='K').zip(0..).flat_map(|(letter, port)| {
         let name = move |pin| (format!("P{letter}{pin}"), mode(machine, port, pin));
@@ -89,7 +89,7 @@ fn every_pin_is_set_up_as_its_boards_page_says() {
         let said = said(board);
         assert!(said.len() >= 15, "{board}: {said:?}");
         assert_eq!(machine.run_ms(10), Stop::Time, "{board}");
-        // What the page does not name stays as a reset leaves it.
+        // Pins that are not on the page keep their reset state.
         expected.extend(said);
         let is = modes(&machine);
         let other = expected

@@ -1,5 +1,5 @@
-//! A plane pressed by a millimetre, from encoder counts to what is at the
-//! amplifiers' inputs, in the boards' own images.
+//! A plane pressed by a millimetre, from encoder counts to the amplifiers' inputs, in the boards'
+//! own images.
 
 use hapterra::phantom::{ArmFrame, PhantomModel};
 use hapterra_core::contact::ContactState;
@@ -69,8 +69,7 @@ fn plane_at_a_millimetre_has_the_currents_of_f64() {
     });
 }
 
-/// Most instructions that angles' sines and cosines, the tip and the three levers
-/// may take together.
+/// Most instructions of the angles' sines and cosines, the tip and the three levers together.
 const POSE: u32 = 120;
 
 #[test]

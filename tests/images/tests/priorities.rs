@@ -1,21 +1,21 @@
-//! Nothing delays the haptic interrupt: what its priority is, what critical
-//! sections hold back, and what happens when it comes in the middle of one.
+//! Nothing delays the haptic interrupt: its priority, the interrupts that critical sections mask,
+//! and its behaviour when it is raised in one.
 
 use std::fmt::Write;
 
 use hapterra_image_tests::device::{Device, machines, on_each_board, rough_ground};
 use hapterra_image_tests::machine::{Machine, Stop};
 
-/// The highest priority that critical sections hold back.
+/// The highest priority that critical sections mask.
 const CEILING: u8 = 0x20;
-/// The haptic interrupt's.
+/// Priority of the haptic interrupt.
 const HAPTIC: u8 = 0x10;
-/// Of the supply's interrupt, whose handler does not return.
+/// Priority of the supply's interrupt, whose handler does not return.
 const SUPPLY: u8 = 0x00;
 /// The page with the table.
 const PAGE: &str = include_str!("../../../docs/explanation/priorities.md");
 
-/// Name of the handler in the vector table.
+/// Returns the name of the handler in the vector table.
 fn handler(machine: &Machine, interrupt: usize) -> String {
     let table = machine.chip.memories[0].0;
     let address = machine.word(table + 4 * (interrupt as u32 + 16)) & !1;
@@ -29,7 +29,7 @@ fn handler(machine: &Machine, interrupt: usize) -> String {
     machine.image.at(address).to_string()
 }
 
-/// Rows of the page's table for a board: runs of neighbours in one row.
+/// Returns the rows of the page's table for a board, with runs of neighbours in one row.
 fn rows(machine: &Machine) -> String {
     let mut rows: Vec<(Vec<(usize, String)>, u8)> = vec![];
     for (interrupt, priority) in machine.bus().nvic.enabled() {
@@ -49,7 +49,7 @@ fn rows(machine: &Machine) -> String {
         let numbers: Vec<_> = run.iter().map(|(n, _)| n.to_string()).collect();
         let mut names: Vec<_> = run.iter().map(|(_, name)| format!("`{name}`")).collect();
         names.dedup();
-        // What commands the amplifiers changes no interrupt.
+        // The kind of output does not change the interrupts.
         let board = machine.chip.board.trim_end_matches("-spi");
         let _ = writeln!(
             text,
@@ -90,7 +90,7 @@ fn only_programs_that_failed_mask_everything() {
         let mut maskers = vec![];
         for (address, word) in image.instructions() {
             let cpsid = word >> 16 == 0xB672 || word >> 16 == 0xB671;
-            // MSR PRIMASK or FAULTMASK, of a register.
+            // MSR to PRIMASK or FAULTMASK from a register.
             let msr = word & 0xFFF0_FFFF == 0xF380_8810 || word & 0xFFF0_FFFF == 0xF380_8813;
             if cpsid || msr {
                 maskers.push(image.at(address));
@@ -98,8 +98,8 @@ fn only_programs_that_failed_mask_everything() {
         }
         assert!(!maskers.is_empty(), "the panic handler does");
         maskers.dedup();
-        // `main` takes the core's peripherals under a mask, before there is a
-        // tick; it is the first of the tasks and never polled again.
+        // `main` takes the core's peripherals under a mask, before there is a tick; it is the first
+        // of the tasks and never polled again.
         let is_main = |name: &&str| {
             ["TaskStorage", "embassy_main_task"]
                 .iter()
@@ -114,10 +114,10 @@ fn only_programs_that_failed_mask_everything() {
             "DefaultHandler",
             "unhandled",
             "supply_low",
-            // On the way into the chip's loader, with the amplifiers off.
+            // At the start of the chip's loader, with the amplifiers off.
             "loader",
-            // embassy's flash driver, for the one register write that begins an
-            // erase: at start-up only, before there is a tick.
+            // embassy's flash driver, for the one register write that begins an erase: only at
+            // start-up, before there is a tick.
             "blocking_erase",
         ];
         for name in maskers {
@@ -136,10 +136,10 @@ fn a_tick_raised_in_any_critical_section_or_interrupt_is_not_delayed() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |mut machine, terrain, scene| {
         let board = machine.chip.board;
-        // Fine enough to find the shortest sections, odd enough to find all.
+        // Small enough to find the shortest sections, odd enough to find all.
         machine.slice = 13;
         machine.raises_tick_every = Some(11);
-        // Tiles on their way in, telemetry on its way out.
+        // Receives tiles and sends telemetry.
         let device = Device::open(machine, terrain, scene);
         let machine = device.machine.borrow();
         println!("{board}: raised {} times out of turn", machine.raised);

@@ -6,7 +6,7 @@ use hapterra_image_tests::chip::Commands;
 use hapterra_image_tests::device::Device;
 use hapterra_image_tests::machine::Stop;
 
-/// Ticks until the amplifiers are off, at most `max`, and the reported fault.
+/// Returns the ticks until the amplifiers are off, at most `max`, and the reported fault.
 fn ends(device: &mut Device<'_>, max: usize) -> (Option<usize>, Option<Fault>) {
     let mut machine = device.machine.borrow_mut();
     let took = (1..=max).find(|_| {
@@ -26,7 +26,7 @@ fn a_command_pin_that_reads_otherwise_is_a_fault() {
             if !matches!(machine.chip.commands, Commands::Converters(_)) {
                 return;
             }
-            // As commanded, but for an error that a good output may have.
+            // As commanded, within the error of a good output.
             let commanded = machine.bus().commands()[axis] as u16;
             machine.bus().command_held_at = Some((axis, commanded + 40));
             assert_eq!(machine.run_ticks(20), Stop::Asked);

@@ -1,5 +1,5 @@
-//! Shutdown without the program, and the chip's reaction when
-//! its supply, its stack or its core fails.
+//! Shutdown without the program, and the chip's reaction to a failure of its supply, its stack or
+//! its core.
 
 use std::cell::Cell;
 
@@ -17,19 +17,18 @@ use hapterra_tests::usb::Port;
 
 /// Below every chip's highest level.
 const TOO_LOW_MV: u32 = 2_800;
-/// Branches to itself.
+/// A branch to itself.
 const HANG: [u8; 2] = [0xFE, 0xE7];
-/// No instruction: a hard fault.
+/// An invalid instruction, for a hard fault.
 const UNDEFINED: [u8; 2] = [0x00, 0xDE];
 
-/// Does something with every board, over rough ground.
+/// Runs a test on every board, over rough ground.
 fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, then);
 }
 
-/// Arms every board, does something to it, resets it in a way, and gives what it tells
-/// after that.
+/// Arms every board, calls `disturb`, resets the board, and passes its status to `asked`.
 fn after(
     cause: Reset,
     mut disturb: impl FnMut(&mut Device<'_>, Scene),
@@ -46,7 +45,7 @@ fn after(
     });
 }
 
-/// Runs, the host reading, until the amplifiers are off.
+/// Runs with a reading host until the amplifiers are off.
 fn run_until_off(machine: &mut Machine, ms: u64) -> Stop {
     machine.run_until(ms, |m| {
         let _ = m.take_in(1);
@@ -54,8 +53,8 @@ fn run_until_off(machine: &mut Machine, ms: u64) -> Stop {
     })
 }
 
-/// Asserts that the pins of duty cycles are driven low: an amplifier reads that as a broken wire,
-/// and nothing that is coupled into the wire as a command.
+/// Checks that the pins of duty cycles are driven low: an amplifier detects a broken wire, and
+/// interference is not a command.
 fn assert_low(machine: &Machine, why: &str) {
     let outputs = machine.bus().duty_outputs();
     assert!(
@@ -77,7 +76,7 @@ fn a_supply_that_falls_in_a_tick_switches_off_before_the_tick_goes_on() {
         let before_ns = machine.bus().now_ns;
         assert_eq!(run_until_off(&mut machine, 1), Stop::Asked, "off");
         assert!(machine.is_ticking(), "the tick has not gone on");
-        // A few instructions, and what an exception costs.
+        // A few instructions, and the cost of an exception.
         let after_ns = machine.bus().now_ns - before_ns;
         assert!(after_ns < 500, "off after {after_ns} ns");
         let _ = machine.take_effects();
@@ -154,7 +153,7 @@ fn a_core_that_a_debugger_halts_is_stopped_by_the_chip() {
         let device = Device::arm(machine, terrain, scene);
         let mut machine = device.machine.borrow_mut();
         machine.attach_debugger();
-        // One look of the supervisor.
+        // One check of the supervisor.
         assert_eq!(machine.run_ms(15), Stop::Time, "{board}");
         assert!(
             machine.is_enabled(),
@@ -186,7 +185,7 @@ fn locked_core_stops_duty_cycles_and_the_watchdog_resets() {
     });
 }
 
-/// Plays on each board that drives duty cycles, armed, with a tick that never ends.
+/// Plays on each armed board with duty cycles, with a tick that never ends.
 fn on_each_hung(play: impl Fn(&mut Machine)) {
     on_each(|machine, terrain, scene| {
         let device = Device::arm(machine, terrain, scene);
@@ -239,7 +238,7 @@ fn a_supply_that_falls_ends_the_duty_cycles_without_the_program() {
         assert_low(machine, "broken off");
         machine.run_ms(3);
         assert!(machine.is_enabled(), "no program has switched off");
-        // Not even when it is back.
+        // Not even after its return.
         machine.set_supply_mv(NOMINAL_MV);
         machine.run_ms(3);
         assert_low(machine, "broken off");
@@ -271,7 +270,7 @@ fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
         let pin = machine.chip.emergency_stop;
         machine.set_input(pin, true);
         machine.set_input(pin, false);
-        // The pulses that return would be the last command's.
+        // Pulses that return would have the last command.
         machine.slice = 1;
         machine.run_until(3, |m| {
             let pulses = m.bus().drives_duty_cycles() == Some(true);
@@ -395,7 +394,7 @@ fn a_panic_before_the_watchdog_runs_resets_the_chip() {
     });
 }
 
-/// Level changes of the heartbeat in so many ticks.
+/// Returns the level changes of the heartbeat in this many ticks.
 fn beats(machine: &mut Machine, ticks: usize) -> usize {
     let pin = machine.chip.heartbeat;
     let mut level = machine.bus().output(pin);
@@ -449,7 +448,7 @@ fn a_tick_that_hangs_has_no_heartbeat() {
 fn no_clock_comes_from_outside_of_the_chip() {
     for mut machine in machines() {
         let board = machine.chip.board;
-        // The model has nothing on the pins of an external clock.
+        // The model has no external clock.
         assert_eq!(machine.run_ms(20), Stop::Time, "{board}");
         assert!(machine.is_attached(), "{board}: it waits for a clock");
         let (control, on) = machine.chip.external_clock;
@@ -457,8 +456,7 @@ fn no_clock_comes_from_outside_of_the_chip() {
     }
 }
 
-/// The clock of the core, as the registers of its PLL have it, from the chip's own
-/// oscillator.
+/// Returns the clock of the core, by the registers of its PLL, from the chip's own oscillator.
 fn core_hz(machine: &Machine) -> u64 {
     let field = |address, from: u32, bits: u32| {
         u64::from(machine.bus().read(address) >> from & ((1 << bits) - 1))

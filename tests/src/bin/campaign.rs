@@ -1,7 +1,7 @@
-//! Runs the closed-loop campaign: `hapterra-campaign --seconds N --seed S`, or
-//! one segment of it with `--segment K [--effects]`; with `--link` the campaign of link faults.
-//! `cargo xtask campaign` builds it with full optimisation and puts the report into
-//! `log/campaign.md` or `log/link-campaign.md`.
+//! Runs the closed-loop campaign: `hapterra-campaign --seconds N --seed S`, or one segment of it
+//! with `--segment K [--effects]`. `--link` selects the campaign of link faults. `cargo xtask
+//! campaign` builds this with full optimisation and writes the report to `log/campaign.md` or
+//! `log/link-campaign.md`.
 
 #![forbid(unsafe_code)]
 
@@ -11,17 +11,17 @@ use std::process::ExitCode;
 use hapterra_tests::campaign::{self, Ground, Violation};
 use hapterra_tests::link_campaign;
 
-/// Request of the user.
+/// The user's options.
 struct Request {
-    /// The campaign of link faults, not that of the closed loop.
+    /// True for the campaign of link faults, false for the closed loop.
     link: bool,
-    /// With one segment: its ground has effects.
+    /// The ground of a single segment.
     ground: Ground,
     seconds: Option<u64>,
     seed: Option<u64>,
     segment: Option<u64>,
     report: Option<PathBuf>,
-    /// Of the source that is run, for the report.
+    /// The commit of the source, for the report.
     commit: Option<String>,
 }
 
@@ -49,7 +49,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Says what must not happen and did, and how to repeat it.
+/// Prints a violation and the command that repeats it.
 fn tell(request: &Request, violation: &Violation) {
     let Violation {
         segment,
@@ -105,7 +105,7 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
     Ok(request)
 }
 
-/// Runs the closed loop; gives the report, none for a single segment.
+/// Runs the closed loop. Returns the report, or `None` for a single segment.
 fn run(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(campaign::SEED);
     if let Some(number) = request.segment {
@@ -130,7 +130,7 @@ fn run(request: &Request) -> Result<Option<String>, Violation> {
     Ok(Some(campaign::report::page(commit, seed, seconds, &tally)))
 }
 
-/// Runs the campaign of link faults; gives the report, none for a single segment.
+/// Runs the campaign of link faults. Returns the report, or `None` for a single segment.
 fn run_link(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(link_campaign::SEED);
     if let Some(number) = request.segment {
@@ -155,7 +155,7 @@ fn run_link(request: &Request) -> Result<Option<String>, Violation> {
     )))
 }
 
-/// Leaves the report where it is wanted.
+/// Writes the report to its file.
 fn finish(request: &Request, page: &Option<String>) -> ExitCode {
     let (Some(path), Some(page)) = (&request.report, page) else {
         return ExitCode::SUCCESS;

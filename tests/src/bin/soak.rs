@@ -62,7 +62,7 @@ fn wanted() -> Result<Wanted, String> {
     Ok(wanted)
 }
 
-/// One scene again, by its number.
+/// Repeats one scene by its number.
 fn one(seed: u64, number: u64, surface: Surface) -> ExitCode {
     match run(seed, number, surface, &mut Buffers::default()) {
         Found::Held(kind, measured) => {
@@ -103,7 +103,7 @@ fn all(wanted: &Wanted) -> ExitCode {
         wanted.seed,
         began.elapsed().as_secs_f64() / 60.0
     );
-    // A few of each kind.
+    // Prints a few of each kind.
     let mut told: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
     for broken in &tally.broken {
         let times = told.entry(&broken.invariant).or_default();
@@ -127,7 +127,7 @@ fn all(wanted: &Wanted) -> ExitCode {
     }
 }
 
-/// One line, written over again on a terminal, once a minute elsewhere.
+/// Prints progress: one line, overwritten on a terminal, and once a minute elsewhere.
 fn live(tally: &LinkStats, elapsed: Duration, time: Duration) {
     let terminal = stderr().is_terminal();
     if !terminal && !elapsed.as_secs().is_multiple_of(60) {

@@ -10,17 +10,17 @@ use crate::random::Random;
 
 /// Range of the hand around the home pose, east and north, mm.
 const REACH_MM: [f64; 2] = [55.0, 30.0];
-/// Vertical speed of a hand that is not yanked, mm/s.
+/// Vertical speed of the hand except during a yank, mm/s.
 const UP_AND_DOWN_MM_S: f64 = 100.0;
-/// Above the terrain while the arm is being armed, mm.
+/// Height above the terrain while the arm is being armed, mm.
 const LIFTED_MM: f64 = 14.0;
-/// No hand is still: physiological tremor, mm, and turns a second of each axis.
+/// Physiological tremor: amplitude, mm, and frequency of each axis, Hz.
 const TREMOR_MM: f64 = 0.4;
 const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
 /// Length of a tick, s.
 const TICK_S: f64 = 1e-3;
 
-/// Mood of the hand.
+/// Behaviour of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mood {
     /// Held off the terrain.
@@ -38,8 +38,7 @@ pub struct Arm<'t> {
     terrain: &'t Terrain<'t>,
     plant: Plant,
     placement: ArmFrame,
-    /// Turns a second and phase of the waves that make the way: two east, two
-    /// north, two up.
+    /// Frequency (Hz) and phase of the waves that make the path: two east, two north, two up.
     waves: [(f64, f64); 6],
     t_s: f64,
     above_mm: f64,
@@ -48,10 +47,10 @@ pub struct Arm<'t> {
 }
 
 impl<'t> Arm<'t> {
-    /// An arm whose home pose is over the middle of a terrain.
+    /// Creates an arm with its home pose over the middle of a terrain.
     ///
     /// # Panics
-    /// When the terrain has a hole in its middle or is out of reach.
+    /// If the terrain has no data in its middle or is out of reach.
     pub fn new(terrain: &'t Terrain<'t>, random: &mut Random) -> Self {
         let [east, north] = terrain.size_mm().map(|side| 0.5 * side);
         let ground_mm = terrain
@@ -76,7 +75,7 @@ impl<'t> Arm<'t> {
         }
     }
 
-    /// The terrain point at the home pose, mm.
+    /// Returns the terrain point at the home pose, mm.
     #[must_use]
     pub fn home_mm(&self) -> [f64; 3] {
         self.placement.home_mm
@@ -88,7 +87,7 @@ impl<'t> Arm<'t> {
         self.plant.counts()
     }
 
-    /// Breaks the amplifier of an axis; all others are whole.
+    /// Breaks the amplifier of one axis, or repairs all with `None`.
     pub fn break_amplifier(&mut self, broken: Option<(usize, AmplifierFault)>) {
         for axis in 0..3 {
             let fault = broken.filter(|(at, _)| *at == axis).map(|(_, fault)| fault);
@@ -96,13 +95,13 @@ impl<'t> Arm<'t> {
         }
     }
 
-    /// The plant.
+    /// Returns the plant.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// One tick under these motor currents.
+    /// Advances the arm by one tick under these motor currents.
     pub fn step(&mut self, currents_a: [f64; 3], mood: Mood) {
         let before = self.target_mm;
         self.t_s += TICK_S;
@@ -128,7 +127,7 @@ impl<'t> Arm<'t> {
         };
         let most = UP_AND_DOWN_MM_S * TICK_S;
         self.above_mm += (wanted - self.above_mm).clamp(-most, most);
-        // Over a hole the hand stays where it was.
+        // Over no-data the hand keeps its height.
         if let Some(ground) = self.terrain.height_mm(east, north) {
             self.ground_mm += (ground - self.ground_mm).clamp(-2.0 * most, 2.0 * most);
         }

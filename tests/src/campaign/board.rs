@@ -1,4 +1,4 @@
-//! The device of a segment, and what a reset leaves of it.
+//! The device of a segment, and its flash and RAM after a reset.
 
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::{BootReport, ResetCause};
@@ -19,8 +19,7 @@ pub type Board = Device<SetClock, WINDOW>;
 /// Stored calibration of every board of the campaign.
 pub const STORED: Stored = Stored::Found(Calibration::PREMIUM_1_5);
 
-/// The two halves of the application hand tile buffers to each other by reference, for
-/// as long as the program runs.
+/// Allocates the tile buffers that the two halves of the application exchange by reference.
 fn memory() -> (
     &'static mut TileBuffers<WINDOW>,
     &'static mut WorkingMemory<'static>,
@@ -29,15 +28,15 @@ fn memory() -> (
     (tiles, Box::leak(Box::new(WorkingMemory::new())))
 }
 
-/// A device with cold motors.
+/// Creates a device with cold motors.
 #[must_use]
 pub fn new(clock: SetClock) -> Board {
     let (tiles, memory) = memory();
     Device::new(tiles, memory, clock, STORED, BootReport::default())
 }
 
-/// The device after a reset: flash and RAM as the one before has left them, the RAM
-/// damaged by chance where the supply was low.
+/// Returns the device after a reset: it keeps the flash and RAM of `before`, with random damage to
+/// the RAM if the supply was low.
 #[must_use]
 pub fn reset(before: &Board, clock: SetClock, cause: ResetCause, random: &mut Random) -> Board {
     let mut ram = *before.retained();
@@ -52,7 +51,7 @@ pub fn reset(before: &Board, clock: SetClock, cause: ResetCause, random: &mut Ra
     Device::restarted(tiles, memory, clock, *before.memory(), boot, &ram)
 }
 
-/// Flips a bit of no copy, of one, or of both.
+/// Flips a bit of neither copy, of one, or of both.
 fn damage(ram: &mut Copies, random: &mut Random) {
     for copy in ram {
         if random.below(2) == 0 {

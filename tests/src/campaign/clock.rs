@@ -21,7 +21,7 @@ pub struct Reading {
 pub struct SetClock(Rc<Cell<Reading>>);
 
 impl SetClock {
-    /// Sets what it says in the next tick.
+    /// Sets its reading for the next tick.
     pub fn set(&self, reading: Reading) {
         self.0.set(reading);
     }

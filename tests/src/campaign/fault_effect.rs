@@ -16,36 +16,36 @@ use super::faulty_pipe::Unkind;
 use super::host::Tiles;
 use crate::random::Random;
 
-/// Actions of the device's core in a tick.
+/// State of the device's core in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Core {
     /// It runs.
     Runs,
-    /// It stands still, and its outputs stay as they are.
+    /// It is halted, and its outputs keep their values.
     Halted,
     /// It has no supply.
     Down,
-    /// It comes out of a reset.
+    /// It starts after a reset.
     Resets(ResetCause),
 }
 
-/// One mishap under way.
+/// An injected fault in progress.
 #[derive(Clone, Debug)]
 pub struct Mishap {
-    /// Its value.
+    /// Its kind.
     pub kind: Kind,
-    /// Its first tick, and the one past its last.
+    /// Its ticks.
     pub ticks: std::ops::Range<u64>,
     axis: usize,
     sign: i32,
     size: f64,
     by_mm: [f64; 3],
-    /// Reading of a stuck encoder, and the last one of a runaway encoder.
+    /// Reading of a stuck encoder, or the last reading of a runaway encoder.
     held: Option<i32>,
 }
 
 impl Mishap {
-    /// One of a kind that begins at `now`.
+    /// Draws a fault of a kind that begins at `now`.
     #[must_use]
     pub fn of(kind: Kind, now: u64, random: &mut Random) -> Self {
         let (shortest, longest) = kind.duration();
@@ -62,8 +62,8 @@ impl Mishap {
         }
     }
 
-    /// Changes what encoders and switches say. `lost` are counts that the
-    /// encoders are off by for good.
+    /// Changes the readings of encoders and switches. `lost` are the encoders' permanent errors,
+    /// counts.
     pub fn meddle(
         &mut self,
         sense: &mut GuardInputs,
@@ -88,7 +88,7 @@ impl Mishap {
             Kind::EncoderStuck => {
                 counts[self.axis] = *self.held.get_or_insert(counts[self.axis]);
             }
-            // Within what a tick may move, whatever the hand adds, and above what a tip may do.
+            // Below the limit for a tick, whatever the hand adds, but above a real tip's speed.
             Kind::EncoderRunaway => {
                 let count = &mut counts[self.axis];
                 let away = *count + self.sign * 110 * since;
@@ -188,21 +188,20 @@ impl Mishap {
         self.kind == Kind::TaskStalled
     }
 
-    /// Returns true if the device's transport is interrupted at `now`, as
-    /// USB tells it; a silent line tells nothing.
+    /// Returns true if the device's transport is interrupted at `now`, as USB reports it; a silent
+    /// line reports nothing.
     #[must_use]
     pub fn unplugs(&self, now: u64) -> bool {
         self.kind == Kind::LinkSilence && self.sign > 0 && now == self.ticks.start
     }
 
-    /// Returns true if an endpoint is halted and cleared at `now`: what was under way on it is
-    /// lost.
+    /// Returns true if an endpoint is halted and cleared at `now`, which loses its transfer.
     #[must_use]
     pub fn halts_endpoint(&self, random: &mut Random) -> bool {
         self.kind == Kind::EndpointHalt && random.below(20) == 0
     }
 
-    /// Returns the core's actions at `now`.
+    /// Returns the core's state at `now`.
     #[must_use]
     pub fn core(&self, now: u64) -> Core {
         let is_last = now + 1 == self.ticks.end;
@@ -228,7 +227,7 @@ impl Mishap {
         }
     }
 
-    /// A message that the host had better not send.
+    /// Returns a message that the host should not send.
     #[must_use]
     pub fn misplaced<'b>(&self, random: &mut Random, epoch: u32) -> Option<ToDevice<'b>> {
         if self.kind != Kind::Misplaced || random.below(4) != 0 {
@@ -237,7 +236,7 @@ impl Mishap {
         let mut calibration = Calibration::PREMIUM_1_5;
         calibration.l1_mm *= 0.5;
         calibration.motor_sign = -calibration.motor_sign;
-        // Any number: some are new, some were given before.
+        // Any number: new, or used before.
         let number = random.bits() as u8;
         let request = |request| ToDevice::Request { number, request };
         Some(match random.below(6) {

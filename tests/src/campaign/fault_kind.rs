@@ -2,53 +2,53 @@
 
 use hapterra_core::guard::Fault;
 
-/// Something that goes wrong.
+/// Kind of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// One encoder reads some hundred counts more from one tick on.
+    /// One encoder is off by some hundred counts from one tick on.
     EncoderJump,
     /// One encoder reads far off for a single tick.
     EncoderGlitch,
-    /// Encoders read up to two counts off, another error in each tick.
+    /// Encoders are off by up to two counts, with a new error in each tick.
     EncoderNoise,
-    /// One encoder stands still for a while, then reads right again.
+    /// One encoder's reading freezes for a while, then is right again.
     EncoderStuck,
-    /// One encoder reads its joint on and on, as if it ran away.
+    /// One encoder's reading keeps changing, as if its joint ran away.
     EncoderRunaway,
     /// One encoder creeps beyond its joint's limits.
     EncoderBeyondLimits,
     /// The emergency stop is pressed.
     EmergencyStop,
-    /// The dead-man switch is let go.
+    /// The dead-man switch is released.
     DeadManReleased,
     /// The dead-man switch opens for one tick.
     DeadManBounce,
-    /// The encoder or amplifier hardware says that it cannot work.
+    /// The encoder or amplifier hardware reports a failure.
     HardwareFailed,
-    /// A converter's settings do not read back as they were written.
+    /// A converter's settings differ from those written when they are read back.
     OutputsNotAsSet,
     /// An amplifier loses its supply: it is not ready, and its motor has no current.
     AmplifierNotReady,
-    /// A motor's measured current is another than the one that was commanded.
+    /// A motor's measured current differs from its command.
     CurrentMismatch,
     /// The wire of a motor breaks.
     MotorOpen,
-    /// Bytes are lost, both ways.
+    /// Bytes are lost in both directions.
     LinkLoss,
-    /// Bytes come late, both ways.
+    /// Bytes are late in both directions.
     LinkDelay,
-    /// Bytes come twice, both ways.
+    /// Bytes are duplicated in both directions.
     LinkDuplicates,
-    /// Bits are flipped, both ways.
+    /// Bits are flipped in both directions.
     LinkCorruption,
     /// The link is unplugged or silent for seconds, then the host returns.
     LinkSilence,
-    /// The host is restarted and brings another scene.
+    /// The host restarts with another scene.
     HostRestarted,
-    /// The host says goodbye.
+    /// The host closes the session.
     Goodbye,
-    /// Well-formed messages that make no sense now: another calibration,
-    /// another zero pose, points of a replay, tiles without a request.
+    /// Valid messages at the wrong time: another calibration, another zero pose, points of a
+    /// replay, tiles without a request.
     Misplaced,
     /// A tick is not done when the next is due.
     TickOverrun,
@@ -56,48 +56,48 @@ pub enum Kind {
     LateTicks,
     /// The link's task hangs.
     TaskStalled,
-    /// Tiles that are asked for do not come for seconds.
+    /// Requested tiles do not arrive for seconds.
     TilesMissing,
-    /// Tiles come whose heights are infinite, not numbers or absurd.
+    /// Tiles arrive with heights that are infinite, NaN or absurd.
     TilesPoisoned,
     /// The hand presses as hard as it can until the motors are hot.
     HotMotors,
     /// The hand is yanked away.
     Yank,
-    /// The supply breaks down under load and returns; the RAM may be damaged.
+    /// The supply fails under load and returns; the RAM may be damaged.
     BrownOut,
     /// The chip is reset under load.
     ResetUnderLoad,
-    /// The core stands still with its command on, until the watchdog resets it.
+    /// The core halts with its command on, until the watchdog resets it.
     HaltedCore,
-    /// The core stands still with its command on and runs again before the watchdog resets it.
+    /// The core halts with its command on and resumes before the watchdog resets it.
     CoreHaltedBriefly,
-    /// The host replays points while the arm is moved, and then runs a terrain.
+    /// The host replays points while the arm is moved, then runs a terrain.
     ReplayThenRun,
-    /// The host sends calibrations above every ceiling, or of garbage, or wants one
-    /// stored without consent.
+    /// The host sends calibrations above an absolute limit or with garbage, or requests to store
+    /// one without consent.
     HostileCalibration,
-    /// Endpoints of the USB are halted and cleared in the middle of what is sent.
+    /// USB endpoints are halted and cleared during a transfer.
     EndpointHalt,
-    /// The clutch input is held, and let go again. Nothing goes wrong.
+    /// The clutch input is held and released. This is not a failure.
     Clutch,
 }
 
 /// Permitted outcomes. All others are violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expectation {
-    /// It may be ridden through: the arm stays armed.
+    /// True if the arm may stay armed.
     pub may_ride: bool,
-    /// It may disarm the arm without a fault: force goes out, no more.
+    /// True if the arm may be disarmed without a fault: the force fades, no more.
     pub may_disarm: bool,
-    /// Faults that it may latch.
+    /// Faults that the device may latch.
     pub may_latch: &'static [Fault],
-    /// Ticks after its first one in which the amplifiers may still be on, where
-    /// it has to be latched.
+    /// If a fault must be latched: ticks after the first one in which the amplifiers may still be
+    /// on.
     pub within: Option<u32>,
 }
 
-/// For how many ticks it lasts, shortest and longest.
+/// Shortest and longest duration, ticks.
 pub type Duration = (u32, u32);
 
 const RIDE: Expectation = Expectation {
@@ -117,7 +117,7 @@ const fn latch(may_latch: &'static [Fault], within: u32) -> Expectation {
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 37] = [
         Self::EncoderJump,
         Self::EncoderGlitch,
@@ -170,20 +170,20 @@ impl Kind {
             // Two ticks may be a spike on the wire.
             Self::AmplifierNotReady => latch(&[Fault::AmplifierNotReady], 2),
             Self::CurrentMismatch => latch(&[Fault::CurrentMismatch], MISMATCH_TICKS),
-            // Where nothing is commanded nothing is missing.
+            // Without a command no current is missing.
             Self::MotorOpen => Expectation {
                 may_latch: &[Fault::CurrentMismatch],
                 ..RIDE
             },
-            // Found when the tick that ran over has driven already.
+            // The late tick is found only after it has driven the motors.
             Self::TickOverrun => latch(&[Fault::TickOverrun], 1),
             Self::TaskStalled => latch(&[Fault::TaskStalled], STALL_TICKS),
             Self::EncoderRunaway => {
                 latch(&[Fault::TooFast, Fault::JointLimit, Fault::Linkage], 400)
             }
             Self::EncoderBeyondLimits => latch(&[Fault::JointLimit, Fault::Linkage], 3_000),
-            // Where nothing moves or pushes it cannot be seen, and does no harm;
-            // what it missed returns as a jump.
+            // Without motion or force the fault is invisible and harmless; the missed motion
+            // returns as a jump.
             Self::EncoderStuck => Expectation {
                 may_latch: &[Fault::NoMotion, Fault::EncoderJump, Fault::TooFast],
                 ..RIDE
@@ -196,7 +196,7 @@ impl Kind {
                 may_latch: &[Fault::TooFast, Fault::EncoderJump],
                 ..RIDE
             },
-            // No later than the watchdog's reset.
+            // At the latest when the watchdog resets the chip.
             Self::HaltedCore => latch(&[Fault::WatchdogReset], WATCHDOG_TICKS),
             // The first tick after it has no force.
             Self::CoreHaltedBriefly => latch(&[Fault::TickGap], WATCHDOG_TICKS),
@@ -229,7 +229,7 @@ impl Kind {
         }
     }
 
-    /// Returns the time for which it lasts, ticks.
+    /// Returns its shortest and longest duration, ticks.
     #[must_use]
     pub const fn duration(self) -> Duration {
         match self {
@@ -255,7 +255,7 @@ impl Kind {
             Self::CoreHaltedBriefly => (2, 40),
             Self::ReplayThenRun => (300, 3_000),
             Self::HostileCalibration => (500, 2_500),
-            // It opens to the end.
+            // The clutch opens completely.
             Self::Clutch => (250, 1_000),
             Self::EncoderNoise
             | Self::LinkLoss
@@ -268,12 +268,12 @@ impl Kind {
     }
 }
 
-/// Within this many ticks a current that was not commanded has to be noticed.
+/// Ticks within which a wrong current must be detected.
 pub const MISMATCH_TICKS: u32 = 25;
 
-/// Within this many ticks a task that hangs has to be noticed.
+/// Ticks within which a hanging task must be detected.
 pub const STALL_TICKS: u32 = 41;
-/// Within this many ticks the watchdog resets a chip whose core stands still.
+/// Ticks within which the watchdog resets a halted chip.
 pub const WATCHDOG_TICKS: u32 = 60;
-/// For so many ticks the hand presses before the supply breaks down.
+/// Ticks that the hand presses before the supply fails.
 pub const LOADED_TICKS: u32 = 1_500;

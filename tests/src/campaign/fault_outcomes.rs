@@ -27,12 +27,12 @@ struct Row {
     disarmed: u32,
     /// By the fault's number.
     latched: BTreeMap<u8, (Fault, u32)>,
-    /// Most ticks after the first one in which the amplifiers were on, where
-    /// it was latched or disarmed.
+    /// Most ticks after the first one with the amplifiers on, before the fault was latched or the
+    /// arm disarmed.
     worst: Option<u64>,
 }
 
-/// All of a campaign.
+/// All outcomes of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinkStats {
     rows: Rows<Kind, Row>,
@@ -40,15 +40,15 @@ pub struct LinkStats {
     pub ticks: u64,
     /// Ticks with the amplifiers on.
     pub armed: u64,
-    /// The largest that was seen.
+    /// The largest values.
     pub extremes: Maxima,
 }
 
 impl LinkStats {
-    /// Counts a mishap.
+    /// Counts an injected fault.
     ///
     /// # Errors
-    /// When that is not what is expected of its kind.
+    /// If the outcome is not the expected one of its kind.
     pub fn count(
         &mut self,
         kind: Kind,
@@ -87,14 +87,14 @@ impl LinkStats {
         }
     }
 
-    /// Adds a segment's time and extremes.
+    /// Adds a segment's ticks and extremes.
     pub fn add(&mut self, ticks: u64, armed: u64, extremes: &Maxima) {
         self.ticks += ticks;
         self.armed += armed;
         self.extremes = self.extremes.or(*extremes);
     }
 
-    /// Mishaps in all.
+    /// Returns the number of injected faults.
     #[must_use]
     pub fn injected(&self) -> u32 {
         self.rows.sum(|row| row.injected)
@@ -106,7 +106,7 @@ impl LinkStats {
         self.rows.get(kind).map_or(0, |row| row.injected)
     }
 
-    /// The table, in Markdown.
+    /// Returns the table in Markdown.
     #[must_use]
     pub fn table(&self) -> String {
         let heading = "| fault | injected | ridden through | disarmed | latched | amplifiers on, ticks |\n\

@@ -1,4 +1,4 @@
-//! One direction of a link that is not always kind.
+//! One direction of a link with faults.
 
 use std::collections::VecDeque;
 
@@ -7,26 +7,26 @@ use crate::random::Random;
 /// Disturbance of a pipe's transfers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Unkind {
-    /// Share of pieces that are lost.
+    /// Share of chunks that are lost.
     pub lost: f64,
-    /// Share of pieces that come twice.
+    /// Share of chunks that are duplicated.
     pub twice: f64,
-    /// Share of pieces in which a bit is flipped.
+    /// Share of chunks in which a bit is flipped.
     pub flipped: f64,
-    /// Ticks that a piece is late at most.
+    /// Largest delay of a chunk, ticks.
     pub late: u32,
-    /// Nothing gets in, and what was on its way is gone.
+    /// True if the pipe is cut: new bytes are lost, and so are those in transit.
     pub cut: bool,
 }
 
-/// Bytes on their way.
+/// Bytes in transit.
 #[derive(Default)]
 pub struct Pipe {
     pieces: VecDeque<(u64, Vec<u8>)>,
 }
 
 impl Pipe {
-    /// Puts bytes in at a tick.
+    /// Sends bytes at a tick.
     pub fn send(&mut self, bytes: &[u8], now: u64, unkind: &Unkind, random: &mut Random) {
         if unkind.cut {
             self.pieces.clear();
@@ -53,13 +53,13 @@ impl Pipe {
         self.pieces.push_back((due, piece));
     }
 
-    /// The next piece that has arrived.
+    /// Returns the next chunk that has arrived.
     pub fn receive(&mut self, now: u64) -> Option<Vec<u8>> {
         let (due, _) = self.pieces.front()?;
         (*due <= now).then(|| self.pieces.pop_front().map(|(_, piece)| piece))?
     }
 
-    /// Puts back what was not taken.
+    /// Returns unread bytes to the pipe.
     pub fn put_back(&mut self, rest: Vec<u8>, now: u64) {
         if !rest.is_empty() {
             self.pieces.push_front((now, rest));

@@ -11,64 +11,64 @@ use super::force_share::{Share, Shares};
 use super::ground::SceneSurfaces;
 use super::limit_cycle::{MAX_TURNS, Swing};
 
-/// From the beginning of a tick until its force acts, as a part of it
+/// Delay of a force after the start of its tick, as a fraction of a tick
 /// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
 const LATE: f32 = 0.11;
-/// Energy that a contact may give with the controller on, mJ: a hundredth of what a tap gives
-/// without (docs/explanation/effects.md).
+/// Energy that a contact may create with the controller on, mJ: a hundredth of a tap's without it
+/// (docs/explanation/effects.md).
 const GIVEN_MJ: f32 = 0.05;
-/// Additional energy that shaded ground may give, until its force is no longer turned
-/// (docs/explanation/effects.md), mJ: a constant, a part of the largest force times a cell and the depth,
-/// and the bound of both.
+/// Additional energy that shaded ground may create until its force is no longer turned
+/// (docs/explanation/effects.md), mJ: a constant, a fraction of the largest force times a cell and
+/// the depth, and the bound of both.
 const SHADED_MJ: f32 = 0.2;
 const SHADED_PART: f32 = 0.2;
 const SHADED_MOST_MJ: f32 = 2.0;
-/// Rounding, as a part of a force, and N.
+/// Rounding: a fraction of a force, and a constant in N.
 const ROUNDING: f32 = 1e-4;
 /// The guard's clamp, N.
 const CLAMP_N: f32 = WORKING_SHARE * Calibration::PREMIUM_1_5.max_force_n;
-/// Limits under which a force is another than the scene asks for.
+/// Limits that change the force of a scene.
 const NOT_AS_ASKED: Limits = Limits::SLEW_LIMITED.union(Limits::SPEED_LIMITED);
-/// Limits under which a surface is no spring.
+/// Limits under which a surface is not a spring.
 const NO_SPRING: Limits = Limits::SPEED_LIMITED
     .union(Limits::TERRAIN_MISSING)
     .union(Limits::EDGE_FADING);
 
-/// Watches what one scene feels like.
+/// Checks the forces of one scene.
 pub struct ForceWatch {
     surfaces: SceneSurfaces,
     cell_mm: f32,
     last: Option<TickRecord>,
-    /// The force of the tick before that.
+    /// The force of the tick before the last one.
     before_n: Vec3,
-    /// The contact under way, where all of it is known.
+    /// The contact in progress, if all of it is known.
     contact: Option<Touched>,
-    /// The most that a contact had given to the tip with the controller on, mJ.
+    /// The most energy that a contact has given to the tip with the controller on, mJ.
     pub most_given_mj: f32,
-    /// Ticks of such contacts.
+    /// Ticks of these contacts.
     pub watched_ticks: u64,
-    /// Of these, ticks in the ramp.
+    /// Those of `watched_ticks` during the ramp.
     pub ramp_ticks: u64,
-    /// Of these, ticks in which the clutch moved.
+    /// Those of `watched_ticks` in which the clutch moved.
     pub clutch_ticks: u64,
     share: Share,
-    /// The share of the tick before, where it is known.
+    /// The share of force in the last tick, if it is known.
     let_through: Option<Shares>,
     swing: Swing,
-    /// The most turns back of the tip in a quarter of a second.
+    /// The most reversals of the tip in a quarter of a second.
     pub most_turns: usize,
 }
 
 /// Record of a contact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Touched {
-    /// The work of its force at the tip, mJ, less what a spring gets that becomes stiffer.
+    /// The work of its force at the tip, mJ, less the energy due to a rising stiffness.
     given_mj: f32,
     deepest_mm: f32,
 }
 
 impl ForceWatch {
-    /// Of a scene.
+    /// Creates the checks of a scene.
     #[must_use]
     pub fn new(surfaces: SceneSurfaces, cell_mm: f32) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl ForceWatch {
         (self.last, self.contact) = (None, None);
     }
 
-    /// Looks at a sample; `is_calm` where nothing has gone wrong for a while.
+    /// Checks a sample; `is_calm` is true if no fault was injected for a while.
     ///
     /// # Errors
     /// The broken invariant.
@@ -116,7 +116,7 @@ impl ForceWatch {
         self.gives_nothing(last.as_ref(), sample, before.zip(share), is_calm)
     }
 
-    /// No force is larger than the stiffest material makes of the depth.
+    /// Checks that no force exceeds the stiffest material's at this depth.
     fn is_small(&self, sample: &TickRecord, way_mm: Vec3, share: f32) -> Result<(), String> {
         let depth_mm = way_mm.length();
         let [high_mm, steep] = self.surfaces.relief();
@@ -133,8 +133,8 @@ impl ForceWatch {
         }
     }
 
-    /// No force is against the way to the proxy: friction holds, and does not push. What shading
-    /// turns is turned by 60° at most.
+    /// Checks that no force points away from the proxy: friction holds and does not push. Shading
+    /// turns a force by 60° at most.
     fn never_pulls(&self, sample: &TickRecord, way_mm: Vec3) -> Result<(), String> {
         let [high_mm, _] = self.surfaces.relief();
         if high_mm > 0.0 && self.surfaces.is_shaded() {
@@ -148,8 +148,8 @@ impl ForceWatch {
         }
     }
 
-    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what
-    /// the clutch leaves, and the ramp takes its share of that.
+    /// Returns the energy of the spring at a depth, mJ: the guard clamps the clutch's share of the
+    /// force, and the ramp scales the result.
     fn holds_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
         if shares.clutch == 0.0 {
             return 0.0;
@@ -164,9 +164,9 @@ impl ForceWatch {
         gives_mj.min(SHADED_MOST_MJ)
     }
 
-    /// With the controller on no contact has given more than it got, at any time, and the tip does
-    /// not swing; but for what shading and a texture may. `shares` are those of the tick before and
-    /// of this one.
+    /// Checks that with the controller on no contact gives more energy than it received, at any
+    /// time, and that the tip does not swing, within the allowance for shading and texture.
+    /// `shares` are those of the last tick and of this one.
     fn gives_nothing(
         &mut self,
         last: Option<&TickRecord>,
@@ -187,13 +187,13 @@ impl ForceWatch {
         let moved_mm = last.hip.to(&sample.hip) * self.cell_mm;
         let work_mj = acted_n.dot(moved_mm);
         let depth_mm = sample.hip.to(&sample.proxy).length() * self.cell_mm;
-        // A surface that becomes stiffer is meant to give so much at this depth.
+        // A rising stiffness may add this energy at this depth.
         let is_rendered = sample.state == ContactState::Touching;
         let meant_mj = match is_rendered {
             true => self.holds_mj(depth_mm, now) - self.holds_mj(depth_mm, before),
             false => 0.0,
         };
-        // A force that the guard lets go by and by belongs to the contact before.
+        // A force that fades belongs to the contact before.
         let begins = last.force_n == Vec3::ZERO
             && (last.state == ContactState::Free || before.product() == 0.0);
         self.contact = match begins {
@@ -232,8 +232,8 @@ impl ForceWatch {
     }
 }
 
-/// The last force goes out on its own: it only becomes less, whatever the tip does. With an open
-/// clutch there is none but what the slew limit leaves.
+/// Checks that a fading force only decreases, whatever the tip does, and that with an open
+/// clutch only the slew limit leaves any.
 fn fades(last: &TickRecord, sample: &TickRecord) -> Result<(), String> {
     let (was, is) = (last.force_n, sample.force_n);
     if sample.mode == Mode::Fading && is.length() > was.length() * (1.0 + ROUNDING) {

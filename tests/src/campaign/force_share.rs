@@ -1,10 +1,10 @@
-//! The share of a scene's force that is let through, by the modes and limits that the device
+//! The share of a scene's force that passes the guard, from the modes and limits that the device
 //! reports.
 
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::TickRecord;
 
-/// Increment of a ramp in a tick of a millisecond: 2 s after arming, 0.1 s and 0.5 s of the clutch.
+/// Increments of the ramps in a tick of 1 ms: 2 s after arming, 0.1 s and 0.5 s of the clutch.
 const RAMPS: f32 = 1.0 / 2_000.0;
 const OPENS: f32 = 1.0 / 100.0;
 const CLOSES: f32 = 1.0 / 500.0;
@@ -21,9 +21,9 @@ enum Clutch {
 /// The shares of a scene's force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shares {
-    /// The clutch's, before the guard's clamp.
+    /// The clutch's share, before the guard's clamp.
     pub clutch: f32,
-    /// The ramp's, after it.
+    /// The ramp's share, after the clamp.
     pub ramp: f32,
 }
 
@@ -43,14 +43,14 @@ pub struct Share {
 }
 
 impl Share {
-    /// Before the first sample.
+    /// The state before the first sample.
     pub const UNKNOWN: Self = Self {
         ramp: None,
         clutch: None,
     };
 
-    /// Takes the sample that follows on `last`; none where samples between are missing. Returns the
-    /// shares of the force, where they are known and follow what is asked for.
+    /// Takes the sample after `last`, or `None` as `last` if samples are missing. Returns the
+    /// shares of the force if they are known and agree with the scene.
     pub fn of(&mut self, last: Option<&TickRecord>, sample: &TickRecord) -> Option<Shares> {
         self.ramp = match (last.map(|last| last.mode), sample.mode) {
             (_, Mode::Armed) => Some(1.0),

@@ -9,10 +9,10 @@ use heightfield::Raster;
 
 use crate::random::Random;
 
-/// Which ground a segment has.
+/// Ground of a segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ground {
-    /// The spring alone.
+    /// The spring alone, frictionless.
     #[default]
     Ice,
     /// Surface drawn by the segment's number: friction, shading, texture, damping, the controller,
@@ -36,12 +36,12 @@ impl Ground {
 pub struct Effects {
     params: SurfaceParams,
     classes: Vec<Material>,
-    /// Samples of the terrain to a pixel of the classes.
+    /// Terrain samples along a pixel of the classes.
     pixel: u32,
 }
 
 impl Effects {
-    /// Those of a segment, by a generator of its own.
+    /// Draws the effects of a segment with a generator of its own.
     #[must_use]
     pub fn drawn(seed: u64, segment: u64) -> Self {
         let mut random = Random::new(!seed ^ segment.wrapping_mul(0xd134_2543_de82_ef95));
@@ -67,7 +67,7 @@ impl Effects {
             0 => 0,
             _ => 1 + random.below(MaterialTable::MOST - 1),
         };
-        // Of one stiffness the ground is a spring, as far as energy goes.
+        // With one stiffness everywhere, the ground is a spring in the energy checks.
         let is_even = random.below(2) == 0;
         let mut class = |_| {
             let times = match is_even {
@@ -85,10 +85,10 @@ impl Effects {
         }
     }
 
-    /// The materials over a terrain, where there are some.
+    /// Returns the materials over a terrain, if the segment has any.
     ///
     /// # Panics
-    /// When the terrain has no samples.
+    /// If the terrain has no samples.
     #[must_use]
     pub fn materials(&self, terrain: &Raster, samples: u32) -> Option<Materials> {
         let count = self.classes.len() as u64;
@@ -97,7 +97,7 @@ impl Effects {
         }
         let classes = Raster::from_fn(samples, samples, |column, row| {
             let place = u64::from(column / self.pixel) << 32 | u64::from(row / self.pixel);
-            // One of them is none of the table's: the default.
+            // One class is missing in the table and has the default.
             (Random::new(place).bits() % (count + 1)) as f32
         });
         let class = |(class, material): (i64, &Material)| ClassMaterial {
@@ -113,7 +113,7 @@ impl Effects {
         Materials::over(over, ("classes", classes.expect("classes")), looks).ok()
     }
 
-    /// The surface parameters of a scene that is `times` as stiff.
+    /// Returns the surface parameters of a scene with `times` the stiffness.
     #[must_use]
     pub const fn params(&self, times: f32) -> SurfaceParams {
         SurfaceParams {
@@ -123,7 +123,7 @@ impl Effects {
     }
 }
 
-/// A material of such a stiffness.
+/// Draws a material with this stiffness.
 fn material(random: &mut Random, stiffness_n_per_mm: f32) -> Material {
     let dynamic_mu = [0.0, 0.0, 0.2, 0.6, 1.5][random.below(5)];
     let friction = Friction {
@@ -165,7 +165,7 @@ pub struct SceneSurfaces {
 }
 
 impl SceneSurfaces {
-    /// Of surface parameters, and of a table if there is one.
+    /// Collects surface parameters, and those of a table if there is one.
     #[must_use]
     pub fn of(params: &SurfaceParams, table: Option<&MaterialTable>) -> Self {
         let Some(table) = table else {
@@ -192,7 +192,7 @@ impl SceneSurfaces {
         }
     }
 
-    /// The stiffest of them, N/mm.
+    /// Returns the largest stiffness, N/mm.
     #[must_use]
     pub fn stiffest_n_per_mm(&self) -> f32 {
         self.all_params
@@ -200,21 +200,20 @@ impl SceneSurfaces {
             .fold(0.0, |most, params| params.stiffness_n_per_mm.max(most))
     }
 
-    /// The largest force of a spring so deep, N.
+    /// Returns the largest force of a spring at this depth, N.
     #[must_use]
     pub fn most_n(&self, depth_mm: f32) -> f32 {
         let spring_n = self.stiffest_n_per_mm() * depth_mm;
         spring_n.min(self.hardest.max_force_n)
     }
 
-    /// Dissipation of the energy leak of the sampled wall.
+    /// Returns true if the passivity controller is on.
     #[must_use]
     pub const fn is_controlled(&self) -> bool {
         self.hardest.is_controlled()
     }
 
-    /// The energy that the stiffest of them holds at a depth, mJ, where the guard lets `most_n`
-    /// through.
+    /// Returns the energy of the stiffest spring at a depth, mJ, with a force of `most_n` at most.
     #[must_use]
     pub fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
         let stiffness = self.stiffest_n_per_mm();
@@ -225,7 +224,7 @@ impl SceneSurfaces {
         }
     }
 
-    /// Returns true if its force is that of one spring: no material follows a softer one.
+    /// Returns true if the force is that of one spring: no material has another stiffness.
     #[must_use]
     pub fn is_spring(&self) -> bool {
         let stiff = |params: &SurfaceParams| params.stiffness_n_per_mm;
@@ -233,7 +232,7 @@ impl SceneSurfaces {
         pairs.all(|pair| stiff(&pair[0]) == stiff(&pair[1]))
     }
 
-    /// Returns true if some of it is damped.
+    /// Returns true if any surface is damped.
     #[must_use]
     pub fn is_damped(&self) -> bool {
         self.all_params
@@ -241,7 +240,7 @@ impl SceneSurfaces {
             .any(|params| params.damping.ns_per_m > 0.0)
     }
 
-    /// The highest texture, mm, and the steepest.
+    /// Returns the largest height of a texture, mm, and the largest slope.
     #[must_use]
     pub fn relief(&self) -> [f32; 2] {
         let relief = |most: [f32; 2], params: &SurfaceParams| {
@@ -255,7 +254,7 @@ impl SceneSurfaces {
         self.all_params.iter().fold([0.0; 2], relief)
     }
 
-    /// Returns true if the force is turned by as much as shading turns it.
+    /// Returns true if any surface is shaded.
     #[must_use]
     pub fn is_shaded(&self) -> bool {
         self.hardest.shading != Shading::None

@@ -1,4 +1,4 @@
-//! The host's end of the link, tick by tick, over two pipes.
+//! The host's end of the link, in steps of a tick, over two pipes.
 
 use std::time::Duration;
 
@@ -20,15 +20,15 @@ use crate::random::Random;
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 33 * 33 * 4;
 
-/// The host's answers to requests for tiles.
+/// The host's answers to tile requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tiles {
-    /// As asked.
+    /// As requested.
     #[default]
     Sent,
-    /// Not at all.
+    /// No answer.
     Withheld,
-    /// With heights that are none.
+    /// With invalid heights.
     Poisoned,
 }
 
@@ -39,18 +39,18 @@ pub struct Host<'t> {
     reader: Box<FrameReader<MAX_FRAME>>,
     to_device: Pipe,
     to_host: Pipe,
-    /// Samples that came since they were last taken.
+    /// Samples received since the last read.
     pub samples: Vec<TickRecord>,
-    /// The last answer to a question for the status.
+    /// The last answer to a status query.
     pub status: Option<Status>,
     /// The last reported fault.
     pub fault: Option<Fault>,
-    /// A link error that no fault of a link may cause.
+    /// A link error that no link fault may cause.
     pub failed: Option<LinkError>,
 }
 
 impl<'t> Host<'t> {
-    /// A host that has not sent anything yet.
+    /// Creates a host that has not sent anything yet.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Self {
         Self {
@@ -66,7 +66,7 @@ impl<'t> Host<'t> {
         }
     }
 
-    /// Forgets everything and begins anew with another scene.
+    /// Clears all state and restarts with another scene.
     pub fn restart(&mut self, scene: Scene, now: u64, random: &mut Random) {
         let seed = random.bits();
         let patience = Timeouts::REAL_TIME;
@@ -75,45 +75,44 @@ impl<'t> Host<'t> {
         self.greet(now, random);
     }
 
-    /// Says hello; the scene follows.
+    /// Opens a session and sends the scene.
     pub fn greet(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.greet(time(now), &mut out);
         self.to_device.send(&out, now, &Unkind::default(), random);
     }
 
-    /// Says hello where there is no session.
+    /// Opens a session if none is open.
     pub fn greet_if_closed(&mut self, now: u64, random: &mut Random) {
         if self.client.state() == State::Closed {
             self.greet(now, random);
         }
     }
 
-    /// Says goodbye.
+    /// Closes the session.
     pub fn leave(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.leave(time(now), &mut out);
         self.to_device.send(&out, now, &Unkind::default(), random);
     }
 
-    /// Asks for the status.
+    /// Queries the status.
     pub fn ask_status(&mut self) {
         self.client.ask(HostRequest::Status);
     }
 
-    /// Asks for something to be done.
+    /// Sends a request.
     pub fn request(&mut self, request: Request) {
         self.client.ask(HostRequest::Request(request));
     }
 
-    /// Sends a message that the client would not send.
+    /// Sends a message that the real client would not send.
     pub fn say(&mut self, message: &ToDevice<'_>, now: u64, unkind: &Unkind, random: &mut Random) {
         let bytes = framed(self.client.session(), message);
         self.to_device.send(&bytes, now, unkind, random);
     }
 
-    /// Delivers the bytes of this tick to the device; `take` returns how many bytes it
-    /// took.
+    /// Delivers the bytes of this tick to the device; `take` returns the number of bytes accepted.
     pub fn deliver(&mut self, now: u64, take: &mut dyn FnMut(&[u8]) -> usize) {
         while let Some(piece) = self.to_device.receive(now) {
             let taken = take(&piece);
@@ -123,8 +122,7 @@ impl<'t> Host<'t> {
         }
     }
 
-    /// Sends the device's bytes of this tick, and what arrives is
-    /// answered.
+    /// Queues the device's bytes of this tick, and answers those that arrive.
     pub fn hear(
         &mut self,
         said: &[u8],
@@ -145,7 +143,7 @@ impl<'t> Host<'t> {
         self.to_device.send(&out, now, unkind, random);
     }
 
-    /// Repeats what is not answered; a device that is gone is greeted anew.
+    /// Repeats unanswered messages, and opens a new session if the device is gone.
     fn do_what_is_due(&mut self, now: u64, out: &mut Vec<u8>) {
         match self.client.due(time(now), out, &mut |_| {}) {
             Ok(()) => {}
@@ -175,7 +173,7 @@ impl<'t> Host<'t> {
         }
     }
 
-    /// Withholds tiles or sends poison, and is a host else.
+    /// Withholds or poisons tiles; handles all other messages normally.
     fn mistreat(
         &mut self,
         mut bytes: &[u8],
@@ -220,7 +218,7 @@ fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
     encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
 }
 
-/// A tile of even ground with materials that are none, or are those of other ground.
+/// Returns a tile of even ground with materials that are invalid or belong to other ground.
 fn of_poisoned_materials(
     session: SessionNumber,
     epoch: u32,
@@ -232,7 +230,7 @@ fn of_poisoned_materials(
         0 => TileMaterials::One(random.bits() as u8),
         1 => TileMaterials::Runs(&bytes[..random.below(12)]),
         2 => TileMaterials::Each(&bytes[..MAX_TILE_BYTES - random.below(2)]),
-        // Of the table, whatever it is.
+        // A material of the table, whatever it is.
         _ => TileMaterials::One(0),
     };
     let heights = match random.below(2) {
@@ -251,7 +249,7 @@ fn of_poisoned_materials(
     framed(session, &message)
 }
 
-/// A well-formed tile of heights that no terrain has.
+/// Returns a well-formed tile with impossible heights.
 fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, random: &mut Random) -> Vec<u8> {
     const WORDS: [f32; 6] = [
         f32::INFINITY,

@@ -1,13 +1,11 @@
-//! Calibrations that no device may work with, and the ceilings that it has to keep,
-//! written down a second time.
+//! Calibrations that no device may accept, and its absolute limits, written a second time.
 
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Model};
 
 use crate::random::Random;
 
-/// The record of the campaign's arm, changed so that it is in range, harmless, and not
-/// the one that is stored.
+/// Returns a valid, harmless record that differs from the stored one of the campaign's arm.
 #[must_use]
 pub fn harmless() -> Calibration {
     Calibration {
@@ -16,7 +14,7 @@ pub fn harmless() -> Calibration {
     }
 }
 
-/// A record with one number above its ceiling or of garbage.
+/// Returns a record with one number above its absolute limit or of garbage.
 #[must_use]
 pub fn calibration(random: &mut Random) -> Calibration {
     let mut record = Calibration::PREMIUM_1_5;
@@ -45,10 +43,10 @@ pub fn calibration(random: &mut Random) -> Calibration {
     record
 }
 
-/// Checks that a record that is in force keeps the ceilings of a Premium 1.5.
+/// Checks that an active record keeps the absolute limits of a Premium 1.5.
 ///
 /// # Errors
-/// The first number above.
+/// The first number above its limit.
 pub fn keeps_ceilings(record: &Calibration) -> Result<(), String> {
     let thermal = &record.thermal;
     let most = |values: Vec3| values.max_element();
@@ -76,7 +74,7 @@ pub fn keeps_ceilings(record: &Calibration) -> Result<(), String> {
             2.0 / (11.2 * 0.0234),
         ),
     ];
-    // Written so that what is not a number is above.
+    // Negated, so that NaN counts as above.
     let above = numbers.into_iter().find(|(_, is, at_most)| {
         let keeps = *is >= 0.0 && *is <= at_most * 1.001;
         !keeps

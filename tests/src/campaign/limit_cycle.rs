@@ -1,25 +1,25 @@
-//! Detection of a swinging tip: it moves to and fro faster than any hand does.
+//! Detection of a limit cycle: the tip moves to and fro faster than a hand can.
 
 use hapterra_core::Vec3;
 
-/// Distance, mm; what is less is an encoder's count or two, or the hand's tremor.
+/// Least distance of a reversal, mm; below it is an encoder's count or two, or the hand's tremor.
 const FAR_MM: f32 = 0.3;
-/// Most turns back in so many ticks. Tremor of 11.2 Hz turns six times in 0.25 s.
+/// Most reversals in the window. Tremor of 11.2 Hz reverses six times in 0.25 s.
 pub const MAX_TURNS: usize = 10;
 const TICKS: u32 = 250;
 
-/// Watches the tip along the force.
+/// Tracks the tip along the force.
 #[derive(Clone, Debug, Default)]
 pub struct Swing {
     place_mm: f32,
-    /// The farthest since the last turn, and which way it was.
+    /// The farthest point since the last reversal, and the direction.
     farthest_mm: f32,
     is_out: bool,
     turns: std::collections::VecDeque<u32>,
 }
 
 impl Swing {
-    /// Takes a tick's motion along a unit vector. Returns the turns of the last quarter of a
+    /// Adds a tick's motion along a unit vector. Returns the reversals in the last quarter of a
     /// second.
     pub fn turns(&mut self, tick: u32, moved_mm: Vec3, along: Vec3) -> usize {
         self.place_mm += moved_mm.dot(along);

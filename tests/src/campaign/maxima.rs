@@ -1,33 +1,32 @@
-//! The largest of everything that was seen in a campaign.
+//! The largest values of a campaign.
 
 use hapterra_core::guard::MAX_COUNTS_PER_S;
 
-/// Counts of the encoder that is farthest off up to which the force at the true tip
-/// is held to the record's: two jumps at 1 kHz that the guard lets pass.
+/// Largest encoder error up to which the force at the true tip must keep the record's limit,
+/// counts: two jumps at 1 kHz that the guard accepts.
 pub const OFF_COUNTS: u32 = 2 * (MAX_COUNTS_PER_S / 1_000);
 
 /// The force at the true tip while an encoder was wrong by more than
-/// [`OFF_COUNTS`]: recorded, not checked, as no program can know the arm's levers then.
+/// [`OFF_COUNTS`]: recorded, not checked, as the true levers cannot be computed then.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Misled {
     /// The force, N.
     pub force_n: f64,
-    /// Largest error of an encoder by then, counts.
+    /// Largest error of an encoder at that time, counts.
     pub off_counts: u32,
 }
 
-/// The largest that was seen.
+/// The largest values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Maxima {
     /// Force reported by the device, N.
     pub force_n: f64,
-    /// Force made by the currents with the levers of the pose that the encoders
-    /// tell, N.
+    /// Force of the currents with the levers of the encoders' pose, N.
     pub read_force_n: f64,
-    /// Force made by the currents at the true tip while no encoder was off by more
-    /// than [`OFF_COUNTS`], N.
+    /// Force of the currents at the true tip while no encoder was off by more than [`OFF_COUNTS`],
+    /// N.
     pub tip_force_n: f64,
-    /// The same while one was.
+    /// The same while an encoder was off by more.
     pub misled: Misled,
     /// Current of a motor, A.
     pub current_a: f64,
@@ -35,27 +34,27 @@ pub struct Maxima {
     pub slew_n: f64,
     /// Temperature of a winding of the virtual arm, °C.
     pub winding_c: f64,
-    /// Energy that its ticks have created by the device's report, mJ.
+    /// Energy that the ticks have created, as reported by the device, mJ.
     pub created_mj: f32,
-    /// The most that a contact had given to the tip with the controller on, mJ.
+    /// The most energy that a contact has given to the tip with the controller on, mJ.
     pub given_mj: f32,
-    /// Ticks in which that was worked out.
+    /// Ticks in which `given_mj` was computed.
     pub watched_ticks: u64,
-    /// Of these, ticks in the ramp, and ticks in which the clutch moved.
+    /// Those of `watched_ticks` during the ramp.
     pub ramp_ticks: u64,
-    /// See [`Self::ramp_ticks`].
+    /// Those of `watched_ticks` in which the clutch moved.
     pub clutch_ticks: u64,
-    /// The most turns back of the tip in a quarter of a second.
+    /// The most reversals of the tip in a quarter of a second.
     pub turns: usize,
     /// Ticks with the amplifiers on and an encoder off by more than [`OFF_COUNTS`].
     pub misled_ticks: u64,
-    /// Ticks with the amplifiers on near a singular pose, where the force at the tip
-    /// is not worked out.
+    /// Ticks with the amplifiers on near a singular pose, where the force at the tip is not
+    /// computed.
     pub singular_ticks: u64,
 }
 
 impl Maxima {
-    /// The larger of each, and all ticks.
+    /// Returns the larger of each value, and the sum of the ticks.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -79,7 +78,7 @@ impl Maxima {
 }
 
 impl Misled {
-    /// The one with the larger force.
+    /// Returns the one with the larger force.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         if other.force_n > self.force_n {

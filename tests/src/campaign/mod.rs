@@ -1,5 +1,5 @@
-//! The randomized closed-loop campaign: a virtual Phantom in a hand, the real
-//! application, and everything that can go wrong, at random.
+//! The randomised closed-loop campaign: a virtual Phantom in a hand, the real application, and
+//! random injected faults of all kinds.
 //!
 //! ```text
 //! hand ─ arm ─▶ counts ─ fault ─▶ device ─▶ currents ─▶ arm
@@ -7,9 +7,9 @@
 //!                                   host ── terrain
 //! ```
 //!
-//! In every tick [`tick_invariants`] and [`force_invariants`] check the device; after every injected
-//! fault [`fault_outcomes`] compares the outcome with that of [`fault_kind`]. A segment depends on the
-//! seed and its own number alone, so a violation can be repeated.
+//! In every tick [`tick_invariants`] and [`force_invariants`] check the device; after every
+//! injected fault [`fault_outcomes`] compares the outcome with that of [`fault_kind`]. A segment
+//! depends only on the seed and its number, so a violation can be repeated.
 
 pub mod arm;
 pub mod board;
@@ -37,8 +37,8 @@ pub use segment::Violation;
 /// The default seed.
 pub const SEED: u64 = 4;
 
-/// Runs segments, from the first on, each on ice and with effects, until the amplifiers were on for so many
-/// seconds. `done` gets each segment's number and the outcomes so far.
+/// Runs segments from the first on, each frictionless and with effects, until the amplifiers were
+/// on for the requested seconds. `done` receives each segment's number and the outcomes up to then.
 ///
 /// # Errors
 /// The first [`Violation`].

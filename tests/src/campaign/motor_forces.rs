@@ -3,7 +3,7 @@
 use hapterra::phantom::{PhantomModel, kinematics};
 use hapterra_core::phantom::Calibration;
 
-/// The levers of an arm in a pose, and what its weight asks of the motors.
+/// The levers of an arm in a pose, and the joint torques of its weight.
 #[derive(Clone, Copy, Debug)]
 pub struct Levers {
     jacobian: [[f64; 3]; 3],
@@ -11,8 +11,8 @@ pub struct Levers {
 }
 
 impl Levers {
-    /// At joint angles; none near a singular pose, where small torques are large
-    /// forces.
+    /// Computes the levers at joint angles; `None` near a singular pose, where small torques are
+    /// large forces.
     #[must_use]
     pub fn at(model: &PhantomModel, record: &Calibration, q_rad: [f64; 3]) -> Option<Self> {
         if is_near_singular(model, q_rad) {
@@ -29,9 +29,8 @@ impl Levers {
         })
     }
 
-    /// The least force at the tip that explains these joint torques with any share
-    /// of the arm's weight held, N: the share is not known while force comes in or
-    /// goes out.
+    /// Returns the least force at the tip that explains these joint torques with any share of the
+    /// arm's weight compensated, N. The share is unknown while the force ramps up or down.
     #[must_use]
     pub fn force_n(&self, torque_nm: [f64; 3]) -> f64 {
         let [all, weight] = [torque_nm, self.weight_nm].map(|t| force(&self.jacobian, t));
@@ -41,7 +40,7 @@ impl Levers {
     }
 }
 
-/// Joint torques (Nm) of motor currents (A).
+/// Returns the joint torques (Nm) of motor currents (A).
 #[must_use]
 pub fn torques_nm(model: &PhantomModel, currents_a: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| {
@@ -59,7 +58,7 @@ pub fn is_near_singular(model: &PhantomModel, q: [f64; 3]) -> bool {
     spread.abs() < 0.5 || reach_m.abs() < 0.08
 }
 
-/// F in Jᵀ·F = τ, by Cramer's rule.
+/// Solves Jᵀ·F = τ for F by Cramer's rule.
 #[must_use]
 pub fn force(jacobian: &[[f64; 3]; 3], torque: [f64; 3]) -> [f64; 3] {
     // Rows of Jᵀ are the columns of J.

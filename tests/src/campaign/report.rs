@@ -6,7 +6,7 @@ use super::limit_cycle::MAX_TURNS;
 use super::maxima::OFF_COUNTS;
 use crate::campaign_table;
 
-/// The page of a campaign that ran with the source at `commit`.
+/// Returns the page of a campaign that ran with the source at `commit`.
 #[must_use]
 pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &LinkStats) -> String {
     let at = &tally.extremes;
@@ -101,7 +101,7 @@ detected within {STALL_TICKS} ticks, before the watchdog resets the board. The a
     )
 }
 
-/// Kinds that a page does not have, or not with a count.
+/// Returns the kinds that a page lacks, or lists without a count.
 #[must_use]
 pub fn missing(page: &str) -> Vec<Kind> {
     campaign_table::missing(page, &Kind::ALL)

@@ -1,5 +1,5 @@
-//! A stretch of the campaign: one device, one arm, every kind of mishap once, in
-//! an order of its own. Nothing but the seed decides what happens.
+//! A segment of the campaign: one device, one arm, and one injected fault of each kind in random
+//! order. It depends only on the seed.
 
 use hapterra::materials::Materials;
 use hapterra::phantom::PhantomModel;
@@ -33,17 +33,17 @@ use crate::random::Random;
 /// Samples along the side of the terrain, and the side of a cell, mm.
 const SAMPLES: u32 = 512;
 const CELL_MM: f64 = 0.5;
-/// Armed ticks between two mishaps, shortest and longest.
+/// Armed ticks between two faults, shortest and longest.
 const CALM: (usize, usize) = (200, 1_500);
-/// Ticks between the end of a mishap and the question what became of it.
+/// Ticks between the end of a fault and the check of its outcome.
 const SETTLE: u64 = 400;
 /// Ticks that an answer may take.
 const ANSWER: u64 = 5_000;
-/// Ticks that one try to arm takes, and tries before that is a violation: hot
-/// motors have to cool.
+/// Ticks of one attempt to arm, and the number of attempts before a violation: hot motors must
+/// cool.
 const TRY: u64 = 4_000;
 const TRIES: u64 = 40;
-/// In each try, the ticks at which the host asks and the switch is pressed.
+/// The ticks of an attempt at which the host sends the request and the switch is pressed.
 const ASK: u64 = 60;
 const PRESS: u64 = 200;
 
@@ -54,13 +54,13 @@ pub struct Violation {
     pub segment: u64,
     /// Surface of its ground.
     pub ground: Ground,
-    /// The tick in it.
+    /// Its tick in the segment.
     pub tick: u64,
     /// Its description.
     pub what: String,
 }
 
-/// Runs a segment of a campaign and adds it to the tally.
+/// Runs a segment of a campaign and adds it to `tally`.
 ///
 /// # Errors
 /// The first [`Violation`].
@@ -73,7 +73,7 @@ pub fn run(
     let mut random = Random::new(seed ^ segment.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let raster = terrain(&mut random);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
-    // By a generator of their own, so that a segment on ice stays what it was.
+    // From a generator of its own, so that frictionless segments stay as they were.
     let effects = (ground == Ground::Drawn).then(|| Effects::drawn(seed, segment));
     let materials = effects
         .as_ref()
@@ -97,7 +97,7 @@ pub fn run(
     })
 }
 
-/// Hills with a hole in them.
+/// Returns hills with no-data among them.
 fn terrain(random: &mut Random) -> Raster {
     let looks = [Look::Fractal, Look::Ridge, Look::Steps, Look::Fractal];
     let amplitude_mm = random.between(6.0, 20.0);
@@ -118,9 +118,9 @@ struct Segment<'t> {
     /// Effects besides the spring.
     effects: Option<Effects>,
     forces: ForceWatch,
-    /// From this tick on nothing is wrong.
+    /// The tick from which no fault is active.
     calm_from: u64,
-    /// The device may hold tiles that are not the terrain's, whose borders are open.
+    /// True if the device may store poisoned tiles, whose borders are open.
     poisoned: bool,
     random: Random,
     clock: SetClock,
@@ -129,12 +129,12 @@ struct Segment<'t> {
     scene: Scene,
     arm: Arm<'t>,
     watch: Watch,
-    /// Counts that the encoders are off by.
+    /// The encoders' permanent errors, counts.
     lost: [i32; 3],
     /// Counts of the zero pose, as sent to the device.
     zero: [i32; 3],
     dead_man: bool,
-    /// Readings of the current monitors a tick ago, mA.
+    /// Readings of the current monitors in the last tick, mA.
     measured_ma: [i16; 3],
     drive: GuardOutputs,
     now: u64,
@@ -199,8 +199,8 @@ impl<'t> Segment<'t> {
         Ok(())
     }
 
-    /// Lets one thing go wrong and says what became of it, and for how many
-    /// ticks after its first the amplifiers stayed on.
+    /// Injects one fault. Returns its outcome, and for how many ticks after its first one the
+    /// amplifiers stayed on.
     fn mishap(&mut self, kind: Kind) -> Result<(Outcome, Option<u64>), String> {
         let mut mishap = Mishap::of(kind, self.now, &mut self.random);
         let began = self.now;
@@ -217,8 +217,8 @@ impl<'t> Segment<'t> {
                 epoch: self.scene.epoch.wrapping_add(1),
                 ..self.scene
             }),
-            // In a session of its own: a misplaced request before may have had any number, and
-            // in its session the device hears no older one.
+            // In a new session: a misplaced request may have had any number, and the device ignores
+            // older numbers in its session.
             Kind::HostileCalibration => self.host.greet(self.now, &mut self.random),
             _ => {}
         }
@@ -243,8 +243,8 @@ impl<'t> Segment<'t> {
         Ok((outcome, off))
     }
 
-    /// Acts as host and user in a fault of several ticks, `at` ticks after its first one and with
-    /// so many left.
+    /// Acts as host and user during a fault of several ticks, `at` ticks after its first one and
+    /// with `left` ticks left.
     fn act(&mut self, kind: Kind, at: u64, left: u64) {
         match kind {
             Kind::ReplayThenRun if left == 1 => {
@@ -257,7 +257,7 @@ impl<'t> Segment<'t> {
                 self.say(&ToDevice::Hip(HipCommand { seq, hip }));
             }
             Kind::HostileCalibration if at == 30 => self.host.request(Request::Disarm),
-            // The force has gone out.
+            // The force has faded.
             Kind::HostileCalibration if at == 180 => self.dead_man = false,
             Kind::HostileCalibration if at > 180 && left > 0 && at.is_multiple_of(20) => {
                 let store = self.random.below(2) == 0;
@@ -274,13 +274,13 @@ impl<'t> Segment<'t> {
         }
     }
 
-    /// Makes a request under any number, as no honest host would.
+    /// Makes a request under any number, which a correct host never does.
     fn ask_past_the_client(&mut self, request: Request) {
         let number = self.random.bits() as u8;
         self.say(&ToDevice::Request { number, request });
     }
 
-    /// Sends a message that the client would not send.
+    /// Sends a message that the real client would not send.
     fn say(&mut self, message: &ToDevice<'_>) {
         let (now, kind) = (self.now, Unkind::default());
         self.host.say(message, now, &kind, &mut self.random);
@@ -298,7 +298,7 @@ impl<'t> Segment<'t> {
         Ok(())
     }
 
-    /// The host comes with a scene, as if it were started anew.
+    /// Restarts the host with a scene.
     fn bring(&mut self, scene: Scene) {
         self.host.restart(scene, self.now, &mut self.random);
         self.watch.forget();
@@ -306,7 +306,7 @@ impl<'t> Segment<'t> {
         self.poisoned = false;
     }
 
-    /// The device comes out of a reset. Its encoders count from where the arm is now.
+    /// Resets the device. Its encoders count from the arm's present position.
     fn reset(&mut self, cause: ResetCause) {
         let clock = self.clock.clone();
         self.device = board::reset(&self.device, clock, cause, &mut self.random);
@@ -314,7 +314,7 @@ impl<'t> Segment<'t> {
         self.watch.forget();
     }
 
-    /// Asks for the status until there is an answer.
+    /// Queries the status until it is answered.
     fn status(&mut self) -> Result<Status, String> {
         self.host.status = None;
         let began = self.now;
@@ -332,7 +332,7 @@ impl<'t> Segment<'t> {
         Err("the device does not tell its status".into())
     }
 
-    /// Clears, zeroes and arms as a user would, until the force is in.
+    /// Clears faults, zeroes and arms as a user would, until the force is ramped up.
     fn arm_it(&mut self) -> Result<(), String> {
         for _ in 0..TRIES {
             if self.try_to_arm()? {
@@ -373,7 +373,7 @@ impl<'t> Segment<'t> {
         Ok(false)
     }
 
-    /// With the arm in its zero pose its encoders would read what they are off by.
+    /// Sends the zero pose: in it the encoders would read their permanent errors.
     fn say_zero(&mut self) {
         self.zero = self.lost;
         self.host.request(Request::Zero { counts: self.zero });
@@ -386,7 +386,7 @@ impl<'t> Segment<'t> {
         self.tick_in(mood, mishap)
     }
 
-    /// One tick of everything.
+    /// Advances everything by one tick.
     fn tick_in(&mut self, mood: Mood, mishap: Option<&mut Mishap>) -> Result<(), String> {
         self.arm
             .break_amplifier(mishap.as_ref().and_then(|mishap| mishap.amplifier()));
@@ -437,7 +437,7 @@ impl<'t> Segment<'t> {
         Ok(())
     }
 
-    /// Runs the core for a tick; returns the number of bytes that it sent.
+    /// Runs the core for a tick. Returns the number of bytes it sent.
     fn run_core(&mut self, core: Core, sense: GuardInputs, stalls: bool, said: &mut [u8]) -> usize {
         match core {
             Core::Runs if stalls => self.drive = self.device.tick_alone(sense),
@@ -448,7 +448,7 @@ impl<'t> Segment<'t> {
                 self.drive = device.tick(sense);
                 return device.link.transmit(said);
             }
-            // The last command stays.
+            // The last command stays on.
             Core::Halted => {}
             Core::Down => self.drive = GuardOutputs::default(),
             Core::Resets(cause) => {
@@ -504,7 +504,7 @@ fn scene(
 ) -> Scene {
     let stiffness_n_per_mm = random.between(0.3, 0.8) as f32;
     let params = match effects {
-        // Another scene each time.
+        // A new scene each time.
         Some(effects) => effects.params(0.5 + stiffness_n_per_mm),
         None => SurfaceParams {
             stiffness_n_per_mm,
@@ -514,7 +514,7 @@ fn scene(
     };
     let home = terrain.scale().to_grid(arm.home_mm()).expect("in range");
     Scene {
-        // Real time: nothing waits for the host.
+        // Real time: the device does not wait for the host.
         hold_clock: false,
         ..terrain.scene(params, Source::Encoders, home)
     }

@@ -1,11 +1,10 @@
 //! Invariants of every tick under any fault.
 //!
-//! The currents are held to three bounds, each worked out in f64 from them alone:
-//! - with the levers of the pose that the encoders tell, the force is within the
-//!   guard's clamp, always;
-//! - with the arm's true levers it is within the record's largest force while no
-//!   encoder is off by more than [`OFF_COUNTS`];
-//! - while one is, no program can know the true levers: that force is recorded.
+//! The currents have three bounds, each computed in f64 from the currents alone:
+//! - with the levers of the encoders' pose, the force is always within the guard's clamp;
+//! - with the arm's true levers, it is within the record's largest force while no encoder is off by
+//!   more than [`OFF_COUNTS`];
+//! - while one is, the true levers cannot be computed: that force is recorded.
 
 use hapterra::phantom::{Encoder, PhantomModel};
 use hapterra_core::Vec3;
@@ -18,15 +17,15 @@ use super::motor_forces::{Levers, torques_nm};
 
 /// Largest change of force in a tick, N: the guard's slew limit at 1 kHz.
 const SLEW_N: f32 = 1.0;
-/// The winding of a virtual motor may get this hot, °C. The guard trips at
-/// 110 °C by its own, more careful model.
+/// Highest temperature of a virtual motor's winding, °C. The guard trips at 110 °C by its own, more
+/// careful model.
 const HOTTEST_C: f64 = 112.0;
-/// A winding may be warmer than the device takes it to be by this, K: the arm's motors
-/// and the device's model are not the same formula.
+/// Largest excess of a winding's temperature over the device's estimate, K: the virtual motors and
+/// the device's model use different formulas.
 const COLDER_K: f64 = 1.0;
-/// Bound of the energy that is kept, mJ (docs/explanation/effects.md).
+/// Bound of the stored energy, mJ (docs/explanation/effects.md).
 const MAX_CREATED_MJ: f32 = 2.0;
-/// Room for rounding in comparisons of f32.
+/// Allowance for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
 
 /// True state of the arm in a tick.
@@ -34,25 +33,25 @@ const ROUNDING: f32 = 1e-4;
 pub struct Truth {
     /// Joint angles, rad.
     pub q_rad: [f64; 3],
-    /// Counts of faultless encoders there.
+    /// Counts of faultless encoders in this pose.
     pub counts: [i32; 3],
     /// Temperatures of the windings, °C.
     pub winding_c: [f64; 3],
 }
 
-/// Watches one segment.
+/// Checks the ticks of one segment.
 pub struct Watch {
     record: Calibration,
     model: PhantomModel,
     last: Option<TickRecord>,
-    /// True if the host has asked to hold outputs with the amplifiers off.
+    /// True if the host has requested held outputs with the amplifiers off.
     pub may_hold: bool,
-    /// The largest so far.
+    /// The largest values up to now.
     pub extremes: Maxima,
 }
 
 impl Watch {
-    /// For a device with this calibration on such an arm.
+    /// Creates the checks for a device with this calibration on an arm of this model.
     #[must_use]
     pub fn new(record: Calibration, model: PhantomModel) -> Self {
         Self {
@@ -64,8 +63,8 @@ impl Watch {
         }
     }
 
-    /// Checks the amplifiers' inputs in a tick in which the device got
-    /// `sense`, with `zero` as the counts of its zero pose.
+    /// Checks the amplifiers' inputs in a tick in which the device received `sense`, with `zero` as
+    /// the counts of its zero pose.
     ///
     /// # Errors
     /// The broken invariant.
@@ -92,8 +91,8 @@ impl Watch {
         Ok(())
     }
 
-    /// Checks a command that a halted core holds: no tick reads the
-    /// encoders, so only what is true counts.
+    /// Checks the command of a halted core. No tick reads the encoders, so only the true pose
+    /// counts.
     ///
     /// # Errors
     /// The broken invariant.
@@ -104,10 +103,10 @@ impl Watch {
         self.force_at_the_tip(torque, truth.counts, truth)
     }
 
-    /// Looks at what the device takes its motors to be: never colder than they are.
+    /// Checks the device's estimate of the motors' temperatures, which must not be too low.
     ///
     /// # Errors
-    /// If it does.
+    /// If it is lower.
     pub fn warmth(&self, believed_c: Vec3, truth: &Truth) -> Result<(), String> {
         for (axis, is_c) in truth.winding_c.into_iter().enumerate() {
             let believed_c = f64::from(believed_c[axis]);
@@ -121,7 +120,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Checks the outputs for any inputs.
+    /// Checks the outputs, independently of the inputs.
     fn outputs(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
         let currents = drive.currents_a;
         let largest = currents.abs().max_element();
@@ -153,7 +152,7 @@ impl Watch {
         Ok(())
     }
 
-    /// With the levers that the device believes in.
+    /// Checks the force with the levers that the device computes.
     fn force_as_read(&mut self, torque_nm: [f64; 3], told: [i32; 3]) -> Result<(), String> {
         let angle = |i: usize| Encoder::new(&self.model.drive[i]).angle_rad(told[i]);
         let q = std::array::from_fn(angle);
@@ -169,7 +168,7 @@ impl Watch {
         }
     }
 
-    /// With the levers that the arm has.
+    /// Checks the force with the arm's true levers.
     fn force_at_the_tip(
         &mut self,
         torque_nm: [f64; 3],
@@ -202,7 +201,7 @@ impl Watch {
         }
     }
 
-    /// Checks the device's report of a tick.
+    /// Checks the device's report on a tick.
     ///
     /// # Errors
     /// The broken invariant.
@@ -237,10 +236,10 @@ impl Watch {
         }
     }
 
-    /// Looks at the energy that the device says its ticks have created.
+    /// Checks the energy that the ticks have created, as the device reports it.
     ///
     /// # Errors
-    /// If it is none, or above the limit.
+    /// If it is not a valid energy, or above the limit.
     pub fn created(&mut self, mj: f32) -> Result<(), String> {
         self.extremes.created_mj = self.extremes.created_mj.max(mj);
         match (0.0..=MAX_CREATED_MJ).contains(&mj) {
@@ -249,13 +248,13 @@ impl Watch {
         }
     }
 
-    /// The last reported mode.
+    /// Returns the last reported mode.
     #[must_use]
     pub fn latest(&self) -> Option<Mode> {
         self.last.map(|sample| sample.mode)
     }
 
-    /// The next sample follows from nothing before.
+    /// Forgets the last sample, so that the next one is checked alone.
     pub fn forget(&mut self) {
         self.last = None;
     }

@@ -1,19 +1,20 @@
-//! Time that instructions take in two cores, without what their memories add.
+//! Time of instructions in two cores, without the wait states of their memories.
 //!
-//! Upper bounds: where a manual has a range, its end; no two instructions overlap that may.
+//! Upper bounds: the end of a manual's range, and no overlap of instructions that might overlap.
 
 use super::instruction::{Instruction, Kind};
 
 /// A core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Core {
-    /// By its manual's tables (DDI 0439, 3.3 and 7.2). A load or store takes its 2 cycles though
-    /// neighbours overlap, a refill of the pipeline the 3 it may, a division 12.
+    /// The Cortex-M4, by its manual's tables (DDI 0439, 3.3 and 7.2). A load or store takes its 2
+    /// cycles though neighbours overlap, a refill of the pipeline the maximum of 3, a division 12.
     M4,
-    /// Arm publishes no table. The latencies of LLVM's model (`ARMScheduleM7.td`), one instruction
-    /// at a time: the next one waits for an integer result to the end, as if it were an address,
-    /// and for a floating-point result where it reads it ([`Floats`]). Every branch that may be
-    /// mispredicted is: 6 cycles, where that model has 4 to 6.
+    /// The Cortex-M7. Arm publishes no table, so it has the latencies of LLVM's model
+    /// (`ARMScheduleM7.td`), one instruction at a time: the next one waits for an integer result to
+    /// the end, as if it were an address, and for a floating-point result when it reads it
+    /// ([`Floats`]). Every branch that may be mispredicted is: 6 cycles, where that model has 4 to
+    /// 6.
     M7,
 }
 
@@ -23,7 +24,7 @@ const REFILL: u64 = 3;
 const MISPREDICTED: u64 = 6;
 
 impl Core {
-    /// Cycles of an instruction, at most. `jumps`: the next one executed is not the one behind it.
+    /// Returns the most cycles of an instruction. `jumps`: the next one executed is elsewhere.
     #[must_use]
     pub fn cycles(self, instruction: &Instruction, jumps: bool) -> u64 {
         match self {
@@ -35,8 +36,8 @@ impl Core {
         }
     }
 
-    /// Cycles that a floating-point instruction waits for the one before it, whose result it
-    /// reads. The M7's are [`Floats`]'.
+    /// Returns the cycles that a floating-point instruction waits for the result of the previous
+    /// one, if it reads it. For the M7, [`Floats`] computes them.
     #[must_use]
     pub fn wait(self, before: Option<u32>, instruction: &Instruction) -> u64 {
         let reads = before.is_some() && instruction.reads.contains(&before);
@@ -70,16 +71,16 @@ fn m7(kind: Kind) -> u64 {
     }
 }
 
-/// When the M7's floating-point results are there.
+/// Times at which the M7's floating-point results are ready.
 #[derive(Clone, Debug, Default)]
 pub struct Floats {
     ready_at: [u64; 32],
-    /// The latest of them, which a transfer waits for: it may read the flags.
+    /// The latest of them: a transfer waits for it, as it may read the flags.
     all_ready_at: u64,
 }
 
 impl Floats {
-    /// Returns when an instruction can begin that would at `now`, and notes its result.
+    /// Returns the time, `now` or later, at which an instruction can begin, and records its result.
     pub fn begin(&mut self, instruction: &Instruction, now: u64) -> u64 {
         let reads = instruction.reads.iter().flatten();
         let at = reads.map(|register| self.ready_at[*register as usize]);
@@ -103,7 +104,7 @@ mod tests {
     use super::super::instruction::decode;
     use super::*;
 
-    /// Cycles on an M4 with memory without wait states, each with the next one's address.
+    /// Returns the cycles on an M4 without wait states, each with the next one's address.
     fn m4_cycles(program: &[(u16, u16, bool)]) -> u64 {
         let mut before = None;
         let each = program.iter().map(|&(first, second, jumps)| {
@@ -121,12 +122,12 @@ mod tests {
         assert_eq!(m4_cycles(&[(0x2001, 0, false), (0x1840, 0, false)]), 2);
         // push {r4-r7, lr}: 1 + N; pop {r4-r7, pc}: 1 + N + P
         assert_eq!(m4_cycles(&[(0xB5F0, 0, false), (0xBDF0, 0, true)]), 6 + 9);
-        // A branch that is not taken, and one that is: 1, 1 + P.
+        // A branch not taken, and one taken: 1, 1 + P.
         assert_eq!(m4_cycles(&[(0xD001, 0, false), (0xD001, 0, true)]), 1 + 4);
         // vdiv.f32 s0, s0, s1; vsqrt.f32 s2, s3
         let (divide, root) = ((0xEE80, 0x0A20, false), (0xEEB1, 0x1AE1, false));
         assert_eq!(m4_cycles(&[divide, root]), 28);
-        // vadd.f32 s0, s0, s1, and the same again, which needs its result.
+        // vadd.f32 s0, s0, s1 twice: the second needs the first one's result.
         let add = (0xEE30, 0x0A20, false);
         assert_eq!(m4_cycles(&[add, add]), 3);
         // vldmia r0, {s0-s3}: 1 + N

@@ -3,29 +3,29 @@
 /// Fetches of code from a memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flash {
-    /// Bytes that one read gives.
+    /// Bytes of one read.
     pub line: u32,
-    /// Cycles of the core that a read takes.
+    /// Core cycles of a read.
     pub read: u64,
 }
 
-/// The flash of an STM32G474 at 168 MHz: four wait states (RM0440, 3.3.3), and 64 bits a read
-/// while it has two banks, as this firmware demands. Its cache counts for nothing here.
+/// The flash of an STM32G474 at 168 MHz: four wait states (RM0440, 3.3.3), and 64 bits a read in
+/// dual-bank mode, which this firmware requires. Its cache is ignored here.
 pub const G474: Flash = Flash { line: 8, read: 5 };
 
-/// Reads in the order in which a core executes. The line behind the one in use is read ahead
-/// (PRFTEN), as soon as the memory is free; a jump waits until the read under way has ended.
+/// Reads in the order of execution. The line after the one in use is prefetched (PRFTEN) as soon as
+/// the memory is free; a jump waits until the current read ends.
 #[derive(Clone, Debug)]
 pub struct Fetch {
     flash: Flash,
     /// The line in use.
     line: Option<u32>,
-    /// When the read ahead ends.
+    /// The time at which the prefetch ends.
     ahead_at: u64,
 }
 
 impl Fetch {
-    /// Nothing is read yet.
+    /// Creates a fetch with nothing read.
     #[must_use]
     pub const fn new(flash: Flash) -> Self {
         Self {
@@ -35,7 +35,7 @@ impl Fetch {
         }
     }
 
-    /// Returns when an instruction is there that the core wants at `now`.
+    /// Returns the time at which the instruction requested at `now` has arrived.
     pub fn instruction(&mut self, address: u32, length: u32, now: u64) -> u64 {
         let (from, to) = (
             address / self.flash.line,
@@ -60,8 +60,8 @@ impl Fetch {
         there_at
     }
 
-    /// Returns when a constant beside the code is there: the memory reads it between two lines, and
-    /// its cache counts for nothing.
+    /// Returns the time at which a constant beside the code has arrived: the memory reads it
+    /// between two lines, and its cache is ignored.
     pub fn literal(&mut self, now: u64) -> u64 {
         let there_at = now.max(self.ahead_at) + self.flash.read;
         self.ahead_at = there_at;
@@ -80,7 +80,7 @@ mod tests {
         for i in 0..100 {
             now = fetch.instruction(4 * i, 4, now) + 1;
         }
-        // The first line from nothing, 49 behind it at 5 cycles each, and the last two executed.
+        // The first line without prefetch, the next 49 at 5 cycles each, and the last two executed.
         assert_eq!(now, 5 + 49 * 5 + 2);
     }
 
@@ -99,9 +99,9 @@ mod tests {
     fn a_jump_waits_for_the_read_under_way_and_for_its_own() {
         let mut fetch = Fetch::new(G474);
         assert_eq!(fetch.instruction(0, 2, 0), 5);
-        // The line behind is being read until 10.
+        // The prefetch of the next line ends at 10.
         assert_eq!(fetch.instruction(0x100, 2, 6), 15);
-        // A wide instruction on two lines needs both.
+        // A wide instruction across two lines needs both.
         assert_eq!(fetch.instruction(0x206, 4, 30), 30 + 5 + 5);
     }
 

@@ -1,24 +1,24 @@
-//! Parts of the tick that an H743 leaves in flash, by the linker script.
+//! Functions of the tick that an H743 runs from flash, by the linker script.
 
 const SCRIPT: &str = include_str!("../../../firmware/memory/nucleo-h743zi2.x");
-/// Around the patterns.
+/// Markers around the patterns.
 const FROM: &str = "_tick_in_flash_start = .;";
 const TO: &str = "_tick_in_flash_end = .;";
 
-/// Returns true if the function of this mangled name is to stay in flash.
+/// Returns true if the function of this mangled name stays in flash.
 #[must_use]
 pub fn is_left(name: &str) -> bool {
     patterns().any(|pattern| fits(name, pattern))
 }
 
-/// The patterns, without what all sections of code begin with.
+/// Returns the patterns without the prefix that all code sections share.
 fn patterns() -> impl Iterator<Item = &'static str> {
     let list = SCRIPT.split(FROM).nth(1).and_then(|s| s.split(TO).next());
     let lines = list.unwrap_or_default().lines();
     lines.filter_map(|line| line.trim().strip_prefix("*(.text.")?.strip_suffix(')'))
 }
 
-/// Returns true if a name fits a pattern whose only special character is `*`, at both ends.
+/// Returns true if a name matches a pattern whose only special character is `*`, at both ends.
 fn fits(name: &str, pattern: &str) -> bool {
     let parts = pattern.split('*').filter(|part| !part.is_empty());
     let behind = |rest: Option<usize>, part: &str| {

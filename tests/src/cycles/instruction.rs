@@ -1,7 +1,7 @@
-//! Kinds of instructions by their time: Thumb-2 of an ARMv7E-M core, by its encoding
-//! (DDI 0403E, A5 and A6).
+//! Kinds of instructions by their timing: Thumb-2 of an ARMv7E-M core, by its encoding (DDI 0403E,
+//! A5 and A6).
 
-/// A kind of instruction, as far as it takes time of its own.
+/// A kind of instruction, by its timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// One pass through the integer unit.
@@ -10,47 +10,47 @@ pub enum Kind {
     Multiply,
     /// An integer division.
     Divide,
-    /// Loads so many words.
+    /// Loads this number of words.
     Load(u32),
-    /// Stores so many words.
+    /// Stores this number of words.
     Store(u32),
-    /// A branch and nothing else; conditional, or not.
+    /// A branch, conditional or not.
     Branch {
-        /// Returns true if it may fall through.
+        /// True if it may fall through.
         conditional: bool,
     },
-    /// Branches where a table says.
+    /// A branch through a table.
     TableBranch,
-    /// A system register, or a barrier.
+    /// Access to a system register, or a barrier.
     System,
-    /// One pass through the floating-point unit: additions, multiplications, conversions, moves.
+    /// One pass through the floating-point unit: an addition, multiplication, conversion or move.
     Float,
     /// A floating-point multiplication and addition.
     FloatMac,
     /// A floating-point division or square root.
     FloatDivide,
-    /// Between the two units' registers.
+    /// A transfer between the registers of the two units.
     FloatTransfer,
 }
 
 /// An instruction at its address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
-    /// Its place.
+    /// Its address.
     pub address: u32,
-    /// Its bytes.
+    /// Its length in bytes.
     pub length: u32,
     /// Its kind.
     pub kind: Kind,
-    /// Returns true if it loads a constant that lies beside the code.
+    /// True if it loads a constant beside the code.
     pub is_literal: bool,
-    /// The single register that its floating-point result goes to.
+    /// The single-precision register of its floating-point result.
     pub result: Option<u32>,
     /// Floating-point registers that it reads.
     pub reads: [Option<u32>; 3],
 }
 
-/// Decodes an instruction from its first half-word and, of a wide one, the second.
+/// Decodes an instruction from its first half-word and, if it is wide, the second.
 #[must_use]
 pub fn decode(address: u32, first: u16, second: u16) -> Instruction {
     let is_wide = first >> 11 >= 0b11101;
@@ -77,7 +77,7 @@ fn narrow(word: u32) -> Kind {
     let listed = (word & 0xFF).count_ones();
     let branch = |conditional| Kind::Branch { conditional };
     match word >> 11 {
-        // Data processing; BX, BLX, and ADD or MOV to PC among it.
+        // Data processing, with BX, BLX, and ADD or MOV to PC.
         0b01000 if word >> 8 == 0x47 || word & 0xFD87 == 0x4487 || word & 0xFF87 == 0x4687 => {
             branch(false)
         }
@@ -141,7 +141,7 @@ fn coprocessor(first: u32, second: u32) -> Kind {
         // Two core registers at once.
         0xC if first & 0xFFE0 == 0xEC40 => Kind::FloatTransfer,
         0xC | 0xD => {
-            // One register where it is P without W, else the list's words.
+            // One register if P is set and W is not, else the words of the list.
             let words = match first & 0x120 {
                 0x100 => second >> 8 & 1,
                 _ => (second & 0xFF).max(1) - 1,
@@ -160,7 +160,7 @@ fn coprocessor(first: u32, second: u32) -> Kind {
     }
 }
 
-/// LDR and VLDR by PC.
+/// Returns true for LDR and VLDR relative to PC.
 fn is_wide_literal(first: u32, second: u32) -> bool {
     let single = first & 0xFE1F == 0xF81F && first >> 5 & 3 != 3;
     let double = first & 0xFE5F == 0xE85F && first & 0x120 != 0;
@@ -168,7 +168,7 @@ fn is_wide_literal(first: u32, second: u32) -> bool {
     single || double || float
 }
 
-/// Single registers: where the result of an arithmetic instruction goes, and what any
+/// Returns the single register of an arithmetic instruction's result, and those that any
 /// floating-point instruction reads.
 fn float_registers(first: u32, second: u32) -> (Option<u32>, [Option<u32>; 3]) {
     let is_single = second >> 8 & 0xF == 0b1010;
@@ -176,7 +176,7 @@ fn float_registers(first: u32, second: u32) -> (Option<u32>, [Option<u32>; 3]) {
     let n = (first & 0xF) << 1 | second >> 7 & 1;
     let m = (second & 0xF) << 1 | second >> 5 & 1;
     match first >> 8 {
-        // Arithmetic. Its destination is an operand of a comparison and of an accumulation.
+        // Arithmetic. A comparison and an accumulation also read the destination.
         0xEE if is_single && second >> 4 & 1 == 0 => (Some(d), [Some(d), Some(n), Some(m)]),
         // To or from a core register.
         0xEE if is_single => (None, [Some(n), None, None]),
@@ -194,7 +194,7 @@ mod tests {
         decode(0, first, second).kind
     }
 
-    // The encodings are what LLVM assembles for the instructions named.
+    // The encodings are LLVM's for the instructions in the comments.
     #[test]
     fn kinds_are_what_the_assembler_meant() {
         for (first, second, is) in [

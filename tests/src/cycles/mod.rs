@@ -1,6 +1,6 @@
-//! Cycles that an executed tick takes on the boards' chips, at most: a model of their cores and
-//! memories over the addresses that the emulated core has executed. `docs/reference/cycles.md` has its
-//! sources and its margins.
+//! Upper bound of an executed tick's cycles on the boards' chips: a model of their cores and
+//! memories, driven by the addresses that the emulated core executed. `docs/reference/cycles.md`
+//! has its sources and margins.
 
 pub mod core;
 pub mod fetch;
@@ -13,25 +13,25 @@ use instruction::{Instruction, Kind};
 
 /// Bytes of a line of the H743's caches, and of a word of its flash.
 const H743_LINE: u32 = 32;
-/// Cycles of the core until a line is there from the H743's flash: the bus has half of the core's
-/// clock; a word of flash takes five of it (RM0433, 4.3.8), its transfers four, and the way through
-/// bus and cache some ten.
+/// Core cycles until a line arrives from the H743's flash: the bus has half of the core's clock. A
+/// word of flash takes five of its cycles (RM0433, 4.3.8), the transfers four, and the path through
+/// bus and cache about ten.
 const H743_MISS: u64 = 40;
-/// Cycles of an access to a peripheral, beyond those of the instruction: through its buses, of
-/// which the slowest of an H743 has a quarter of the core's clock.
+/// Additional cycles of an access to a peripheral, through its buses; the slowest of an H743 has a
+/// quarter of the core's clock.
 const G474_PERIPHERAL: u64 = 4;
 const H743_PERIPHERAL: u64 = 32;
-/// Cycles that a tick of the H743 waits for its data, at most, with nothing of it in the data cache:
-/// [`H743_DATA_LINES`] lines of the AXI SRAM at [`H743_DATA_LINE`] each. Until then every load and
-/// store waits `H743_MISS`.
+/// The most cycles that a tick of the H743 waits for its data if none is in the data cache:
+/// [`H743_DATA_LINES`] lines of the AXI SRAM at [`H743_DATA_LINE`] each. Up to this sum every load
+/// and store waits `H743_MISS`.
 pub const H743_DATA: u64 = 16_000;
-/// Lines of it: the loop's own data, four for each patch that a tick may look at, and a queue's. A
-/// test holds the images to them.
+/// Lines of data of a tick: the loop's own data, four for each patch that a tick may examine, and a
+/// queue's. A test checks the images against this.
 pub const H743_DATA_LINES: u64 = 615;
-/// Cycles of the core for one of them: 13 of the bus, four of which are transfers.
+/// Core cycles for one line: 13 cycles of the bus, of which four are transfers.
 pub const H743_DATA_LINE: u64 = 26;
 const _: () = assert!(H743_DATA_LINES * H743_DATA_LINE <= H743_DATA);
-/// Place where the peripherals are.
+/// Address range of the peripherals.
 const PERIPHERALS: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
 
 /// Cycles of a tick.
@@ -39,13 +39,13 @@ const PERIPHERALS: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
 pub struct Cycles {
     /// Instructions.
     pub instructions: u32,
-    /// Cycles of an STM32G474 at 168 MHz, its code in flash, at most.
+    /// Most cycles of an STM32G474 at 168 MHz with its code in flash.
     pub g474: u32,
-    /// Cycles of an STM32H743 at 456 MHz, its code in ITCM but for some functions, at most.
+    /// Most cycles of an STM32H743 at 456 MHz with its code in ITCM, except some functions.
     pub h743: u32,
 }
 
-/// Both chips, executing one tick. Their caches are empty at its beginning.
+/// Both chips while they execute one tick. Their caches are empty at its start.
 #[derive(Clone, Debug)]
 pub struct Tick {
     instructions: u64,
@@ -53,11 +53,11 @@ pub struct Tick {
     fetch: Fetch,
     h743: u64,
     floats: Floats,
-    /// The line of the H743's flash that it executes from.
+    /// The line of the H743's flash in use.
     line: Option<u32>,
     /// Loads and stores.
     accesses: u64,
-    /// Place where the result of the floating-point instruction before is.
+    /// Register of the previous floating-point instruction's result.
     before: Option<u32>,
 }
 
@@ -77,8 +77,8 @@ impl Default for Tick {
 }
 
 impl Tick {
-    /// Executes an instruction, behind which `next` is executed. `in_flash`: the H743 has it in
-    /// flash, too.
+    /// Executes an instruction; `next` is the address executed after it. `in_flash` is true if the
+    /// H743 has it in flash as well.
     pub fn execute(&mut self, instruction: &Instruction, next: u32, in_flash: bool) {
         let Instruction {
             address,
@@ -100,13 +100,13 @@ impl Tick {
         self.h743 += Core::M7.cycles(instruction, jumps);
         let line = in_flash.then_some((address + length - 1) / H743_LINE);
         if line.is_some() && line != self.line {
-            // Nothing is read ahead, and no line is found again.
+            // No prefetch, and no cache hit.
             self.h743 += H743_MISS;
         }
         self.line = line;
     }
 
-    /// Tells where an instruction loads or stores, where that is known.
+    /// Records the address of a load or store, if it is known.
     pub fn touch(&mut self, address: u32) {
         if PERIPHERALS.contains(&address) {
             self.g474 += G474_PERIPHERAL;
@@ -114,7 +114,7 @@ impl Tick {
         }
     }
 
-    /// Returns what it took.
+    /// Returns the cycles up to now.
     #[must_use]
     pub fn cycles(&self) -> Cycles {
         let data = (self.accesses * H743_MISS).min(H743_DATA);
@@ -143,10 +143,10 @@ mod tests {
         }
         let cycles = tick.cycles();
         assert_eq!(cycles.instructions, 40);
-        // A pass: the first line's read, the second line's, two instructions of it, of which one
-        // waits for a result, and the branch with its refill. The read behind has ended by then.
+        // An iteration: reads of the first and second line, two instructions of the second, one of
+        // which waits for a result, and the branch with its refill. The prefetch has ended by then.
         assert_eq!(cycles.g474, 10 * (5 + 5 + 2 + 4));
-        // The second and the third wait until the one before is there; the branch, and its guess.
+        // The second and third wait for the previous result; then the branch and its misprediction.
         assert_eq!(cycles.h743, 10 * (2 * 3 + 1 + 1 + 6));
     }
 

@@ -1,6 +1,6 @@
-//! Numbers out of bytes.
+//! Numbers from bytes.
 
-/// Bytes taken one after the other; zeros when they are used up.
+/// Reads bytes in turn; returns zeros after the end.
 pub(super) struct Bytes<'b>(pub(super) &'b [u8]);
 
 impl Bytes<'_> {
@@ -16,12 +16,12 @@ impl Bytes<'_> {
         i32::from_le_bytes(self.take())
     }
 
-    /// Any bits.
+    /// Returns any bits.
     pub(super) fn float(&mut self) -> f32 {
         f32::from_le_bytes(self.take())
     }
 
-    /// Most often a small number, else any bits.
+    /// Returns a small number most of the time, else any bits.
     pub(super) fn height(&mut self) -> f32 {
         match self.byte() {
             0 => self.float(),

@@ -1,4 +1,4 @@
-//! Tables of materials, and the materials of a tile, out of bytes.
+//! Tables of materials, and the materials of a tile, from bytes.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Material, MaterialTable};
@@ -7,7 +7,7 @@ use hapterra_core::terrain::{TILE_SAMPLES, Tile};
 use super::bytes::Bytes;
 use super::tick::texture;
 
-/// A table that a scene may have, or of any numbers.
+/// Returns a table that is valid for a scene, or one of arbitrary numbers.
 pub(super) fn table(bytes: &mut Bytes<'_>) -> MaterialTable {
     let count = 1 + usize::from(bytes.byte()) % MaterialTable::MOST;
     let all: Vec<Material> = (0..count).map(|_| material(bytes)).collect();
@@ -37,8 +37,8 @@ fn material(bytes: &mut Bytes<'_>) -> Material {
     }
 }
 
-/// Gives a tile materials: as many as there are samples, or one less, of this table, or also beyond
-/// it. A tile that is refused is left vacant.
+/// Fills a tile's materials: as many as its samples, or one less, of this table or beyond it. A
+/// refused tile stays vacant.
 pub(super) fn lay(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>) {
     let kind = bytes.byte();
     let count = match kind & 3 {

@@ -1,5 +1,5 @@
-//! Bodies of the fuzz targets in `fuzz/`: arbitrary bytes,
-//! which a plain test drives, too (`tests/fuzz_targets.rs`).
+//! Bodies of the fuzz targets in `fuzz/`: arbitrary bytes, which a plain test also runs
+//! (`tests/fuzz_targets.rs`).
 
 mod bytes;
 mod materials;

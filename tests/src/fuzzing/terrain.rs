@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a terrain file of each format that is read without GDAL, with a file beside it.
+//! Arbitrary bytes as a terrain file of each format that is read without GDAL, with a sidecar.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use heightfield::{OpenOptions, PngChannel, Raster, RasterError, RawLayout, Sampl
 
 use super::bytes::Bytes;
 
-/// Names of the file and of the one beside it.
+/// Names of the file and its sidecar.
 pub const KINDS: [[&str; 2]; 10] = [
     ["t.tif", "t.tfw"],
     ["t.tif", "t.tif.msk"],
@@ -21,8 +21,8 @@ pub const KINDS: [[&str; 2]; 10] = [
     ["t.raw", "t.prj"],
 ];
 
-/// The first byte chooses the kind, the second how it is opened, the next two how many bytes go to
-/// the file beside it; the file has the rest. Returns true if it is a terrain.
+/// Runs an input. Byte 1 selects the kind, byte 2 the options, bytes 3 and 4 the length of the
+/// sidecar; the rest is the file. Returns true if it is a terrain.
 pub fn run(data: &[u8]) -> bool {
     let folder = tempfile::tempdir().expect("a folder");
     let (kind, how, beside, file) = parts(data);
@@ -34,7 +34,7 @@ pub fn run(data: &[u8]) -> bool {
     open(&folder.path().join(name), how)
 }
 
-/// An input of these parts.
+/// Returns an input with these parts.
 #[must_use]
 pub fn of(kind: usize, how: u8, beside: &[u8], file: &[u8]) -> Vec<u8> {
     let length = (beside.len() as u16).to_le_bytes();
@@ -49,7 +49,7 @@ fn parts(data: &[u8]) -> (usize, u8, &[u8], &[u8]) {
     (kind, how, beside, file)
 }
 
-/// Opens the file, and looks at heights of it. Returns true if it is a terrain.
+/// Opens the file and reads some heights. Returns true if it is a terrain.
 fn open(path: &Path, how: u8) -> bool {
     let is_set = |bit: u8| how & (1 << bit) != 0;
     let raw = RawLayout {
@@ -76,7 +76,7 @@ fn open(path: &Path, how: u8) -> bool {
         Err(error) => {
             let told = error.to_string();
             assert!(!told.contains(char::is_control), "{told:?}");
-            // A decoder of another's may panic; none of this project's may.
+            // Third-party decoders may panic; the project's may not.
             assert!(
                 !matches!(error.fault(), RasterError::DecoderFailed(name) if !is_anothers(name))
             );
@@ -93,7 +93,7 @@ fn open(path: &Path, how: u8) -> bool {
     true
 }
 
-/// Returns true if a format is decoded by a library.
+/// Returns true if a third-party library decodes the format.
 fn is_anothers(format: &str) -> bool {
     ["TIFF", "PNG"].contains(&format)
 }

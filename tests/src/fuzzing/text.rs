@@ -1,4 +1,4 @@
-//! Arbitrary bytes as the other files that the command reads: recordings, calibrations, tables of
+//! Arbitrary bytes as the command's other input files: recordings, calibrations, tables of
 //! materials, logs of a first power-up, commands.
 
 use std::fs;
@@ -13,10 +13,10 @@ use hapterra::steering::command;
 /// Number of kinds.
 pub const KINDS: u8 = 5;
 
-/// Rows of a recording that are read, at most.
+/// Most rows of a recording that are read.
 const MAX_ROWS: usize = 10_000;
 
-/// The first byte chooses the kind of file, the others are its content.
+/// Runs an input: the first byte selects the kind of file, the others are its content.
 pub fn run(data: &[u8]) {
     let (kind, content) = data.split_first().unwrap_or((&0, data));
     if kind % KINDS == 4 {
@@ -45,7 +45,7 @@ fn read_command(line: &str) {
     check(command::parse(line));
 }
 
-/// As `replay`, the viewer and Python read it.
+/// Reads it as `replay`, the viewer and Python do.
 fn read_recording(path: &Path) {
     if let Ok(rows) = Trajectory::open(path) {
         rows.take(MAX_ROWS).for_each(check);

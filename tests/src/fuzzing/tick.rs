@@ -1,4 +1,4 @@
-//! Arbitrary scenes, tiles, points and encoder counts into the tick.
+//! Arbitrary scenes, tiles, points and encoder counts as input of the tick.
 
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
@@ -19,13 +19,13 @@ use super::materials;
 
 /// Tiles along the side of the window.
 const SIDE: usize = 2;
-/// Buffers besides: one that comes and goes, and those that a fallback keeps.
+/// Additional buffers: one in transfer, and those that a fallback keeps.
 const SPARES: usize = 3;
 
-/// Does what the bytes say, and looks at every tick.
+/// Runs an input, and checks every tick.
 ///
 /// # Panics
-/// When a tick gives what no tick may give.
+/// If a tick's output is invalid.
 pub fn run(data: &[u8]) {
     let mut bytes = Bytes(data);
     let mut tiles = vec![Tile::VACANT; SIDE * SIDE + SPARES];
@@ -37,7 +37,7 @@ pub fn run(data: &[u8]) {
     haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("a preset"));
     let mut params = SurfaceParams::PREMIUM;
     let mut table = MaterialTable::EMPTY;
-    // Ticks since the scene was taken, where that is known.
+    // Ticks since the scene was set, if known.
     let mut ticks = Some(0);
     while !bytes.is_empty() {
         let kind = bytes.byte();
@@ -59,10 +59,10 @@ pub fn run(data: &[u8]) {
                 spare.extend(haptics.accept(Command::SceneChange(view)).ok().flatten());
                 ticks = None;
             }
-            // A table, and a scene of it or of another.
+            // A table, and a scene that belongs to it or to another.
             _ if kind == 247 || kind == 246 => {
                 let (told, mut scene) = (materials::table(&mut bytes), scene(&mut bytes));
-                // As the link does: a scene that cannot be rendered is refused before.
+                // As on the link, which refuses a scene that cannot be rendered.
                 if told.is_valid() && scene.is_valid() {
                     haptics.take_materials(&told);
                     table = told;
@@ -151,7 +151,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// Returns true if the loop takes a scene, with the table that it has.
+/// Returns true if the loop accepts a scene with its present table.
 fn is_taken(scene: &Scene, table: &MaterialTable) -> bool {
     let is_here = |sum: u32| sum == table.check_sum() && table.is_valid();
     scene.is_valid() && scene.materials.is_none_or(is_here)
@@ -216,7 +216,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     scene
 }
 
-/// A fallback that a scene may have, or any numbers; or none.
+/// Returns a valid fallback, one of arbitrary numbers, or none.
 fn fallback(bytes: &mut Bytes<'_>) -> Option<Fallback> {
     let kind = bytes.byte();
     let mut part = |shift: u8| match kind >= 250 {
@@ -234,7 +234,7 @@ fn fallback(bytes: &mut Bytes<'_>) -> Option<Fallback> {
     (!kind.is_multiple_of(3)).then_some(Fallback { wide, near })
 }
 
-/// A texture that a scene may have, or any numbers.
+/// Returns a valid texture, or one of arbitrary numbers.
 pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
     let (kind, share) = (bytes.byte(), f32::from(bytes.byte()) / 255.0);
     let pattern = [Pattern::Grain, Pattern::Grating][usize::from(kind % 2)];
@@ -259,7 +259,7 @@ pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
 }
 
 fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {
-    // Of the field, of a fallback, or of another level.
+    // A level of the field, of a fallback, or neither.
     let level = [0, 0, 2, 3, 1][usize::from(bytes.byte() / 60)];
     let key = TileKey::new(
         level,
@@ -268,7 +268,7 @@ fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {
     );
     let base = if bytes.byte() == 255 { bytes.int() } else { 0 };
     let heights: Vec<f32> = (0..7).map(|_| bytes.height()).collect();
-    // A tile that is refused is left vacant, which the loop refuses in turn.
+    // A refused tile stays vacant, and the loop refuses it.
     let _ = tile.fill(key, base, |col, row| heights[(3 * col + 5 * row) % 7]);
 }
 
@@ -283,14 +283,14 @@ fn position(bytes: &mut Bytes<'_>) -> GridPoint {
     GridPoint::new(cell.map(i32::from), offset - Vec3::new(0.0, 0.0, 4.0))
 }
 
-/// Checks the result of one tick, rendered with `params`.
+/// Checks the output of one tick, rendered with `params`.
 ///
 /// # Panics
-/// When no tick may give that.
+/// If it is invalid.
 pub fn look(outcome: &Outcome, params: &SurfaceParams) {
     let (sample, drive) = (&outcome.sample, &outcome.drive);
     let force = sample.force_n.as_dvec3().length();
-    // A limit smaller than any normal number is kept to no more than that.
+    // A limit below the smallest normal number is only kept to that number.
     let limit = f64::from(params.max_force_n.max(f32::MIN_POSITIVE)) * (1.0 + 1e-6);
     assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
     assert!(drive.currents_a.is_finite(), "{outcome:?}");

@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a packed tile, and arbitrary heights through the packed form.
+//! Arbitrary bytes as a packed tile, and arbitrary heights as input of the packing.
 
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
@@ -8,10 +8,10 @@ use super::bytes::Bytes;
 
 const KEY: TileKey = TileKey::new(0, 1, 2);
 
-/// Unpacks the bytes, and packs heights that are made of them.
+/// Unpacks the bytes, then packs heights made from them.
 ///
 /// # Panics
-/// When a tile is filled of what was refused, or is not what it was after packing.
+/// If refused bytes fill a tile, or a tile changes by packing.
 pub fn run(data: &[u8]) {
     let mut tile = Box::new(Tile::VACANT);
     match tile.unpack(KEY, 0, data) {
@@ -60,7 +60,7 @@ fn packed(bytes: &mut Bytes<'_>, tile: &mut Tile) {
     }
 }
 
-/// All samples of a tile, some of them more than once.
+/// Returns all samples of a tile, some of them more than once.
 fn bits(tile: &Tile) -> Vec<[u32; 4]> {
     let cells = TILE_SAMPLES as i32 - 1;
     let corners = |i: i32| tile.corners(Cell::new(i % cells, i / cells));

@@ -1,4 +1,4 @@
-//! Arbitrary bytes into the frame decoder and the device's end of the link.
+//! Arbitrary bytes as input of the frame decoder and of the device's end of the link.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -19,11 +19,11 @@ use hapterra_firmware::store::Stored;
 use super::bytes::Bytes;
 use hapterra_core::terrain::FieldSize;
 
-/// The session that is played in, and how many others are opened before it.
+/// The session under test, and the number of sessions opened before it.
 const SESSION: SessionNumber = SessionNumber::new(0);
 const OTHERS: u32 = 16;
 
-/// A device that lives as long as the thread: its memory cannot be had back.
+/// A device that lives as long as the thread, as its memory is leaked.
 pub struct Wire {
     device: Device<StoppedClock, 2>,
     host: Box<FrameReader<8192>>,
@@ -46,11 +46,10 @@ impl Default for Wire {
 }
 
 impl Wire {
-    /// Plays the bytes to the decoder and to the device, in a fresh session and
-    /// scene.
+    /// Sends the bytes to the decoder and to the device, in a fresh session and scene.
     ///
     /// # Panics
-    /// When the device says what is no message, or drives a motor in a replay.
+    /// If the device sends an invalid message, or drives a motor in a replay.
     pub fn run(&mut self, data: &[u8]) {
         decoded(data);
         self.begin();
@@ -61,11 +60,11 @@ impl Wire {
             let (chunk, rest) = bytes.0.split_at(length);
             bytes.0 = rest;
             match kind % 4 {
-                // As it is, on the line.
+                // Unchanged.
                 0 => self.hear(chunk),
-                // In a frame whose check sum fits, so that its content is read.
+                // In a frame with a correct checksum, so that its content is parsed.
                 1 => self.hear(&framed(chunk)),
-                // And of the session that is open, so that it is acted on.
+                // In a frame of the open session, so that the device acts on it.
                 2 => self.hear(&framed(&in_session(chunk))),
                 _ => self.device.link.interrupted(),
             }
@@ -81,7 +80,7 @@ impl Wire {
         }
     }
 
-    /// A new session, whatever was heard before.
+    /// Opens a new session, whatever the device received before.
     fn begin(&mut self) {
         self.device.link.interrupted();
         self.hear(&[0]);
@@ -90,14 +89,14 @@ impl Wire {
             number: 1,
             silence_s: DEFAULT_SILENCE_S,
         };
-        // Others first, so that the session is none that the device remembers.
+        // The other sessions first, so that the device no longer stores this session's number.
         for session in (1..=OTHERS).map(SessionNumber::new) {
             self.hear(&message_in(session, &ToDevice::Hello(hello)));
         }
         for said in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
             self.hear(&message(&said));
         }
-        // Whichever is latched. The last of these requests has the number 1.
+        // Clears any latched fault. The last of these requests has the number 1.
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
         for (fault, number) in Fault::ALL.into_iter().zip(0..) {
             let number = first.wrapping_add(number);
@@ -108,7 +107,7 @@ impl Wire {
         self.listen();
     }
 
-    /// All of it, with ticks in between where the device takes no more.
+    /// Sends all bytes, with ticks in between while the device has no room.
     fn hear(&mut self, mut bytes: &[u8]) {
         for _ in 0..10_000 {
             let taken = self.device.receive(bytes);
@@ -122,7 +121,7 @@ impl Wire {
         panic!("the device does not take {} bytes", bytes.len());
     }
 
-    /// Everything the device says is a message.
+    /// Checks that everything the device sends is a message.
     fn listen(&mut self) {
         let mut chunk = [0; 256];
         for _ in 0..10_000 {
@@ -148,7 +147,7 @@ impl Wire {
     }
 }
 
-/// The decoder alone, for both directions.
+/// Runs the decoder alone, for both directions.
 fn decoded(mut data: &[u8]) {
     let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
     while !data.is_empty() {
@@ -163,9 +162,9 @@ fn decoded(mut data: &[u8]) {
     }
 }
 
-/// Bytes as postcard would have written them, check sum and all.
+/// Frames bytes as postcard would, with the checksum.
 fn framed(content: &[u8]) -> Vec<u8> {
-    /// Serializes as nothing but its bytes.
+    /// Serializes as its bytes alone.
     struct Raw<'b>(&'b [u8]);
     impl serde::Serialize for Raw<'_> {
         fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -182,10 +181,10 @@ fn framed(content: &[u8]) -> Vec<u8> {
         .to_vec()
 }
 
-/// A whole message of the session on the line.
+/// Returns a whole message of the session as a frame.
 ///
 /// # Panics
-/// When it does not fit a frame.
+/// If it does not fit a frame.
 #[must_use]
 pub fn message(message: &ToDevice<'_>) -> Vec<u8> {
     message_in(SESSION, message)
@@ -198,14 +197,14 @@ fn message_in(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
         .to_vec()
 }
 
-/// A message's bytes with the session's number in front.
+/// Returns a message's bytes after the session's number.
 fn in_session(content: &[u8]) -> Vec<u8> {
-    // The least number: as a varint it is two bytes.
+    // The smallest number with a varint of two bytes.
     assert_eq!(SESSION.get(), 128);
     [&[0x80, 0x01], content].concat()
 }
 
-/// A replay over 64 × 64 patches.
+/// Returns the scene of a replay over 64 × 64 patches.
 #[must_use]
 pub fn scene() -> Scene {
     Scene {

@@ -1,5 +1,5 @@
-//! A proxy does not pass a crest: the places no farther from the HIP than its last place are
-//! flooded from there, column by column.
+//! The proxy does not pass a crest: a flood fill, column by column, of the points no farther from
+//! the HIP than its last position, starting there.
 
 use std::collections::HashSet;
 
@@ -8,24 +8,24 @@ use super::observed_tick::ObservedTick;
 use super::oracle::{TickOracle, Verdict};
 use super::surface::{distance, patches_at};
 
-/// Shorter moves, in cells, pass no crest that is worth a name.
+/// Moves shorter than this, in cells, pass no relevant crest.
 const SHORT: f64 = 0.02;
-/// HIPs farther than this, in cells, would flood too much.
+/// HIPs farther than this, in cells, need too large a flood.
 const FAR: f64 = 4.0;
-/// Columns over the reach of the HIP, where that is a cell or less: 64 a cell at least, and a
-/// whole number, so that edges between patches lie in columns.
+/// Columns over the reach of the HIP, if that is a cell or less: at least 64 a cell, and a whole
+/// number, so that edges between patches lie in columns.
 const COLUMNS: f64 = 256.0;
 /// Tolerance of a channel between two columns, cells.
 const SLACK: f64 = 0.02;
 
 impl TickOracle<'_> {
-    /// The proxy is joined with where it was.
+    /// Checks that a path within reach joins the proxy with its last position.
     pub(super) fn stays_in_basin(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let reach = distance(before.proxy, seen.hip);
         let is_judged = before.is_touching()
             && seen.is_touching()
             && reach < FAR
-            // One that is farther from the HIP is found by that.
+            // Otherwise another check reports it.
             && distance(seen.proxy, seen.hip) <= reach + SLACK
             && distance(before.proxy, seen.proxy) > SHORT;
         if !is_judged {
@@ -46,17 +46,17 @@ impl TickOracle<'_> {
         self.fail(Invariant::Basin, detail)
     }
 
-    /// Returns true if a column has places of ground or air so near to the HIP.
+    /// Returns true if a column has a point of ground or air within `reach` of the HIP.
     fn is_open(&self, [x, y]: [f64; 2], hip: [f64; 3], reach: f64) -> bool {
         let up = reach * reach - (x - hip[0]).powi(2) - (y - hip[1]).powi(2);
         let ground = patches_at(self.terrain, x, y).map(|patch| patch.height(x, y));
-        // Over a hole there is air alone.
+        // Over no-data there is only air.
         let lowest = ground.reduce(f64::min).unwrap_or(f64::NEG_INFINITY);
         up >= 0.0 && lowest - hip[2] <= up.sqrt()
     }
 }
 
-/// Returns true if two places are joined by columns that are open.
+/// Returns true if open columns join two points.
 fn is_flooded(
     from: [f64; 2],
     to: [f64; 2],

@@ -3,20 +3,20 @@
 use super::surface::Patch;
 use crate::scene::terrain::Terrain;
 
-/// The first place at which a way is not above the surface.
+/// The first point of a path that is not above the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
     /// The point.
     pub at: [f64; 3],
-    /// Most by which the way is below the surface anywhere, perpendicular to
-    /// both as far as they are steep, cells.
+    /// Largest depth of the path below the surface anywhere, perpendicular to the steeper of the
+    /// two, cells.
     pub depth: f64,
 }
 
-/// Returns the place where the line from `from` to `to` meets the surface from above, if it does.
+/// Returns the point where the line from `from` to `to` meets the surface from above, if any.
 ///
-/// Cell by cell; in each the gap is a quadratic of which the first root is
-/// found by halving. `None` when it stays above every patch.
+/// In each cell the gap is a quadratic, and bisection finds its first root. `None` if the line
+/// stays above every patch.
 #[must_use]
 pub fn first(terrain: &Terrain, from: [f64; 3], to: [f64; 3]) -> Option<Crossing> {
     let mut found: Option<Crossing> = None;
@@ -49,7 +49,7 @@ fn along(from: [f64; 3], to: [f64; 3], t: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| from[i] + t * (to[i] - from[i]))
 }
 
-/// Surface minus way over one cell, by Bernstein coefficients.
+/// Height of the surface above the path over one cell, as Bernstein coefficients.
 struct Gap {
     f: [f64; 3],
 }
@@ -68,7 +68,7 @@ impl Gap {
         f0 * (1.0 - s) * (1.0 - s) + 2.0 * f1 * s * (1.0 - s) + f2 * s * s
     }
 
-    /// Returns the place where it is largest.
+    /// Returns the parameter at which it is largest.
     fn top(&self) -> f64 {
         let [f0, f1, f2] = self.f;
         let bend = f0 - 2.0 * f1 + f2;
@@ -85,12 +85,12 @@ impl Gap {
         self.at(self.top())
     }
 
-    /// The first root, when there is a place that is not negative.
+    /// Returns the first root, if the gap is non-negative anywhere.
     fn first(&self) -> f64 {
         if self.f[0] >= 0.0 {
             return 0.0;
         }
-        // Monotonic up to the top.
+        // It is monotonic up to the top.
         let (mut below, mut above) = (0.0, self.top());
         for _ in 0..100 {
             let middle = 0.5 * (below + above);
@@ -104,7 +104,7 @@ impl Gap {
     }
 }
 
-/// The parts of a way by cell: from, to, and the cell. Only cells of the field.
+/// Returns the parts of a path by cell: start, end and the cell, for cells of the field only.
 fn cells(
     terrain: &Terrain,
     from: [f64; 3],
@@ -150,8 +150,8 @@ fn cells(
         .flat_map(|cut| {
             let middle = 0.5 * (cut[0] + cut[1]);
             let (x, y) = (from[0] + middle * way[0], from[1] + middle * way[1]);
-            // A way along a line belongs to the patches on both sides of it, and one up or
-            // down through a vertex to the four around it.
+            // A path along a grid line belongs to the patches on both sides, and a vertical path
+            // through a vertex to the four around it.
             let pair = |c: f64, still: bool| {
                 let cell = c.floor() as i32;
                 let other = if still && c == c.floor() {

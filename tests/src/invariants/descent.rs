@@ -1,17 +1,17 @@
-//! The exact local closest point: down from a place until no way leads nearer.
+//! The exact local closest point: descent from a point until no direction leads nearer.
 //!
-//! With y fixed a patch is a straight line, so its nearest point is known in
-//! closed form and the squared distance is a function F of y alone. F is walked
-//! downhill in small steps until its slope turns, that interval is halved to the
-//! end of f64, and the next patch is taken if that leads nearer. Slow and plain.
+//! At a fixed y a patch is a straight line, so its nearest point is known in closed form, and the
+//! squared distance is a function F of y alone. The search follows F downhill in small steps until
+//! its slope changes sign, bisects that interval to the precision of f64, and continues in the next
+//! patch if that leads nearer. Slow and simple.
 
 use super::surface::{Corners, Patch, distance};
 
-/// First step of the walk, cells: on a wall of 10⁶ the next minimum is not far.
+/// First step of the descent, cells: on a slope of 10⁶ the next minimum is close.
 const STEP: f64 = 1e-9;
-/// A neighbouring patch must lead at least this far, cells.
+/// Least motion into a neighbouring patch, cells.
 const LEAST_WAY: f64 = 1e-11;
-/// Patches at most.
+/// Most patches.
 const PATCHES: usize = 10_000;
 
 /// A local closest point.
@@ -21,11 +21,11 @@ pub struct Closest {
     pub at: [f64; 3],
     /// Its distance from the HIP.
     pub distance: f64,
-    /// Patches gone through.
+    /// Number of patches visited.
     pub patches: usize,
 }
 
-/// Descends from a place in a patch.
+/// Descends from a point in a patch.
 #[must_use]
 pub fn from(field: &impl Corners, hip: [f64; 3], start: [f64; 2], patch: Patch) -> Closest {
     let (mut patch, mut at) = (patch, start);
@@ -55,7 +55,7 @@ pub fn from(field: &impl Corners, hip: [f64; 3], start: [f64; 2], patch: Patch) 
     }
 }
 
-/// The other patches that share a point.
+/// Returns the other patches that share a point.
 fn neighbours<'f, F: Corners>(
     field: &'f F,
     patch: &Patch,
@@ -68,7 +68,7 @@ fn neighbours<'f, F: Corners>(
     let (cell, [east, north]) = (patch.cell, [side(0), side(1)]);
     let mut shifts = vec![[east, 0], [0, north], [east, north]];
     shifts.retain(|shift| *shift != [0, 0]);
-    shifts.dedup(); // on an edge, two of them are the same
+    shifts.dedup(); // on an edge, two of them are equal
     shifts
         .into_iter()
         .filter_map(move |shift| Patch::at(field, [cell[0] + shift[0], cell[1] + shift[1]]))
@@ -78,10 +78,10 @@ fn squared(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2]) -> f64 {
     distance([x, y, patch.height(x, y)], hip).powi(2)
 }
 
-/// Downhill inside one patch.
+/// Descends inside one patch.
 fn descend(patch: &Patch, hip: [f64; 3], start: [f64; 2]) -> [f64; 2] {
     let line = Line { patch, hip };
-    // The steeper direction in closed form: it is the one that needs it.
+    // The steeper direction uses the closed form, because it needs the precision.
     let [east, north] = patch.slopes(start[0], start[1]);
     if north.abs() > east.abs() {
         let x = line.bottom(1, start[0]);
@@ -91,23 +91,22 @@ fn descend(patch: &Patch, hip: [f64; 3], start: [f64; 2]) -> [f64; 2] {
     [line.best(0, y), y]
 }
 
-/// The squared distance as a function of one coordinate, the other (`axis`)
-/// being the best for it.
+/// The squared distance as a function of one coordinate, minimised over the other (`axis`).
 struct Line<'p> {
     patch: &'p Patch,
     hip: [f64; 3],
 }
 
 impl Line<'_> {
-    /// The best coordinate along `axis` with the other one fixed.
+    /// Returns the best coordinate along `axis` with the other one fixed.
     fn best(&self, axis: usize, fixed: f64) -> f64 {
         self.nearest(axis, fixed).0
     }
 
-    /// That coordinate, and the height above the HIP there.
+    /// Returns that coordinate, and the height above the HIP there.
     ///
-    /// Up a wall of slope m the height of the place is exact only to m units in its
-    /// last place; that of the closed form to one.
+    /// On a slope m the height from the position has an error of m units in the last place, that
+    /// from the closed form one unit.
     fn nearest(&self, axis: usize, fixed: f64) -> (f64, f64) {
         let low = f64::from(self.patch.cell[axis]);
         let above = |along: f64| {
@@ -126,14 +125,14 @@ impl Line<'_> {
         (end, above(end))
     }
 
-    /// Half the slope of F.
+    /// Returns half the slope of F.
     fn slope(&self, axis: usize, fixed: f64) -> f64 {
         let (along, z) = self.nearest(axis, fixed);
         let [x, y] = place(axis, along, fixed);
         (fixed - self.hip[1 - axis]) + z * self.patch.slopes(x, y)[1 - axis]
     }
 
-    /// Downhill from `start` to where F turns.
+    /// Descends from `start` to the point where the slope of F changes sign.
     fn bottom(&self, axis: usize, start: f64) -> f64 {
         let low = f64::from(self.patch.cell[1 - axis]);
         let slope = self.slope(axis, start);
@@ -145,7 +144,7 @@ impl Line<'_> {
         loop {
             let far = (near + down * step).clamp(low, low + 1.0);
             if far == near {
-                return near; // at the end of the patch, still downhill
+                return near; // at the border of the patch, still downhill
             }
             if self.slope(axis, far) * down >= 0.0 {
                 return self.halve(axis, near, far, down);
@@ -167,7 +166,7 @@ impl Line<'_> {
                 near = middle;
             }
         }
-        // The end of the interval where F is less; beside a border that is one.
+        // The end of the interval with the smaller F; next to a border it is the border.
         let at_near = self.slope(axis, near).abs() < self.slope(axis, far).abs();
         if at_near { near } else { far }
     }

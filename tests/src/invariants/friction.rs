@@ -1,4 +1,4 @@
-//! Friction, judged by trying every direction in which a proxy could go.
+//! Friction, checked by a search over all directions in which a proxy could move.
 
 use hapterra_core::contact::ContactState;
 
@@ -7,40 +7,40 @@ use super::observed_tick::ObservedTick;
 use super::oracle::{TickOracle, Verdict};
 use super::surface::{Patch, distance, patches_at};
 
-/// Part by which a proxy that has slid may be pulled more, or less, than its friction holds.
+/// Tolerance of the pull on a proxy that has slid, as a fraction of what friction holds.
 const SLACK: f64 = 0.01;
-/// Longer ways in a tick, in cells, may lead over more than is looked at.
+/// Longer moves in a tick, in cells, may leave the checked area.
 const SLIDES: f64 = 2.0;
 /// Ticks at 1 kHz after which a proxy that does not move sticks by static friction.
 const STICKS_AFTER: u32 = 21;
-/// HIPs nearer than this, in cells, press with nothing worth a cone.
+/// HIPs nearer than this, in cells, press too little for a check.
 const NEAR: f64 = 1e-3;
-/// HIPs farther than this are so far that the last places of the way decide.
+/// For HIPs farther than this, in cells, rounding of the path decides.
 const FAR: f64 = 1e4;
-/// Steepness up to which single precision tells a direction along the surface.
+/// Largest slope at which single precision resolves a direction along the surface.
 const STEEP: f64 = 1e3;
 
-/// The way from a proxy to the HIP: how long it is along the best direction of the
-/// surface, and what is left of it.
+/// The vector from a proxy to the HIP: its length along the best direction of the surface, and the
+/// rest.
 #[derive(Clone, Copy, Debug)]
 struct Pull {
     along: f64,
     rest: f64,
     /// Slope of the ground there.
     slope: f64,
-    /// Tolerance of the height: the place is rounded, and of a patch with a needle at a corner the
-    /// heights that are mixed are.
+    /// Tolerance of the height, from rounding of the position, and of the corner heights in a patch
+    /// with a spike.
     rounding: f64,
 }
 
 impl TickOracle<'_> {
-    /// A proxy that has slid, or was held, is inside the friction cone.
+    /// Checks that a proxy that has slid or was held is inside the friction cone.
     pub(super) fn is_in_cone(&mut self, seen: &ObservedTick) -> Verdict {
         let Some((least, _)) = self.pulls(seen.proxy, seen.hip) else {
             return Ok(());
         };
         let slid = self.slid_from(seen);
-        // What slid is held by dynamic friction, what may have come down by static friction.
+        // Dynamic friction holds a proxy that slid, static friction one that may have landed.
         let mu = f64::from(match slid {
             Some(_) => self.friction.dynamic_mu,
             None => self.friction.static_mu,
@@ -49,7 +49,7 @@ impl TickOracle<'_> {
         let place = seen.allowed() + least.rounding;
         let gone = match (slid, self.before) {
             (Some(start), _) => distance(start, seen.proxy),
-            // One that came down may have done so at any place nearer to the HIP than it was.
+            // A proxy that landed may have done so at any point nearer to the HIP than it was.
             (None, Some(before)) => {
                 distance(before.proxy, seen.hip) + distance(seen.proxy, seen.hip)
             }
@@ -65,7 +65,7 @@ impl TickOracle<'_> {
         self.fail(Invariant::Cone, detail)
     }
 
-    /// A proxy that has slid goes no farther than friction lets it.
+    /// Checks that a proxy that has slid moved no farther than friction allows.
     pub(super) fn is_held_back(&mut self, seen: &ObservedTick) -> Verdict {
         let Some(start) = self.slid_from(seen) else {
             return Ok(());
@@ -76,7 +76,7 @@ impl TickOracle<'_> {
         let mu = f64::from(self.friction.dynamic_mu);
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
         let gone = distance(start, seen.proxy);
-        // On an edge it may have come from any patch that meets there.
+        // On an edge it may have come from any of the patches that meet there.
         let falls_short = |(start, patch): &([f64; 2], Patch)| {
             let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
             let [east, north] = patch.slopes(start[0], start[1]);
@@ -96,8 +96,8 @@ impl TickOracle<'_> {
         self.fail(Invariant::Cone, detail)
     }
 
-    /// Returns the position of the proxy when its motion for this HIP began: ticks that were cut
-    /// short continue with it.
+    /// Returns the position of the proxy at the start of its motion for this HIP, which may take
+    /// several ticks.
     pub(super) fn begun_at(&self, before: &ObservedTick, seen: &ObservedTick) -> [f64; 3] {
         match before.output.converged || before.hip != seen.hip {
             true => before.proxy,
@@ -105,11 +105,11 @@ impl TickOracle<'_> {
         }
     }
 
-    /// Returns the start of a proxy's slide over the surface alone: around the two the HIP is
-    /// clearly below every tangent plane, so that nothing lifts it off.
+    /// Returns the start of a slide over the surface alone: around start and end the HIP is clearly
+    /// below every tangent plane, so that nothing lifts the proxy off.
     fn slid_from(&self, seen: &ObservedTick) -> Option<[f64; 3]> {
         const LOOKS: u32 = 12;
-        /// So far beside the straight way, in cells, a slide may lead.
+        /// Largest distance of a slide from the straight path, cells.
         const BESIDE: f64 = 0.25;
         let before = self.before?;
         let start = self.begun_at(&before, seen);
@@ -130,7 +130,7 @@ impl TickOracle<'_> {
         is_pressed.then_some(start)
     }
 
-    /// Returns true if there is ground at a place, and a HIP is clearly below its tangent plane.
+    /// Returns true if there is ground at a point, and the HIP is clearly below its tangent plane.
     fn is_pressed_at(&self, [x, y]: [f64; 2], hip: [f64; 3]) -> bool {
         let mut patches = patches_at(self.terrain, x, y).peekable();
         patches.peek().is_some()
@@ -141,14 +141,14 @@ impl TickOracle<'_> {
             })
     }
 
-    /// Returns the tolerance of the height at a place of a patch: the place is rounded, and of a
-    /// patch with a needle at a corner the heights that are mixed are.
+    /// Returns the tolerance of the height at a point of a patch, from rounding of the position,
+    /// and of the corner heights in a patch with a spike.
     fn rounding(&self, patch: &Patch, [x, y]: [f64; 2], hip: f64) -> f64 {
         f64::from(f32::EPSILON) * (patch.slope(x, y) + 4.0 * patch.mixed_size(x, y, hip))
     }
 
-    /// A proxy inside the cone does not move. One that was in the air slides at first, also where
-    /// it returns to where it was.
+    /// Checks that a proxy inside the cone does not move. A proxy that was in the air slides first,
+    /// even if it returns to its old position.
     pub(super) fn sticks(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let touches = |seen: &ObservedTick| {
             seen.output.state == ContactState::Touching && seen.output.converged
@@ -175,9 +175,9 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    /// The least and the most that the HIP pulls a proxy by, over the places that single
-    /// precision cannot tell apart; `None` where the HIP is not below, or too near, too far
-    /// or the ground too steep to tell.
+    /// Returns the smallest and largest pull of the HIP on a proxy, over the points that single
+    /// precision cannot distinguish; `None` if the HIP is not below, too near or too far, or the
+    /// ground is too steep.
     fn pulls(&self, proxy: [f64; 3], hip: [f64; 3]) -> Option<(Pull, Pull)> {
         if !(NEAR..FAR).contains(&distance(proxy, hip)) {
             return None;
@@ -213,7 +213,7 @@ impl TickOracle<'_> {
     }
 }
 
-/// The most that a way has in any direction of the surface into a patch.
+/// Returns the largest component of a vector along the surface, over all directions into a patch.
 fn most_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
     const TRIED: u32 = 720;
     let [east, north] = patch.slopes(start[0], start[1]);

@@ -1,4 +1,4 @@
-//! One tick as the oracle sees it, and the tolerances of the checks.
+//! One tick as the oracle receives it, and the tolerances of the checks.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState};
@@ -11,27 +11,27 @@ use crate::whole_field::position;
 
 /// Error that is always allowed, cells (docs/explanation/contact.md).
 pub const ERROR: f64 = 2e-6;
-/// Stretches shorter than this, in cells, tell nothing about a fade.
+/// Displacements shorter than this, in cells, are too short to check a fade.
 const SHORT: f64 = 1e-3;
 /// The surface parameters that turn displacements into forces; [`CELLS_MM`] are the cell sizes.
 pub const PARAMS: SurfaceParams = SurfaceParams::PREMIUM;
-/// Millimetres of a cell.
+/// Millimetres a cell.
 pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
 
-/// One tick as the judge sees it.
+/// One tick as the oracle receives it.
 #[derive(Clone, Copy, Debug)]
 pub struct ObservedTick {
     /// The HIP.
     pub hip: [f64; 3],
-    /// The answer.
+    /// The contact's output.
     pub output: ContactOutput,
-    /// The displacement as shading turns it, where there is shading.
+    /// The displacement turned by shading, if there is shading.
     pub shaded: Option<Shaded>,
-    /// The same, or the plain displacement, as texture changes it, where there is texture.
+    /// The shaded or plain displacement with texture, if there is texture.
     pub textured: Option<Vec3>,
-    /// The proxy, where the terrain was made.
+    /// The proxy, in the terrain's own coordinates.
     pub proxy: [f64; 3],
-    /// The force that the product's surface parameters gives for it, N, by [`CELLS_MM`].
+    /// The force from the product's surface parameters, N, for each of [`CELLS_MM`].
     pub force_n: [[f64; 3]; CELLS_MM.len()],
 }
 
@@ -40,11 +40,11 @@ pub struct ObservedTick {
 pub struct Shaded {
     /// The displacement, turned.
     pub displacement: Vec3,
-    /// True if every sample that it takes was here.
+    /// True if all samples that it uses were in the window.
     pub is_whole: bool,
 }
 
-/// A place, where the terrain was made.
+/// Returns a point in the terrain's own coordinates.
 #[must_use]
 pub fn unshifted(point: &GridPoint, shift: [i32; 3]) -> [f64; 3] {
     let at = position(point);
@@ -52,7 +52,7 @@ pub fn unshifted(point: &GridPoint, shift: [i32; 3]) -> [f64; 3] {
 }
 
 impl ObservedTick {
-    /// A tick over a terrain that lies `shift` cells away.
+    /// Creates a tick over a terrain that is shifted by `shift` cells.
     #[must_use]
     pub fn new(hip: [f64; 3], output: ContactOutput, shift: [i32; 3]) -> Self {
         Self {
@@ -76,7 +76,7 @@ impl ObservedTick {
         self.output.state == ContactState::Touching
     }
 
-    /// Returns true if the proxy has stayed on the ground where it was in the tick before.
+    /// Returns true if the proxy has not moved on the ground since the last tick.
     pub(super) fn stays(&self, before: &Self) -> bool {
         self.is_touching() && before.is_touching() && self.output.proxy == before.output.proxy
     }
@@ -88,9 +88,8 @@ impl ObservedTick {
         (self.is_touching() && whole > SHORT).then(|| output / whole)
     }
 
-    /// Error allowed where the height is not in question: the bound, or four
-    /// units in the last place of the largest coordinate of the HIP in the
-    /// proxy's patch.
+    /// Returns the allowed error if the height is certain: the bound, or four units in the last
+    /// place of the HIP's largest coordinate in the proxy's patch.
     #[must_use]
     pub fn allowed(&self) -> f64 {
         let reach = (0..3).map(|i| (self.proxy[i] - self.hip[i]).abs());
@@ -98,8 +97,8 @@ impl ObservedTick {
         ERROR.max(4.0 * f64::from(f32::EPSILON) * largest)
     }
 
-    /// Returns the four units in the last place of the corners of the proxy's patches, as height
-    /// above the HIP: they are coordinates, too.
+    /// Returns four units in the last place of the corner heights of the proxy's patches, above the
+    /// HIP: they are coordinates as well.
     pub(super) fn rounding_of_corners(&self, terrain: &Terrain) -> f64 {
         let [x, y, _] = self.proxy;
         let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());
@@ -107,7 +106,7 @@ impl ObservedTick {
         4.0 * f64::from(f32::EPSILON) * highest
     }
 
-    /// Error allowed in space.
+    /// Returns the allowed error in space.
     pub(super) fn allowed_in_space(&self, terrain: &Terrain) -> f64 {
         self.allowed().max(self.rounding_of_corners(terrain))
     }

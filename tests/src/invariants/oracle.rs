@@ -18,9 +18,9 @@ use crate::scene::terrain::Terrain;
 pub struct Measured {
     /// Ticks unseeded, free, touching and releasing.
     pub states: [u64; 4],
-    /// Ticks that left work over.
+    /// Ticks that did not converge.
     pub unconverged: u64,
-    /// Most units of work in a tick.
+    /// Most work units in a tick.
     pub work: u32,
     /// Largest distance of a proxy from the surface, cells, with the HIP within
     /// a few cells.
@@ -28,26 +28,25 @@ pub struct Measured {
     /// Largest distance from the exact closest point, cells, among those within
     /// the bound of gentle patches.
     pub off_minimum: f64,
-    /// Answers judged against the exact closest point.
+    /// Results compared with the exact closest point.
     pub judged: u64,
-    /// Of those, beyond that bound, where steepness or a badly conditioned
-    /// minimum allows it.
+    /// Those of `judged` beyond that bound, because of steep ground or a badly conditioned minimum.
     pub beyond: u64,
-    /// Ways that met the surface and yet ended free: around a pole.
+    /// Paths that met the surface but ended free: around a pole.
     pub around: u64,
-    /// Most ticks in a row in which a proxy in the air came no farther.
+    /// Most ticks in a row in which a proxy in the air made no progress.
     pub stalled: u32,
-    /// Twins compared to the end: repeated, shifted, in another window, mirrored
-    /// or turned.
+    /// Metamorphic tests compared to the end: repeated, shifted, in another window, mirrored or
+    /// turned.
     pub twins: [u64; 4],
-    /// On materials.
+    /// Measurements on materials.
     pub on_materials: Judged,
-    /// Twins on materials compared to the end: in another window, shifted, mirrored or turned.
+    /// Metamorphic tests on materials, to the end: in another window, shifted, mirrored or turned.
     pub twins_on_materials: [u64; 3],
 }
 
 impl Measured {
-    /// Adds what another judge measured.
+    /// Adds another oracle's measurements.
     pub fn add(&mut self, other: &Self) {
         for (own, other) in self.states.iter_mut().zip(other.states) {
             *own += other;
@@ -71,22 +70,22 @@ impl Measured {
     }
 }
 
-/// Looks at the ticks of one scene in turn.
+/// Checks the ticks of one scene in turn.
 pub struct TickOracle<'g> {
     pub(super) terrain: &'g Terrain,
     pub(super) friction: Friction,
     texture: Option<TextureJudge>,
-    /// Units of work that a tick may spend.
+    /// Work units that a tick may spend.
     pub(super) work: u32,
     /// Ticks in a row in which the proxy has not moved.
     pub(super) still: u32,
     tick: usize,
     pub(super) before: Option<ObservedTick>,
-    /// Place where the proxy was when its motion for the last HIP began.
+    /// Position of the proxy at the start of its motion for the last HIP.
     pub(super) began: [f64; 3],
-    /// Displacement, cells, when the proxy began to let go.
+    /// Displacement, cells, when the release began.
     pub(super) let_go_from: f64,
-    /// Ticks in a row in which a proxy in the air came no farther.
+    /// Ticks in a row in which a proxy in the air made no progress.
     pub(super) stalled: u32,
     /// Its measurements.
     pub measured: Measured,
@@ -96,7 +95,7 @@ pub struct TickOracle<'g> {
 pub type Verdict = Result<(), Violation>;
 
 impl<'g> TickOracle<'g> {
-    /// A judge over a terrain.
+    /// Creates the oracle of a terrain.
     #[must_use]
     pub fn new(terrain: &'g Terrain) -> Self {
         Self {
@@ -114,7 +113,7 @@ impl<'g> TickOracle<'g> {
         }
     }
 
-    /// A judge of a scene.
+    /// Creates the oracle of a scene.
     #[must_use]
     pub fn of(scene: &'g Scene) -> Self {
         let judge = Self::new(&scene.terrain)
@@ -126,20 +125,20 @@ impl<'g> TickOracle<'g> {
         }
     }
 
-    /// The same of a rough surface.
+    /// Returns the oracle for a surface with friction.
     #[must_use]
     pub fn with_friction(self, friction: Friction) -> Self {
         Self { friction, ..self }
     }
 
-    /// The same of a surface with a texture, or an even one.
+    /// Returns the oracle for a surface with a texture, or with none.
     #[must_use]
     pub fn with_texture(self, texture: Texture) -> Self {
         let texture = (!texture.is_none()).then(|| TextureJudge::new(texture));
         Self { texture, ..self }
     }
 
-    /// Judges the next tick.
+    /// Checks the next tick.
     ///
     /// # Errors
     /// The first invariant that it breaks.
@@ -147,9 +146,8 @@ impl<'g> TickOracle<'g> {
         self.all(seen).into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Judges where the proxy of the next tick lies and how it came there, and nothing of its
-    /// force; what friction holds of it, where it `is_rubbed`, is judged by
-    /// [`Self::is_held_by`] before.
+    /// Checks the proxy of the next tick and its motion, but not its force. If friction may hold it
+    /// (`is_rubbed`), [`Self::is_held_by`] checks that before.
     ///
     /// # Errors
     /// The first invariant that it breaks.
@@ -189,8 +187,7 @@ impl<'g> TickOracle<'g> {
         self.tick += 1;
     }
 
-    /// Judges whether the proxy of the next tick is where a friction lets it be that is known to
-    /// lie between two.
+    /// Checks that the proxy of the next tick is where a friction between these two allows it.
     ///
     /// # Errors
     /// [`Invariant::Cone`] and [`Invariant::Stuck`].
@@ -212,7 +209,7 @@ impl<'g> TickOracle<'g> {
         verdict
     }
 
-    /// Judges the texture of the next tick, and nothing else.
+    /// Checks only the texture of the next tick.
     ///
     /// # Errors
     /// [`Invariant::Texture`].
@@ -222,7 +219,7 @@ impl<'g> TickOracle<'g> {
         verdict
     }
 
-    /// Judges the next tick: everything that it breaks.
+    /// Checks the next tick. Returns all violations.
     pub fn all(&mut self, seen: &ObservedTick) -> Vec<Violation> {
         let output = &seen.output;
         self.measured.states[output.state as usize] += 1;
@@ -279,7 +276,7 @@ impl<'g> TickOracle<'g> {
         }
     }
 
-    /// The force is the one without texture, and what the texture adds.
+    /// Checks that the force is the untextured one plus the texture's.
     fn is_textured(&mut self, seen: &ObservedTick) -> Verdict {
         let judged = self.texture.as_mut().map(|judge| judge.look(seen));
         match judged {

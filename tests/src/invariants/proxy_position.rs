@@ -1,12 +1,12 @@
-//! Invariants of the proxy's place.
+//! Invariants of the proxy's position.
 
 use super::observed_tick::{ERROR, ObservedTick};
 use super::oracle::{TickOracle, Verdict};
 use super::surface::{Patch, distance, patches_at};
 use super::{Invariant, descent};
 
-/// HIPs farther from the surface than this, in cells, are so far that distances
-/// to all that is near the proxy count as equal.
+/// Distance of the HIP from the surface, cells, beyond which all distances to points near the proxy
+/// count as equal.
 const FAR: f64 = 1e4;
 
 /// An exact local closest point.
@@ -14,7 +14,7 @@ struct Minimum {
     at: [f64; 3],
     /// Distance of the proxy from it, cells.
     off: f64,
-    /// Start of the path down to it, with its patch.
+    /// Start of the descent to it, with its patch.
     start: [f64; 2],
     patch: Patch,
 }
@@ -45,7 +45,7 @@ impl TickOracle<'_> {
             return Ok(()); // off the surface: reported before
         };
         self.measured.judged += 1;
-        // Within the bound of the HIP itself there is no force to be wrong about.
+        // Within the error bound of the HIP itself there is no force to check.
         if !(ERROR..=FAR).contains(&distance(seen.proxy, seen.hip)) {
             return Ok(());
         }
@@ -57,16 +57,16 @@ impl TickOracle<'_> {
             return Ok(());
         }
         self.measured.beyond += 1;
-        // Up a wall rounding of the height decides which of two minima is the nearer one.
+        // On a steep slope, rounding of the height decides which of two minima is nearer.
         let tie = error + seen.rounding_of_corners(self.terrain);
         let near = minima.iter().take_while(|minimum| minimum.off <= tie);
         let verdicts = near.map(|minimum| self.is_near_in_plane(seen, minimum));
         verdicts.reduce(Verdict::or).unwrap_or(Ok(()))
     }
 
-    /// On steep ground a unit in the last place of a coordinate is much height: the bound is one in
-    /// the plane. And how far does the truth move for a rounding of the HIP, or of the heights
-    /// above it that are mixed there?
+    /// On steep ground a unit in the last place of a coordinate is a large height, so the bound
+    /// applies in the plane. It includes the motion of the minimum due to rounding of the HIP and
+    /// of the corner heights.
     fn is_near_in_plane(&self, seen: &ObservedTick, minimum: &Minimum) -> Verdict {
         let Minimum {
             at, start, patch, ..
@@ -93,12 +93,12 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    /// A contact that pulls holds a HIP which is free to go: from each place that the
-    /// proxy may be at, the straight way to it starts above the ground.
+    /// Checks that no contact pulls on a HIP that is free to leave: from no point of the proxy may
+    /// the straight line to it start above the ground.
     pub(super) fn is_hip_below(&self, seen: &ObservedTick) -> Verdict {
         let above = starts(seen.proxy).map(|start| self.height_of_way(seen, start));
         let above = above.fold(f64::INFINITY, |least, above| {
-            // Over a hole there is no ground: the proxy is held at its edge.
+            // Over no-data there is no ground: the proxy is held at its edge.
             least.min(above.unwrap_or(f64::NEG_INFINITY))
         });
         if above > 4.0 * seen.allowed() {
@@ -107,8 +107,8 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    /// Returns the height of the HIP above the tangent plane of the patch that the straight way to
-    /// it leads into from a place; `None` where it leads into none.
+    /// Returns the height of the HIP above the tangent plane of the patch into which the straight
+    /// line from a point to it leads, or `None` if it leads into none.
     fn height_of_way(&self, seen: &ObservedTick, start: [f64; 2]) -> Option<f64> {
         let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
         let level = way[0].hypot(way[1]);
@@ -116,7 +116,7 @@ impl TickOracle<'_> {
         let above = patches.filter(|patch| leads_into(start, way, patch));
         let above = above.map(|patch| {
             let [east, north] = patch.slopes(start[0], start[1]);
-            // Of the heights that are mixed, and of a rounded place the slope's.
+            // Rounding of the corner heights, and of the slope at a rounded position.
             let heights = patch.mixed_size(start[0], start[1], seen.hip[2]);
             let rounding = 4.0 * f64::from(f32::EPSILON) * heights;
             let unsure = rounding + 4.0 * ERROR * patch.twist().abs() * level;
@@ -126,16 +126,15 @@ impl TickOracle<'_> {
         above.reduce(f64::min)
     }
 
-    /// The patches that single precision cannot tell the proxy's place from, and
-    /// where in them it is.
+    /// Returns the patches that contain the proxy to single precision, and its point in each.
     pub(super) fn nearby(&self, proxy: [f64; 3]) -> impl Iterator<Item = ([f64; 2], Patch)> + '_ {
         starts(proxy).flat_map(|start| {
             patches_at(self.terrain, start[0], start[1]).map(move |patch| (start, patch))
         })
     }
 
-    /// The exact closest points from the patches that single precision cannot tell the proxy's
-    /// place from, the nearest first.
+    /// Returns the exact closest points from the patches that contain the proxy to single
+    /// precision, nearest first.
     fn minima(&self, proxy: [f64; 3], hip: [f64; 3]) -> Vec<Minimum> {
         let minimum = |(start, patch)| {
             let at = descent::from(self.terrain, hip, start, patch).at;
@@ -154,7 +153,7 @@ impl TickOracle<'_> {
 
     pub(super) fn is_above(&self, seen: &ObservedTick, before: Option<&ObservedTick>) -> Verdict {
         let [x, y, z] = seen.hip;
-        // On a line of the grid the HIP is over the patch to the north-east.
+        // On a grid line the HIP is over the patch to the north-east.
         let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
             return Ok(());
         };
@@ -168,7 +167,7 @@ impl TickOracle<'_> {
     }
 }
 
-/// Returns true if a way from a place of a patch leads into it, or along its border.
+/// Returns true if a direction at a point of a patch leads into the patch, or along its border.
 fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
     (0..2).all(|axis| {
         let place = start[axis] - f64::from(patch.cell[axis]);
@@ -176,20 +175,20 @@ fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
     })
 }
 
-/// Distance in the plane.
+/// Returns the distance in the plane.
 fn level(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// The places that single precision cannot tell a proxy's from.
+/// Returns the points that equal the proxy to single precision.
 fn starts(proxy: [f64; 3]) -> impl Iterator<Item = [f64; 2]> {
     let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
     xs.into_iter()
         .flat_map(move |x| ys.clone().into_iter().map(move |y| [x, y]))
 }
 
-/// A coordinate, and the border of a patch that single precision cannot tell it
-/// from: on a sharp ridge its two sides lead to different valleys.
+/// Returns a coordinate, and the border of a patch if it equals it to single precision: from a
+/// sharp ridge its two sides lead to different valleys.
 fn sides(x: f64) -> Vec<f64> {
     const ROUNDING: f64 = 1e-6;
     let border = x.round();

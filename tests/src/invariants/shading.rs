@@ -10,22 +10,22 @@ use super::oracle::{TickOracle, Verdict};
 use super::surface::Patch;
 use crate::scene::terrain::Terrain;
 
-/// Part by which the length may be off.
+/// Tolerance of the length, as a fraction.
 const LENGTH: f64 = 1e-5;
-/// A shorter force has no direction to speak of, cells.
+/// Shorter displacements have no reliable direction, cells.
 const SHORT: f64 = 1e-2;
 /// Rounding of a direction, rad.
 const ANGLE: f64 = 1e-3;
-/// A proxy so near to its patch's border may be on it, where patches meet.
+/// Distance from a border of patches, cells, within which the proxy may be on it.
 const BORDER: f64 = 1e-5;
-/// Most that a force is turned.
+/// Largest angle by which a force is turned, rad.
 const MAX_TURN: f64 = 60.0 / 45.0 * FRAC_PI_4;
-/// Bend up to which the direction changes along a whole edge, and from which along a fifth.
+/// Bends up to which the direction changes along a whole edge, and from which along a fifth.
 const GENTLE: f64 = FRAC_PI_4;
 const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
 
 impl TickOracle<'_> {
-    /// As long as without shading; inside of a patch along the smoothed normal, on ice.
+    /// Checks the length, and without friction the direction inside a patch.
     pub(super) fn is_shaded(&self, seen: &ObservedTick) -> Verdict {
         let Some(shaded) = seen.shaded else {
             return Ok(());
@@ -53,7 +53,7 @@ impl TickOracle<'_> {
         };
         let [east, north] = patch.slopes(x, y);
         let normal = DVec3::new(-east, -north, 1.0);
-        // The force is off its normal by as much as it is without shading.
+        // Without shading the force already deviates from its normal by this much.
         let allowed = ANGLE + angle(plain, normal);
         let wanted = angle(normal, smoothed).min(MAX_TURN);
         let left = (angle(normal, smoothed) - wanted).max(0.0);
@@ -66,13 +66,13 @@ impl TickOracle<'_> {
     }
 }
 
-/// The angle between two vectors, rad.
+/// Returns the angle between two vectors, rad.
 fn angle(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b))
 }
 
-/// By the samples around; `None` next to a hole or the border of the data, or where a step is
-/// so high that rounding decides.
+/// Returns the normal from the samples around; `None` next to no-data or the border, or if a step
+/// is so high that rounding decides.
 fn smoothed_normal(terrain: &Terrain, [x, y]: [f64; 2]) -> Option<DVec3> {
     let (col, row) = (x.floor() as i32, y.floor() as i32);
     let (u, v) = (x - x.floor(), y - y.floor());
@@ -90,7 +90,7 @@ fn smoothed_normal(terrain: &Terrain, [x, y]: [f64; 2]) -> Option<DVec3> {
     Some(DVec3::new(-east, -north, 1.0))
 }
 
-/// The slope at a place between the middle two of four samples.
+/// Returns the slope at a point between the middle two of four samples.
 fn smoothed_slope(posts: [f64; 4], place: f64) -> Option<f64> {
     let angle = |i: usize| (posts[i + 1] - posts[i]).atan();
     let [before, own, after] = [angle(0), angle(1), angle(2)];
@@ -101,7 +101,7 @@ fn smoothed_slope(posts: [f64; 4], place: f64) -> Option<f64> {
         let part = (bend.cos() - SHARP.cos()) / (GENTLE.cos() - SHARP.cos());
         0.2 + 0.8 * part.clamp(0.0, 1.0)
     };
-    // Directions are mixed, not angles.
+    // Directions are blended, not angles.
     let part = |bend: f64, away: f64| 0.5 * (1.0 - away / reach(bend)).max(0.0);
     let (first, last) = (part(before - own, place), part(after - own, 1.0 - place));
     let mix = |of: fn(f64) -> f64| {

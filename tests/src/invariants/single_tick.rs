@@ -8,8 +8,8 @@ use super::observed_tick::{CELLS_MM, ObservedTick, PARAMS};
 use super::oracle::{TickOracle, Verdict};
 use super::surface::distance;
 
-/// Part by which a force may be off: the clamp keeps eight units in the last
-/// place below its limit.
+/// Tolerance of a force, as a fraction: the clamp stays eight units in the last place below its
+/// limit.
 const FORCE_ERROR: f64 = 2e-6;
 
 impl TickOracle<'_> {
@@ -31,8 +31,8 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    /// No force but of a contact; a free proxy in the HIP; a contact's displacement
-    /// a part of the way to the proxy.
+    /// Checks that there is no force without contact, that a free proxy is at the HIP, and that the
+    /// displacement of a contact is a fraction of the vector to the proxy.
     pub(super) fn is_consistent(&self, seen: &ObservedTick) -> Verdict {
         let output = &seen.output;
         let none = output.displacement.to_array() == [0.0; 3];
@@ -45,7 +45,7 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    /// The force is the spring's, or as long as the clamp.
+    /// Checks that the force is the spring's, limited by the clamp.
     pub(super) fn is_clamped(&self, seen: &ObservedTick) -> Verdict {
         let displacement = seen.output.displacement.as_dvec3().to_array();
         let most = f64::from(PARAMS.max_force_n);
@@ -54,7 +54,7 @@ impl TickOracle<'_> {
             let spring = displacement.map(|s| s * rate);
             let part = (most / length(spring)).min(1.0);
             let off = distance(force, spring.map(|f| f * part));
-            // Half a unit in the last place is what its own length may be off.
+            // The length itself may be off by half a unit in the last place.
             let is_long = length(force) > most * (1.0 + 1e-7);
             let error = FORCE_ERROR * length(spring).min(most) + f64::from(f32::MIN_POSITIVE);
             let is_off = !(0.0..=error).contains(&off);
@@ -71,8 +71,8 @@ fn length(v: [f64; 3]) -> f64 {
     distance(v, [0.0; 3])
 }
 
-/// Returns true if the displacement is the way from the HIP to the proxy, times a boundary fade
-/// in `[0, 1]`.
+/// Returns true if the displacement is the vector from the HIP to the proxy, times an edge fade in
+/// `[0, 1]`.
 fn is_part_of_the_way(seen: &ObservedTick) -> bool {
     let way = [0, 1, 2].map(|i| seen.proxy[i] - seen.hip[i]);
     let output = seen.output.displacement.as_dvec3().to_array();

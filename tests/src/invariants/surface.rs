@@ -2,10 +2,10 @@
 
 use crate::scene::terrain::Terrain;
 
-/// A field whose patches can be asked for by their cells.
+/// A field that returns the corners of a patch by its cell.
 pub trait Corners {
-    /// Heights of a patch's corners in cells: south-west, south-east, north-west,
-    /// north-east; `None` where there is no patch.
+    /// Returns the heights of a patch's corners in cells: south-west, south-east, north-west,
+    /// north-east; `None` if there is no patch.
     fn corners(&self, cell: [i32; 2]) -> Option<[f64; 4]>;
 }
 
@@ -15,7 +15,7 @@ impl Corners for Terrain {
     }
 }
 
-/// One patch, heights as they are: z = d + b·u + c·v + a·u·v.
+/// One patch with unscaled heights: z = d + b·u + c·v + a·u·v.
 #[derive(Clone, Copy, Debug)]
 pub struct Patch {
     /// Its column and row.
@@ -27,7 +27,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// The patch in a cell, unless there is none.
+    /// Returns the patch of a cell, if there is one.
     #[must_use]
     pub fn at(field: &impl Corners, cell: [i32; 2]) -> Option<Self> {
         let [sw, se, nw, ne] = field.corners(cell)?;
@@ -40,36 +40,36 @@ impl Patch {
         })
     }
 
-    /// Height at a place of the terrain.
+    /// Returns the height at a point of the terrain.
     #[must_use]
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let (u, v) = self.local(x, y);
         self.d + self.b * u + (self.c + self.a * u) * v
     }
 
-    /// Slopes eastward and northward.
+    /// Returns the slopes eastward and northward.
     #[must_use]
     pub fn slopes(&self, x: f64, y: f64) -> [f64; 2] {
         let (u, v) = self.local(x, y);
         [self.b + self.a * v, self.c + self.a * u]
     }
 
-    /// Returns its slope at a place.
+    /// Returns the slope at a point.
     #[must_use]
     pub fn slope(&self, x: f64, y: f64) -> f64 {
         let [east, north] = self.slopes(x, y);
         east.hypot(north)
     }
 
-    /// Heights of its corners.
+    /// Returns the heights of its corners.
     #[must_use]
     pub fn corners(&self) -> [f64; 4] {
         let (b, c) = (self.d + self.b, self.d + self.c);
         [self.d, b, c, b + self.c + self.a]
     }
 
-    /// Returns the size of the terms of the height above `from` at a place, signs left out: a
-    /// corner that has no part in the place does not count.
+    /// Returns the sum of the absolute terms of the height above `from` at a point: a corner with
+    /// zero weight does not count.
     #[must_use]
     pub fn mixed_size(&self, x: f64, y: f64, from: f64) -> f64 {
         let (u, v) = self.local(x, y);
@@ -77,13 +77,13 @@ impl Patch {
         (1.0 - v) * ((1.0 - u) * sw + u * se) + v * ((1.0 - u) * nw + u * ne)
     }
 
-    /// The twist: how much a slope changes over the patch.
+    /// Returns the twist: the change of a slope across the patch.
     #[must_use]
     pub fn twist(&self) -> f64 {
         self.a
     }
 
-    /// Middle Bernstein coefficient of the height along a straight line.
+    /// Returns the middle Bernstein coefficient of the height along a straight line.
     #[must_use]
     pub fn blossom(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
         let (u0, v0) = self.local(from[0], from[1]);
@@ -96,8 +96,8 @@ impl Patch {
     }
 }
 
-/// The patches that a place belongs to: one inside, two on an edge, four on a
-/// vertex, less where there are holes.
+/// Returns the patches of a point: one inside, two on an edge, four on a vertex, fewer next to
+/// no-data.
 pub fn patches_at(terrain: &Terrain, x: f64, y: f64) -> impl Iterator<Item = Patch> + '_ {
     let rows = sides(y);
     sides(x)
@@ -105,7 +105,7 @@ pub fn patches_at(terrain: &Terrain, x: f64, y: f64) -> impl Iterator<Item = Pat
         .filter_map(|cell| Patch::at(terrain, cell))
 }
 
-/// The cells along one axis that a coordinate belongs to.
+/// Returns the cells along one axis that contain a coordinate.
 fn sides(x: f64) -> std::ops::RangeInclusive<i32> {
     let cell = x.floor() as i32;
     if x == x.floor() {
@@ -115,7 +115,7 @@ fn sides(x: f64) -> std::ops::RangeInclusive<i32> {
     }
 }
 
-/// Distance of two points.
+/// Returns the distance of two points.
 #[must_use]
 pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()

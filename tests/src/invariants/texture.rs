@@ -1,5 +1,4 @@
-//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and whole
-//! numbers.
+//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and integers.
 
 use glam::DVec3;
 use hapterra_core::force::{Pattern, Texture};
@@ -7,38 +6,38 @@ use hapterra_core::grid::GridPoint;
 
 use super::observed_tick::ObservedTick;
 
-/// A tick of the soak, s.
+/// A tick of the stress test, s.
 const TICK_S: f64 = 1e-3;
-/// Rounding, as a part of the depth and of the amplitude.
+/// Rounding, as a fraction of the depth and of the amplitude.
 const ROUNDING: f64 = 1e-5;
-/// The part along the surface is so far from it.
+/// Tolerance against pulling, as a fraction of the depth.
 const PULL: f64 = 1e-6;
-/// The product's sine is so far off at most, and its slope.
+/// Error bounds of the product's sine and of its slope.
 const SINE: f64 = 5e-4;
 const SLOPE: f64 = 1e-2;
-/// Grain's rounding, of heights and slopes of 1.
+/// Rounding of grain with heights and slopes of 1.
 const GRAIN: f64 = 1e-5;
-/// A force that is rendered in full is so far in the texture's share, by rounding of a speed.
+/// Additional tolerance, as a fraction of the texture's share, due to rounding of a speed.
 const SHARE: f64 = 1e-3;
-/// Depths whose squares are no normal numbers have no texture, cells.
+/// Depths whose squares are subnormal have no texture, cells.
 const SHALLOW: f64 = 2e-19;
 const DEEP: f64 = 1e18;
 
-/// Judges the texture of one scene, of cells of a millimetre, tick by tick.
+/// Checks the texture of one scene with cells of a millimetre, tick by tick.
 #[derive(Clone, Debug)]
 pub struct TextureJudge {
     texture: Texture,
     before: Option<GridPoint>,
-    /// Wavelengths a tick.
+    /// Wavelengths a tick, decaying.
     speed: f64,
 }
 
 /// Contribution of a texture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Added {
-    /// To the displacement, cells.
+    /// Addition to the displacement, cells.
     pub(super) wanted: DVec3,
-    /// By so much the displacement may be off, cells.
+    /// Error bound of the displacement, cells.
     pub(super) allowed: f64,
 }
 
@@ -49,7 +48,7 @@ pub(super) struct TextureBounds {
     pub(super) amplitude: f64,
     /// Addition to the depth.
     pub(super) rise: f64,
-    /// Most that it adds along the surface.
+    /// Largest addition along the surface.
     pub(super) along: f64,
 }
 
@@ -57,7 +56,7 @@ pub(super) struct TextureBounds {
 type Verdict = Result<(), String>;
 
 impl TextureJudge {
-    /// Before the first tick.
+    /// Creates the oracle before the first tick.
     #[must_use]
     pub const fn new(texture: Texture) -> Self {
         Self {
@@ -67,10 +66,10 @@ impl TextureJudge {
         }
     }
 
-    /// Judges the next tick.
+    /// Checks the next tick.
     ///
     /// # Errors
-    /// The fault of its force.
+    /// The error of its force.
     pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
         let share = self.share(&seen.output.proxy);
         let Some(textured) = seen.textured else {
@@ -94,13 +93,13 @@ impl TextureJudge {
                 "{textured} is {off:e} off {plain} and {share} of {wanted}, {allowed:e} may be: {seen:?}"
             )
         };
-        // To the bit, where the proxy is too fast.
+        // Exact, if the proxy is too fast for any texture.
         let is_gone = (2.0 - 8.0 * self.speed) < -1e-5;
         held(off <= allowed && (!is_gone || textured == plain), told)
     }
 
-    /// Returns the contribution of the whole texture to a displacement at a place, cells, where a
-    /// share of it is rendered.
+    /// Returns the contribution of the whole texture to a displacement at a point, cells; `share`
+    /// only changes the error bound.
     pub(super) fn adds(&self, plain: DVec3, proxy: &GridPoint, share: f64) -> Added {
         let depth = plain.length();
         let normal = plain / depth;
@@ -123,7 +122,7 @@ impl TextureJudge {
         Added { wanted, allowed }
     }
 
-    /// Returns the height and slope of the whole texture at a place, under so much depth, cells.
+    /// Returns the height and slope of the whole texture at a point and depth, cells.
     pub(super) fn relief(&self, proxy: &GridPoint, depth: f64) -> TextureBounds {
         let (amplitude, wavelength) = self.sizes();
         let (height, slopes) = height_and_slopes(&self.texture, proxy);
@@ -135,13 +134,13 @@ impl TextureJudge {
         }
     }
 
-    /// Wavelengths a tick.
+    /// Returns the speed in wavelengths a tick.
     pub(super) const fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Returns the precision of a place, cells: to 2⁻²³; along a way of any direction, which is
-    /// rounded, to the last place of the distance from the origin.
+    /// Returns the error of a position, cells: 2⁻²³, or for a turned texture, whose direction is
+    /// rounded, the last place of the distance from the origin.
     fn misplaced(&self, at: &GridPoint) -> f64 {
         let [x, y, _] = at.cell().map(|cell| f64::from(cell.unsigned_abs()));
         let is_turned = self.texture.direction_deg != 0.0;
@@ -156,8 +155,8 @@ impl TextureJudge {
         )
     }
 
-    /// Returns the rendered share of a texture at a proxy: a speed that falls does so by a tenth a
-    /// tick.
+    /// Returns the rendered share of a texture at a proxy. The speed in it falls by at most a tenth
+    /// a tick.
     pub(super) fn share(&mut self, proxy: &GridPoint) -> f64 {
         let now = self.before.map_or(1.0, |before| {
             let way = before.to(proxy).as_dvec3();
@@ -174,7 +173,7 @@ fn held(holds: bool, told: impl Fn() -> String) -> Verdict {
     holds.then_some(()).ok_or_else(told)
 }
 
-/// The height of a texture as high as 1 at a place, and the slopes of the one that is asked for.
+/// Returns the height of a texture of amplitude 1 at a point, and the slopes of `texture`.
 fn height_and_slopes(texture: &Texture, at: &GridPoint) -> (f64, DVec3) {
     let amplitude = f64::from(texture.amplitude_mm);
     let waves = 1.0 / texture.wavelength_mm;
@@ -196,7 +195,7 @@ fn height_and_slopes(texture: &Texture, at: &GridPoint) -> (f64, DVec3) {
     }
     let angle = f64::from(texture.direction_deg).to_radians();
     let way = DVec3::new(angle.cos(), angle.sin(), 0.0);
-    // Rounded once, as the texture is made of it.
+    // Rounded once, as in the product.
     let [east, north] = [way.x, way.y].map(|part| (part as f32) * waves);
     let seed = f64::from(scrambled(texture.seed)) / 2_f64.powi(32);
     let turns = counted(east, cell[0], frac.x).1 + counted(north, cell[1], frac.y).1 + seed;
@@ -205,7 +204,7 @@ fn height_and_slopes(texture: &Texture, at: &GridPoint) -> (f64, DVec3) {
     (sin, way * steepness)
 }
 
-/// A coordinate times a number a cell: whole ones, and the rest.
+/// Returns the integer and fractional part of a coordinate times a number per cell.
 fn counted(per_cell: f32, cell: i32, frac: f32) -> (i64, f64) {
     let per_cell = (f64::from(per_cell) * 2_f64.powi(32)) as i128;
     let place = (i128::from(cell) << 30) + (f64::from(frac) * 2_f64.powi(30)) as i128;

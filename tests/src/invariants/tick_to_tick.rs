@@ -9,16 +9,15 @@ use super::surface::{distance, patches_at};
 use super::{Invariant, crossing};
 use crate::scene::terrain::{Kind, WALL, WALL_EVERY};
 
-/// Distances that differ by less than this part count as equal: the squared
-/// distance is compared to 10⁻⁶ in each patch on the way.
+/// Distances that differ by less than this fraction count as equal: the product compares the
+/// squared distance to 10⁻⁶ in each patch of a path.
 const TIE: f64 = 4e-6;
-/// A HIP that moves no farther than this in a tick, in cells, is in the same
-/// contact as before.
+/// Motion of the HIP in a tick, cells, up to which the contact is the same as before.
 const NEAR: f64 = 0.1;
-/// A HIP that moves by less than this part of the way to it lies in the same direction.
+/// Motion of the HIP, as a fraction of its distance, up to which its direction counts as unchanged.
 const AHEAD: f64 = 0.25;
-/// Ticks in which a proxy in the air may come no farther: the longest way there is has
-/// to be halved, looked along and halved again before a first piece of it is gone through.
+/// Ticks in which a proxy in the air may make no progress: the longest path must be halved,
+/// searched and halved again before its first part is traversed.
 const STALLED: u32 = 4;
 
 impl TickOracle<'_> {
@@ -33,12 +32,12 @@ impl TickOracle<'_> {
         let moved = distance(before.hip, seen.hip);
         let hopped = distance(before.proxy, seen.proxy);
         if !before.is_touching() || moved > NEAR {
-            return Ok(()); // a new contact may come at once
+            return Ok(()); // a new contact may begin at once
         }
         let rate = f64::from(RATE) + 1e-3;
         let broken = match (before.edge_fade(), seen.edge_fade()) {
             (Some(was), Some(is)) => hopped < 2.0 * NEAR && (is - was).abs() > rate,
-            // Let go: there was next to nothing left.
+            // A release ends when almost no force is left.
             (Some(was), None) => seen.output.state == ContactState::Unseeded && was > rate,
             (None, _) => false,
         };
@@ -53,7 +52,7 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    /// Checks that the last force fades to nothing in equal steps.
+    /// Checks that a releasing force fades to zero in equal steps.
     pub(super) fn lets_go_gently(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let output = |seen: &ObservedTick| seen.output.displacement.as_dvec3().length();
         let lets_go = |seen: &ObservedTick| seen.output.state == ContactState::Releasing;
@@ -63,7 +62,7 @@ impl TickOracle<'_> {
         let step = output(before) - output(seen);
         let most = (f64::from(RATE) + 1e-3) * self.let_go_from;
         let ends = lets_go(before) || lets_go(seen);
-        // It gets less, and does not turn.
+        // The force decreases and does not turn.
         let [was, is] = [before, seen].map(|seen| seen.output.displacement.as_dvec3());
         let turned = was.cross(is).length() > 1e-6 * was.length() * is.length().max(1e-6);
         if ends && (turned || !(-1e-6..=most + 1e-6).contains(&step)) {
@@ -74,7 +73,7 @@ impl TickOracle<'_> {
     }
 
     pub(super) fn descends(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        // A proxy that waits for a tile continues from where it entered its patch.
+        // A proxy that waits for a tile continues from its entry into the patch.
         let waited = before.output.missing_tile.is_some();
         if !(before.is_touching() && seen.is_touching()) || waited {
             return Ok(());
@@ -94,7 +93,7 @@ impl TickOracle<'_> {
         is > was * (1.0 + TIE) + allowed(seen) + allowed(before)
     }
 
-    /// In real time: a tick that is repeated has [`Invariant::Settles`].
+    /// Only in real time: [`Invariant::Settles`] covers repeated ticks.
     pub(super) fn advances(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let flies = |seen: &ObservedTick| {
             let output = &seen.output;
@@ -113,7 +112,7 @@ impl TickOracle<'_> {
     }
 
     pub(super) fn first_crossing(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        // Lowered by what rounding may do, the way meets the surface no later.
+        // Lowered by the rounding, the path meets the surface no later.
         let slope = patches_at(self.terrain, seen.proxy[0], seen.proxy[1])
             .map(|patch| patch.slope(seen.proxy[0], seen.proxy[1]))
             .fold(0.0, f64::max);
@@ -149,7 +148,7 @@ impl TickOracle<'_> {
             (0..2).all(|axis| (0.0..f64::from(self.terrain.size[axis])).contains(&p[axis]))
         };
         let held = |seen: &ObservedTick| seen.output.state != ContactState::Unseeded;
-        // Any place on a wall's top is farther from the HIP than the proxy was.
+        // Any point on top of a wall is farther from the HIP than the proxy was.
         let out_of_reach = WALL - seen.hip[2] > distance(before.proxy, seen.hip) + 1.0;
         if self.terrain.kind != Kind::Walls
             || !(held(before) && held(seen) && out_of_reach)

@@ -1,13 +1,13 @@
-//! The two directions between host and device, and what may be done to each.
+//! The two directions between host and device, and their faults.
 
 use std::collections::VecDeque;
 
 use crate::random::Random;
 
-/// Bytes that a direction holds at most: a device that finds no room waits, as one does
-/// whose host does not read.
+/// Capacity of a direction in bytes: without room a device waits, as it does while its host does
+/// not read.
 const CAPACITY: usize = 8 << 10;
-/// Bytes that a device may send in a tick: a full-speed USB's, about.
+/// Bytes that a device may send in a tick, about as many as over full-speed USB.
 pub const A_TICK: usize = 1_024;
 
 /// Fault of one direction.
@@ -17,18 +17,18 @@ pub struct Harm {
     pub flipped: f64,
     /// Share of transfers that lose a run of bytes.
     pub dropped: f64,
-    /// Share of transfers that come twice.
+    /// Share of transfers that are duplicated.
     pub twice: f64,
-    /// Milliseconds that a transfer is late, at most.
+    /// Largest delay of a transfer, ms.
     pub late: u32,
     /// True if no transfer moves.
     pub stalled: bool,
-    /// Nothing gets in, and what was on its way is gone.
+    /// True if it is cut: new bytes are lost, and so are those in transit.
     pub cut: bool,
 }
 
 impl Harm {
-    /// None.
+    /// No fault.
     pub const NONE: Self = Self {
         flipped: 0.0,
         dropped: 0.0,
@@ -57,13 +57,13 @@ impl Way {
         }
     }
 
-    /// Bytes that there is room for.
+    /// Returns the free capacity in bytes.
     #[must_use]
     pub fn room(&self) -> usize {
         CAPACITY.saturating_sub(self.held)
     }
 
-    /// Puts a transfer in at `now`, ms.
+    /// Sends a transfer at `now`, ms.
     pub fn send(&mut self, bytes: &[u8], now: u64, random: &mut Random) {
         if bytes.is_empty() || self.harm.cut {
             return;
@@ -86,7 +86,7 @@ impl Way {
         }
     }
 
-    /// The next transfer that has arrived.
+    /// Returns the next transfer that has arrived.
     pub fn receive(&mut self, now: u64) -> Option<Vec<u8>> {
         let (due, _) = self.transfers.front()?;
         if self.harm.stalled || *due > now {
@@ -97,7 +97,7 @@ impl Way {
         Some(transfer)
     }
 
-    /// Puts back what was not taken.
+    /// Returns unread bytes to the cable.
     pub fn put_back(&mut self, rest: &[u8], now: u64) {
         if !rest.is_empty() {
             self.held += rest.len();
@@ -110,12 +110,12 @@ fn happens(share: f64, random: &mut Random) -> bool {
     share > 0.0 && random.between(0.0, 1.0) < share
 }
 
-/// Flips a bit in so many of the bytes.
+/// Flips a bit in this share of the bytes.
 fn flip(bytes: &mut [u8], share: f64, random: &mut Random) {
     if share <= 0.0 {
         return;
     }
-    // From one flip to the next it is so many bytes.
+    // Distance of two flips in bytes.
     let stride = |random: &mut Random| {
         let u = random.between(f64::MIN_POSITIVE, 1.0);
         (libm::log(u) / libm::log1p(-share)) as usize

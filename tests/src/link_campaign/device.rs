@@ -22,22 +22,22 @@ const WINDOW: usize = 4;
 pub struct Board<'t> {
     device: Device<StoppedClock, WINDOW>,
     arm: Arm<'t>,
-    /// Holds every tick to its bounds.
+    /// Checks every tick against its bounds.
     pub watch: Watch,
     /// True if the hand holds the dead-man switch.
     pub dead_man: bool,
-    /// Mood of the hand.
+    /// Behaviour of the hand.
     pub mood: Mood,
     /// Commands to the amplifiers in the last tick.
     pub drive: GuardOutputs,
-    /// True if the device's time stands still while it waits for the host.
+    /// True if the device's time stops while it waits for the host.
     pub lock_step: bool,
-    /// Ticks so far, and those with the amplifiers on.
+    /// Ticks up to now, and those with the amplifiers on.
     pub ticks: [u64; 2],
 }
 
 impl<'t> Board<'t> {
-    /// A board that was just switched on, its arm over the middle of a terrain.
+    /// Creates a board after power-up, with its arm over the middle of a terrain.
     pub fn new(terrain: &'t Terrain<'t>, random: &mut Random) -> Self {
         let record = Calibration::PREMIUM_1_5;
         Self {
@@ -52,30 +52,30 @@ impl<'t> Board<'t> {
         }
     }
 
-    /// The terrain point at the home pose, mm.
+    /// Returns the terrain point at the home pose, mm.
     #[must_use]
     pub fn home_mm(&self) -> [f64; 3] {
         self.arm.home_mm()
     }
 
-    /// Restarts the device; the arm stays where it is.
+    /// Restarts the device; the arm keeps its position.
     pub fn restart(&mut self) {
         self.device = start();
         self.drive = GuardOutputs::default();
         self.watch.forget();
     }
 
-    /// The transport says that it was interrupted.
+    /// Reports an interruption of the transport.
     pub fn interrupt(&mut self) {
         self.device.link.interrupted();
     }
 
-    /// Takes bytes from the host; gives how many it took.
+    /// Receives bytes from the host. Returns the number of bytes accepted.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         self.device.receive(bytes)
     }
 
-    /// Returns the device's bytes, as far as there is room for them.
+    /// Returns the bytes that the device sends, up to `room`.
     pub fn say<'b>(&mut self, into: &'b mut [u8; A_TICK], room: usize) -> &'b [u8] {
         let room = room.min(A_TICK);
         let said = self.device.link.transmit(&mut into[..room]);
@@ -88,7 +88,7 @@ impl<'t> Board<'t> {
     /// The broken invariant.
     pub fn tick(&mut self) -> Result<(), String> {
         if self.lock_step && self.device.link.may_stand_still() {
-            // The link's task runs all the same.
+            // The link's task runs nevertheless.
             self.device.receive(&[]);
             return Ok(());
         }
@@ -115,8 +115,8 @@ impl<'t> Board<'t> {
 }
 
 fn start() -> Device<StoppedClock, WINDOW> {
-    // The two halves of the application hand tile buffers to each other by reference, for
-    // as long as the program runs.
+    // The two halves of the application exchange tile buffers by reference, as long as the program
+    // runs.
     let tiles = Box::leak(Box::new(TileBuffers::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));
     let stored = Stored::Found(Calibration::PREMIUM_1_5);

@@ -3,39 +3,39 @@
 use super::cable::Harm;
 use crate::random::Random;
 
-/// Something that goes wrong.
+/// Kind of a link fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Bits flip, in one byte of a million to one of a hundred.
     Flips,
     /// Transfers lose a run of bytes.
     Drops,
-    /// Transfers come twice.
+    /// Transfers are duplicated.
     Duplicates,
-    /// Transfers come late.
+    /// Transfers are delayed.
     Delays,
-    /// Both directions stand still, then everything comes at once.
+    /// Both directions stop, then everything arrives at once.
     Stall,
     /// Nothing reaches the host.
     DeafHost,
     /// Nothing reaches the device.
     DeafDevice,
-    /// Nothing reaches either.
+    /// Nothing arrives at either end.
     Cut,
-    /// The host is killed and another is started.
+    /// The host is killed and another one starts.
     HostKilled,
-    /// The host is killed, and for a long time there is no other.
+    /// The host is killed, and no other starts for a long time.
     HostVanishes,
-    /// The device is restarted.
+    /// The device restarts.
     DeviceRestarted,
-    /// Another program talks to the device: noise, floods, messages that make no sense.
+    /// Another program sends to the device: noise, floods, invalid messages.
     HostileHost,
-    /// Something else answers the host.
+    /// A program that is not a device answers the host.
     HostileDevice,
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 13] = [
         Self::Flips,
         Self::Drops,
@@ -52,7 +52,7 @@ impl Kind {
         Self::HostileDevice,
     ];
 
-    /// For how many milliseconds it lasts, shortest and longest.
+    /// Returns its shortest and longest duration, ms.
     #[must_use]
     pub const fn duration(self) -> (usize, usize) {
         match self {
@@ -66,24 +66,24 @@ impl Kind {
     }
 }
 
-/// One fault of a kind that lasts.
+/// A fault with its duration.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault {
-    /// Its value.
+    /// Its kind.
     pub kind: Kind,
-    /// When it ends, ms.
+    /// The time at which it ends, ms.
     pub end: u64,
     share: f64,
-    /// Which directions a fault of the bytes harms: to the device, to the host.
+    /// Directions that a fault of the bytes affects: to the device, to the host.
     ways: [bool; 2],
 }
 
 impl Fault {
-    /// One that begins at `now`, ms.
+    /// Draws a fault of a kind that begins at `now`, ms.
     #[must_use]
     pub fn of(kind: Kind, now: u64, random: &mut Random) -> Self {
         let (shortest, longest) = kind.duration();
-        // As many short ones as long ones.
+        // Squared, so that short faults are more frequent.
         let segment = random.between(0.0, 1.0);
         let length = (longest - shortest) as f64 * segment * segment;
         Self {
@@ -94,7 +94,7 @@ impl Fault {
         }
     }
 
-    /// Returns its faults of the directions to the device and to the host.
+    /// Returns its faults for the directions to the device and to the host.
     #[must_use]
     pub fn harms(&self) -> [Harm; 2] {
         let harm = match self.kind {

@@ -1,5 +1,4 @@
-//! Tap of the frames that leave the device: data that the oracle has and the host does
-//! not.
+//! Tap of the frames that the device sends: data for the oracle that the host does not have.
 
 use std::collections::HashMap;
 
@@ -10,48 +9,46 @@ use hapterra_core::wire::session::SessionNumber;
 
 use super::frames;
 
-/// Within this time a device that repeats a request for a tile cannot know that the tile
-/// is lost, ms: its own time-out is as long.
+/// Time within which a device cannot detect that a requested tile is lost, ms: its own time-out.
 const EARLY: u64 = 200;
 
-/// When something left the device.
+/// The time at which a frame left the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     /// The time, ms.
     pub now: u64,
-    /// Ticks that the device has run.
+    /// Ticks of the device up to now.
     pub ticks: u64,
-    /// True if the line has not stood still lately: otherwise what leaves may have been
-    /// sent at any time before.
+    /// True if the line has not stalled recently: otherwise the frame may have been sent at any
+    /// earlier time.
     pub flows: bool,
 }
 
-/// Reads what the device says.
+/// Reads the frames of the device.
 #[derive(Default)]
 pub struct Tap {
-    /// The session that is counted.
+    /// The session under observation.
     session: Option<SessionNumber>,
     reader: Box<FrameReader<MAX_FRAME>>,
-    /// The first sample's tick and the last one's, in the present scene, since
-    /// [`Tap::begin`].
+    /// The ticks of the first and last sample in the present scene, since [`Tap::begin`].
     ticks: Option<(u32, u32)>,
-    /// Samples of the scenes before, since then.
+    /// Samples of earlier scenes since then.
     before: u64,
-    /// Of those scenes, the samples that were made after the last that left, at most: what
-    /// another scene replaces is dropped, and counted by the device.
+    /// Upper bound of the samples of earlier scenes that never left: a new scene drops them, and
+    /// the device counts them.
     replaced: u64,
-    /// Ticks that the device had run when it took a scene, since the last sample left.
+    /// Ticks of the device when it accepted a scene, since the last sample.
     taken: Option<u64>,
-    /// Ticks of the device that were not the scene's, before it: the least that any sample
-    /// was late to leave, so what it is for one that left at once.
+    /// Ticks of the device minus the scene's: the least over all samples, so the value for a sample
+    /// that left without delay.
     lead: u64,
     requested: HashMap<TileKey, u64>,
-    /// Requests for tiles that came too early after the last for the same tile.
+    /// Requests for a tile that came too early after the last one for the same tile.
     pub early: u32,
 }
 
 impl Tap {
-    /// A host begins, with this session; none where nothing is to be counted.
+    /// Starts the observation of a session, or stops it with `None`.
     pub fn begin(&mut self, session: Option<SessionNumber>) {
         self.session = session;
         self.requested.clear();
@@ -62,15 +59,15 @@ impl Tap {
         self.early = 0;
     }
 
-    /// Samples that were made from the first that left the device since [`Tap::begin`] to
-    /// the last, by the numbers of their ticks: also those that never left.
+    /// Returns the samples made between the first and the last one that left the device since
+    /// [`Tap::begin`], by their ticks, with those that never left.
     #[must_use]
     pub fn made(&self) -> u64 {
         self.before + self.ticks.map_or(0, length)
     }
 
-    /// Returns the largest number of samples that were made and have not left when the device has run so
-    /// many ticks: after the last of each scene that did, as many as the device ran ticks.
+    /// Returns an upper bound of the samples made but not sent at this tick of the device: for each
+    /// scene, the ticks since its last sample.
     #[must_use]
     pub fn unseen(&self, ticks: u64) -> u64 {
         self.replaced + self.made_since(ticks)
@@ -81,12 +78,12 @@ impl Tap {
         ticks.saturating_sub(self.lead.saturating_add(last))
     }
 
-    /// Takes what left the device.
+    /// Reads bytes from the device.
     pub fn hear(&mut self, mut bytes: &[u8], when: &Moment) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
-            // A frame that was cut short by a hello is none.
+            // A frame cut short by an open is dropped.
             let said = frame.and_then(|frame| frames::said_by_device(frame.ok()?));
             if let Some(said) = said.filter(|said| Some(said.session) == self.session) {
                 self.on_message(&said.message, when);
@@ -112,12 +109,12 @@ impl Tap {
         }
     }
 
-    /// Takes a sample that left when the device had run so many ticks.
+    /// Records a sample that left at `ticks` of the device.
     fn on_sample(&mut self, tick: u32, ticks: u64) {
         let taken = self.taken.take();
         self.ticks = Some(match self.ticks {
             Some((first, last)) if tick > last => (first, tick),
-            // A tick that goes back is that of another scene, whose ticks begin with 1.
+            // A lower tick belongs to a new scene, whose ticks begin with 1.
             Some(scene) => {
                 self.before += length(scene);
                 self.replaced += taken.map_or(0, |ticks| self.made_since(ticks));
@@ -162,7 +159,7 @@ mod tests {
             epoch: 7,
             accepted: true,
         };
-        // The first scene runs for 19 ticks; the word for it comes again in between.
+        // The first scene runs for 19 ticks; its acknowledgement is repeated in between.
         say(0, taken());
         say(9, samples(1));
         say(12, taken());

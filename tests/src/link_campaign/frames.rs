@@ -1,12 +1,12 @@
-//! Frames as the judge and hostile programs make and read them. All that they know of the
-//! link's format is here.
+//! Frames as the oracle and hostile programs write and read them. Their only code with the link's
+//! format is here.
 
 use hapterra_core::wire::frame::{MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
-/// A message of a host, as it travels.
+/// Returns a host's message as a frame.
 #[must_use]
 pub fn from_host(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
     let mut frame = [0; MAX_FRAME];
@@ -14,7 +14,7 @@ pub fn from_host(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
     encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
 }
 
-/// A message of a device, as it travels.
+/// Returns a device's message as a frame.
 #[must_use]
 pub fn from_device(session: SessionNumber, message: &ToHost) -> Vec<u8> {
     let mut frame = [0; MAX_FRAME];
@@ -22,7 +22,7 @@ pub fn from_device(session: SessionNumber, message: &ToHost) -> Vec<u8> {
     encode(&framed, &mut frame).unwrap_or(&[]).to_vec()
 }
 
-/// A frame of no session, as it travels.
+/// Returns a frame without a session.
 #[must_use]
 pub fn version_check(check: VersionCheck) -> Vec<u8> {
     let mut frame = [0; MAX_FRAME];
@@ -41,7 +41,7 @@ pub fn said_by_host(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
     decode(frame).ok()
 }
 
-/// Returns a device's frame, changed by `change`, encoded.
+/// Returns an encoded copy of a device's frame, modified by `change`.
 #[must_use]
 pub fn changed(frame: &[u8], change: impl FnOnce(&mut ToHost)) -> Option<Vec<u8>> {
     let InSession {

@@ -1,7 +1,7 @@
-//! An honest host: the product's own client, and the messages to its user.
+//! A correct host: the product's own client, and the messages to its user.
 //!
-//! It goes through the steps of `hapterra run`: it opens a session, zeroes and arms, and
-//! takes its leave. All its deadlines are the client's own; the judge holds it to them.
+//! It follows the steps of `hapterra run`: it opens a session, zeroes and arms, and closes the
+//! session. All its deadlines are the client's own; the oracle checks them.
 
 use std::time::Duration;
 
@@ -14,8 +14,7 @@ use hapterra_core::wire::session::{SessionEnd, SessionNumber};
 
 use crate::random::Random;
 
-/// For how many seconds the device lets an armed arm be while the host is silent: the
-/// least that there is.
+/// Seconds of a silent host after which the device disarms: the smallest value allowed.
 pub const SILENCE_S: u16 = 5;
 const PATIENCE: Timeouts = Timeouts {
     silence_s: SILENCE_S,
@@ -25,44 +24,44 @@ const PATIENCE: Timeouts = Timeouts {
 /// End of a host.
 #[derive(Debug)]
 pub enum End {
-    /// It has taken its leave, and says that all is well.
+    /// It closed the session, and reports success.
     Agreed,
     /// It reported a fault to its user.
     Told(LinkError),
 }
 
-/// Report of arming to the user.
+/// Report on arming to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     /// Nothing yet.
     Nothing,
-    /// That the device arms, when the switch is pressed.
+    /// The device will arm when the switch is pressed.
     Accepted,
-    /// That it does not: refused, or not known.
+    /// The device does not arm: refused, or unknown.
     No,
 }
 
-/// A host.
+/// A host and its user.
 pub struct Host<'t> {
     client: Client<'t>,
-    /// End of the session before, by the device's introduction.
+    /// End of the previous session, from the device's introduction.
     pub last_end: Option<SessionEnd>,
-    /// True if the scene is in force.
+    /// True if the scene is active.
     pub opened: bool,
-    /// True if it has asked to arm.
+    /// True if it has requested arming.
     pub asked: bool,
-    /// Its user's report of that.
+    /// The report to its user on that request.
     pub told: Told,
-    /// State of the device's guard, as its user sees it.
+    /// State of the device's guard, as shown to its user.
     pub view: Option<Report>,
-    /// Samples that came since they were last taken.
+    /// Samples received since the last read.
     pub samples: Vec<TickRecord>,
     /// Its end.
     pub end: Option<End>,
 }
 
 impl<'t> Host<'t> {
-    /// A host that says hello at `now`, ms; what it says goes to `out`.
+    /// Starts a host that opens a session at `now`, ms, and writes its bytes to `out`.
     #[must_use]
     pub fn start(
         terrain: &'t Terrain<'t>,
@@ -85,19 +84,19 @@ impl<'t> Host<'t> {
         }
     }
 
-    /// The counts that its user is shown.
+    /// Returns the counts that its user sees.
     #[must_use]
     pub fn tally(&self) -> &LinkStats {
         self.client.tally()
     }
 
-    /// Its session.
+    /// Returns its session.
     #[must_use]
     pub fn session(&self) -> SessionNumber {
         self.client.session()
     }
 
-    /// Asks to clear a fault, to zero the arm and to arm it.
+    /// Requests to clear a fault, to zero the arm and to arm it.
     pub fn arm(&mut self) {
         self.asked = true;
         let zero = Request::Zero { counts: [0; 3] };
@@ -108,12 +107,12 @@ impl<'t> Host<'t> {
         }
     }
 
-    /// Takes its leave at `now`, ms; what it says goes to `out`.
+    /// Closes the session at `now`, ms, and writes its bytes to `out`.
     pub fn leave(&mut self, now: u64, out: &mut Vec<u8>) {
         self.client.leave(Duration::from_millis(now), out);
     }
 
-    /// Takes what has come by `now`, ms, and lets time pass; what it says goes to `out`.
+    /// Processes the bytes received by `now`, ms, and writes its own to `out`.
     pub fn step(&mut self, now: u64, bytes: &[u8], out: &mut Vec<u8>) {
         if self.end.is_some() {
             return;

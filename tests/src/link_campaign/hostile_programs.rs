@@ -1,4 +1,4 @@
-//! Programs that mean no good: one that talks to the device, one that answers a host.
+//! Hostile programs: one that sends to the device, and one that answers a host.
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::Friction;
@@ -18,7 +18,7 @@ use hapterra_core::wire::version::VersionCheck;
 use super::frames;
 use crate::random::Random;
 
-/// Bytes that a hostile program says in a millisecond, at most.
+/// Most bytes of a hostile program in a millisecond.
 const A_MILLISECOND: usize = 2_048;
 
 /// Returns a hostile host's bytes of a millisecond.
@@ -26,7 +26,7 @@ pub fn host(random: &mut Random) -> Vec<u8> {
     match random.below(6) {
         0 => noise(random, A_MILLISECOND),
         1 => vec![0; random.below(A_MILLISECOND)],
-        // The beginning of a frame without its end, or an end without a beginning.
+        // The start of a frame without its end, or an end without a start.
         2 => {
             let frame = host_frame(random);
             let cut = random.below(frame.len().max(1));
@@ -53,7 +53,7 @@ fn noise(random: &mut Random, most: usize) -> Vec<u8> {
     (0..length).map(|_| random.bits() as u8).collect()
 }
 
-/// A well-formed frame of one of a few sessions.
+/// Returns a well-formed frame of one of a few sessions.
 fn host_frame(random: &mut Random) -> Vec<u8> {
     if random.below(12) == 0 {
         let protocol = random.bits() as u16;
@@ -63,8 +63,8 @@ fn host_frame(random: &mut Random) -> Vec<u8> {
     frames::from_host(session, &host_message(random))
 }
 
-/// A well-formed message with content that is not. Calibrations that the device may take
-/// are not among them: a device that is disarmed takes those from anybody.
+/// Returns a well-formed message with invalid content. It is never a calibration that the device
+/// may accept: while disarmed it accepts those from any host.
 fn host_message<'b>(random: &mut Random) -> ToDevice<'b> {
     let words = [i32::MIN, -1, 0, 1, 1_000_000, i32::MAX];
     let word = |random: &mut Random| words[random.below(words.len())];
@@ -124,7 +124,7 @@ fn host_message<'b>(random: &mut Random) -> ToDevice<'b> {
     }
 }
 
-/// A scene that a device may refuse or take.
+/// Returns a scene that a device may refuse or accept.
 fn host_scene(random: &mut Random, epoch: u32) -> Scene {
     let words = [i32::MIN, -1, 0, 1, 1_000_000, i32::MAX];
     let word = |random: &mut Random| words[random.below(words.len())];
@@ -181,30 +181,29 @@ fn host_request(random: &mut Random) -> Request {
     ][random.below(8)]
 }
 
-/// Behaviour of something that is no device.
+/// Behaviour of a program that is not a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Behaviour {
-    /// It says nothing.
+    /// It sends nothing.
     Mute,
-    /// It says noise without end.
+    /// It sends noise without end.
     Noise,
-    /// It says one byte each half second.
+    /// It sends one byte every half second.
     Drips,
-    /// It greets each hello, and nothing follows.
+    /// It answers each open, and sends nothing else.
     GreetsOnly,
-    /// It takes every scene, and then asks for tiles that there are not, as fast as it
-    /// can.
+    /// It accepts every scene, then requests non-existent tiles as fast as it can.
     AsksForEverything,
-    /// It takes every scene and then refuses the protocol that both speak, and others.
+    /// It accepts every scene, then refuses the protocol that both use, and others.
     RefusesLate,
-    /// It takes every scene and sends samples with numbers at random.
+    /// It accepts every scene and sends samples with random numbers.
     CountsWildly,
     /// It refuses the scene.
     RefusesScenes,
 }
 
 impl Behaviour {
-    /// All of them.
+    /// All behaviours.
     pub const ALL: [Self; 8] = [
         Self::Mute,
         Self::Noise,
@@ -216,8 +215,8 @@ impl Behaviour {
         Self::RefusesScenes,
     ];
 
-    /// Returns its bytes in the millisecond `now` to a host that serves a scene and has sent
-    /// hello with this number.
+    /// Returns its bytes in the millisecond `now` to a host that serves a scene and has sent an
+    /// open with this number.
     pub fn say(
         self,
         now: u64,
@@ -276,7 +275,7 @@ fn count(random: &mut Random) -> SampleCount {
     }
 }
 
-/// A greeting whose words a terminal would obey.
+/// Returns a greeting with control sequences for a terminal.
 #[must_use]
 pub fn hello(number: u8) -> DeviceHello {
     DeviceHello {

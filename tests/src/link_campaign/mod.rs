@@ -1,5 +1,5 @@
-//! The campaign of link faults: a host, a device with a virtual arm in a hand, and a line
-//! between them to which everything happens, at random, in the device's own time.
+//! The campaign of link faults: a host, a device with a virtual arm in a hand, and a line between
+//! them with random faults, in the device's own time.
 //!
 //! ```text
 //! terrain ── host ══ cable (harm) ══ device ─▶ currents ─▶ arm ── hand
@@ -7,17 +7,16 @@
 //!            end, view, counts           └───── counts ─────┘
 //! ```
 //!
-//! A *run* is one host from its hello to its end, with one fault in it ([`fault`]) that
-//! begins in one of the run's steps ([`runs`]). In every tick [`segment`](mod@segment) checks force and
-//! currents ([`crate::campaign::tick_invariants`]), the proxy against the bilinear
-//! surface ([`proxy_oracle`]), amplifiers that are on without a request, and wrong
-//! messages to the user. At the end of a run [`runs`] checks the report of the host:
-//! - each step ends within its time, with what it is for or with an error;
-//! - an end that host and device agree on is one with the amplifiers off;
-//! - received, lost and dropped samples are together the samples made ([`frame_tap`]).
+//! A *run* is one host from its open to its end, with one fault ([`fault`]) that begins in one of
+//! the run's steps ([`runs`]). In every tick [`segment`](mod@segment) checks force and currents
+//! ([`crate::campaign::tick_invariants`]), the proxy against the bilinear surface
+//! ([`proxy_oracle`]), amplifiers that are on without a request, and wrong messages to the user. At
+//! the end of a run [`runs`] checks the report of the host:
+//! - each step ends within its time, with its result or with an error;
+//! - if host and device agree on the end, the amplifiers are off;
+//! - received, lost and dropped samples add up to the samples made ([`frame_tap`]).
 //!
-//! A segment depends on the seed and its own number alone, so a violation is repeated by
-//! itself.
+//! A segment depends only on the seed and its number, so a violation can be repeated alone.
 
 pub mod cable;
 pub mod device;
@@ -49,8 +48,8 @@ pub const SEED: u64 = 1;
 const SAMPLES: u32 = 512;
 const CELL_MM: f64 = 0.5;
 
-/// Runs segments, from the first on, until devices have run for so many seconds. `done`
-/// gets each segment's number and the outcomes so far.
+/// Runs segments from the first on, until devices have run for the requested seconds. `done`
+/// receives each segment's number and the outcomes up to then.
 ///
 /// # Errors
 /// The first [`Violation`].
@@ -69,8 +68,8 @@ pub fn run(
     Ok(tally)
 }
 
-/// Runs a segment of a campaign, every kind of fault once in an order of its own, and
-/// adds it to the tally.
+/// Runs a segment of a campaign, with each kind of fault once in random order, and adds it to
+/// `tally`.
 ///
 /// # Errors
 /// The first [`Violation`].
@@ -97,8 +96,8 @@ pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Viol
     })
 }
 
-/// Hills or steps; no sample is higher above a tile's base than the bound of
-/// [`proxy_oracle::OFF_SURFACE`] has room for.
+/// Returns hills or steps; no sample is higher above a tile's base than
+/// [`proxy_oracle::OFF_SURFACE`] allows for.
 fn terrain(random: &mut Random) -> Raster {
     let looks = [Look::Fractal, Look::Ridge, Look::Fractal];
     let amplitude_mm = random.between(6.0, 16.0);

@@ -1,4 +1,4 @@
-//! A host meets something that is no device.
+//! A host connects to a program that is not a device.
 
 use hapterra::link::LinkError;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
@@ -10,19 +10,19 @@ use super::hostile_programs::Behaviour;
 use super::run_outcomes::Outcome;
 use super::segment::Segment;
 
-/// Time for which the host puts up with it, ms.
+/// Time that the host stays connected to it, ms.
 const MEETS: u64 = 12_000;
 /// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
-/// Time that leaving may take, ms.
+/// Time that closing may take, ms.
 const LEAVES: u64 = 3_500;
-/// Bytes that a host may say in a second to whatever it is.
+/// Most bytes that a host may send in a second, whatever it is connected to.
 const A_SECOND: usize = 1 << 20;
 
-/// Lets a host meet one; says how it ended.
+/// Connects a host to such a program. Returns the outcome.
 ///
 /// # Errors
-/// If it does not end, or sends without bound.
+/// If the run does not end, or the host sends without bound.
 pub fn meet(segment: &mut Segment<'_>) -> Result<Outcome, String> {
     let behaviour = Behaviour::ALL[segment.random.below(Behaviour::ALL.len())];
     let outcome = talk(segment, behaviour);
@@ -64,7 +64,7 @@ fn talk(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcome, Stri
     Err("the host does not end".into())
 }
 
-/// Listens for the number of the host's last hello, which an answer has to bear.
+/// Reads the number of the host's last open, which an answer must repeat.
 #[derive(Default)]
 struct Hellos {
     reader: Box<FrameReader<MAX_FRAME>>,

@@ -13,10 +13,10 @@ use crate::whole_field::position;
 /// height above its base, in single precision.
 pub const OFF_SURFACE: f64 = 2e-6 + 4.0 * 64.0 * f32::EPSILON as f64;
 
-/// The largest distance of a proxy in contact from the surface, cells.
+/// Returns the distance of a proxy in contact from the surface, cells.
 ///
 /// # Errors
-/// When it is above [`OFF_SURFACE`].
+/// If it is above [`OFF_SURFACE`].
 pub fn judge(terrain: &Terrain<'_>, sample: &TickRecord) -> Result<f64, String> {
     if sample.state != ContactState::Touching {
         return Ok(0.0);
@@ -42,7 +42,7 @@ fn off_surface(terrain: &Terrain<'_>, [x, y, z]: [f64; 3]) -> f64 {
     let Some(surface) = oracle.surface(x, y) else {
         return f64::INFINITY;
     };
-    // Along the steeper side of an edge a proxy is nearer than it is above.
+    // Along the steeper side of an edge the surface is nearer to the proxy than vertically.
     let near = |dx: f64, dy: f64| {
         let there = oracle.surface(x + dx, y + dy);
         there.map_or(0.0, |there| ((there - surface) / 1e-3).abs())

@@ -5,7 +5,7 @@ use super::proxy_oracle::OFF_SURFACE;
 use super::run_outcomes::LinkStats;
 use crate::campaign_table;
 
-/// The page of a campaign that ran with the source at `commit`.
+/// Returns the page of a campaign that ran with the source at `commit`.
 #[must_use]
 pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &LinkStats) -> String {
     let at = &tally.extremes;
@@ -64,7 +64,7 @@ contact, or while the host closes. In one segment of four the device's clock sto
     )
 }
 
-/// Kinds of faults that a page does not have, or not with a count.
+/// Returns the kinds of faults that a page lacks, or lists without a count.
 #[must_use]
 pub fn missing(page: &str) -> Vec<Kind> {
     campaign_table::missing(page, &Kind::ALL)

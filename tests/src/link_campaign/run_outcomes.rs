@@ -13,7 +13,7 @@ pub enum Outcome {
     Agreed,
     /// The fault was reported to the user.
     Told(String),
-    /// The host was killed, and no other came in this run.
+    /// The host was killed, and no other connected in this run.
     Killed,
 }
 
@@ -23,21 +23,21 @@ struct Row {
     runs: u32,
     agreed: u32,
     killed: u32,
-    /// By the error's words, without numbers.
+    /// By the error's text, without numbers.
     told: BTreeMap<String, u32>,
 }
 
-/// All of a campaign.
+/// All outcomes of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinkStats {
     rows: Rows<Kind, Row>,
-    /// Ticks of devices run, and those with the amplifiers on.
+    /// Ticks of all devices, and those with the amplifiers on.
     pub ticks: [u64; 2],
-    /// Samples in contact whose proxy was held against the surface.
+    /// Samples in contact whose proxy was checked against the surface.
     pub touching: u64,
     /// The largest distance of a proxy from the surface, cells.
     pub off_surface: f64,
-    /// The largest of what the watch saw.
+    /// The largest values of the tick checks.
     pub extremes: Maxima,
 }
 
@@ -57,7 +57,7 @@ impl LinkStats {
         }
     }
 
-    /// Adds what was seen in a stretch.
+    /// Adds the measurements of a segment.
     pub fn add(&mut self, ticks: [u64; 2], touching: u64, off_surface: f64, extremes: &Maxima) {
         self.ticks = [0, 1].map(|i| self.ticks[i] + ticks[i]);
         self.touching += touching;
@@ -65,25 +65,25 @@ impl LinkStats {
         self.extremes = self.extremes.or(*extremes);
     }
 
-    /// Runs with this kind of fault.
+    /// Returns the number of runs with this kind of fault.
     #[must_use]
     pub fn runs_with(&self, kind: Kind) -> u32 {
         self.rows.get(kind).map_or(0, |row| row.runs)
     }
 
-    /// Runs in all.
+    /// Returns the number of runs.
     #[must_use]
     pub fn runs(&self) -> u32 {
         self.rows.sum(|row| row.runs)
     }
 
-    /// Runs whose end host and device agreed on.
+    /// Returns the number of runs whose end host and device agreed on.
     #[must_use]
     pub fn agreed(&self) -> u32 {
         self.rows.sum(|row| row.agreed)
     }
 
-    /// The table, in Markdown.
+    /// Returns the table in Markdown.
     #[must_use]
     pub fn table(&self) -> String {
         let heading = "| fault | runs | end agreed | host killed |\n\

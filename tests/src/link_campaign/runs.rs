@@ -1,5 +1,5 @@
-//! The runs of a stretch: a host opens a session, arms, serves, and leaves or is killed,
-//! and somewhere in between something goes wrong.
+//! The runs of a segment: a host opens a session, arms, serves, and leaves or is killed, and a
+//! fault begins in one of the steps.
 
 use super::fault::{Fault, Kind};
 use super::host::{End, SILENCE_S, Told};
@@ -11,26 +11,25 @@ use hapterra_core::guard::Mode;
 
 /// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
-/// Time that the answer to arming, or the word that there is none, may take, ms.
+/// Time that an answer to arming may take, or the report that there is none, ms.
 const ANSWERS: u64 = 6_000;
-/// Time that leaving may take, ms.
+/// Time that closing may take, ms.
 const LEAVES: u64 = 3_500;
-/// Time that the arm takes from the press of the switch until all force is in, ms.
+/// Time from the press of the switch to the full force, ms.
 const ARMS: u64 = 2_600;
-/// Time that the user's hand takes to the switch, ms.
+/// Reaction time of the user at the switch, ms.
 const REACTION: u64 = 150;
-/// For how long a host may be silent, as hosts here tell the device, ms.
+/// Time that a host may be silent, as configured by these hosts, ms.
 const SILENCE: u64 = 1_000 * SILENCE_S as u64;
-/// Time that after that the force may take to be out, ms.
+/// Time that the force may then take to fade, ms.
 const LETS_GO: u64 = 300;
-/// Time for which before a host vanished the device may have heard it last, ms: a sign of life
-/// comes twice a second, and a line that was harmed may have lost some.
+/// Largest time from the last message at the device to the loss of its host, ms: heartbeats are
+/// sent twice a second, and a faulty line may lose some.
 const AGO: u64 = 700;
-/// Requests for a tile that a device may repeat early in a session: those that were under
-/// way when it began.
+/// Tile requests that a device may repeat early in a session: those in transit when it began.
 const IN_FLIGHT: u32 = 4;
 
-/// The steps of a run in which something may begin to go wrong.
+/// The steps of a run in which a fault may begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
     Open,
@@ -43,12 +42,12 @@ enum Step {
 struct Plan {
     kind: Kind,
     step: Step,
-    /// Milliseconds after the step begins.
+    /// Milliseconds from the start of the step to the fault.
     after: u64,
     done: bool,
 }
 
-/// Plays a run in which a fault of this kind happens.
+/// Plays a run with a fault of this kind.
 ///
 /// # Errors
 /// The broken invariant.
@@ -58,8 +57,8 @@ pub fn run(segment: &mut Segment<'_>, kind: Kind, tally: &mut LinkStats) -> Resu
         tally.count(kind, outcome);
         return Ok(());
     }
-    // A run that ended before anything went wrong in it, as one whose host left a device
-    // that was disarmed, is not counted.
+    // A run that ended before its fault is not counted, for example because its host left a
+    // disarmed device.
     loop {
         if let Some(outcome) = try_run(segment, kind)? {
             tally.count(kind, outcome);
@@ -68,11 +67,11 @@ pub fn run(segment: &mut Segment<'_>, kind: Kind, tally: &mut LinkStats) -> Resu
     }
 }
 
-/// Plays a run; how it ended, if what was planned for it happened.
+/// Plays a run. Returns its outcome, if the planned fault happened.
 fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, String> {
     let steps = [Step::Open, Step::Arm, Step::Feel, Step::Leave];
     let step = steps[segment.random.below(4)];
-    // A host that leaves is gone when the force is out, in a tenth of a second.
+    // A host that leaves is gone when the force has faded, within a tenth of a second.
     let within = if step == Step::Leave { 90 } else { 400 };
     let plan = Plan {
         kind,
@@ -95,15 +94,14 @@ fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, Str
 struct Run<'s, 't> {
     segment: &'s mut Segment<'t>,
     plan: Plan,
-    /// True if one host has talked to one device all the time, so that counts can be
-    /// exact.
+    /// True if one host was connected to one device all the time, so that counts must be exact.
     is_whole: bool,
 }
 
 impl Run<'_, '_> {
     fn play(&mut self) -> Result<Outcome, String> {
         let mut outcome = self.steps()?;
-        // A host that was killed has one after it, which goes all the way.
+        // After a killed host another one completes the run.
         while outcome == Outcome::Killed && self.plan.kind == Kind::HostKilled {
             let other_scene = self.segment.random.below(2) == 0;
             self.segment.start_host(other_scene);
@@ -113,7 +111,7 @@ impl Run<'_, '_> {
         Ok(outcome)
     }
 
-    /// All steps, as far as they go.
+    /// Runs all steps, or up to the end of the run.
     fn steps(&mut self) -> Result<Outcome, String> {
         for step in [Step::Open, Step::Arm, Step::Feel, Step::Leave] {
             if let Some(outcome) = self.take(step)? {
@@ -123,7 +121,7 @@ impl Run<'_, '_> {
         Err("a host that left did not end".into())
     }
 
-    /// One step: how the run ended, if it did.
+    /// Runs one step. Returns the outcome if the run ended.
     fn take(&mut self, step: Step) -> Result<Option<Outcome>, String> {
         let began = self.segment.now;
         let feels = 1_000 + self.segment.random.below(5_000) as u64;
@@ -162,14 +160,13 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Carries out the plan of a step.
+    /// Returns true if the fault planned for this step, if any, has been injected.
     fn may_go_on(&self, step: Step) -> bool {
         self.plan.done || self.plan.step != step
     }
 
-    /// Returns true if arming has come to its end: the user got a message that it does not come to
-    /// that, or sees that the arm is disarmed, or the force is in. Presses the switch
-    /// where the user sees that it is waited for.
+    /// Returns true if arming has ended: the user was told that the device does not arm, or sees it
+    /// disarmed, or the force is ramped up. Presses the switch when the user sees the request.
     fn is_armed(&mut self, pressed: &mut Option<u64>) -> bool {
         let now = self.segment.now;
         let Some(host) = &self.segment.host else {
@@ -190,7 +187,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Lets what was planned happen when its time has come.
+    /// Injects the planned fault when it is due.
     fn go_wrong(&mut self, step: Step, at: u64) -> Result<Option<Outcome>, String> {
         if self.plan.done || step != self.plan.step || at < self.plan.after {
             return Ok(None);
@@ -230,7 +227,7 @@ impl Run<'_, '_> {
         Ok(None)
     }
 
-    /// Up to so many milliseconds with no host.
+    /// Waits up to `most` milliseconds without a host.
     fn wait(&mut self, most: usize) -> Result<(), String> {
         let end = self.segment.now + self.segment.random.below(most) as u64;
         self.wait_until(end)
@@ -243,11 +240,11 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// No host for longer than the device waits for one: force is let out, and the arm
-    /// disarmed; not before.
+    /// Waits without a host for longer than the device's limit: it must release the force and
+    /// disarm, but not earlier.
     fn vanished(&mut self) -> Result<(), String> {
         let was_on = self.segment.board.drive.enabled;
-        // Time that stands still does not run out.
+        // A stopped clock does not reach the limit.
         let runs = !self.segment.board.lock_step;
         self.wait_until(self.segment.now + SILENCE - LETS_GO)?;
         let still_on = self.segment.board.drive.enabled;
@@ -260,7 +257,7 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Judges the end of a host: what it says has to be so.
+    /// Checks the report of a host that ended against the truth.
     fn ended(&mut self) -> Result<Outcome, String> {
         let segment = &mut *self.segment;
         if let Some(End::Told(error)) = segment.host.as_ref().and_then(|host| host.end.as_ref()) {
@@ -279,7 +276,7 @@ impl Run<'_, '_> {
         };
         let (tally, tap) = (host.tally(), &self.segment.tap);
         let (told, made) = (tally.samples + tally.lost + tally.dropped, tap.made());
-        // What is dropped last of all, or last of a scene, no tap sees.
+        // The tap does not see samples that are dropped at the end of a scene or of the session.
         let unseen = match tally.dropped {
             0 => 0,
             _ => tap.unseen(self.segment.board.ticks[0]),
@@ -299,7 +296,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// The user lets the arm go and waits a moment.
+    /// The user releases the switch and waits a moment.
     fn afterwards(&mut self) -> Result<(), String> {
         self.segment.host = None;
         self.segment.board.dead_man = false;

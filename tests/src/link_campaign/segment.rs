@@ -1,5 +1,5 @@
-//! A stretch of the campaign: one device with its arm, the line, and the program at the
-//! other end, millisecond by millisecond.
+//! A segment of the campaign: one device with its arm, the line, and the program at the other end,
+//! millisecond by millisecond.
 
 use hapterra::terrain::Terrain;
 use hapterra_core::force::SurfaceParams;
@@ -15,23 +15,22 @@ use super::hostile_programs;
 use super::proxy_oracle;
 use crate::random::Random;
 
-/// Time for which what the user sees may differ from what is, on a line that works, ms; also
-/// where another program has taken the device, which is reported to the user.
+/// Longest time that the user may see an outdated state on a working line, ms; also if another
+/// program has taken the device, which is reported to the user.
 const STALE: u64 = 1_500;
-/// Time for which after the line stood still the device may still say what it had to say then,
-/// ms.
+/// Time after a stall of the line in which the device may still send old messages, ms.
 const DRAINS: u64 = 50;
-/// Time for which an arm that was asked for may still come after its host is gone, ms: the
-/// switch was pressed just before.
+/// Time after the end of a host in which a requested arming may still happen, ms: the switch was
+/// pressed just before.
 const LATE_ARM: u64 = 500;
 
-/// One device and what is around it.
+/// One device and its environment.
 pub struct Segment<'t> {
-    /// The terrain that honest hosts serve.
+    /// The terrain that correct hosts serve.
     pub terrain: &'t Terrain<'t>,
-    /// The scene that they put in force.
+    /// The scene that they set.
     pub scene: Scene,
-    /// Decides everything.
+    /// The only source of chance.
     pub random: Random,
     /// The device and its arm.
     pub board: Board<'t>,
@@ -41,34 +40,34 @@ pub struct Segment<'t> {
     pub to_host: Way,
     /// Frames that leave the device, as the oracle reads them.
     pub tap: Tap,
-    /// The honest host, if one runs.
+    /// The correct host, if one runs.
     pub host: Option<Host<'t>>,
     /// Present fault of the line.
     pub fault: Option<Fault>,
     /// Milliseconds so far.
     pub now: u64,
-    /// When the line or one of its ends was last not as it should be.
+    /// The last time at which the line or one of its ends was faulty.
     troubled: u64,
-    /// Until when the amplifiers may be switched on.
+    /// The time until which the amplifiers may be switched on.
     wished: u64,
     was_on: bool,
-    /// When the direction to the host had no room last.
+    /// The last time at which the direction to the host had no room.
     full: u64,
-    /// The device has let an arm go whose host was silent, and no host has connected
+    /// True if the device has disarmed because its host was silent, and no host has connected
     /// since.
     pub let_go: bool,
-    /// This has to be reported to the present host.
+    /// True if this must be reported to the present host.
     owed: bool,
-    /// Since when the user has seen something else than what is.
+    /// The time since which the user has seen a wrong state.
     stale: Option<u64>,
     /// The largest distance of a proxy from the surface, cells.
     pub off_surface: f64,
-    /// Samples that were judged while they touched.
+    /// Samples in contact that were checked.
     pub touching: u64,
 }
 
 impl<'t> Segment<'t> {
-    /// A device that was just switched on, without a host.
+    /// Creates a device after power-up, without a host.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, mut random: Random) -> Self {
         let mut board = Board::new(terrain, &mut random);
@@ -97,7 +96,7 @@ impl<'t> Segment<'t> {
         }
     }
 
-    /// Starts an honest host, with another scene or the one that was in force last.
+    /// Starts a correct host, with another scene or the last active one.
     pub fn start_host(&mut self, other_scene: bool) {
         if other_scene {
             self.scene = scene(self.terrain, &self.board, &mut self.random);
@@ -112,7 +111,7 @@ impl<'t> Segment<'t> {
         self.send(&out);
     }
 
-    /// Kills the honest host: it says nothing more.
+    /// Kills the correct host: it sends nothing more.
     pub fn kill_host(&mut self) {
         self.host = None;
         self.troubled = self.now;
@@ -127,7 +126,7 @@ impl<'t> Segment<'t> {
         self.was_on = false;
     }
 
-    /// Lets something go wrong with the line.
+    /// Starts a fault of the line.
     pub fn begin(&mut self, fault: Fault) {
         if fault.kind == Kind::HostileHost {
             (self.let_go, self.owed) = (false, false);
@@ -138,7 +137,7 @@ impl<'t> Segment<'t> {
         self.fault = Some(fault);
     }
 
-    /// Lets the honest host do something; its frames enter the line.
+    /// Runs an action of the correct host; its frames enter the line.
     pub fn with_host(&mut self, act: impl FnOnce(&mut Host<'t>, u64, &mut Vec<u8>)) {
         let mut out = Vec::new();
         if let Some(host) = &mut self.host {
@@ -147,18 +146,18 @@ impl<'t> Segment<'t> {
         self.send(&out);
     }
 
-    /// Puts bytes on their way to the device.
+    /// Sends bytes to the device.
     pub fn send(&mut self, bytes: &[u8]) {
         self.to_device.send(bytes, self.now, &mut self.random);
     }
 
-    /// Returns the time for which the line and its ends have been as they should be, ms.
+    /// Returns the time since the line and its ends were last faulty, ms.
     #[must_use]
     pub fn calm(&self) -> u64 {
         self.now - self.troubled
     }
 
-    /// One millisecond of everything.
+    /// Advances everything by one millisecond.
     ///
     /// # Errors
     /// The broken invariant.
@@ -201,7 +200,7 @@ impl<'t> Segment<'t> {
         }
     }
 
-    /// Another program talks to the device, if that is what goes wrong.
+    /// Sends the bytes of another program to the device, during that fault.
     fn speak_hostile(&mut self) {
         let hostile = self
             .fault
@@ -229,7 +228,7 @@ impl<'t> Segment<'t> {
         self.judge_last_end()
     }
 
-    /// The first host after one that vanished gets the reason why the arm is disarmed.
+    /// Checks that the first host after one that vanished receives the reason for the disarming.
     fn judge_last_end(&mut self) -> Result<(), String> {
         let greeted = self.host.as_ref().and_then(|host| host.last_end);
         match greeted.filter(|_| self.owed) {
@@ -259,7 +258,7 @@ impl<'t> Segment<'t> {
         Ok(())
     }
 
-    /// Amplifiers are switched on only if a live host has requested it.
+    /// Checks that the amplifiers are switched on only if a live host has requested it.
     fn judge_wish(&mut self) -> Result<(), String> {
         let wishes = |host: &Host<'_>| host.asked && host.end.is_none();
         if self.host.as_ref().is_some_and(wishes) {
@@ -302,7 +301,7 @@ impl<'t> Segment<'t> {
     }
 }
 
-/// A scene like no other before.
+/// Draws a scene with a new number.
 fn scene(terrain: &Terrain<'_>, board: &Board<'_>, random: &mut Random) -> Scene {
     let params = SurfaceParams {
         stiffness_n_per_mm: random.between(0.3, 0.8) as f32,

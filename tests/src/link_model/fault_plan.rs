@@ -10,40 +10,40 @@ pub enum Interruption {
     HostKilled,
     /// The device is reset.
     DeviceReset,
-    /// For so many ticks nothing gets through one way.
+    /// Frames of one direction are lost for this many ticks.
     Cut(Direction, u64),
-    /// All frames of one direction so far arrive again: of this session, and of those before.
+    /// All earlier frames of one direction arrive again, from this session and those before.
     Echo(Direction),
-    /// A host of another version says hello on the same line.
+    /// A host of another version opens a session on the same line.
     OtherHost,
-    /// Another host of this version opens a session on the same line, and ends it.
+    /// Another host of this version opens a session on the same line, and closes it.
     Takeover,
-    /// From now on the device says that it is of another version.
+    /// From now on the device reports another version.
     OtherDevice,
     /// The host's program is killed, and no other is started.
     HostGone,
 }
 
-/// Everything that goes wrong in a run.
+/// All faults of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// Harm to single frames, by their number in their direction.
+    /// Faults of single frames, by their number in their direction.
     pub harms: Vec<(Direction, usize, Harm)>,
     /// Interruptions by tick.
     pub interruptions: Vec<(u64, Interruption)>,
-    /// The host leaves while the arm is armed, without a request to disarm before.
+    /// The host leaves while the arm is armed, without a request to disarm.
     pub abrupt: bool,
-    /// The host asks for the status without a pause while it feels and disarms.
+    /// The host queries the status without a pause while it renders and disarms.
     pub curious: bool,
-    /// The host puts another view in while it feels, and asks for more than that when the arm
-    /// is disarmed.
+    /// The host changes the placement while it renders, and makes more requests when the arm is
+    /// disarmed.
     pub errands: bool,
-    /// Harm at random: the seed, and the share of frames in a thousand.
+    /// Random faults: the seed, and the share of frames in a thousand.
     pub random: Option<(u64, usize)>,
 }
 
 impl Plan {
-    /// A plan drawn from a seed.
+    /// Draws a plan from a seed.
     #[must_use]
     pub fn random(seed: u64) -> Self {
         let mut random = Random::new(seed);

@@ -1,4 +1,4 @@
-//! Frames of others: a host and a device of another version, and another host.
+//! Frames of other programs: a host and a device of another version, and another host.
 
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
@@ -16,7 +16,7 @@ fn frame(content: &impl Serialize) -> Vec<u8> {
     frame.expect("a short frame").to_vec()
 }
 
-/// Returns the greeting of a host of another version.
+/// Returns the open of a host of another version.
 pub(super) fn greeting() -> [Vec<u8>; 2] {
     let hello = ToDevice::Hello(HostHello {
         protocol: OTHER,
@@ -33,7 +33,7 @@ pub(super) fn greeting() -> [Vec<u8>; 2] {
     ]
 }
 
-/// Returns the messages of another host that takes the device and gives it up at once.
+/// Returns the messages of another host that opens a session and closes it at once.
 pub(super) fn takeover() -> [Vec<u8>; 2] {
     let hello = ToDevice::Hello(HostHello {
         protocol: PROTOCOL,
@@ -44,7 +44,7 @@ pub(super) fn takeover() -> [Vec<u8>; 2] {
     [hello, ToDevice::Bye].map(|message| frame(&InSession { session, message }))
 }
 
-/// The same frame, but for a greeting, which is then of another version.
+/// Returns the same frame, except that a greeting becomes one of another version.
 pub(super) fn of_another_version(bytes: Vec<u8>) -> Vec<u8> {
     let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
     let (_, Some(Ok(content))) = reader.push(&bytes) else {

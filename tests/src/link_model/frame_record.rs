@@ -1,5 +1,5 @@
-//! Record of both sides' frames before any fault: the device's hello, the number of samples of each
-//! session, and whether a host has asked to arm.
+//! Record of both sides' frames before any fault: the device's greetings, the samples of each
+//! session, and whether a host has requested arming.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,7 +9,7 @@ use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SampleCount};
 
-/// The samples of every session, by the device's own words.
+/// The samples of every session, as the device sent them.
 #[derive(Default)]
 pub(super) struct FrameRecord {
     reader: Box<FrameReader<MAX_FRAME>>,
@@ -20,7 +20,7 @@ pub(super) struct FrameRecord {
     greetings: Vec<(u32, DeviceHello)>,
 }
 
-/// Returns true if a host asks to arm in any of these frames.
+/// Returns true if any of these frames requests arming.
 pub(super) fn asks_to_arm(mut bytes: &[u8]) -> bool {
     let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
     while !bytes.is_empty() {
@@ -40,7 +40,7 @@ pub(super) fn asks_to_arm(mut bytes: &[u8]) -> bool {
 }
 
 impl FrameRecord {
-    /// Hears what the device says.
+    /// Records the device's bytes.
     pub(super) fn hear(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
@@ -69,7 +69,7 @@ impl FrameRecord {
         }
     }
 
-    /// Greetings in this session so far.
+    /// Returns the greetings of a session up to now.
     pub(super) fn greetings(&self, session: u32) -> impl Iterator<Item = &DeviceHello> {
         let of_it = self.greetings.iter().filter(move |(of, _)| *of == session);
         of_it.map(|(_, device)| device)

@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 
-/// Which way a frame travels.
+/// Direction of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// From the host.
@@ -16,23 +16,23 @@ pub enum Direction {
 pub enum Harm {
     /// It is lost.
     Lose,
-    /// It comes at once and again after so many ticks.
+    /// It arrives at once, and again this many ticks later.
     Repeat(u64),
-    /// It comes so many ticks late; others overtake it.
+    /// It is delayed by this many ticks; others overtake it.
     Delay(u64),
 }
 
-/// Frames on their way.
+/// Frames in transit.
 pub(super) struct LossyLine {
-    /// When each arrives.
+    /// The frames with the tick of their arrival.
     frames: Vec<(u64, Vec<u8>)>,
-    /// Bytes of a frame that has not ended.
+    /// Bytes of an unfinished frame.
     begun: Vec<u8>,
-    /// Frames that were put in so far.
+    /// All frames sent up to now.
     past: Vec<Vec<u8>>,
     harms: Vec<(usize, Harm)>,
     random: Option<(Random, usize)>,
-    /// Until when nothing gets in.
+    /// The tick until which new frames are lost.
     cut_until: u64,
 }
 
@@ -52,14 +52,13 @@ impl LossyLine {
         self.past.len()
     }
 
-    /// All that was ever put in comes again, in its order, as of something that stores and
-    /// forwards.
+    /// Repeats all earlier frames in order, like a store-and-forward node.
     pub(super) fn echo(&mut self, now: u64) {
         let again = self.past.iter().map(|frame| (now + 1, frame.clone()));
         self.frames.extend(again);
     }
 
-    /// A frame of another program arrives.
+    /// Inserts a frame of another program.
     pub(super) fn slip_in(&mut self, frame: Vec<u8>, now: u64) {
         self.frames.push((now + 1, frame));
     }
@@ -73,13 +72,13 @@ impl LossyLine {
         self.begun.clear();
     }
 
-    /// Puts bytes in; whole frames enter the line.
+    /// Sends bytes; whole frames enter the line.
     pub(super) fn send(&mut self, bytes: &[u8], now: u64) {
         for byte in bytes {
             self.begun.push(*byte);
             if *byte == 0 {
                 let frame = std::mem::take(&mut self.begun);
-                // A zero alone only ends what was before.
+                // A zero alone only ends an earlier frame.
                 if frame.len() > 1 {
                     self.put(frame, now);
                 }
@@ -120,7 +119,7 @@ impl LossyLine {
         })
     }
 
-    /// The frames that arrive by now, in the order in which they do.
+    /// Returns the frames that have arrived, in order of arrival.
     pub(super) fn arrived(&mut self, now: u64) -> Vec<Vec<u8>> {
         let (mut here, there): (Vec<_>, Vec<_>) =
             self.frames.drain(..).partition(|(due, _)| *due <= now);

@@ -1,6 +1,6 @@
-//! A checked model of the link: the host's client and the device's link as they ship, tick by tick,
-//! over a line that loses, repeats and delays the frames that a plan names. Later frames overtake a
-//! delayed one.
+//! A checked model of the link: the product's client and the device's link, tick by tick, over a
+//! line that loses, repeats and delays the frames named in a plan. Later frames overtake a delayed
+//! one.
 //!
 //! ```text
 //! Client ──▶ LossyLine ──▶ Device        `run`: one run

@@ -5,50 +5,47 @@ use hapterra_core::wire::hello::DeviceHello;
 
 use super::frame_record::{FrameRecord, asks_to_arm};
 
-/// Ticks in which the force goes out after a request to disarm was answered.
+/// Ticks in which the force fades after the answer to a request to disarm.
 pub(super) const FADE: u64 = 150;
-/// For so long the device lets a silent host's arm be, seconds, and ticks with the force
-/// going out.
+/// Silence of a host after which the device disarms: in seconds, and in ticks with the fade.
 pub(super) const SILENCE_S: u16 = 5;
 const SILENCE: u64 = SILENCE_S as u64 * 1_000 + FADE;
 
 /// Violation of the protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wrong {
-    /// Nothing came to an end in `LONGEST` ticks.
+    /// The run did not end within `LONGEST` ticks.
     Hangs,
-    /// The amplifiers were on at this tick, and no host wished it.
+    /// The amplifiers were on at this tick without a host that requested force.
     Driven(u64),
-    /// The amplifiers were switched on at this tick in a session without a request of its host.
+    /// The amplifiers were switched on at this tick in a session whose host had not requested it.
     Unasked(u64),
-    /// The amplifiers were on at this tick, and nothing had come for longer than the host
-    /// had sent.
+    /// The amplifiers were on at this tick, longer than allowed after the host's last frame.
     Forsaken(u64),
-    /// The host took this for a message of the device, which had not sent it in its
+    /// The host accepted this as the device's message, which the device had not sent in its
     /// session.
     Misled(String),
-    /// The host took this tick's status for the answer to a question that it asked at that
-    /// tick of the device, which was later.
+    /// The host accepted the status of the first tick as the answer to a query made at the second,
+    /// later tick.
     Outdated(u32, u32),
-    /// The host got a report that the device is disarmed, and it is not.
+    /// The host received a report that the device is disarmed while it was not.
     NotDisarmed(u64),
-    /// Samples were not counted once: what the host counted as here or lost, and as
-    /// dropped; what the device had.
+    /// Samples were not counted exactly once: the host's counts (received or lost, and dropped),
+    /// then the device's.
     Miscounted((u64, u64), (u64, u64)),
-    /// An error that no harm to frames may lead to.
+    /// An error that no fault of a frame may cause.
     Error(String),
 }
 
-/// State of a run, and its faults.
+/// State of a run's checks.
 #[derive(Default)]
 pub(super) struct RunOracle {
     account: FrameRecord,
-    /// Since when no host wishes that anything is driven.
+    /// The tick since which no host requests force.
     unwished: Option<u64>,
-    /// The present host has asked to arm.
+    /// True if the present host has requested arming.
     asked: bool,
-    /// The session that the device is in, and whether the amplifiers were on when it began
-    /// and ever since.
+    /// The device's session, and true if the amplifiers were on at its start and ever since.
     inherited: (u32, bool),
     /// The tick of the last frame to the device.
     heard_at: u64,
@@ -63,28 +60,27 @@ impl RunOracle {
         self.asked |= asks_to_arm(bytes);
     }
 
-    /// A frame has come to the device.
+    /// Records a frame that arrived at the device.
     pub(super) const fn frame_came(&mut self, now: u64) {
         self.heard_at = now;
     }
 
-    /// A host was started in the place of one that was killed.
+    /// Records that another host replaced a killed one.
     pub(super) const fn another_host(&mut self) {
         self.asked = false;
     }
 
-    /// A host is there that wishes that something is driven.
+    /// Records that a host requests force.
     pub(super) const fn wished(&mut self) {
         self.unwished = None;
     }
 
-    /// From this tick on no host wishes it any more.
+    /// Records that no host requests force from this tick on.
     pub(super) const fn unwished_from(&mut self, tick: u64) {
         self.unwished = Some(tick);
     }
 
-    /// After a tick in which the amplifiers were on or off, while the host is in this
-    /// session.
+    /// Checks a tick with the amplifiers on or off, while the host is in this session.
     pub(super) fn look(&mut self, now: u64, enabled: bool, session: u32) -> Result<(), Wrong> {
         let is_greeted = self.account.greetings(session).next().is_some();
         if self.inherited.0 != session && is_greeted {
@@ -104,8 +100,8 @@ impl RunOracle {
         Ok(())
     }
 
-    /// The host believes that its session is open with this device, and that these were
-    /// samples of it, by their ticks.
+    /// Checks the host's view: its session is open with this device, and these were its samples, by
+    /// their ticks.
     pub(super) fn told(
         &self,
         session: u32,
@@ -123,7 +119,7 @@ impl RunOracle {
         }
     }
 
-    /// The host believes that the device is disarmed, and so it has to stay.
+    /// Checks that the device is disarmed, as the host concluded, and must stay so.
     pub(super) const fn agreed(&mut self, now: u64, enabled: bool) -> Result<(), Wrong> {
         self.unwished = Some(0);
         match enabled {
@@ -132,7 +128,7 @@ impl RunOracle {
         }
     }
 
-    /// The host's account of its sessions against the device's.
+    /// Compares the host's counts of its sessions with the device's.
     pub(super) fn count(&self, tally: &LinkStats, sessions: &[u32]) -> Result<(), Wrong> {
         let counted = (tally.samples + tally.lost, tally.dropped);
         let made = self.account.of(sessions);

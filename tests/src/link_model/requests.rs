@@ -1,5 +1,5 @@
-//! Requests of a host besides arming and disarming, one after the other: another placement
-//! while it feels, and afterwards the calibration, held outputs, storing, and a jog.
+//! Requests of a host besides arming and disarming, in sequence: another placement while it
+//! renders, then the calibration, held outputs, storing, and a jog.
 
 use std::collections::VecDeque;
 
@@ -8,34 +8,34 @@ use hapterra_core::clutch::ClutchHold;
 use hapterra_core::guard::Jog;
 use hapterra_core::wire::request::Request;
 
-/// Ticks from the clutch's answer in which it opens, and from a jog's in which it drives.
+/// Ticks in which the clutch opens or a jog drives, after the answer.
 const CLUTCH_TICKS: u64 = 300;
 const JOG_TICKS: u64 = 900;
-/// Ticks in which the force goes out.
+/// Ticks in which the force fades.
 const FADE_TICKS: u64 = 300;
 
-/// A thing to do.
+/// One step of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum RequestStep {
-    /// To ask, and to wait for the answer.
+    /// Sends a request and waits for the answer.
     HostRequest(HostRequest),
-    /// To put this view in, and to wait for what becomes of it.
+    /// Sends this placement and waits for the result.
     View(u8),
-    /// To let so many ticks pass.
+    /// Waits for this many ticks.
     Wait(u64),
 }
 
-/// Rest of a list, and the results of the others.
+/// The remaining steps, and the results of the others.
 #[derive(Default)]
 pub(super) struct RequestSequence {
     left: VecDeque<RequestStep>,
     under_way: Option<(RequestStep, u64)>,
-    /// Things that were done, refused, and given up.
+    /// Counts of requests that succeeded, were refused, and were given up.
     pub(super) came_of: [u32; 3],
 }
 
 impl RequestSequence {
-    /// While the arm is armed.
+    /// Returns the requests for an armed arm.
     pub(super) fn armed() -> Self {
         let clutch =
             |hold| RequestStep::HostRequest(HostRequest::Request(Request::Clutch { hold }));
@@ -49,7 +49,7 @@ impl RequestSequence {
         ])
     }
 
-    /// While it is disarmed; the last that drives is disarmed again.
+    /// Returns the requests for a disarmed arm; the jog at the end is disarmed again.
     pub(super) fn disarmed() -> Self {
         let jog = Jog {
             axis: 1,
@@ -80,7 +80,7 @@ impl RequestSequence {
         self.left.is_empty() && self.under_way.is_none()
     }
 
-    /// The next thing to do, where the one before is over.
+    /// Returns the next step if the last one has ended.
     pub(super) fn next(&mut self, now: u64) -> Option<RequestStep> {
         if let Some((RequestStep::Wait(ticks), since)) = self.under_way
             && now >= since + ticks
@@ -95,7 +95,7 @@ impl RequestSequence {
         Some(next)
     }
 
-    /// Takes what may be the answer.
+    /// Takes an event that may be the answer.
     pub(super) fn take(&mut self, event: &Event<'_>) {
         let Some((errand, _)) = self.under_way else {
             return;

@@ -1,5 +1,5 @@
-//! One run: a host that opens a session, arms, feels, disarms, arms again and leaves; a
-//! device; a user who presses the dead-man switch whenever that could arm it.
+//! One run: a host that opens a session, arms, renders, disarms, arms again and leaves; a device; a
+//! user who presses the dead-man switch whenever it could arm the device.
 
 use std::time::Duration;
 
@@ -23,21 +23,21 @@ use super::oracle::{FADE, RunOracle, SILENCE_S, Wrong};
 use super::requests::{RequestSequence, RequestStep};
 use super::status_queries::StatusQueries;
 
-/// Ticks after which a run hangs: each step has its deadline, and no plan needs more.
+/// Ticks after which a run counts as hanging: each step has its deadline, and no plan needs more.
 const LONGEST: u64 = 60_000;
-/// Ticks after the end, in which what was delayed still arrives.
+/// Ticks after the end in which delayed frames still arrive.
 const AFTER: u64 = 6_500;
 /// Samples with the amplifiers on after which the host continues.
 const RAMP_SAMPLES: u32 = 60;
-/// Times that the host takes up a session that went silent.
+/// Times that the host resumes a silent session.
 const RESUMPTIONS: u32 = 4;
 
 /// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The host has the confirmation that the device is disarmed.
+    /// The host has a confirmation that the device is disarmed.
     Agreed,
-    /// The host tells its user that it does not know, and why.
+    /// The host reported to its user that the state is unknown, and why.
     Told,
 }
 
@@ -48,32 +48,32 @@ pub struct Report {
     pub end: End,
     /// The tick of the end.
     pub ticks: u64,
-    /// Frames put onto the line, to the device and to the host.
+    /// Frames sent, to the device and to the host.
     pub frames: [usize; 2],
-    /// True if the arm was ever driven.
+    /// True if the amplifiers were ever on.
     pub driven: bool,
-    /// Sessions of which the host says that it does not know their end.
+    /// Sessions whose end the host reports as unknown.
     pub uncertain: u64,
-    /// Times that the host gave a session up and began another.
+    /// Times that the host gave up a session and opened another.
     pub resumptions: u32,
-    /// Queries for the status that were answered.
+    /// Status queries that were answered.
     pub answers: u32,
-    /// Things beside arming and disarming that were done, refused, and given up.
+    /// Other requests than arming and disarming: succeeded, refused, and given up.
     pub came_of: [u32; 3],
 }
 
-/// Step of the host.
+/// Current step of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// To open and to be armed.
+    /// Opens a session and arms.
     Arming,
-    /// To feel a little.
+    /// Renders for a while.
     Feeling,
-    /// To be disarmed, since a tick if that was answered.
+    /// Disarms, with the tick of the answer if it has arrived.
     Disarming(Option<u64>),
-    /// To do what the disarmed arm is asked for.
+    /// Makes the requests for a disarmed arm.
     Asking,
-    /// To end.
+    /// Closes the session.
     Leaving,
     Over(End),
 }
@@ -85,7 +85,7 @@ struct World<'t> {
     device: Device<StoppedClock, 2>,
     lines: [LossyLine; 2],
     judge: RunOracle,
-    /// Sessions that the present host has spoken in.
+    /// Sessions in which the present host has sent something.
     sessions: Vec<u32>,
     step: Step,
     ramp_samples: u32,
@@ -94,18 +94,18 @@ struct World<'t> {
     now: u64,
     enabled: bool,
     driven: bool,
-    /// The host leaves without a request to disarm.
+    /// True if the host leaves without a request to disarm.
     abrupt: bool,
-    /// The host asks for the status without a pause.
+    /// True if the host queries the status without a pause.
     curious: bool,
     questions: StatusQueries,
-    /// Requests while the arm is armed, and afterwards; none without requests.
+    /// Requests while the arm is armed, and afterwards; `None` without requests.
     errands: Option<[RequestSequence; 2]>,
-    /// Ticks of the device since it was started.
+    /// Ticks of the device since its start.
     device_ticks: u32,
-    /// The device says that it is of another version.
+    /// True if the device reports another version.
     other_device: bool,
-    /// There is no host any more.
+    /// True if no host remains.
     host_gone: bool,
 }
 
@@ -126,10 +126,10 @@ pub fn check(plan: &Plan) -> Result<Report, Wrong> {
     World::new(&terrain, scene, plan).play(plan)
 }
 
-/// Frames that an undisturbed run puts onto the line, to the device and to the host.
+/// Returns the frames of an undisturbed run, to the device and to the host.
 ///
 /// # Panics
-/// When an undisturbed run goes wrong.
+/// If an undisturbed run fails.
 #[must_use]
 pub fn frames() -> [usize; 2] {
     check(&Plan::default()).expect("nothing goes wrong").frames
@@ -140,8 +140,8 @@ fn errands() -> [RequestSequence; 2] {
 }
 
 fn device() -> Device<StoppedClock, 2> {
-    // The two halves of the application hand tile buffers to each other by
-    // reference, for as long as the program runs.
+    // The two halves of the application exchange tile buffers by reference, as long as the program
+    // runs.
     Device::new(
         Box::leak(Box::new(TileBuffers::VACANT)),
         Box::leak(Box::new(WorkingMemory::new())),
@@ -191,7 +191,7 @@ impl<'t> World<'t> {
             if let Step::Over(end) = self.step {
                 break end;
             }
-            // It reports to no user, and what counts is the device.
+            // Without a user to report to, only the state of the device counts.
             if self.host_gone && !self.enabled {
                 break End::Told;
             }
@@ -287,14 +287,14 @@ impl<'t> World<'t> {
         for frame in self.lines[0].arrived(self.now) {
             self.judge.frame_came(self.now);
             let mut rest = frame.as_slice();
-            // What finds no room now finds it after a poll.
+            // Bytes without room now have room after a poll.
             for _ in 0..100 {
                 let taken = self.device.receive(rest);
                 rest = &rest[taken..];
                 self.listen();
             }
         }
-        // The user presses the switch until something is driven, and then on.
+        // The user presses the switch until the amplifiers are on, and holds it.
         let dead_man = self.enabled || self.now % 300 > 60;
         let sense = GuardInputs {
             dead_man,
@@ -325,7 +325,7 @@ impl<'t> World<'t> {
         }
     }
 
-    /// The host's program.
+    /// Runs the host's program.
     fn host(&mut self) -> Result<(), Wrong> {
         let (mut out, now) = (vec![], time(self.now));
         let (step, ramp_samples) = (&mut self.step, &mut self.ramp_samples);
@@ -372,7 +372,7 @@ impl<'t> World<'t> {
         Ok(())
     }
 
-    /// Asks for the status, where that was answered.
+    /// Queries the status, if the last query was answered.
     fn wonder(&mut self) {
         let is_at_leisure = matches!(self.step, Step::Feeling | Step::Disarming(_));
         if self.curious
@@ -383,7 +383,7 @@ impl<'t> World<'t> {
         }
     }
 
-    /// The next step, where the last is done.
+    /// Starts the next step, if the last one is done.
     fn go_on(&mut self) {
         self.wonder();
         let is_closed = self.client.state() == State::Closed;
@@ -408,19 +408,19 @@ impl<'t> World<'t> {
             Step::Asking if self.has_errands(1) => self.run_errands(1),
             Step::Asking => self.leave(),
             Step::Leaving if is_closed => self.step = Step::Over(End::Agreed),
-            // Somebody who waits for too long gives up, and ends it.
+            // A user who waits too long gives up and closes the session.
             _ if self.now.is_multiple_of(40_000) && self.step != Step::Leaving => self.leave(),
             _ => {}
         }
     }
 
-    /// Returns true if something of a list is left or under way.
+    /// Returns true if a list has steps left or in progress.
     fn has_errands(&self, list: usize) -> bool {
         let lists = self.errands.as_ref();
         lists.is_some_and(|lists| !lists[list].are_done())
     }
 
-    /// Does the next thing of a list, where the one before is over.
+    /// Starts the next step of a list, if the last one has ended.
     fn run_errands(&mut self, list: usize) {
         let lists = self.errands.as_mut();
         let Some(errand) = lists.and_then(|lists| lists[list].next(self.now)) else {
@@ -430,7 +430,7 @@ impl<'t> World<'t> {
             RequestStep::HostRequest(ask) => {
                 match ask {
                     HostRequest::Request(Request::Jog(_)) => self.judge.wished(),
-                    // Two deadlines for a request that has to be repeated.
+                    // Two deadlines, because the request may be repeated once.
                     HostRequest::Request(Request::Disarm) => {
                         self.judge.unwished_from(self.now + 9_000);
                     }
@@ -439,7 +439,7 @@ impl<'t> World<'t> {
                 self.client.ask(ask);
             }
             RequestStep::View(number) => self.put_view(number),
-            // The force that there may be has gone out.
+            // A remaining force has faded.
             RequestStep::Wait(_) => {}
         }
     }
@@ -475,7 +475,7 @@ impl<'t> World<'t> {
     fn on_error(&mut self, error: LinkError) -> Result<(), Wrong> {
         match (error, self.step) {
             (_, Step::Over(_)) => {}
-            // Frames of a host before that come seconds late look like another host's.
+            // To the device, late frames of an earlier host look like another host's.
             (LinkError::NotConfirmed | LinkError::Taken, _) => self.step = Step::Over(End::Told),
             (LinkError::Version { .. }, _) if self.other_device => {
                 self.step = Step::Over(End::Told);
@@ -504,7 +504,7 @@ fn host<'t>(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Client<'t> {
     Client::numbered(terrain, scene, arming, patience, seed)
 }
 
-/// A tick is a millisecond; the clock began before the program.
+/// A tick is a millisecond; the clock starts before the program.
 const fn time(now: u64) -> Duration {
     Duration::from_millis(1_000_000 + now)
 }

@@ -1,22 +1,22 @@
-//! A host that asks for the status without a pause, and what it takes for the answer.
+//! A host that queries the status without a pause, and the statuses that it accepts as answers.
 
 use hapterra::link::{Event, HostRequest};
 
 use super::oracle::Wrong;
 
-/// The question under way, and the answers so far.
+/// The query in progress, and the answers up to now.
 #[derive(Default)]
 pub(super) struct StatusQueries {
-    /// The device's tick at which it was asked.
+    /// The device's tick at the query.
     asked: Option<u32>,
     /// Number of answers.
     pub(super) answers: u32,
-    /// The tick of the first status that is older than its question, and the question's.
+    /// The tick of the first status that is older than its query, and the query's tick.
     outdated: Option<(u32, u32)>,
 }
 
 impl StatusQueries {
-    /// Asks at this tick of the device, unless it has asked already.
+    /// Makes a query at this tick of the device, unless one is in progress.
     pub(super) fn ask(&mut self, tick: u32) -> Option<HostRequest> {
         match self.asked {
             Some(_) => None,
@@ -27,12 +27,12 @@ impl StatusQueries {
         }
     }
 
-    /// The host was killed.
+    /// Drops the query of a killed host.
     pub(super) const fn forget(&mut self) {
         self.asked = None;
     }
 
-    /// The device counts its ticks from zero again.
+    /// Drops the query if the device restarts, as its ticks count from zero again.
     pub(super) fn device_restarted(&mut self) {
         self.asked = self.asked.and(Some(0));
     }

@@ -1,5 +1,4 @@
-//! The run of a scene with every check: each tick under the judge, and the whole
-//! beside its twins.
+//! The run of a scene with all checks: the oracle for each tick, and the metamorphic tests.
 
 use super::material_checks;
 use super::metamorphic;
@@ -10,7 +9,7 @@ use crate::invariants::oracle::{Measured, TickOracle};
 use crate::random::Random;
 
 impl Scene {
-    /// Runs it under the judge, and beside it the twins it is compared with.
+    /// Runs the scene under the oracle, then its metamorphic tests.
     ///
     /// # Errors
     /// The first violation.

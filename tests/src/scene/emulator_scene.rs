@@ -1,8 +1,8 @@
-//! A scene of the soak as the emulated board can replay it: the tiles and HIPs in
-//! the order they came here, and what the contact answered here, or the loop on materials.
+//! A scene of the stress test for the emulated board: tiles and HIPs in their order of arrival on
+//! the host, and the host's results of the contact, or of the loop on materials.
 //!
-//! The board's window has room for 16 × 16 tiles, as many as this one, so every
-//! scene can be replayed: also those whose tiles are pulled, late and in parts.
+//! The board's window has room for 16 × 16 tiles, as has the host's, so every scene can be
+//! replayed, even if its tiles are pulled, late and in parts.
 
 use crate::scene::run::Execution;
 use hapterra_core::force::SurfaceParams;
@@ -18,7 +18,7 @@ use crate::cycles::Cycles;
 use crate::instruction_counter::{Counted, Event, Replay, Samples, WINDOW};
 use crate::whole_field::point;
 
-/// The seed of scenes by which the emulated processor is compared.
+/// The seed of the scenes that compare the emulated processor with the host.
 const COMPARED: u64 = 77;
 
 fn surface(number: u64) -> Surface {
@@ -28,30 +28,30 @@ fn surface(number: u64) -> Surface {
     }
 }
 
-/// A scene, rendered here in real time.
+/// A scene, rendered on the host in real time.
 pub struct EmulatorScene {
     /// Its settings.
     pub scene: Scene,
-    /// It was rendered on its materials, by the whole loop.
+    /// True if the whole loop rendered it on its materials.
     is_on_materials: bool,
-    /// In the form that the device gets.
+    /// The scene as the device receives it.
     message: SceneMessage,
-    /// Tiles and HIPs, in the order they came.
+    /// Tiles and HIPs in their order of arrival.
     events: Vec<Event>,
-    /// Answer of each tick here, without costs.
+    /// The host's result of each tick, without costs.
     answers: Vec<Counted>,
 }
 
 impl EmulatorScene {
-    /// Runs a scene of a seed in real time, as the board does, and notes it down.
+    /// Runs a scene of a seed in real time, as the board does, and records it.
     ///
     /// # Panics
-    /// When a tick in real time gives no answer.
+    /// If a tick in real time gives no result.
     #[must_use]
     pub fn random(seed: u64, number: u64, surface: Surface) -> Self {
         let scene = Scene {
             execution: Execution::RealTime,
-            // As the counting board, which counts at 10 kHz.
+            // Like the counting board, which counts at 10 kHz.
             work_per_tick: LEAST_WORK_PER_TICK,
             ..Scene::random(seed, number).with_surface(surface)
         };
@@ -99,8 +99,8 @@ impl EmulatorScene {
         }
     }
 
-    /// Replays a scene of a seed on its materials, in lock-step as the board does, and notes it
-    /// down; `None` where it has none.
+    /// Replays a scene of a seed on its materials, in lock-step as the board does, and records it;
+    /// `None` if it has no materials.
     #[must_use]
     pub fn on_materials(seed: u64, number: u64, surface: Surface) -> Option<Self> {
         let scene = Scene::random(seed, number).with_surface(surface);
@@ -115,7 +115,7 @@ impl EmulatorScene {
         })
     }
 
-    /// Scenes by which the emulated processor is compared with this one, with their numbers: a
+    /// Returns the scenes that compare the emulated processor with the host, with their numbers: a
     /// third of them with friction.
     #[must_use]
     pub fn compared() -> Vec<(u64, Self)> {
@@ -123,7 +123,7 @@ impl EmulatorScene {
         (0..40).map(random).collect()
     }
 
-    /// The same on materials.
+    /// Returns the same on materials.
     #[must_use]
     pub fn compared_on_materials() -> Vec<(u64, Self)> {
         let on_materials = |number| {
@@ -133,7 +133,7 @@ impl EmulatorScene {
         (0..120).filter_map(on_materials).collect()
     }
 
-    /// As the counting board takes it.
+    /// Returns the scene as the counting board receives it.
     #[must_use]
     pub fn replay(&self) -> Replay<'_> {
         Replay {
@@ -148,8 +148,8 @@ impl EmulatorScene {
         }
     }
 
-    /// The first tick whose answer on the board differs in a bit, or in a unit of
-    /// work, from the one here.
+    /// Returns the first tick whose result on the board differs from the host's in a bit or a work
+    /// unit.
     #[must_use]
     pub fn differs(&self, there: &[Counted]) -> Option<usize> {
         let pairs = self.answers.iter().zip(there);

@@ -3,15 +3,15 @@
 use super::terrain::Terrain;
 use crate::random::Random;
 
-/// Positions are whole multiples of this many cells, so that they are exact in
-/// single precision however a scene is mirrored, turned or shifted.
+/// Positions are integer multiples of this, in cells, so that they stay exact in single precision
+/// in a mirrored, turned or shifted scene.
 pub const GRAIN: f64 = 1.0 / (1 << 20) as f64;
 /// An encoder count at the tip, cells of a millimetre.
 const COUNT: f64 = 0.03;
 
-/// The HIP moves no farther than this along an axis in a tick, cells.
+/// Largest motion of the HIP along an axis in a tick, cells.
 pub const LEAP: f64 = 32.0;
-/// Leaps toward a place, at most.
+/// Most leaps towards a target.
 const LEAPS: usize = 12;
 
 /// Motion of the HIP for some ticks.
@@ -19,7 +19,7 @@ const LEAPS: usize = 12;
 enum Habit {
     /// Steps of one length near the surface.
     Wander,
-    /// Anywhere in one tick.
+    /// Jumps to any point in one tick.
     Teleport,
     /// Trembles by one encoder count.
     Tremble,
@@ -31,7 +31,7 @@ enum Habit {
     OnLines,
     /// Up and down through the surface.
     Tap,
-    /// Across the whole field in one tick, there and back.
+    /// Crosses the whole field in one tick, and returns.
     Sweep,
     /// Does not move.
     Still,
@@ -49,7 +49,7 @@ const HABITS: [Habit; 9] = [
     Habit::Still,
 ];
 
-/// `ticks` positions in cells; the first is high above everything.
+/// Returns `ticks` positions in cells; the first is high above everything.
 #[must_use]
 pub fn random(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
     walked(terrain, random, ticks, |walker| {
@@ -61,8 +61,8 @@ pub fn random(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64;
     })
 }
 
-/// `ticks` positions in cells: down out of the sky, and then far below the surface, as a
-/// hand that presses into small cells: to and fro, slow and fast.
+/// Returns `ticks` positions in cells: from the sky to far below the surface, like a hand that
+/// presses into small cells: to and fro, slow and fast.
 #[must_use]
 pub fn deep(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
     walked(terrain, random, ticks, |walker| {
@@ -71,7 +71,7 @@ pub fn deep(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3
     })
 }
 
-/// `ticks` positions: out of the sky, and now and then back to it.
+/// Returns `ticks` positions: from the sky, with an occasional return to it.
 fn walked(
     terrain: &Terrain,
     random: &mut Random,
@@ -98,7 +98,7 @@ struct Walker<'a> {
 }
 
 impl<'a> Walker<'a> {
-    /// High above the surface, somewhere.
+    /// Starts at a random point high above the surface.
     fn in_the_sky(terrain: &'a Terrain, random: &'a mut Random) -> Self {
         let size = terrain.size.map(f64::from);
         let at = [random.between(1.0, size[0]), random.between(1.0, size[1])];
@@ -140,13 +140,13 @@ impl<'a> Walker<'a> {
         self.put(x, y, self.terrain.height_about(x, y) + height);
     }
 
-    /// A length over many orders of magnitude, at most `most`.
+    /// Returns a length over many orders of magnitude, at most `most`.
     fn length(&mut self, most: f64) -> f64 {
         most * 10_f64.powf(self.random.between(-4.0, 0.0))
     }
 
     fn anywhere(&mut self) -> [f64; 2] {
-        // Off the field, too.
+        // Also off the field.
         [0, 1].map(|axis| self.random.between(-2.0, self.size[axis] + 2.0))
     }
 
@@ -221,7 +221,7 @@ impl<'a> Walker<'a> {
         self.above(x, y, 0.5);
         let depth = self.length(2.0);
         for tick in 0..ticks {
-            // Exactly under it, and beside it by the least there is.
+            // Exactly below it, or beside it by the smallest step.
             let off = if tick % 3 == 2 { GRAIN } else { 0.0 };
             let z = self.terrain.height_about(x, y) - depth;
             self.put(x + off, y - off, z);

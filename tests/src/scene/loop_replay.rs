@@ -1,4 +1,4 @@
-//! A scene on materials, rendered by the product's whole loop: points go in, samples come out.
+//! A scene on materials, rendered by the product's whole loop, from points to samples.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -23,18 +23,18 @@ const PATIENCE: usize = 20_000;
 /// Answer to a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Replied {
-    /// The HIP, where the terrain was made.
+    /// The HIP, in the terrain's own coordinates.
     pub hip: [f64; 3],
-    /// The proxy there.
+    /// The proxy, in the same coordinates.
     pub proxy: [f64; 3],
     /// Record of the tick that answered it.
     pub sample: TickRecord,
 }
 
-/// Conditions of a scene's replay.
+/// Settings of a scene's replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Replay {
-    /// By so many cells the terrain lies elsewhere.
+    /// Shift of the terrain, cells.
     pub shift: [i32; 3],
     /// Supply of the tiles.
     pub supply: Supply,
@@ -51,19 +51,19 @@ struct Device<'t, 'g, const D: usize> {
     coming: Vec<(u32, TileKey)>,
     now: u32,
     seq: u32,
-    /// Tiles and points in the order of their arrival, and each tick's report.
+    /// Tiles and points in their order of arrival, and each tick's report.
     events: Vec<Event>,
     ticks: Vec<Counted>,
 }
 
-/// Replays the path of a scene on materials in a window of `D × D` tiles, and lets `look` see what
-/// was rendered of each point.
+/// Replays the path of a scene on materials in a window of `D × D` tiles, and calls `look` for the
+/// result of each point.
 ///
 /// # Errors
 /// The error of `look`, or a point without an answer.
 ///
 /// # Panics
-/// When the loop refuses the scene, or the terrain that is to be held does not fit.
+/// If the loop refuses the scene, or a terrain to be stored whole does not fit.
 pub fn replay<const D: usize>(
     scene: &Scene,
     materials: &Materials,
@@ -93,11 +93,11 @@ pub fn replay<const D: usize>(
     Ok(all)
 }
 
-/// Replays the path of a scene on materials in a window as large as the counting board's: the scene
-/// as the device gets it, tiles and points in the order of their arrival, and each tick's report.
+/// Replays the path of a scene on materials in a window as large as the counting board's. Returns
+/// the scene as the device receives it, tiles and points in order, and each tick's report.
 ///
 /// # Panics
-/// As [`replay`], and when a point is never answered.
+/// Like [`replay`], and if a point is never answered.
 #[must_use]
 pub fn noted(scene: &Scene, materials: &Materials) -> (SceneMessage, Vec<Event>, Vec<Counted>) {
     let mut buffers = Buffers::new(WINDOW);
@@ -163,7 +163,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         }
     }
 
-    /// Brings a tile; whether the loop took it.
+    /// Sends a tile. Returns true if the loop accepted it.
     fn bring(&mut self, key: TileKey) -> bool {
         let tile = self.spare.pop().expect("as many spares as requests");
         let [dx, dy, dz] = self.replay.shift;
@@ -187,7 +187,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         is_taken
     }
 
-    /// One point: ticks until it is answered, or `None`.
+    /// Runs ticks for one point until it is answered; `None` if it never is.
     fn step(&mut self, hip: GridPoint) -> Option<TickRecord> {
         let seq = self.seq;
         self.seq += 1;
@@ -229,7 +229,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         });
     }
 
-    /// Asks for what the tick showed to be wanted, and takes what has come.
+    /// Requests the tiles that the tick needs, and delivers those that are due.
     fn supply(&mut self, sample: &TickRecord) {
         let Supply::Pulled { latency } = self.replay.supply else {
             return;
@@ -256,7 +256,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 }
 
-/// The scene as the device gets it.
+/// Returns the scene as the device receives it.
 fn message(scene: &Scene, materials: &Materials, shift: [i32; 3]) -> SceneMessage {
     let [columns, rows] = scene.terrain.size;
     SceneMessage {

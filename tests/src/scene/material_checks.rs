@@ -1,5 +1,5 @@
-//! The replay of a scene on materials under its judge, and beside twins in which no force may
-//! change.
+//! The replay of a scene on materials under its oracle, and in metamorphic tests in which no force
+//! may change.
 
 use super::hip_path::LEAP;
 use super::loop_replay::{Replay, Replied, replay};
@@ -17,7 +17,7 @@ use crate::random::Random;
 const BESIDE: f64 = 128.0;
 const DEEP: f64 = 4e6;
 
-/// Replays a scene on its materials, and adds to what was measured.
+/// Replays a scene on its materials under the oracle, and adds to its measurements.
 ///
 /// # Errors
 /// The first violation.
@@ -52,7 +52,7 @@ pub fn run(
     match twin {
         0 if fits(&replied) => windowed(scene, materials, &replied, buffers, &mut random)?,
         1 => shifted(scene, materials, buffers, &mut random)?,
-        // Mirrored walls are elsewhere than the judge of walls takes them to be.
+        // Mirrored walls are not where the check of walls expects them.
         2 if scene.terrain.kind != Kind::Walls => turned(scene, materials, buffers, &mut random)?,
         _ => return Ok(()),
     }
@@ -60,7 +60,7 @@ pub fn run(
     Ok(())
 }
 
-/// [`replay`] in a window of so many tiles each way.
+/// Runs [`replay`] in a window of `side` × `side` tiles.
 fn replay_in(
     side: usize,
     scene: &Scene,
@@ -78,8 +78,8 @@ fn replay_in(
     }
 }
 
-/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each
-/// point was rendered with all of its terrain: one that needs more tiles than its window holds is not.
+/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and no
+/// point lacked terrain, as one does that needs more tiles than its window has.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
@@ -89,7 +89,7 @@ fn fits(replied: &[Replied]) -> bool {
     replied.iter().all(is_whole) && replied.windows(2).all(is_near)
 }
 
-/// In another window, whose tiles come at other times: the same bits.
+/// Replays in another window, whose tiles arrive at other times: the bits must be identical.
 fn windowed(
     scene: &Scene,
     materials: &Materials,
@@ -107,8 +107,8 @@ fn windowed(
     same_bits(Invariant::Window, replied, &other, [0; 3], true)
 }
 
-/// Elsewhere, by whole tiles: the same bits, but for the force of textures that are others there;
-/// they are judged in both places.
+/// Replays in two places, whole tiles apart: the bits must be identical, except for forces of
+/// textures that differ there. The oracle checks both.
 fn shifted(
     scene: &Scene,
     materials: &Materials,
@@ -133,7 +133,7 @@ fn shifted(
             judge.look(replied)
         })
     };
-    // Both away from the origin, so that what lies beyond the field is alike.
+    // Both are away from the origin, so that the space beyond the field is alike.
     let near = [256, 256, 0];
     let (here, there) = (at(near)?, at(away)?);
     let alike = |one: &hapterra_core::force::Material| is_alike(&one.texture, materials.cell_mm);
@@ -142,8 +142,8 @@ fn shifted(
     same_bits(Invariant::Shift, &here, &there, by, forces)
 }
 
-/// Mirrored or turned, ground and classes: judged as any scene. The bits are others, since a place
-/// half way between two samples has the class of the other one there.
+/// Replays mirrored or turned ground and classes under the oracle. The bits differ, since a point
+/// half way between two samples then has the other one's class.
 fn turned(
     scene: &Scene,
     materials: &Materials,
@@ -167,8 +167,7 @@ fn turned(
     .map(drop)
 }
 
-/// Compares two replays of which the second is `shift` cells away; the forces, too, if that is
-/// asked for.
+/// Compares two replays, the second shifted by `shift` cells; `forces` includes the forces.
 fn same_bits(
     invariant: Invariant,
     one: &[Replied],

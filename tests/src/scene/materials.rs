@@ -1,4 +1,4 @@
-//! Materials of a scene, drawn at random: a table, and the class of each sample.
+//! Random materials of a scene: a table, and the class of each sample.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Texture};
@@ -8,21 +8,21 @@ use super::symmetry::Symmetry;
 use super::terrain::Terrain;
 use crate::random::Random;
 
-/// One scene in so many has materials.
+/// One scene in this many has materials.
 const EVERY: usize = 4;
 
 /// Layout of the classes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// All samples are of one.
+    /// One class for all samples.
     One,
-    /// One in the west or south, another in the rest; often at a tile's border.
+    /// One class in the west or south, another in the rest; often at a tile's border.
     Halves,
-    /// Two in turns, from sample to sample.
+    /// Two classes, alternating from sample to sample.
     Checker,
-    /// All of them in stripes.
+    /// All classes, in stripes.
     Stripes,
-    /// Each sample by itself.
+    /// A random class for each sample.
     Each,
     /// Patches of some samples.
     Blobs,
@@ -41,11 +41,11 @@ pub const LAYOUTS: [Layout; 6] = [
 /// Materials of a scene's ground.
 #[derive(Clone, Debug)]
 pub struct Materials {
-    /// The materials, the default first.
+    /// The materials; the default is first.
     pub table: Vec<Material>,
     /// Layout of the classes.
     pub layout: Layout,
-    /// The scene's own params: a limit, and a stiffness that is the default's or a multiple.
+    /// The scene's own parameters: a limit, and a stiffness that is the default's or a multiple.
     pub params: SurfaceParams,
     /// Millimetres a cell: a power of two, so that lengths in cells are exact.
     pub cell_mm: f32,
@@ -57,9 +57,9 @@ pub struct Materials {
 }
 
 impl Materials {
-    /// The materials of a scene, if it has some: one in four has.
+    /// Draws the materials of a scene, if it has some: one in four has.
     pub(super) fn drawn(mixed: u64, terrain: &Terrain) -> Option<Self> {
-        // A generator of their own, so that the rest of a scene stays what it was.
+        // From a generator of their own, so that the rest of a scene stays as it was.
         let mut random = Random::new(mixed ^ 0x3a7e_71a1);
         (random.below(EVERY) == 0).then(|| Self::random(&mut random, terrain))
     }
@@ -104,7 +104,7 @@ impl Materials {
         materials
     }
 
-    /// Materials whose classes follow from the sample.
+    /// Creates materials whose classes are a function of the sample.
     #[must_use]
     pub fn from_fn(table: &[Material], size: [i32; 2], class: impl Fn(i32, i32) -> u8) -> Self {
         let mut materials = Self {
@@ -129,8 +129,8 @@ impl Materials {
         self.classes = samples.map(|(x, y)| class(x, y)).collect();
     }
 
-    /// The class of a sample: the place of its material in the table. Beyond the field it is the
-    /// default's.
+    /// Returns the class of a sample: the index of its material in the table. Beyond the field it
+    /// is the default's.
     #[must_use]
     pub fn class(&self, x: i32, y: i32) -> u8 {
         let [columns, rows] = self.size;
@@ -140,7 +140,7 @@ impl Materials {
         self.classes[(y * columns + x) as usize]
     }
 
-    /// The same ground with friction, which follows from the scene; some of it stays like ice.
+    /// Returns the same ground with friction drawn from the scene; some of it stays frictionless.
     #[must_use]
     pub fn roughened(mut self) -> Self {
         let mut random = Random::new(self.seed ^ 0xf71c_7104);
@@ -153,10 +153,10 @@ impl Materials {
         self
     }
 
-    /// The table as the device gets it.
+    /// Returns the table as the device receives it.
     ///
     /// # Panics
-    /// When it has none, or too many.
+    /// If it is empty or too long.
     #[must_use]
     pub fn told(&self) -> MaterialTable {
         MaterialTable::new(&self.table).expect("as many as fit")
@@ -168,7 +168,7 @@ impl Materials {
         self.table.iter().all(|one| one.friction.is_none())
     }
 
-    /// The ground seen from another side.
+    /// Returns the ground mirrored or turned.
     #[must_use]
     pub fn seen_by(&self, symmetry: Symmetry) -> Self {
         let [columns, rows] = self.size;
@@ -193,7 +193,7 @@ impl Materials {
     }
 }
 
-/// A material; now and then with the texture of the one before.
+/// Draws a material; sometimes with the texture of the one before.
 fn material(random: &mut Random, before: Option<&Material>) -> Material {
     let own = texture(random.bits());
     let shared = before.map_or(Texture::NONE, |before| before.texture);
@@ -209,7 +209,7 @@ fn material(random: &mut Random, before: Option<&Material>) -> Material {
     }
 }
 
-/// Which class a sample has, in a field of so many patches.
+/// Returns the class of each sample in a field of this many patches.
 fn classes(
     layout: Layout,
     count: usize,
@@ -247,14 +247,14 @@ fn classes(
     }
 }
 
-/// The random numbers of a place.
+/// Returns the random numbers of a sample.
 fn random_at(seed: u64, x: i32, y: i32) -> Random {
     let place = u64::from(x.cast_unsigned()) << 32 | u64::from(y.cast_unsigned());
     Random::new(seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
-/// The random numbers of the blob in which a sample lies: each square of so many samples has a middle
-/// somewhere, and a sample belongs to the nearest one.
+/// Returns the random numbers of a sample's blob: each square of `side` samples has a centre, and a
+/// sample belongs to the nearest one.
 fn blob(seed: u64, side: i32, [x, y]: [i32; 2]) -> Random {
     let (col, row) = (x.div_euclid(side), y.div_euclid(side));
     let squares = (-1..=1).flat_map(|north| (-1..=1).map(move |east| (col + east, row + north)));

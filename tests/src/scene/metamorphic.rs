@@ -1,4 +1,4 @@
-//! Scenes run twice, the second time so that no force may change.
+//! Metamorphic tests: scenes run a second time so that no force may change.
 
 use crate::scene::run::Execution;
 use hapterra_core::contact::ContactState;
@@ -15,10 +15,10 @@ use crate::invariants::{Invariant, Violation};
 use crate::random::Random;
 
 type Verdict = Result<(), Violation>;
-/// Result of a comparison: true if the twin could be compared to the end.
+/// Result of a comparison: true if it ran to the end.
 type Compared = Result<bool, Violation>;
 
-/// The same again, with the contact's shortcuts switched off: the same bits.
+/// Runs a scene again without the contact's fast paths: the bits must be identical.
 ///
 /// # Errors
 /// The difference.
@@ -33,15 +33,14 @@ pub fn repeated(scene: &Scene, seen: &[ObservedTick], buffers: &mut Buffers) -> 
 
 /// Range of a shifted scene's HIP beyond the field, cells.
 const BESIDE: f64 = 128.0;
-/// Range above or below, cells: farther down than any spike reaches up.
+/// Range above or below, cells: farther down than any spike is high.
 const DEEP: f64 = 4e6;
 
-/// Up to 10⁸ cells away: the same bits, but for textures that are others there.
+/// Runs a scene up to 10⁸ cells away: the same bits, except for textures that differ there.
 ///
-/// Both runs are away from the origin, so that what lies beyond the field is
-/// alike: not here, until it is asked for. By whole tiles, and by any whole cells
-/// up and down; in real time, where the work of a tick may run out, by as many as
-/// keep the blocks of tiles the same.
+/// Both runs are away from the origin, so that the space beyond the field is alike: not in the
+/// window until requested. The shift is whole tiles, and any whole cells up and down; in real time,
+/// where the work of a tick may run out, it is a multiple that keeps the blocks of tiles the same.
 ///
 /// # Errors
 /// The difference.
@@ -53,8 +52,8 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
     let far = [1_000, 30_000, 1_000_000, 100_000_000];
     let mut pick = || far[random.below(far.len())] / whole * whole;
     let shift = [pick(), pick(), pick() - 50_000_000];
-    // No farther beyond the field than the nearer one is from the origin: what
-    // lies there is asked for, tile by tile.
+    // No farther beyond the field than the nearer run is from the origin: each tile there is
+    // requested.
     let beside = |p: &[f64; 3]| {
         let within =
             |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
@@ -65,7 +64,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
         scene.path.iter().map(beside).collect(),
     );
     let mut output = |shift| {
-        // Of grain, and of most gratings, another part is there; it is judged as well.
+        // Grain and most gratings have another part there, so the oracle checks them as well.
         let mut judge = TickOracle::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
         let seen = scene.step(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
@@ -80,8 +79,8 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
     same_bits(Invariant::Shift, &near, &away, by).map(|()| true)
 }
 
-/// With a window of 7 × 7 tiles that waits for them, and with the whole field
-/// held: the same bits, where waiting leaves no trace.
+/// Runs a scene in a window of 7 × 7 tiles that waits for them, and with the whole field stored:
+/// the bits must be identical if waiting leaves no trace.
 ///
 /// # Errors
 /// The difference.
@@ -92,7 +91,7 @@ pub fn windowed(
     random: &mut Random,
 ) -> Compared {
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
-    // A path from the proxy to the HIP fits into the small window.
+    // The path from the proxy to the HIP fits into the small window.
     let is_near = |ticks: &[ObservedTick]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
         way(0).max(way(1)) <= 5.0 * LEAP
@@ -111,10 +110,10 @@ pub fn windowed(
     Ok(true)
 }
 
-/// Compares two runs of which the second is `shift` cells away.
+/// Compares two runs, the second shifted by `shift` cells.
 ///
 /// # Errors
-/// `invariant`, where a bit of the answers differs.
+/// `invariant`, if a bit of the results differs.
 pub fn same_bits(
     invariant: Invariant,
     seen: &[ObservedTick],
@@ -151,20 +150,20 @@ pub fn same_bits(
 /// cells. On steeper ground rounding decides at nearly every vertex.
 const STEEP: f32 = 10.0;
 
-/// A proxy that moves so many times as far as its HIP was moved is elsewhere.
+/// Ratio of the motions of proxy and HIP from which the proxy counts as elsewhere.
 const JUMP: f64 = 1e3;
 
-/// Mirrored or turned: the same answers to within rounding.
+/// Runs a scene mirrored or turned: the results must agree to within rounding.
 ///
-/// The core counts from the south-west corner of a patch, so rounding differs.
-/// If two paths are equally good, the two runs may differ; they are not compared until both are free
-/// again. If the rounding decides in one of them, they are not compared any more.
+/// The core counts from the south-west corner of a patch, so rounding differs. If two paths are
+/// equally good, the two runs may differ; they are not compared until both are free again. If
+/// rounding decides in one of them, the comparison ends.
 ///
 /// # Errors
-/// A difference for no such reason.
+/// A difference that rounding does not explain.
 pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Compared {
-    // On a border of the data a HIP belongs to the patch in the north-east,
-    // mirrored or not; and what is left over of a tick may differ.
+    // On a border of the data a HIP belongs to the patch in the north-east, mirrored or not; and
+    // the work left of a tick may differ.
     let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
     if !settles || !plain {
@@ -185,7 +184,7 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     same_way(scene, symmetry, &seen, &other, buffers)
 }
 
-/// The scene, mirrored or turned.
+/// Returns the scene, mirrored or turned.
 fn twin_of(scene: &Scene, symmetry: Symmetry) -> Scene {
     let turned = |p: &[f64; 3]| symmetry.point(&scene.terrain, *p);
     let path = scene.path.iter().map(turned).collect();
@@ -206,7 +205,7 @@ pub fn same_way(
     let turned = |p| symmetry.point(&scene.terrain, p);
     let mut parted = false;
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
-        // Until both are in the HIP again.
+        // Until both proxies are at the HIP again.
         parted &= a.output.state != ContactState::Free || b.output.state != ContactState::Free;
         if parted {
             continue;
@@ -242,10 +241,10 @@ pub fn same_way(
     Ok(true)
 }
 
-/// Tolerance of the direction of a shaded force. A place that is off by as much as rounding allows
-/// turns it by less than this, rad, on ground that mirrored scenes are compared on.
+/// Tolerance of the direction of a shaded force, rad: more than its turn by rounding of the
+/// position, on ground steep enough for mirrored scenes.
 const TURNED: f32 = 0.01;
-/// A force of a HIP that is farther away is not compared, cells.
+/// Distance of a HIP, cells, from which its force is not compared.
 const FAR: f32 = 1e4;
 
 fn is_shaded_likewise(
@@ -257,7 +256,7 @@ fn is_shaded_likewise(
     let (Some(one), Some(other)) = (a.shaded, b.shaded) else {
         return true;
     };
-    // So far away all that is near the proxy is equally near, and each place has its own normal.
+    // At this distance all points near the proxy are equally near, and each has its own normal.
     let length = a.output.displacement.length();
     let is_told = (0.1..FAR).contains(&length);
     if !is_told || !scene.friction.is_none() || a.output.state != b.output.state {
@@ -272,16 +271,16 @@ fn is_shaded_likewise(
     across <= TURNED * along
 }
 
-/// A proxy that slid may be pulled by so much more than friction holds, as a part: where
-/// rounding decides whether it slides on, twins are as far apart.
+/// Tolerance of the pull on a proxy that slid, as a fraction of friction: if rounding decides
+/// whether it slides on, the two runs differ by as much.
 const SLACK: f64 = 0.03;
 
-/// Rounding apart, the same answer; or another one that is as near to the HIP; or, with
-/// friction, another that a proxy which slid may stop at.
+/// Returns true if two results are equal to within rounding, or equally near to the HIP, or, with
+/// friction, both possible ends of a slide.
 fn agree(scene: &Scene, proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
-    // A HIP in the surface may touch it or be free: no force is rendered either way.
+    // A HIP in the surface may be touching or free: neither gives a force.
     let at_hip = |seen: &ObservedTick| {
         let may = matches!(
             seen.output.state,
@@ -302,13 +301,13 @@ fn is_near(proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
     distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
 }
 
-/// Returns true if a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
+/// Returns true if a proxy moves much farther than the tiny motion `hair` of its HIP, cells.
 fn is_elsewhere(there: &ObservedTick, here: &ObservedTick, hair: f64) -> bool {
     distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
 }
 
-/// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is
-/// rendered once more.
+/// Returns true if a tiny motion of the HIP changes the result of the mirrored or turned run as
+/// well.
 fn is_twin_undecided(
     scene: &Scene,
     symmetry: Symmetry,
@@ -323,8 +322,8 @@ fn is_twin_undecided(
     })
 }
 
-/// Returns true if a hair's breadth on the way to this tick, or in this tick alone, cells, makes
-/// the difference, too.
+/// Returns true if a tiny motion of the HIP on the whole path or in this tick alone changes the
+/// result as well.
 fn is_undecided(
     scene: &Scene,
     tick: usize,
@@ -348,7 +347,7 @@ fn is_undecided(
     false
 }
 
-/// Returns the result of a tick of a path that is shifted by as much in each.
+/// Returns the result of a tick of a path in which each position is shifted by `moved`.
 fn rendered_at(
     scene: &Scene,
     tick: usize,

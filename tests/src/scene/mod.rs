@@ -1,4 +1,4 @@
-//! Scenes: a terrain, a path of the HIP, and how the tiles come.
+//! Scenes: a terrain, a path of the HIP, and the supply of tiles.
 
 pub mod checked_run;
 pub mod emulator_scene;

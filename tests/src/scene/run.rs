@@ -1,4 +1,4 @@
-//! A scene by its seed and number, and the run of it, tick by tick.
+//! A scene by its seed and number, and its run, tick by tick.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{
@@ -18,7 +18,7 @@ use crate::invariants::{Invariant, Violation};
 use crate::random::Random;
 use crate::whole_field::point;
 
-/// Units of work of a tick at 10 kHz.
+/// Work units of a tick at 10 kHz.
 pub(super) const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
     Some(rate) => work_per_tick(rate),
     None => WORK_PER_TICK,
@@ -26,13 +26,13 @@ pub(super) const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
 
 /// Ticks that one HIP may be repeated for in lock-step.
 const PATIENCE: usize = 20_000;
-/// Every so many-th scene has a HIP that stays deep.
+/// One scene in this many has a HIP that stays deep.
 const DEEP_EVERY: u64 = 8;
 
-/// A terrain, a path of the HIP, and the settings it is rendered with.
+/// A terrain, a path of the HIP, and the settings of the rendering.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Answer of a variant.
+    /// The terrain.
     pub terrain: Terrain,
     /// The HIP, cells.
     pub path: Vec<[f64; 3]>,
@@ -42,29 +42,29 @@ pub struct Scene {
     pub supply: Supply,
     /// Friction of the surface.
     pub friction: Friction,
-    /// Which normals the force follows.
+    /// Normals that the force follows.
     pub shading: Shading,
-    /// Its micro-relief, of cells of a millimetre.
+    /// Texture of the surface, with cells of a millimetre.
     pub texture: Texture,
-    /// Materials of its ground, in a scene that is replayed on materials besides.
+    /// Materials of the ground, for an additional replay on materials.
     pub materials: Option<Materials>,
-    /// True if the contact takes its shortcuts.
+    /// True if the contact uses its fast paths.
     pub fast_paths: bool,
-    /// Units of work of a tick: what it has at 1 kHz, or at 10 kHz.
+    /// Work units of a tick at 1 kHz or at 10 kHz.
     pub(super) work_per_tick: u32,
-    /// Which of the twins are run beside it.
+    /// The metamorphic tests that are run.
     pub(super) twins: Twins,
-    /// Seed of the twins' own choices.
+    /// Seed of the metamorphic tests' random choices.
     pub(super) seed: u64,
 }
 
 /// The surface of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Surface {
-    /// Like ice.
+    /// Frictionless.
     #[default]
     Smooth,
-    /// With friction, which follows from the scene.
+    /// With friction, drawn from the scene.
     Rough,
 }
 
@@ -79,7 +79,7 @@ impl Surface {
     }
 }
 
-/// The grating of a scene of one's own.
+/// The grating of a scene from [`Scene::given`].
 const GRATING: Texture = Texture {
     pattern: Pattern::Grating,
     amplitude_mm: 0.05,
@@ -87,10 +87,9 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
-/// Returns true if a texture feels the same a multiple of 32 cells away: it lies fast on the
-/// terrain's cells, of so many millimetres.
+/// Returns true if a texture is the same a multiple of 32 cells away, with cells of `cell_mm`.
 pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
-    // Numbers of waves without rounding.
+    // Wave numbers without rounding.
     let fits = [0.25, 0.5, 1.0, 8.0, 32.0].contains(&texture.wavelength_mm)
         && (32.0 * cell_mm / texture.wavelength_mm).fract() == 0.0;
     match texture.pattern {
@@ -100,7 +99,7 @@ pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
     }
 }
 
-/// A friction.
+/// Draws a friction.
 pub(super) fn friction(random: &mut Random) -> Friction {
     let dynamic_mu = [0.05, 0.3, 0.7, 2.0][random.below(4)];
     let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][random.below(4)];
@@ -112,9 +111,9 @@ pub(super) fn friction(random: &mut Random) -> Friction {
     }
 }
 
-/// The texture of a scene, if any.
+/// Draws the texture of a scene, if it has one.
 pub(super) fn texture(mixed: u64) -> Texture {
-    // A generator of its own, so that the rest of a scene stays what it was.
+    // From a generator of its own, so that the rest of a scene stays as it was.
     let mut random = Random::new(mixed ^ 0x7e87_0e5e);
     let pattern = [Pattern::None, Pattern::Grain, Pattern::Grating][random.below(3)];
     if pattern == Pattern::None {
@@ -131,24 +130,23 @@ pub(super) fn texture(mixed: u64) -> Texture {
     }
 }
 
-/// Which twins a scene is compared with.
+/// Metamorphic tests of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Twins {
-    /// One of them, or none: scenes of a soak are many.
+    /// One of them, or none, as a stress test has many scenes.
     One(usize),
-    /// Each.
+    /// All of them.
     All,
 }
 
 impl Scene {
-    /// The scene of that number among those of a seed.
+    /// Draws the scene of this number and seed.
     #[must_use]
     pub fn random(seed: u64, number: u64) -> Self {
         let mixed = seed ^ number.wrapping_mul(0xd134_2543_de82_ef95);
         let mut random = Random::new(mixed);
         let kind = KINDS[random.below(KINDS.len())];
-        // A hundred patches, or so many that the window cannot hold them all;
-        // or a strip of thousands.
+        // A hundred patches a side, or more than the window can store, or a strip of thousands.
         let (size, supply) = match random.below(4) {
             0 | 1 => ([70 + random.below(60) as i32, 90], Supply::Held),
             2 => ([200, 256], Supply::Held),
@@ -160,7 +158,7 @@ impl Scene {
         };
         let terrain = Terrain::new(kind, size, random.bits());
         let ticks = 300 + random.below(500);
-        // By number, so that a scene of the other kind stays what it was.
+        // By number, so that the scenes of the other kind stay as they were.
         let path = match number % DEEP_EVERY {
             0 => hip_path::deep(&terrain, &mut random, ticks),
             _ => hip_path::random(&terrain, &mut random, ticks),
@@ -177,19 +175,19 @@ impl Scene {
             execution,
             supply,
             friction: Friction::NONE,
-            // By number, as the path.
+            // By number, like the path.
             shading: [Shading::None, Shading::Smooth][(number / 2 % 2) as usize],
             texture: texture(mixed),
             materials,
             fast_paths: true,
             twins: Twins::One(random.below(6)),
-            // By number, as the path.
+            // By number, like the path.
             work_per_tick: [WORK_PER_TICK, LEAST_WORK_PER_TICK][(number / 4 % 2) as usize],
             seed: random.bits(),
         }
     }
 
-    /// The same scene on such a surface.
+    /// Returns the scene with this surface.
     #[must_use]
     pub fn with_surface(self, surface: Surface) -> Self {
         if surface == Surface::Smooth {
@@ -202,7 +200,7 @@ impl Scene {
         }
     }
 
-    /// A scene of one's own, with the work of a tick at 10 kHz, compared with every twin.
+    /// Creates a scene with the work of a tick at 10 kHz and all metamorphic tests.
     #[must_use]
     pub const fn given(
         terrain: Terrain,
@@ -226,7 +224,7 @@ impl Scene {
         }
     }
 
-    /// The settings of its contact.
+    /// Returns the settings of its contact.
     #[must_use]
     pub const fn settings(&self) -> ContactSettings {
         ContactSettings {
@@ -237,11 +235,10 @@ impl Scene {
         }
     }
 
-    /// Runs it over the terrain shifted by so many cells, and lets `look` see
-    /// each tick.
+    /// Runs it over the terrain shifted by `shift` cells, and calls `look` for each tick.
     ///
     /// # Errors
-    /// The error of `look`, or a tick that does not settle.
+    /// The error of `look`, or a tick that does not converge.
     pub fn step(
         &self,
         buffers: &mut Buffers,
@@ -252,10 +249,10 @@ impl Scene {
         self.feel_in::<SIDE>(buffers, shift, supply, look)
     }
 
-    /// The same with a window of `D × D` tiles.
+    /// Same as [`Self::step`] with a window of `D × D` tiles.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Like [`Self::step`].
     pub fn feel_in<const D: usize>(
         &self,
         buffers: &mut Buffers,
@@ -278,13 +275,13 @@ impl Scene {
         Ok(all)
     }
 
-    /// Returns true if it feels the same a multiple of 32 cells away.
+    /// Returns true if its texture is the same a multiple of 32 cells away.
     #[must_use]
     pub fn is_textured_alike(&self) -> bool {
         is_alike(&self.texture, 1.0)
     }
 
-    /// The same settings over another terrain, with another path of the HIP.
+    /// Returns the same settings over another terrain, with another path of the HIP.
     #[must_use]
     pub fn with(&self, terrain: Terrain, path: Vec<[f64; 3]>) -> Self {
         Self {
@@ -296,18 +293,18 @@ impl Scene {
     }
 }
 
-/// When a HIP has its answer.
+/// Condition for the result of a HIP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Execution {
     /// After one tick.
     RealTime,
-    /// Once all is done for it with all of the terrain it needs, as in a replay.
+    /// When it has converged with all of the terrain it needs, as in a replay.
     LockStep,
 }
 
 /// A contact in a scene, tick by tick.
 pub struct Player<'t, 'g, const D: usize> {
-    /// Its state, for those who want to try a tick twice.
+    /// Its state, for tests that repeat a tick.
     pub contact: Contact,
     shader: Option<Shader>,
     /// The last displacement, shaded.
@@ -315,7 +312,7 @@ pub struct Player<'t, 'g, const D: usize> {
     texturer: Option<Texturer>,
     /// The last displacement, shaded and textured.
     textured: Vec3,
-    /// Place where it feels.
+    /// The window and its supply of tiles.
     pub supplied: SuppliedWindow<'t, 'g, D>,
     execution: Execution,
     shift: [i32; 3],
@@ -323,7 +320,7 @@ pub struct Player<'t, 'g, const D: usize> {
 }
 
 impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
-    /// Before the first tick.
+    /// Creates the contact before the first tick.
     pub fn new(
         scene: &'g Scene,
         buffers: &'t mut Buffers,
@@ -343,8 +340,8 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         }
     }
 
-    /// One HIP: one tick, or in lock-step as many as it takes. `None` when those do
-    /// not end. The work is that of the tick which spent most.
+    /// Renders one HIP: one tick, or in lock-step as many as it needs; `None` if it never
+    /// converges. `work` is the most of a tick.
     pub fn step(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
@@ -356,7 +353,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
             let output = *self.contact.output();
             work = work.max(output.work);
             self.shaded = self.shade();
-            // A HIP that needs more tiles than the window holds is rendered without them.
+            // A HIP that needs more tiles than the window can store is rendered without them.
             let waits = self.supplied.installed.len() - installed < 4 * D * D;
             let missing = output.missing_tile.or(self.missing());
             let waits_for = ContactOutput {
@@ -374,7 +371,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
                 return Some(ContactOutput { work, ..output });
             }
             if missing.is_some() && waits {
-                // As a replay does: a transaction.
+                // A transaction, as in a replay.
                 (self.contact, self.shader) = before.clone();
             } else {
                 self.contact.resume(before.0.output());
@@ -394,7 +391,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         self.shader.as_ref().and_then(Shader::missing)
     }
 
-    /// Returns the last HIP's answer, for the oracle.
+    /// Returns the last HIP's result for the oracle.
     #[must_use]
     pub fn seen(&self, hip: [f64; 3], output: ContactOutput) -> ObservedTick {
         ObservedTick {
@@ -408,7 +405,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
     }
 }
 
-/// A position in cells, shifted by whole ones.
+/// Returns a position in cells, shifted by whole cells.
 pub(super) fn shifted(hip: [f64; 3], shift: [i32; 3]) -> GridPoint {
     let here = point(hip);
     let cell = here.cell();

@@ -2,18 +2,18 @@
 
 use super::terrain::Terrain;
 
-/// One of the eight ways to lay a rectangle onto itself or its turned self.
+/// One of the eight symmetries of a rectangle, with or without exchange of its axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Symmetry {
-    /// East and west exchanged, first.
+    /// True to exchange east and west, first.
     pub mirror_x: bool,
-    /// North and south exchanged, first.
+    /// True to exchange north and south, first.
     pub mirror_y: bool,
-    /// Then east and north exchanged.
+    /// True to exchange east and north afterwards.
     pub transpose: bool,
 }
 
-/// All but the one that changes nothing.
+/// Returns all but the identity.
 #[must_use]
 pub fn all() -> [Symmetry; 7] {
     std::array::from_fn(|i| {
@@ -27,7 +27,7 @@ pub fn all() -> [Symmetry; 7] {
 }
 
 impl Symmetry {
-    /// The terrain seen that way.
+    /// Returns the terrain after the symmetry.
     #[must_use]
     pub fn terrain(self, terrain: &Terrain) -> Terrain {
         let [columns, rows] = terrain.size;
@@ -44,7 +44,7 @@ impl Symmetry {
         })
     }
 
-    /// A point of the terrain, where it lies then.
+    /// Returns a point of the terrain after the symmetry.
     #[must_use]
     pub fn point(self, terrain: &Terrain, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let [columns, rows] = terrain.size.map(f64::from);

@@ -1,10 +1,10 @@
-//! Terrains from flat to absurd, as plain samples.
+//! Terrains from flat to extreme, as plain samples.
 
 use hapterra_core::terrain::MAX_STEP_CELLS;
 
 use crate::random::Random;
 
-/// Heights beyond this, in cells, are holes: no position can say them.
+/// Heights beyond this, in cells, are no-data: no position can represent them.
 const TALLEST: f32 = (1 << 29) as f32;
 
 /// Kind of a terrain.
@@ -16,27 +16,27 @@ pub enum Kind {
     Slope,
     /// Waves a few cells long.
     Hills,
-    /// Every sample by itself, between 0 and 2.
+    /// Independent samples between 0 and 2.
     Rough,
-    /// Every sample by itself, over hundreds of cells.
+    /// Independent samples over hundreds of cells.
     Noise,
-    /// 0 and 1 in turns.
+    /// 0 and 1, alternating.
     Checkerboard,
-    /// Flat, one sample in thirty as high as a neighbour may be.
+    /// Flat, with one sample in thirty as high as a neighbour may be.
     Spikes,
-    /// Numbers too small to be normal, of both signs.
+    /// Subnormal numbers of both signs.
     Denormals,
-    /// Rough, with samples that are not numbers, infinite, or out of range.
+    /// Rough, with samples that are NaN, infinite, or out of range.
     Holes,
     /// Straight ridges of tents.
     Ridges,
     /// Cliffs between plateaus.
     Steps,
-    /// A twist from 10⁻⁹ to 10⁴ in each patch.
+    /// A twist of 10⁻⁹ to 10⁴ in each patch.
     Twisted,
     /// A few raised rows and columns, far higher than any HIP.
     Walls,
-    /// Gentle ground with a little noise: what a scan looks like.
+    /// Gentle ground with a little noise, like a scan.
     Scan,
 }
 
@@ -60,11 +60,10 @@ pub const KINDS: [Kind; 14] = [
 
 /// Height of a wall, cells.
 pub const WALL: f64 = 300.0;
-/// Every so many-th row and column of [`Kind::Walls`] is raised.
+/// Distance of the raised rows and columns of [`Kind::Walls`].
 pub const WALL_EVERY: i32 = 23;
 
-/// Samples in rows from the south, as a file may have them: what is no height is
-/// a hole.
+/// Samples in rows from the south, as a file may have them: invalid heights are no-data.
 #[derive(Clone, Debug)]
 pub struct Terrain {
     /// Its kind.
@@ -75,7 +74,7 @@ pub struct Terrain {
 }
 
 impl Terrain {
-    /// One of a kind.
+    /// Creates a terrain of a kind.
     #[must_use]
     pub fn new(kind: Kind, size: [i32; 2], seed: u64) -> Self {
         let mut random = Random::new(seed);
@@ -83,14 +82,14 @@ impl Terrain {
             kind,
             seed,
             wave: [random.between(0.1, 0.9), random.between(0.1, 0.9)],
-            // Powers of ten, as gentle as nothing and as steep as a tile may be.
+            // Powers of ten, from almost flat to as steep as a tile may be.
             amplitude: 10_f64.powf(random.between(-9.0, 3.5)),
             tilt: [random.between(-2.0, 2.0), random.between(-2.0, 2.0)],
         };
         Self::from_fn(kind, size, |x, y| shape.height(x, y))
     }
 
-    /// By a function of the sample.
+    /// Creates a terrain from a function of the sample.
     #[must_use]
     pub fn from_fn(kind: Kind, size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Self {
         let row = |y| (0..=size[0]).map(move |x| (x, y));
@@ -102,7 +101,7 @@ impl Terrain {
         }
     }
 
-    /// A sample; NaN off the field.
+    /// Returns a sample; NaN off the field.
     #[must_use]
     pub fn post(&self, x: i32, y: i32) -> f32 {
         if x < 0 || y < 0 || x > self.size[0] || y > self.size[1] {
@@ -111,8 +110,8 @@ impl Terrain {
         self.posts[(y * (self.size[0] + 1) + x) as usize]
     }
 
-    /// The corners of a patch (south-west, south-east, north-west, north-east);
-    /// `None` in a hole and off the field.
+    /// Returns the corners of a patch (south-west, south-east, north-west, north-east); `None` at
+    /// no-data and off the field.
     #[must_use]
     pub fn patch(&self, [x, y]: [i32; 2]) -> Option<[f64; 4]> {
         if x < 0 || y < 0 || x >= self.size[0] || y >= self.size[1] {
@@ -127,7 +126,7 @@ impl Terrain {
             .then_some(corners)
     }
 
-    /// A whole height that no sample exceeds.
+    /// Returns an integer height that no sample exceeds.
     #[must_use]
     pub fn top(&self) -> i32 {
         let heights = self.posts.iter().filter(|h| h.abs() <= TALLEST);
@@ -139,7 +138,7 @@ impl Terrain {
         }
     }
 
-    /// The largest step between two neighbouring samples; infinite with holes.
+    /// Returns the largest step between two neighbouring samples; infinite with no-data.
     #[must_use]
     pub fn steepest(&self) -> f32 {
         let [columns, rows] = self.size;
@@ -163,7 +162,7 @@ impl Terrain {
         })
     }
 
-    /// About how high the surface is around a place, whatever is there.
+    /// Returns the approximate height of the surface around a point, also at no-data.
     #[must_use]
     pub fn height_about(&self, x: f64, y: f64) -> f64 {
         let cell = [x.floor() as i32, y.floor() as i32];
@@ -221,7 +220,7 @@ impl Shape {
         height as f32
     }
 
-    /// A number in `[0, 1)` that belongs to a sample.
+    /// Returns a number in `[0, 1)` for a sample.
     fn random(&self, x: i32, y: i32) -> f64 {
         let place = u64::from(x.cast_unsigned()) << 32 | u64::from(y.cast_unsigned());
         Random::new(self.seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15)).between(0.0, 1.0)

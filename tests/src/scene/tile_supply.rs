@@ -1,4 +1,4 @@
-//! The product's window over a terrain: held whole, or pulled tile by tile.
+//! The product's window over a terrain: stored whole, or pulled tile by tile.
 
 use hapterra_core::contact::{Contact, ContactOutput};
 use hapterra_core::grid::GridPoint;
@@ -12,17 +12,17 @@ use super::terrain::Terrain;
 pub const SIDE: usize = 8;
 const CELLS: i32 = TILE_CELLS as i32;
 
-/// Memory for a window; may be used again and again.
+/// Reusable memory for a window.
 pub struct Buffers(Vec<Tile>);
 
 impl Buffers {
-    /// For windows of up to `side × side` tiles.
+    /// Allocates windows of up to `side × side` tiles.
     #[must_use]
     pub fn new(side: usize) -> Self {
         Self(vec![Tile::VACANT; side * side + IN_FLIGHT])
     }
 
-    /// All of it.
+    /// Returns all tiles.
     pub(super) fn tiles(&mut self) -> &mut [Tile] {
         &mut self.0
     }
@@ -37,9 +37,9 @@ impl Default for Buffers {
 /// Supply of the tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supply {
-    /// All are here from the start.
+    /// All tiles are stored from the start.
     Held,
-    /// Asked for, and here so many ticks later.
+    /// Tiles are requested, and arrive later.
     Pulled {
         /// Ticks from the request to the tile.
         latency: u32,
@@ -56,16 +56,15 @@ pub struct SuppliedWindow<'t, 'g, const D: usize> {
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
     coming: Vec<(u32, TileKey)>,
-    /// Tiles put into the window since this was last emptied, in that order.
+    /// Tiles put into the window since this list was last emptied, in order.
     pub installed: Vec<TileKey>,
 }
 
 impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
-    /// The terrain in place.
+    /// Creates the window over a terrain.
     ///
     /// # Panics
-    /// When a terrain that is to be held is larger than the window, or that than
-    /// the buffers.
+    /// If a terrain to be stored whole is larger than the window, or the window than the buffers.
     pub fn new(
         buffers: &'t mut Buffers,
         terrain: &'g Terrain,
@@ -126,7 +125,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
         self.installed.push(key);
     }
 
-    /// Asks for what the tick showed to be wanted, and takes what has come.
+    /// Requests the tiles that the tick needs, and stores those that are due.
     pub fn supply(&mut self, now: u32, contact: &Contact, output: &ContactOutput, hip: &GridPoint) {
         let Supply::Pulled { latency } = self.supply else {
             return;
@@ -153,7 +152,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
         }
     }
 
-    /// As the loop does: a tile does not push out the one under the proxy.
+    /// As in the loop, a tile does not replace the one under the proxy.
     fn take(&mut self, key: TileKey, contact: &Contact) {
         let under_proxy = contact.patch().map(|cell| TileKey::holding(0, cell));
         let occupant = self.window.occupant(key);

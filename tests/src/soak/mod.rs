@@ -1,7 +1,6 @@
 //! Random scenes on all cores, until the time is up.
 //!
-//! Scenes are numbered, and a scene follows from its seed and number alone, so
-//! whatever was found can be run again.
+//! A scene depends only on the seed and its number, so any violation can be repeated.
 
 mod soak_counts;
 
@@ -16,20 +15,20 @@ pub use soak_counts::{Broken, Found, LinkStats, MostWork};
 use crate::scene::run::{Scene, Surface};
 use crate::scene::tile_supply::Buffers;
 
-/// When to stop.
+/// Condition for the end.
 #[derive(Clone, Copy, Debug)]
 pub enum Until {
-    /// When so much time has passed.
+    /// After this time.
     Time(Duration),
-    /// After so many scenes.
+    /// After this many scenes.
     Scenes(u64),
 }
 
-/// Runs the scenes of a seed from number `first` on `threads` threads; `live` is
-/// called now and then with what there is so far.
+/// Runs the scenes of a seed from number `first` on `threads` threads; calls `live` from time to
+/// time with the counts.
 ///
 /// # Panics
-/// When a thread cannot be started.
+/// If a thread cannot be started.
 pub fn soak(
     seed: u64,
     surface: Surface,
@@ -66,7 +65,7 @@ pub fn soak(
     tally.into_inner().expect("no panic inside")
 }
 
-/// One scene; a panic is a violation, too.
+/// Runs one scene; a panic counts as a violation.
 #[must_use]
 pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> Found {
     let scene = Scene::random(seed, number).with_surface(surface);
@@ -80,7 +79,7 @@ pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> F
             violation.to_string(),
         ),
         Err(panic) => {
-            // A tile may have been left half filled.
+            // A tile may be partly filled.
             *buffers = Buffers::default();
             let said = panic.downcast_ref::<String>().cloned();
             let said = said.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));

@@ -1,4 +1,4 @@
-//! Counts of a stress test so far.
+//! Counts of a stress test up to now.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,49 +12,49 @@ use crate::scene::terrain::{KINDS, Kind};
 /// Outcome of one scene.
 #[derive(Clone, Debug)]
 pub enum Found {
-    /// Everything held.
+    /// No violation.
     Held(Kind, Measured),
-    /// Something did not: which invariant, and what was found.
+    /// A violation: the invariant, and its details.
     Broke(Kind, String, String),
 }
 
-/// A scene in which something did not hold.
+/// A scene with a violation.
 #[derive(Clone, Debug)]
 pub struct Broken {
     /// Its number.
     pub number: u64,
     /// Its terrain.
     pub kind: Kind,
-    /// Which invariant, by name; `Panic` for a panic.
+    /// Name of the invariant; `Panic` for a panic.
     pub invariant: String,
     /// Its details.
     pub what: String,
 }
 
-/// The largest work of a tick.
+/// The largest work of a tick, and its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MostWork {
-    /// Units.
+    /// Work units.
     pub units: u32,
-    /// The number of the scene that the tick belongs to.
+    /// The number of the tick's scene.
     pub number: u64,
 }
 
-/// All scenes so far.
+/// All scenes up to now.
 #[derive(Clone, Debug, Default)]
 pub struct LinkStats {
     /// Scenes run.
     pub scenes: u64,
     /// Violations.
     pub broken: Vec<Broken>,
-    /// The tick that spent most, among the scenes in which everything held.
+    /// The tick with the most work, among the scenes without violations.
     pub most_work: Option<MostWork>,
     by_kind: BTreeMap<usize, Measured>,
     by_invariant: BTreeMap<String, u64>,
 }
 
 impl LinkStats {
-    /// One more scene.
+    /// Adds one scene.
     pub fn add(&mut self, number: u64, found: Found) {
         self.scenes += 1;
         match found {
@@ -79,7 +79,7 @@ impl LinkStats {
         }
     }
 
-    /// Over all terrains.
+    /// Returns the measurements over all terrains.
     #[must_use]
     pub fn total(&self) -> Measured {
         let mut total = Measured::default();
@@ -89,7 +89,7 @@ impl LinkStats {
         total
     }
 
-    /// Ticks judged.
+    /// Returns the number of ticks checked.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.total().states.iter().sum()

@@ -1,5 +1,5 @@
-//! The application with embassy's USB stack over the scripted wire: the code
-//! of the real boards from the link's task down to the endpoints.
+//! The application with embassy's USB stack over the scripted wire: the code of the real boards,
+//! from the link's task down to the endpoints.
 
 use std::cell::RefCell;
 use std::future::Future;
@@ -33,12 +33,12 @@ use super::{Answer, Handshake, MOMENTS_A_MS, Port};
 
 /// Tiles along the side of the window.
 const WINDOW: usize = 4;
-/// Polls after which everything that can happen now has happened.
+/// Polls after which all pending work is done.
 const POLLS: usize = 8;
-/// The serial number it gives.
+/// The serial number it reports.
 pub const SERIAL: &str = "0123456789ABCDEF";
 
-/// Tells the link that a tick has ended.
+/// Signals the end of a tick to the link.
 #[derive(Clone)]
 struct TickDone(Rc<Signal<NoopRawMutex, ()>>);
 
@@ -50,7 +50,7 @@ impl LinkBoard for TickDone {
     fn after_poll<const D: usize>(&self, _link: &Link<'_, D>) {}
 }
 
-/// Whole packets have no toggles.
+/// Does nothing: whole packets have no toggles.
 struct EndpointHalts;
 
 impl EndpointHalt for EndpointHalts {
@@ -70,8 +70,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board that was just powered by the cable. Its memory is leaked, as a
-    /// board's is never freed.
+    /// Creates a board that is powered by the cable. Its memory is leaked, as a board's is never
+    /// freed.
     #[must_use]
     pub fn plugged_in() -> Self {
         let hardware = Hardware {
@@ -121,21 +121,19 @@ impl Board {
         });
     }
 
-    /// The cable is pulled. Boards that do not sense the supply's voltage see
-    /// an idle bus and nothing else.
+    /// Pulls the cable. Boards that do not sense the supply's voltage only detect an idle bus.
     pub fn unplug(&mut self) {
         self.wire.borrow_mut().report(Event::Suspend);
         self.settle();
     }
 
-    /// Packets so far that were longer than an endpoint's.
+    /// Returns the number of packets longer than an endpoint's.
     #[must_use]
     pub fn babbles(&self) -> u32 {
         self.wire.borrow().babbles
     }
 
-    /// Returns true if the watchdog is fed now: loop and link have lived since it was
-    /// asked last.
+    /// Returns true if the watchdog is fed now: loop and link have both run since the last check.
     pub fn is_alive(&mut self) -> bool {
         self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link])
     }

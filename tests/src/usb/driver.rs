@@ -1,7 +1,6 @@
-//! A USB peripheral for embassy's stack whose other side is the script.
+//! A USB peripheral for embassy's stack, driven by the script.
 //!
-//! Nothing here calls a waker: the owner of the futures polls them after each
-//! thing the script did.
+//! No code here calls a waker: the owner of the futures polls them after each action of the script.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -21,7 +20,7 @@ use super::{Answer, Handshake};
 struct Pipe {
     enabled: bool,
     stalled: bool,
-    /// The one packet there is room for.
+    /// A single packet.
     packet: Option<Vec<u8>>,
 }
 
@@ -32,9 +31,9 @@ pub(super) struct Wire {
     setup: Option<[u8; 8]>,
     into_device: [Pipe; 2],
     out_of_device: [Pipe; 2],
-    /// True if the control endpoint takes a packet now.
+    /// True if the control endpoint accepts a packet now.
     control_listens: bool,
-    /// Packets longer than the endpoint's: never acknowledged, but counted.
+    /// Packets longer than the endpoint's: counted, but never acknowledged.
     pub(super) babbles: u32,
 }
 
@@ -184,7 +183,7 @@ impl Bus for ScriptedDriver {
 }
 
 impl End {
-    /// Waits for something of the wire.
+    /// Waits until `look` returns a value.
     async fn until<T>(&self, mut look: impl FnMut(&mut Wire) -> Option<T>) -> T {
         poll_fn(|_| match look(&mut self.wire.borrow_mut()) {
             Some(found) => Poll::Ready(found),
@@ -193,8 +192,7 @@ impl End {
         .await
     }
 
-    /// Hands a packet of the control pipe to the host; an error if another
-    /// request cuts in.
+    /// Sends a packet of the control pipe to the host; fails if another request interrupts it.
     async fn hand_over(&self, packet: &[u8]) -> Result<(), EndpointError> {
         self.wire.borrow_mut().out_of_device[0].packet = Some(packet.to_vec());
         self.until(|wire| match (&wire.setup, &wire.out_of_device[0].packet) {

@@ -1,5 +1,4 @@
-//! The host: control transfers, enumeration, and the two pipes that the
-//! product's own client runs over.
+//! The host: control transfers, enumeration, and the two pipes under the product's own client.
 
 use std::cell::RefCell;
 use std::io;
@@ -10,26 +9,25 @@ use hapterra::link::{BulkEndpoints, Pipes};
 
 use super::{Answer, Handshake, MOMENTS_A_MS, Port};
 
-/// Milliseconds of the device's time after which a packet that is not answered
-/// is an error.
+/// Milliseconds of the device's time after which an unanswered packet is an error.
 const PATIENCE_MS: u64 = 200;
-/// Milliseconds that a host leaves a device after a reset of the bus.
+/// Milliseconds of recovery for a device after a reset of the bus.
 const RECOVERY_MS: u64 = 10;
 /// Bytes in a full-speed packet, bulk or control.
 pub const PACKET: usize = 64;
 
-/// Reason for which a transfer failed.
+/// Cause of a failed transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// Not answered in `PATIENCE_MS`.
     Silence,
     /// Refused.
     Stalled,
-    /// The device itself stopped: how.
+    /// The device itself stopped, with a message.
     Stopped(String),
 }
 
-/// Tries until it is neither answered with NAK nor too late.
+/// Repeats an action until the answer is not NAK, or the time is over.
 fn try_on<P: Port, T>(
     port: &mut P,
     mut attempt: impl FnMut(&mut P) -> Option<Result<T, Failure>>,
@@ -51,7 +49,7 @@ fn shaken(hand: Handshake) -> Option<Result<(), Failure>> {
     }
 }
 
-/// Sends a packet, waiting for the device to take it.
+/// Sends a packet, and waits until the device accepts it.
 ///
 /// # Errors
 /// [`Failure`].
@@ -59,7 +57,7 @@ pub fn send_packet(port: &mut impl Port, endpoint: usize, packet: &[u8]) -> Resu
     try_on(port, |port| shaken(port.out(endpoint, packet)))
 }
 
-/// Asks for a packet until there is one.
+/// Requests a packet until there is one.
 ///
 /// # Errors
 /// [`Failure`].
@@ -74,7 +72,7 @@ pub fn fetch_packet(port: &mut impl Port, endpoint: usize) -> Result<Vec<u8>, Fa
 /// A control transfer's request: type, number, value, index.
 pub type Request = (u8, u8, u16, u16);
 
-/// A control transfer that reads at most `length` bytes.
+/// Performs a control transfer that reads at most `length` bytes.
 ///
 /// # Errors
 /// [`Failure`].
@@ -92,7 +90,7 @@ pub fn control_in(port: &mut impl Port, request: Request, length: u16) -> Result
     Ok(data)
 }
 
-/// A control transfer without data.
+/// Performs a control transfer without data.
 ///
 /// # Errors
 /// [`Failure`].
@@ -113,7 +111,7 @@ fn set_up(
     try_on(port, |port| shaken(port.setup(bytes)))
 }
 
-/// A descriptor, by its type and index.
+/// Reads a descriptor by its type and index.
 ///
 /// # Errors
 /// [`Failure`].
@@ -128,7 +126,7 @@ pub fn descriptor(
     control_in(port, (0x80, 6, value, language), length)
 }
 
-/// A string descriptor's text.
+/// Reads a string descriptor's text.
 ///
 /// # Errors
 /// [`Failure`].
@@ -148,12 +146,12 @@ pub fn string(port: &mut impl Port, index: u8) -> Result<String, Failure> {
 pub struct Found {
     /// Device descriptor.
     pub device: Vec<u8>,
-    /// Configuration with everything in it.
+    /// Configuration with all its descriptors.
     pub configuration: Vec<u8>,
 }
 
-/// Resets the bus, reads the descriptors, gives an address and puts the first
-/// configuration in force: what every host does with what is plugged in.
+/// Resets the bus, reads the descriptors, assigns an address and selects the first configuration,
+/// as every host does with a new device.
 ///
 /// # Errors
 /// [`Failure`].
@@ -175,8 +173,8 @@ pub fn enumerate(port: &mut impl Port) -> Result<Found, Failure> {
     })
 }
 
-/// The pipes of a device that was enumerated: what the system's USB is to the
-/// real program. Waiting on them is what lets the device's time pass.
+/// The pipes of an enumerated device, in place of the system's USB for the real program. The
+/// device's time passes while the program waits on them.
 pub struct ScriptedPipes<P> {
     port: Rc<RefCell<P>>,
     endpoints: BulkEndpoints,
@@ -185,7 +183,7 @@ pub struct ScriptedPipes<P> {
 }
 
 impl<P: Port> ScriptedPipes<P> {
-    /// The pipes at these endpoints.
+    /// Creates the pipes at these endpoints.
     #[must_use]
     pub const fn new(port: Rc<RefCell<P>>, endpoints: BulkEndpoints) -> Self {
         Self {

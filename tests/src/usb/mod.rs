@@ -1,6 +1,6 @@
-//! USB without a cable: a host that follows a script, and what it plugs into.
+//! USB without a cable: a host that follows a script, and its device.
 //!
-//! Packets are moved whole: no bits, no CRC, no frames, no time on the wire.
+//! Packets are transferred whole: no bits, no CRC, no frames, no time on the wire.
 
 pub mod board;
 mod driver;
@@ -9,41 +9,41 @@ pub mod host;
 /// Answer of a device to a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handshake {
-    /// Taken.
+    /// Accepted.
     Ack,
     /// Not now.
     Nak,
-    /// Never like this.
+    /// Refused for good.
     Stall,
 }
 
-/// Answer of a device to a request for a packet.
+/// Answer of a device to an IN request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// A packet.
     Data(Vec<u8>),
     /// Not now.
     Nak,
-    /// Never like this.
+    /// Refused for good.
     Stall,
 }
 
 /// A device at the end of the cable.
 pub trait Port {
-    /// Returns true if it shows itself.
+    /// Returns true if it is attached to the bus.
     fn is_attached(&self) -> bool;
-    /// The host resets the bus.
+    /// Resets the bus.
     fn bus_reset(&mut self);
-    /// The host begins a control transfer.
+    /// Begins a control transfer.
     fn setup(&mut self, request: [u8; 8]) -> Handshake;
-    /// The host sends a packet.
+    /// Sends a packet.
     fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake;
-    /// The host asks for a packet.
+    /// Requests a packet.
     fn take_in(&mut self, endpoint: usize) -> Answer;
-    /// Lets a moment pass, [`MOMENTS_A_MS`] of which are a millisecond.
+    /// Lets a moment pass; [`MOMENTS_A_MS`] of them are a millisecond.
     ///
     /// # Errors
-    /// The end of the device.
+    /// The reason why the device stopped.
     fn wait(&mut self) -> Result<(), String>;
 }
 

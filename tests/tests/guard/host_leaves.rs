@@ -1,4 +1,4 @@
-//! The host goes, with a word or without.
+//! The host leaves, with or without closing the session.
 
 use hapterra::phantom::{HandModel, Touch};
 use hapterra::terrain::{Scale, Terrain};
@@ -8,7 +8,7 @@ use heightfield::Raster;
 
 use crate::rig::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
 
-/// The largest change of the currents from one tick to the next, A.
+/// Returns the largest change of the currents from one tick to the next, A.
 fn largest_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
     let steps = log.windows(2).map(|pair| {
         let change = pair[1].1.currents_a - pair[0].1.currents_a;
@@ -19,8 +19,7 @@ fn largest_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
 
 #[test]
 fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
-    // Cells of a quarter of a millimetre: a tile is 8 mm, and the hand leaves
-    // those that are held.
+    // Cells of a quarter of a millimetre: a tile is 8 mm, so the hand leaves the stored tiles.
     let raster = Raster::from_fn(801, 801, |_, _| PLANE_MM as f32).expect("raster");
     let scale = Scale::new(0.25, 1.0).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
@@ -48,10 +47,10 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
         let step = largest_step(&alone[..alone.len() - 1]);
         eprintln!("largest step {step:.3} A, at the end {weight} A");
         assert!(step < 0.06, "{step} A");
-        // Only the arm's weight is left: −0.062 A on axis 2, as much on 3.
+        // Only the arm's weight remains: −0.062 A on axis 2, and the same on 3.
         assert!(weight.abs().max_element() < 0.3, "{weight}");
     }
-    // Back again, force comes in as gently.
+    // After the return the force ramps up as gently.
     bed.open(None);
     let before = bed.log.borrow().len() - 1;
     bed = bed.run(PRESSED + u64::from(passed) + 600);
@@ -60,14 +59,13 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
     eprintln!("largest step after the return {step:.3} A");
     assert!(step < 0.06, "{step} A");
     let last = bed.samples.last().expect("samples");
-    // Let go at the edge, the surface is rendered again once the hand has been
-    // above it.
+    // Released at the edge, the surface is rendered again after the hand was above it.
     assert_eq!((last.mode, last.fault), (Mode::Armed, None));
     assert_eq!(
         (last.state, last.missing_tile),
         (ContactState::Unseeded, None)
     );
-    // And while the host was away the device knew why there was less force.
+    // While the host was away, the device reported why the force was lower.
     let reasons = bed.samples.iter().map(|s| s.limits);
     let why = reasons.fold(Limits::empty(), |all, limits| all | limits);
     eprintln!("limits: {why:?}");

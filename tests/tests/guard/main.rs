@@ -1,6 +1,5 @@
-//! Every promise of the guard, in the closed loop: the virtual Phantom with a
-//! hand on it, the device's own application, and something that goes wrong
-//! between them.
+//! Every promise of the guard in the closed loop: the virtual Phantom in a hand, the device's own
+//! application, and injected faults between them.
 
 mod host_leaves;
 mod rates;
@@ -72,7 +71,7 @@ fn what_goes_wrong_under_a_press_is_zero_in_the_same_tick_and_latched() {
             |tick, sense| sense.counts[2] += if tick == PRESSED { 400 } else { 0 },
             Fault::EncoderJump,
         ),
-        // An encoder that starts anew from nothing.
+        // An encoder that restarts from zero.
         (
             |tick, sense| {
                 sense.counts[0] = if tick == PRESSED {
@@ -106,7 +105,7 @@ fn what_goes_wrong_under_a_press_is_zero_in_the_same_tick_and_latched() {
 fn after_a_fault_it_takes_a_clearing_a_command_and_a_new_press() {
     let raster = plane();
     let terrain = on_plane(&raster);
-    // Let go, and held again for good half a second later; pressed anew at 6 s.
+    // Released, then held permanently half a second later; pressed again at 6 s.
     let wrong: Wrong = |tick, sense| {
         sense.dead_man &= !(PRESSED..PRESSED + 500).contains(&tick);
         sense.dead_man &= !(5_900..6_000).contains(&tick);
@@ -133,7 +132,7 @@ fn after_a_fault_it_takes_a_clearing_a_command_and_a_new_press() {
 fn an_encoder_that_slips_away_runs_into_the_joint_limits() {
     let raster = plane();
     let terrain = on_plane(&raster);
-    // Counts that are lost by and by: no jump.
+    // Counts that are lost slowly, without a jump.
     let slip: Wrong = |tick, sense| {
         sense.counts[0] += 15 * tick.saturating_sub(PRESSED) as i32;
     };
@@ -221,7 +220,7 @@ fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
     let limited = |s: &&TickRecord| s.limits.contains(Limits::SPEED_LIMITED);
     assert!(bed.samples.iter().filter(limited).count() > 20);
     assert_eq!(bed.samples.last().and_then(|s| s.fault), None);
-    // An encoder that runs away evenly looks like an arm that was thrown.
+    // An encoder that runs away evenly looks like a thrown arm.
     let thrown: Wrong = |tick, sense| {
         sense.counts[0] += 90 * tick.saturating_sub(PRESSED) as i32;
     };
@@ -261,7 +260,7 @@ fn what_was_found_at_boot_has_to_be_cleared_first() {
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
 
     let damaged = (Stored::Damaged, BootReport::default());
-    // Pressed once to store the calibration, and then again to arm.
+    // Pressed once to store the calibration, then again to arm.
     let pressed_twice: Wrong =
         |tick, sense| sense.dead_man &= (1_000..1_300).contains(&tick) || tick > 1_800;
     let mut bed = Bed::started(&terrain, script(), pressed_twice, damaged).run(500);

@@ -1,4 +1,4 @@
-//! A device with an arm, a hand on it, and something that goes wrong between them.
+//! A device with an arm in a hand, and injected faults between them.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -21,7 +21,7 @@ use heightfield::Raster;
 /// Height of the touched plane, mm; the hand starts above its middle.
 pub(crate) const PLANE_MM: f64 = 20.0;
 pub(crate) const MIDDLE_MM: [f64; 2] = [100.0, 100.0];
-/// When the script begins, in ticks, and when a press has settled.
+/// Tick at which the script begins, and tick at which a press has settled.
 pub(crate) const BEGIN: u64 = (1e3 * HeldPhantom::ARMED_S) as u64;
 pub(crate) const PRESSED: u64 = BEGIN + 1_500;
 
@@ -30,7 +30,7 @@ pub(crate) type Wrong = fn(u64, &mut GuardInputs);
 /// Inputs and outputs of each tick.
 pub(crate) type Log = Rc<RefCell<Vec<(GuardInputs, GuardOutputs)>>>;
 
-/// A device with an arm, a session with it, and all that was seen.
+/// A device with an arm, its session, and all observations.
 pub(crate) struct Bed<'t> {
     pub(crate) terrain: &'t Terrain<'t>,
     pub(crate) scene: Scene,
@@ -124,8 +124,7 @@ impl<'t> Bed<'t> {
         &self.samples[index]
     }
 
-    /// The first tick that was given something and the amplifiers off, after
-    /// they had been on.
+    /// Returns the first tick with inputs and the amplifiers off, after they had been on.
     pub(crate) fn off_at(&self) -> u64 {
         let log = self.log.borrow();
         let on = log.iter().position(|(_, drive)| drive.enabled);
@@ -134,8 +133,8 @@ impl<'t> Bed<'t> {
         (on + off.expect("it went off")) as u64
     }
 
-    /// Never a force above the clamp, a current above the peak, or a current
-    /// while off.
+    /// Checks that no force exceeds the clamp, no current the peak, and that no current flows while
+    /// off.
     pub(crate) fn check_bounds(&self) {
         for (tick, (_, drive)) in self.log.borrow().iter().enumerate() {
             let most = drive.currents_a.abs().max_element();
@@ -158,19 +157,19 @@ pub(crate) fn on_plane(raster: &Raster) -> Terrain<'_> {
     Terrain::new(raster, Scale::new(2.0, 1.0).expect("scale"), 0).expect("terrain")
 }
 
-/// Comes down and presses for so many seconds.
+/// Lowers the hand and presses for this time.
 pub(crate) fn press_for(newtons: f64, seconds: f64) -> Touch<'static> {
     let wall = f64::from(SurfaceParams::PREMIUM.stiffness_n_per_mm);
     let hand = HandModel::default();
     Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, MIDDLE_MM, 10.0).press(newtons, seconds)
 }
 
-/// The same, for a long while.
+/// Same, for a long time.
 pub(crate) fn press(newtons: f64) -> Touch<'static> {
     press_for(newtons, 3.0)
 }
 
-/// To and fro, pressing.
+/// Moves to and fro while pressing.
 pub(crate) fn rub(newtons: f64, times: u32) -> Script {
     let [x, y] = MIDDLE_MM;
     let line: Vec<[f64; 2]> = (0..times)

@@ -1,5 +1,5 @@
-//! Recordings describe themselves: what `run`, `demo` and `replay` write, `replay` feels
-//! again as it was.
+//! Recordings describe themselves: `replay` renders the recordings of `run`, `demo` and `replay`
+//! again as they were.
 
 mod marks;
 mod test_folder;
@@ -44,7 +44,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
     }
     folder.replays("felt.csv", "again.csv", &[]);
     assert!(folder.read("again.csv") == text, "not the same again");
-    // Without its settings it is rendered as any other path.
+    // Without its settings it is rendered like any other path.
     folder.replays("felt.csv", "plain.csv", &["--ignore-settings"]);
     let plain = folder.read("plain.csv");
     assert!(
@@ -53,7 +53,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
             .zip(rows(&text))
             .any(|(a, b)| a["force_z_n"] != b["force_z_n"])
     );
-    // An option on the command line wins, with a note.
+    // An option on the command line has priority, with a note.
     let told = folder.replays("felt.csv", "stiff.csv", &["--stiffness=0.6"]);
     assert!(
         told.contains("--stiffness 0.6N/mm, where the recording has 0.3N/mm"),
@@ -99,7 +99,7 @@ fn a_recording_of_another_terrain_is_refused() {
     );
 }
 
-/// Columns that only the terrain and the path determine; the path comes first.
+/// Columns that depend only on the terrain and the path; the path comes first.
 const REPLAYED_COLUMNS: [&str; 9] = [
     "t_s",
     "x_mm",
@@ -112,12 +112,12 @@ const REPLAYED_COLUMNS: [&str; 9] = [
     "state",
 ];
 
-/// The guard comes to a force by steps in single precision: it differs from the spring's force by
-/// the rounding of one, N.
+/// The guard reaches a force by steps in single precision: the result differs from the spring's
+/// force by the rounding of one step, N.
 const ROUNDING_N: f64 = 1e-6;
 
-/// Replays a recording and compares: every tick that had its terrain feels the same to the
-/// bit, and where the guard limited nothing, the force is the same but for its rounding.
+/// Replays a recording and compares: every tick with all its terrain has the same bits, and without
+/// a limit of the guard the force is the same to within rounding.
 fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
     let [terrain, from, to] = [terrain, recording, "again.csv"].map(|name| folder.text(name));
     folder.runs(&["replay", &terrain, &from, "-o", &to]);
@@ -130,7 +130,7 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
         .copied()
         .collect();
     if !columns.contains(&"tick") {
-        // Of `demo`, which has no board.
+        // A `demo` has no board.
         documented.retain(|name| !TICK_COLUMNS.contains(name));
     }
     assert_eq!(columns, documented, "columns of the reference");
@@ -187,7 +187,7 @@ fn run_recording_replays_bit_by_bit() {
 fn demo_recording_replays_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, out) = (folder.text("hills.tif"), folder.text("demo"));
-    // No image is named, and no device: it runs in the program itself, and reports it.
+    // Without an image or a device it runs in the program itself, and prints this.
     let told = folder.runs(&[
         "demo",
         &terrain,
@@ -202,7 +202,7 @@ fn demo_recording_replays_bit_by_bit() {
     is_reproduced(&folder, "hills.tif", "demo/hills.csv");
 }
 
-/// Writes a terrain of ten degrees from south to north, hills.asc: its cells are not alike.
+/// Writes a terrain of ten degrees from south to north, hills.asc, whose cells differ in size.
 pub(crate) fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
     let mut text = "ncols 60\nnrows 101\nxllcenter 10\nyllcenter 55\ncellsize 0.1\n".to_owned();
     for row in 0..101 {
@@ -233,7 +233,7 @@ fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
     let text = folder.read("demo/hills.csv");
     assert!(text.contains("# measured_at = [13.0, 56.0]"), "{text}");
     is_reproduced(&folder, "hills.asc", "demo/hills.csv");
-    // An earlier version measured a map's cells to 1e-7; others are other cells.
+    // An earlier version measured a map's cells to 1e-7; other sizes are other cells.
     let (_, cell_m) = text.split_once("# cell_m = ").expect("known");
     let cell_m = cell_m.lines().next().expect("a number");
     let with = |share: f64| {
@@ -247,7 +247,7 @@ fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
     assert!(told.contains("cells of another size"), "{told}");
 }
 
-/// A Python that can read Parquet, and what it reads it with.
+/// Returns a Python that reads Parquet, and its code for that.
 fn python() -> Option<(String, &'static str)> {
     let program = std::env::var("HAPTERRA_PYTHON").unwrap_or("python3".into());
     let imports = ["polars", "pandas, pyarrow"];
@@ -275,7 +275,7 @@ fn a_parquet_recording_is_opened_by_polars_or_pandas() {
             .iter()
             .any(|row| row["contact"] == "1")
     );
-    // It is a trajectory with settings, too.
+    // It is also a trajectory with settings.
     folder.replays("felt.parquet", "again.csv", &[]);
     assert!(folder.read("again.csv") == folder.read("felt.csv"));
     let Some((program, import)) = python() else {
@@ -366,7 +366,7 @@ fn no_command_writes_over_its_own_input() {
     folder.runs(&[&native[..], &["-o", &arm]].concat());
     let record = std::fs::read(&arm).expect("there");
     folder.fails(&[&native[..], &["--from", &arm, "-o", &arm]].concat());
-    // The commands of a run are an input, too.
+    // The commands of a run are an input as well.
     std::fs::write(folder.path("steer.txt"), "at 1 zoom 2\n").expect("written");
     let steer = folder.text("steer.txt");
     let native = ["--device", "native", "--duration", "1s"];
@@ -380,8 +380,7 @@ fn no_command_writes_over_its_own_input() {
     exists_as_before(&folder.path("arm.toml"), &record);
 }
 
-/// Files beside a terrain that are read with it: header, reference system, world file, mask,
-/// overviews.
+/// Sidecars that are read with a terrain: header, reference system, world file, mask, overviews.
 #[test]
 fn no_command_writes_over_a_file_beside_its_input() {
     let folder = Folder::new();
@@ -497,7 +496,7 @@ fn a_reader_who_goes_away_is_no_crash() {
             let run = run.wait_with_output().expect("it ends");
             let told = output_text(&run);
             assert!(!told.contains("panicked"), "{words:?}, {closed}: {told}");
-            // A crash is 101; no hardware to be listed is 1.
+            // A crash is 101; a list without hardware is 1.
             assert!(
                 matches!(run.status.code(), Some(0 | 1)),
                 "{words:?}, {closed}: {told}"
@@ -506,7 +505,7 @@ fn a_reader_who_goes_away_is_no_crash() {
     }
 }
 
-/// Nor is a full disk, for messages and for files.
+/// A full disk causes no crash either, for messages or files.
 #[test]
 fn an_output_that_cannot_be_written_is_no_crash() {
     let folder = Folder::new();
@@ -581,7 +580,7 @@ fn an_output_that_cannot_be_written_is_no_crash() {
             matches!(run.status.code(), Some(0 | 1)),
             "{words:?}: {told}"
         );
-        // A report that was lost is no success.
+        // A lost report is not a success.
         if ["info", "status", "calibrate"].contains(&words[0]) {
             assert_eq!(run.status.code(), Some(1), "{words:?}");
             assert!(told.contains("cannot write the report"), "{told}");
@@ -594,7 +593,7 @@ fn odd_outputs_and_options_are_told() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let [hills, input] = ["hills.tif", "in.csv"].map(|name| folder.text(name));
-    // `-` is standard output, and no file.
+    // `-` is standard output, not a file.
     folder.replays("in.csv", "replayed.csv", &[]);
     let run = folder.run(&["replay", &hills, &input, "-o", "-"]);
     assert!(run.status.success(), "{}", output_text(&run));
@@ -606,7 +605,7 @@ fn odd_outputs_and_options_are_told() {
     assert!(told.contains("standard output"), "{told}");
     let told = folder.replays("in.csv", "stiff.csv", &["--stiffness=1e9"]);
     assert!(told.contains("1000000000 N/mm"), "{told}");
-    // What shows a record writes none.
+    // Commands that display a record write none.
     let run = folder.run(&[
         "calibrate",
         "--device",
@@ -620,7 +619,7 @@ fn odd_outputs_and_options_are_told() {
         "{}",
         output_text(&run)
     );
-    // Nothing is left of a demo that fails.
+    // A failed demo leaves no files.
     let demo = folder.text("demo");
     let words = ["demo", &hills, "--device", "emulated:none.elf"];
     let told = folder.fails(&[&words[..], &["--out", &demo]].concat());
@@ -628,7 +627,7 @@ fn odd_outputs_and_options_are_told() {
         told.contains("none.elf") && !folder.path("demo").exists(),
         "{told}"
     );
-    // A path that begins below ground gets a note on the missing force.
+    // A path that begins below ground causes a note on the missing force.
     std::fs::write(
         folder.path("in.csv"),
         "t_s,x_mm,y_mm,z_mm\n0,60,60,-900\n0.001,60,60,-901\n",
@@ -636,7 +635,7 @@ fn odd_outputs_and_options_are_told() {
     .expect("written");
     let told = folder.replays("in.csv", "replayed.csv", &[]);
     assert!(told.contains("2 rows are below ground"), "{told}");
-    // And the recording tells it from a HIP that is free.
+    // The recording distinguishes it from a free HIP.
     let text = std::fs::read_to_string(folder.path("replayed.csv")).expect("written");
     assert_eq!(text.matches(",unseeded").count(), 2, "{text}");
     assert!(!text.contains(",free"), "{text}");

@@ -1,5 +1,4 @@
-//! Marks: made by a command while a terrain is touched, recorded with tick and clock, and kept
-//! by a replay.
+//! Marks: made by a command during contact, recorded with tick and clock, and kept by a replay.
 
 use hapterra::replay::{Mark, Settings, Trajectory};
 use hapterra_tests::timeouts::changed_at_unix_s;
@@ -12,7 +11,7 @@ const COMMANDS: &str = "at 1 mark stimulus #1, \"left\"\nat 2 zoom 1.5\nmark zoo
 
 const TEXTS: [&str; 3] = ["stimulus #1, \"left\"", "zoomed", "'end'"];
 
-/// Runs the hills with the commands; returns the output.
+/// Runs the hills with the commands. Returns the output.
 fn run(folder: &Folder, record: &str) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, commands, record] =
@@ -58,11 +57,11 @@ fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
             "{printed}"
         );
     }
-    // It was asked for at its time, and marked at once; the one without a time after the zoom.
+    // Each mark is made at its requested time; the one without a time follows the zoom.
     for (mark, at_s) in marks.iter().zip([1.0, 2.1, 4.5]) {
         assert!((at_s..at_s + 1.5).contains(&mark.t_s), "{mark:?}");
     }
-    // What the page says: all comments together are one document.
+    // As documented: all comments together are one document.
     let settings = Settings::from_toml(&comments(&text)).expect("read");
     assert_eq!(settings.expect("settings").marks, marks);
 }

@@ -1,4 +1,4 @@
-//! A folder with a terrain of hills, and `hapterra` run on what is in it.
+//! A folder with a terrain of hills, and runs of `hapterra` on its files.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -10,12 +10,12 @@ use hapterra_tests::{hapterra_binary, terrain_file};
 pub(super) struct Folder(tempfile::TempDir);
 
 impl Folder {
-    /// With a terrain of hills, 256 samples wide.
+    /// Creates a terrain of hills, 256 samples wide.
     pub(super) fn new() -> Self {
         Self::of(256)
     }
 
-    /// With a terrain of hills, so many samples wide.
+    /// Creates a terrain of hills of this width in samples.
     pub(super) fn of(size: u32) -> Self {
         let folder = Self(tempfile::tempdir().expect("a folder"));
         terrain_file(&folder.path("hills.tif"), Kind::Fractal, size, 1);
@@ -36,14 +36,14 @@ impl Folder {
         command.output().expect("started")
     }
 
-    /// Runs a command that succeeds; what it says on standard error.
+    /// Runs a command that succeeds. Returns its standard error.
     pub(super) fn runs(&self, words: &[&str]) -> String {
         let run = self.run(words);
         assert!(run.status.success(), "{words:?}: {}", output_text(&run));
         output_text(&run)
     }
 
-    /// Runs a command that fails; what it says.
+    /// Runs a command that fails. Returns its messages.
     pub(super) fn fails(&self, words: &[&str]) -> String {
         let run = self.run(words);
         assert_eq!(
@@ -61,7 +61,7 @@ impl Folder {
         self.run(&[&["replay", &terrain, &from, "-o", &to], more].concat())
     }
 
-    /// The same where it succeeds; what it says.
+    /// Replays `from` into `to` with success. Returns the messages.
     pub(super) fn replays(&self, from: &str, to: &str, more: &[&str]) -> String {
         let run = self.replay(from, to, more);
         assert!(
@@ -80,7 +80,7 @@ impl Folder {
         std::fs::write(self.path(name), text).expect("written");
     }
 
-    /// Makes a trajectory of a row a tick that goes up and down over the hills.
+    /// Writes a trajectory of one row a tick that goes up and down over the hills.
     pub(super) fn write_trajectory(&self, name: &str) {
         let mut text = "t_s,x_mm,y_mm,z_mm\n".to_owned();
         for tick in 0..400 {
@@ -98,7 +98,7 @@ pub(super) fn output_text(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }
 
-/// The rows of a recording by the names of its columns.
+/// Returns the rows of a recording by the names of its columns.
 pub(super) fn rows(text: &str) -> Vec<HashMap<&str, &str>> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<_> = lines.next().expect("a header").split(',').collect();

@@ -1,5 +1,5 @@
-//! Views that change while a terrain is touched: commands of `demo` and `run`, their
-//! recordings, and the replay of these.
+//! Changes of the placement during contact: commands of `demo` and `run`, their recordings, and the
+//! replays.
 
 use std::process::{Command, Stdio};
 
@@ -11,10 +11,10 @@ use hapterra_tests::{UNCONTROLLED, hapterra_binary};
 use super::test_folder::{Folder, output_text, rows};
 use super::write_degrees;
 
-/// Wide enough to be zoomed and panned.
+/// Wide enough for zooming and panning.
 const SIZE: u32 = 512;
 
-/// All comments together, as the page on recordings reads them.
+/// Returns all comments together, as the page on recordings describes.
 pub(super) fn comments(text: &str) -> String {
     let lines = text.lines().filter(|line| line.starts_with('#'));
     lines
@@ -26,7 +26,7 @@ const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nat 4.7 
     spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.8\nat 7.5 clutch on\nat 8 clutch off\n\
     at 8.7 tip 3mm\n";
 
-/// Returns the recording of a demo with these commands; on failure its messages.
+/// Returns the recording of a demo with these commands, or the messages of its failure.
 fn demo(folder: &Folder) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));
@@ -75,7 +75,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
     assert_eq!(softer.stiffness_n_per_mm, 0.4);
     let tips = [softer, sharper].map(|view| view.tip_mm);
     assert_eq!(tips, [Some(settings.rendered.tip_mm), Some(3.0)]);
-    // Rows name their views, in their order, and there are some of each.
+    // Rows name their placements in order, and each has some rows.
     let live = rows(&text);
     let views: Vec<u32> = live
         .iter()
@@ -86,7 +86,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
         let count = views.iter().filter(|of_row| **of_row == view).count();
         assert!(count > 100, "view {view}: {count} rows");
     }
-    // The block that tells of a view stands right before its first row.
+    // The block about a placement is right before its first row.
     let before = text
         .lines()
         .zip(text.lines().skip(1))
@@ -94,7 +94,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
     let (before, _) = before.expect("rows of view 1");
     assert!(before.starts_with("# "), "{before}");
     assert!(folder.path("demo/hills.png").exists());
-    // Time continues, tick by tick.
+    // Time continues tick by tick.
     let times: Vec<f64> = live
         .iter()
         .map(|row| row["t_s"].parse().expect("s"))
@@ -135,7 +135,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
         compared.iter().skip(1).all(|count| *count > 50),
         "{compared:?}"
     );
-    // What was replayed describes itself, too.
+    // The replay's output describes itself as well.
     let of_again = Settings::from_toml(&comments(&again_text)).expect("read");
     assert_eq!(of_again.expect("settings").views, settings.views);
 }
@@ -155,7 +155,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
         told.contains("6 placements") && told.contains("--ignore-settings"),
         "{told}"
     );
-    // One of the views is not described.
+    // One of the placements is not described.
     let text = folder.read("demo/hills.csv");
     folder.write("less.csv", &text.replace("# number = 2", "# number = 7"));
     let told = refused("less.csv", &[]);
@@ -169,7 +169,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
         told.contains("column view") && told.contains("5x"),
         "{told}"
     );
-    // The path alone is what it says.
+    // Only the path is used.
     let run = folder.replay("demo/hills.csv", "again.csv", &["--ignore-settings"]);
     assert!(run.status.success(), "{}", output_text(&run));
 }
@@ -244,12 +244,12 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     );
 }
 
-/// In each view cells are as large as they are at the place that is rendered; the recording says
-/// where that is, and a replay makes the same cells of it.
+/// With each placement, cells have the size at the rendered place; the recording states where that
+/// is, and a replay computes the same cells.
 #[test]
 fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     let folder = Folder::new();
-    // Hills without edges: where a proxy lands does not hang on how it came there.
+    // Hills without edges: a proxy's resting place does not depend on its path.
     write_degrees(&folder, |column, row| {
         let (x, y) = (f64::from(column), f64::from(row));
         (3000.0 + 900.0 * (x / 7.0).sin() + 700.0 * (y / 9.0).cos()) as u32
@@ -281,7 +281,7 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     let first_m = settings.rendered.cell_m.expect("known");
     let latitude = |view: PlacementSettings| view.measured_at.expect("a place")[1];
     let [up, down] = [latitude(north) - 56.0, latitude(softer) - latitude(south)];
-    // The hand continues meanwhile.
+    // Meanwhile the hand continues.
     assert!(
         (2.0..6.0).contains(&up) && (0.5..3.0).contains(&down),
         "{up} {down}"
@@ -329,7 +329,7 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     assert!(compared.iter().all(|count| *count > 50), "{compared:?}");
     // A replay of the replay is the same file.
     assert!(replay(&folder.text("again.csv"), "same.csv") == again_text);
-    // Without the places another terrain is rendered.
+    // Without these places another terrain is rendered.
     let lines = again_text.split_inclusive('\n');
     let (head, views): (Vec<_>, Vec<_>) = lines.partition(|line| line.contains("measured_at"));
     assert_eq!(head.len(), 4);
@@ -348,8 +348,8 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     );
 }
 
-/// On walls a tick has most to do. At 1 kHz its work suffices, also after another view: what was
-/// recorded live equals the replay, which does all of a tick at once, but for rounding.
+/// On walls a tick has the most work. At 1 kHz its work suffices, even after a change of the
+/// placement: the live recording equals the replay, whose ticks converge, to within rounding.
 #[test]
 fn replay_of_a_steep_saw_equals_the_live_forces() {
     /// Rounding by the digits of a file, mm.
@@ -387,7 +387,7 @@ fn replay_of_a_steep_saw_equals_the_live_forces() {
     }
 }
 
-/// Before cells were measured anew, views did not say where: theirs are those of the beginning.
+/// Old recordings describe a placement without its place: cells are those of the start.
 #[test]
 fn recording_without_measured_places_replays_unchanged() {
     let folder = Folder::of(SIZE);

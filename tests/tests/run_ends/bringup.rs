@@ -1,4 +1,4 @@
-//! `hapterra bringup` that is interrupted while the arm is driven.
+//! `hapterra bringup`, interrupted while the arm is driven.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -21,7 +21,7 @@ const RECORD: Calibration = Calibration::PREMIUM_1_5;
 const CONFIRMED: [Task; 2] = [Task::ZeroPose, Task::HoldLoosely];
 const SEEN: [Task; 1] = [Task::PressDeadMan];
 
-/// A device at a virtual bench, whose user does the tasks that are sent.
+/// Starts a device at a virtual bench, whose user does the tasks that are sent.
 fn at_a_bench() -> (SocketDevice, Sender<Task>) {
     let (send, tasks) = channel();
     let served = SocketDevice::with(move || {
@@ -34,7 +34,7 @@ fn at_a_bench() -> (SocketDevice, Sender<Task>) {
     (served, send)
 }
 
-/// A log in which the last step alone is missing.
+/// Writes a log in which only the last step is missing.
 fn log(served: &SocketDevice, file: &Path) {
     let link = Tcp::connect(&served.address.to_string()).expect("there");
     let control = ControlSession::open(Box::new(link), HANG).expect("answers");
@@ -46,7 +46,7 @@ fn log(served: &SocketDevice, file: &Path) {
     log.write(file).expect("written");
 }
 
-/// Brings up until the arm is armed over the soft plane.
+/// Runs the bring-up until the arm is armed over the soft plane.
 fn armed(served: &SocketDevice, bench: &Sender<Task>, folder: &Path) -> Child {
     let file = folder.join("log.toml");
     log(served, &file);
@@ -67,7 +67,7 @@ fn armed(served: &SocketDevice, bench: &Sender<Task>, folder: &Path) -> Child {
     child
 }
 
-/// Does what the next line asks for. Whether the arm is armed and is to be moved now.
+/// Does the task of the next line. Returns true if the arm is armed and must be moved now.
 fn lead(
     lines: &mut impl BufRead,
     keys: &mut ChildStdin,
@@ -79,7 +79,7 @@ fn lead(
     for task in CONFIRMED.into_iter().chain(SEEN) {
         if line.contains(&format!("> {task}")) {
             bench.send(task).expect("a bench");
-            // The tip is led there.
+            // The tip is moved there.
             served.pass_ms(1_000);
             if CONFIRMED.contains(&task) {
                 keys.write_all(b"\n").expect("written");
@@ -125,7 +125,7 @@ fn second_signal_ends_bringup_and_warns_of_an_armed_arm() {
     signal(&child, "INT");
     let output = end_of(child);
     let text = output_text(&output);
-    // Not by itself, as where the board does not confirm in time.
+    // Not after its own time-out, as when the board does not confirm in time.
     assert_eq!(output.status.code(), Some(130), "{text}");
     assert!(text.contains("switch the amplifiers off"), "{text}");
 }

@@ -1,6 +1,6 @@
-//! A worker that ends without a word while the arm is armed: its guardian disarms the
-//! board, puts the terminal back and names the recording. In a terminal, armed by Enter
-//! and a press of the dead-man switch; whether the amplifiers are on is the device's word.
+//! A worker dies while the arm is armed: its guardian disarms the board, restores the terminal and
+//! names the recording. The run is in a terminal, armed by Enter and a dead-man press; the device
+//! reports the state of the amplifiers.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -24,7 +24,7 @@ use super::terminal::{modes, shows, start_command_in, terminal};
 /// The line of the message to the user.
 const SWITCH_OFF: &str = "switch the amplifiers off";
 
-/// An arm that a user at a terminal has armed, and the processes that serve it.
+/// An arm that a user at a terminal has armed, and the processes of the command.
 struct Armed {
     folder: tempfile::TempDir,
     served: SocketDevice,
@@ -46,7 +46,7 @@ impl Armed {
         Self::by(command)
     }
 
-    /// A device that is served by this command, which gets the device's address and a folder.
+    /// Starts a device, and the command made from its address and a folder.
     fn by(command: impl FnOnce(SocketAddr, &Path) -> Command) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let (amplifiers, pressed) = (Arc::default(), Arc::default());
@@ -74,7 +74,7 @@ impl Armed {
         }
     }
 
-    /// The number of the process that serves.
+    /// Returns the process ID of the worker.
     fn worker(&self) -> String {
         let id = self.guardian.id().to_string();
         let found = Command::new("pgrep").args(["-P", &id]).output();
@@ -94,7 +94,7 @@ impl Armed {
         signal(&self.guardian, name);
     }
 
-    /// Waits for the end. The terminal is then as it was before.
+    /// Waits for the end, then checks that the terminal is restored.
     fn end(self) -> (Ended, Rest) {
         let Self {
             folder,
@@ -107,7 +107,7 @@ impl Armed {
         } = self;
         let reader = std::thread::spawn(move || {
             let (mut shown, mut chunk) = (vec![], [0; 4096]);
-            // A terminal whose other end is closed is an error to read on some systems.
+            // On some systems a terminal whose other end is closed gives a read error.
             while let Ok(n @ 1..) = window.read(&mut chunk) {
                 shown.extend_from_slice(&chunk[..n]);
             }
@@ -134,14 +134,14 @@ struct Rest {
 }
 
 impl Rest {
-    /// Fails unless the amplifiers are off, and the session was closed.
+    /// Checks that the amplifiers are off, and that the session was closed.
     fn is_disarmed(&self, how: &str) {
         assert_eq!(self.served.last_end(), SessionEnd::Goodbye, "{how}");
         assert!(!self.amplifiers.load(Ordering::Relaxed), "{how}");
     }
 }
 
-/// An arm at rest over the terrain, whose user holds the dead-man switch on request.
+/// Returns an arm at rest over the terrain, whose user holds the dead-man switch on request.
 fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
     let hand = move |_, sense: &mut GuardInputs, drive: &GuardOutputs| {
         is_on.store(drive.enabled, Ordering::Relaxed);
@@ -150,7 +150,7 @@ fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
     Native::for_replay().restless().meddled_with(Box::new(hand))
 }
 
-/// The recording that was cut off.
+/// Returns the truncated recording.
 pub(super) fn partial(folder: &Path) -> Option<String> {
     let names = std::fs::read_dir(folder).expect("listed");
     let names = names.map(|entry| entry.expect("entry").file_name());
@@ -158,10 +158,10 @@ pub(super) fn partial(folder: &Path) -> Option<String> {
     names.find(|name| name.ends_with(".partial"))
 }
 
-/// The abort stands for a stack that overflows and for memory that ends: Rust's runtime ends both
-/// by one. Neither can be had truly. No input is known any more that overflows a stack, and a
-/// thread that runs has the pages of its stack already. A worker whose address space is limited to
-/// what it has continues for minutes, and serves: it asks for no more.
+/// The abort represents a stack overflow and exhausted memory: Rust's runtime ends both with one.
+/// Neither can be caused for real. No known input overflows a stack, and a running thread already
+/// has the pages of its stack. A worker whose address space is limited to its present size
+/// continues to serve for minutes, because it requests no more.
 #[test]
 fn worker_killed_while_armed_is_disarmed_by_guardian() {
     for (name, number) in [("ABRT", 6), ("KILL", 9)] {
@@ -180,8 +180,8 @@ fn worker_killed_while_armed_is_disarmed_by_guardian() {
     }
 }
 
-/// A file that libgdal reads block by block, and a read that ends in SIGSEGV. Zooming out makes the
-/// thread in the background read what nothing has read before.
+/// A file that libgdal reads block by block, and a read that ends in SIGSEGV. Zooming out causes
+/// the background thread to read new blocks.
 #[test]
 fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     let place = tempfile::tempdir().expect("a folder");
@@ -199,7 +199,7 @@ fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     std::fs::write(&crash, "now").expect("written");
     let mut keys = armed.window.try_clone().expect("a terminal");
     let zooming = std::thread::spawn(move || {
-        // Until the terminal is gone, or the farthest view is there.
+        // Until the terminal is gone, or the placement is as large as possible.
         for _ in 0..8 {
             let _ = keys.write_all(b"-");
             pass(Duration::from_secs(1));
@@ -259,7 +259,7 @@ fn worker_whose_guardian_is_killed_ends_as_after_ctrl_c() {
     }
 }
 
-/// A worker that is stopped stands for one that reads a file without end.
+/// A stopped worker represents one that reads a file without end.
 #[test]
 fn worker_that_does_not_react_to_ctrl_c_is_killed() {
     let armed = Armed::new();
@@ -271,8 +271,8 @@ fn worker_that_does_not_react_to_ctrl_c_is_killed() {
     assert!(ended.shown.contains("did not react"), "{}", ended.shown);
 }
 
-/// Ctrl-C in a terminal reaches both processes, and is pressed once: the worker keeps saying
-/// goodbye, and is not ended at once.
+/// Ctrl-C in a terminal reaches both processes, but counts as one: the worker may still close its
+/// session, and is not ended at once.
 #[test]
 fn signal_to_both_processes_is_pressed_once() {
     let armed = Armed::new();

@@ -1,4 +1,4 @@
-//! A device that asks for much and reads little.
+//! A device that requests much and reads little.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ fn a_device_that_asks_for_much_and_reads_little_holds_no_end_up() {
     let mut command = command(greedy_device::start(), folder.path());
     let mut child = command.arg("--unchecked").spawn().expect("it runs");
     has_begun(child.stdout.as_mut().expect("piped"));
-    // What waits for the device grows.
+    // The queue for the device grows.
     pass(Duration::from_secs(2));
     signal(&child, "INT");
     let output = end_of(child);

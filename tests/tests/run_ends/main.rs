@@ -1,5 +1,5 @@
-//! Every way in which `hapterra run` and `hapterra bringup` end: the board is known to be
-//! disarmed, or the user gets a warning that it may not be; what was recorded is kept.
+//! All ends of `hapterra run` and `hapterra bringup`: the board has confirmed that it is disarmed,
+//! or the user receives a warning that it may not be; the recording is kept.
 #![cfg(unix)]
 
 mod bringup;
@@ -40,7 +40,7 @@ fn the_end_of_the_time_is_a_goodbye_too() {
     let child = start(&served, folder.path(), &["--duration", "0.5s"]);
     let output = end_of(child);
     assert!(output.status.success(), "{}", output_text(&output));
-    // Who looks does not hide it from who looks next.
+    // A query does not change the answer to the next one.
     for _ in 0..2 {
         assert_eq!(served.last_end(), SessionEnd::Goodbye);
     }
@@ -52,7 +52,7 @@ fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
         let folder = tempfile::tempdir().expect("a folder");
         let served = SocketDevice::start();
         let child = start(&served, folder.path(), &[]);
-        // Telemetry keeps coming, and nothing gets to the board any more.
+        // Telemetry continues, but the board receives nothing any more.
         served.deaf.store(true, Ordering::Relaxed);
         signal(&child, name);
         let output = end_of(child);
@@ -104,7 +104,7 @@ fn stiffness_that_no_arm_feels_is_refused() {
     assert!(text.contains("no arm renders more than 20 N/mm"), "{text}");
 }
 
-/// A bound of the system on the size of files stands for a disk that is full.
+/// The system's limit on the size of files represents a full disk.
 #[test]
 fn recording_that_fills_the_disk_is_kept_and_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -141,7 +141,7 @@ fn one_that_cannot_begin_tells_that_the_arm_may_be_armed() {
     let killed = start(&served, folder.path(), &[]);
     signal(&killed, "KILL");
     end_of(killed);
-    // What the one before has left armed cannot be disarmed by the next one.
+    // The next run cannot disarm an arm that the last one left armed.
     served.deaf.store(true, Ordering::Relaxed);
     let next = command(served.address, folder.path()).output();
     let text = output_text(&next.expect("it ends"));
@@ -157,14 +157,14 @@ fn a_signal_before_it_has_begun_is_heeded() {
         .arg("--unchecked")
         .spawn();
     let child = child.expect("it runs");
-    // It greets a device that does not answer; its hello arrives, and the session is closed.
+    // The device does not answer the open. When the open arrives, the session is closed.
     served.wait_for_unheard_hello();
     signal(&child, "INT");
     pass(Duration::from_millis(500));
     served.deaf.store(false, Ordering::Relaxed);
     let output = end_of(child);
     let text = output_text(&output);
-    // Or it had begun before it heard the signal.
+    // Or it had started before it received the signal.
     assert!(
         text.contains("interrupted") || output.status.success(),
         "{text}"

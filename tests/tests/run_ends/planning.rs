@@ -1,4 +1,4 @@
-//! Ctrl-C while the path of a virtual arm is planned.
+//! Ctrl-C during the planning of a virtual arm's path.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -10,7 +10,7 @@ use hapterra_tests::hapterra_binary;
 use hapterra_tests::socket_device::signal;
 use hapterra_tests::timeouts::end_of;
 
-/// Ground with so many holes that each size of the plan is tried.
+/// Returns ground with so much no-data that each size of the plan is tried.
 fn ground_of_holes() -> String {
     let mut text = String::from("ncols 200\nnrows 200\ncellsize 1\nnodata_value -9999\n");
     for row in 0..200_u32 {
@@ -33,10 +33,10 @@ fn ctrl_c_ends_the_planning_of_a_path() {
     std::fs::write(&terrain, ground_of_holes()).expect("written");
     let mut child = Command::new(hapterra_binary())
         .args(["run", "--tip", "8mm", "--level", "0"])
-        // One path after the other is planned: much more than a signal's time.
+        // The paths are planned one after the other, which takes much longer than a signal.
         .args(["--device", "native"].repeat(8))
         .args(["--scale", "1mm/cell", "--exaggeration", "0.05mm/unit"])
-        // Ends by itself where nothing is left to interrupt.
+        // Ends by itself if there is nothing left to interrupt.
         .args(["--duration", "0.1s"])
         .arg(&terrain)
         .current_dir(folder.path())
@@ -63,6 +63,6 @@ fn ctrl_c_ends_the_planning_of_a_path() {
     stderr.read_to_string(&mut rest).expect("text");
     assert_eq!(output.status.code(), Some(1), "{rest}");
     assert!(rest.contains("interrupted\nhint: start again"), "{rest}");
-    // Otherwise a line follows every three seconds until the plan is complete.
+    // Otherwise a line is printed every three seconds until the plan is complete.
     assert!(rest.matches("planning").count() <= 1, "{rest}");
 }

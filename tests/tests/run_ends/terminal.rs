@@ -16,13 +16,13 @@ use rustix::termios::{LocalModes, tcgetattr};
 use hapterra_tests::socket_device::{SocketDevice, command, has_begun, output_text, signal, start};
 use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 
-/// Longer than it takes until a line is written to what is no terminal any more.
+/// Longer than the time until a line is written to a lost terminal.
 const A_LINE: Duration = Duration::from_millis(3_000);
 
-/// The two ends of a terminal: the window's, and the program's.
+/// Opens a terminal. Returns the window's end and the program's.
 pub(super) fn terminal() -> (File, File) {
     let window = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a terminal");
-    // The program does not hold the window's end, too.
+    // The program must not inherit the window's end.
     fcntl_setfd(&window, FdFlags::CLOEXEC).expect("set");
     grantpt(&window).expect("granted");
     unlockpt(&window).expect("unlocked");
@@ -32,12 +32,12 @@ pub(super) fn terminal() -> (File, File) {
     (window.into(), end.expect("open"))
 }
 
-/// Starts `run` with a terminal's end for all that it reads and writes.
+/// Starts `run` with a terminal's end as input and output.
 fn start_in(end: &File, served: &SocketDevice, folder: &Path) -> Child {
     start_command_in(end, command(served.address, folder))
 }
 
-/// Starts a command with a terminal's end for all that it reads and writes.
+/// Starts a command with a terminal's end as input and output.
 pub(super) fn start_command_in(end: &File, mut command: Command) -> Child {
     let end = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));
     let command = command.stdin(end()).stdout(end()).stderr(end());
@@ -103,7 +103,7 @@ fn unread_output_does_not_stop_the_first_and_second_signal() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let (_unread, mut pipe) = std::io::pipe().expect("a pipe");
-    // As much as a pipe takes.
+    // As much as a pipe can store.
     pipe.write_all(&[b'.'; 1 << 16]).expect("written");
     let mut command = command(served.address, folder.path());
     let mut child = command.stderr(pipe).spawn().expect("it runs");
@@ -114,16 +114,16 @@ fn unread_output_does_not_stop_the_first_and_second_signal() {
     served.wait_for_unheard_bye();
     signal(&child, "INT");
     let output = end_of(child);
-    // Not by itself, as where the board does not confirm in time.
+    // Not after its own time-out, as when the board does not confirm in time.
     assert_eq!(output.status.code(), Some(130), "{}", output_text(&output));
 }
 
-/// Reads what is shown in a window until it holds a text.
+/// Reads the output in a window until it contains a text.
 pub(super) fn shows(window: &mut File, text: &str) -> String {
     shows_all(window, &[text])
 }
 
-/// Reads what is shown in a window until it holds all of these texts, in any order.
+/// Reads the output in a window until it contains all of these texts, in any order.
 fn shows_all(window: &mut File, texts: &[&str]) -> String {
     let (mut shown, mut chunk) = (String::new(), [0; 4096]);
     wait_for(&texts.join(", "), || {
@@ -134,7 +134,7 @@ fn shows_all(window: &mut File, texts: &[&str]) -> String {
     })
 }
 
-/// An arm in its zero pose whose hand lets it arm, behind a socket; keys are typed.
+/// An arm in its zero pose with a hand that allows arming, behind a socket; keys are typed.
 #[test]
 fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -147,7 +147,7 @@ fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
     wait_until("keys that come one by one", || {
         !modes(&end).contains(LocalModes::ICANON)
     });
-    // Enter answers the prompt: the arm is zeroed, and has samples to steer by.
+    // Enter answers the prompt: the arm is zeroed, and has samples for the steering.
     window.write_all(b"\r").expect("typed");
     shows(&mut window, "zeroed at");
     window.write_all(b"+").expect("typed");
@@ -190,8 +190,8 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
     }
 }
 
-/// Enter and keys go to the device whose number was pressed, and to no other: neither user arms
-/// the other's arm.
+/// Enter and keys go only to the device whose number was pressed: neither user arms the other's
+/// arm.
 #[test]
 fn enter_and_keys_go_to_the_device_that_was_chosen_and_to_no_other() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -208,7 +208,7 @@ fn enter_and_keys_go_to_the_device_that_was_chosen_and_to_no_other() {
         .expect("it runs");
     let name = |number: usize| format!("[{number} tcp:{}] ", served[number - 1].address);
     let asks = |number| format!("and press {number} and then Enter");
-    // Both are asked for their zero poses, in either order.
+    // Both prompt for their zero poses, in either order.
     let mut shown = shows(&mut window, "hold it there and press");
     while ![1, 2].iter().all(|number| shown.contains(&asks(*number))) {
         shown += &shows(&mut window, "and then Enter");

@@ -1,5 +1,5 @@
-//! A server of buckets that asks for a key. Whose service it plays, Google's or Microsoft's,
-//! says how it asks and refuses.
+//! A server of buckets that requires a key. The service that it represents, Google's or
+//! Microsoft's, determines its requests for a key and its refusals.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -15,10 +15,10 @@ use axum::{Router, serve};
 use tokio::runtime::Runtime;
 use tower_http::services::ServeDir;
 
-/// More than any file here has, bytes.
+/// Upper bound of the size of any file here, bytes.
 const LARGEST: usize = 1 << 30;
 
-/// The bucket that everybody may read.
+/// The public bucket.
 pub const PUBLIC: &str = "open";
 
 /// A server on this machine.
@@ -31,13 +31,13 @@ pub struct Server {
 /// Requests to a server, and its answers.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// Methods, paths and statuses of the answers.
+    /// Methods, paths and answered statuses.
     pub requests: Vec<String>,
     /// Bytes of files that were sent.
     pub bytes: usize,
 }
 
-/// Reason for which a server does not answer with a file.
+/// Reason for an answer without a file.
 pub(crate) struct Refusal {
     pub(crate) status: StatusCode,
     /// Its code for programs.
@@ -48,16 +48,16 @@ pub(crate) struct Refusal {
 
 /// Answer to an authorised request.
 pub(crate) enum Answer {
-    /// The file at a path of the folder that is served.
+    /// The file at a path of the served folder.
     File(String),
-    /// Answer to a request besides files, as JSON.
+    /// Another answer, as JSON.
     Words(String),
 }
 
-/// Whose service is played.
+/// The service that the server represents.
 pub(crate) trait Service: Send + Sync + 'static {
     /// # Errors
-    /// When the key of a request does not open what it asks for.
+    /// If the key of a request does not permit it.
     fn answer(&self, request: &Parts, body: &str) -> Result<Answer, Refusal>;
 
     /// Returns the refusal for a missing file.
@@ -66,7 +66,7 @@ pub(crate) trait Service: Send + Sync + 'static {
     /// Returns the body and head of a refusal.
     fn words(&self, refusal: &Refusal) -> (String, HeaderMap);
 
-    /// The head that an answer with a file has besides a web server's.
+    /// Returns the additional headers of an answer with a file.
     fn head(&self) -> HeaderMap;
 }
 
@@ -76,10 +76,10 @@ struct Shared<S> {
 }
 
 impl Server {
-    /// Serves the folders of a folder as buckets.
+    /// Serves the subfolders of a folder as buckets.
     ///
     /// # Panics
-    /// When there is no port.
+    /// If no port is free.
     pub(crate) fn of(folder: &Path, service: impl Service) -> Self {
         let seen = Arc::<Mutex<Seen>>::default();
         let shared = Arc::new(Shared {
@@ -98,7 +98,7 @@ impl Server {
         }
     }
 
-    /// Returns its place.
+    /// Returns its address.
     #[must_use]
     pub fn endpoint(&self) -> &str {
         &self.url
@@ -137,7 +137,7 @@ async fn answered<S: Service>(
     response
 }
 
-/// The file at a path of the folder, and how many bytes of it.
+/// Returns the file at a path of the folder, and the number of its bytes.
 async fn served(
     service: &impl Service,
     path: String,
@@ -168,12 +168,12 @@ fn refused(service: &impl Service, refusal: &Refusal) -> Response {
     response
 }
 
-/// The bucket of a path.
+/// Returns the bucket of a path.
 pub(crate) fn bucket(path: &str) -> &str {
     path.split('/').nth(1).unwrap_or_default()
 }
 
-/// A refusal in words of its own.
+/// Returns a refusal with its own message.
 pub(crate) fn refusal(status: StatusCode, code: &'static str, message: &str) -> Refusal {
     Refusal {
         status,
@@ -182,7 +182,7 @@ pub(crate) fn refusal(status: StatusCode, code: &'static str, message: &str) -> 
     }
 }
 
-/// Headers of an answer.
+/// Returns the headers of an answer.
 pub(crate) fn headers<const N: usize>(of: [(&'static str, &'static str); N]) -> HeaderMap {
     let entry = |(name, value)| {
         let name = HeaderName::from_static(name);

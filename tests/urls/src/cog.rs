@@ -1,7 +1,7 @@
-//! A cloud-optimised GeoTIFF, written byte by byte: tiles, and overviews behind the full
-//! image. What reads it shares no code with this.
+//! A cloud-optimised GeoTIFF, written byte by byte: tiles, and overviews after the full image. It
+//! shares no code with the reader.
 
-/// Samples of a usual tile each way.
+/// Side of a usual tile, samples.
 const TILE: u32 = 256;
 /// Bytes of a directory with [`TAGS`] tags.
 const TAGS: u16 = 15;
@@ -13,14 +13,14 @@ struct Image {
     samples: Vec<f32>,
 }
 
-/// The file of a field whose cells are 30 m, with overviews of every second sample of the
-/// image before, `overviews` of them.
+/// Returns the file of a field whose cells are 30 m, with `overviews` overviews, each of every
+/// second sample of the image before.
 #[must_use]
 pub fn cog(columns: u32, rows: u32, overviews: u32, height: impl Fn(u32, u32) -> f32) -> Vec<u8> {
     in_tiles(TILE, [columns, rows], overviews, height)
 }
 
-/// The same in tiles of so many samples each way.
+/// Same as [`cog`] with tiles of this size.
 #[must_use]
 pub fn in_tiles(
     tile: u32,
@@ -67,7 +67,7 @@ fn halved(image: &Image) -> Image {
 fn written(tile: u32, images: &[Image]) -> Vec<u8> {
     let directory = 2 + 12 * u32::from(TAGS) + 4;
     let lists: Vec<u32> = images.iter().map(|image| 8 * tiles(tile, image)).collect();
-    // Of each image: its directory, its two lists of tiles, and places on the ground.
+    // For each image: its directory, its two lists of tiles, and its georeference.
     let place = 3 * 8 + 6 * 8 + 2 * 16;
     let header: u32 = 8 + lists
         .iter()
@@ -101,7 +101,7 @@ fn written(tile: u32, images: &[Image]) -> Vec<u8> {
         tag(277, short, 1, 1);
         tag(322, long, 1, tile);
         tag(323, long, 1, tile);
-        // One number is in the tag itself.
+        // A single number is in the tag itself.
         let [offset, size] = match count {
             1 => [first, tile_bytes],
             _ => [list, list + 4 * count],

@@ -1,8 +1,8 @@
-//! A server of buckets that speaks the XML API of Google Cloud Storage.
+//! A server of buckets with the XML API of Google Cloud Storage.
 //!
-//! A service account signs its requests itself: each carries a token (RFC 7519) that names
-//! the account and its key, and is signed with that key (AIP-4111). The server
-//! knows the keys, as Google does, and takes no code of the client's to look at them.
+//! A service account signs its requests itself: each has a token (RFC 7519) that names the account
+//! and its key, signed with that key (AIP-4111). The server has the keys, as Google does, and
+//! verifies tokens without code of the client.
 
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -17,32 +17,32 @@ use serde_json::{Value, json};
 
 use crate::bucket::{Answer, PUBLIC, Refusal, Server, Service, bucket, headers, refusal, token};
 
-/// Scopes that let a service account read files.
+/// Scopes with which a service account may read files.
 const SCOPES: [&str; 3] = [
     "https://www.googleapis.com/auth/cloud-platform",
     "https://www.googleapis.com/auth/devstorage.read_only",
     "https://www.googleapis.com/auth/devstorage.full_control",
 ];
-/// A token may hold so long, seconds.
+/// Longest validity of a token, seconds.
 const LONGEST: u64 = 3600;
 
-/// A token as `gcloud auth print-access-token` prints it, of an account that may read all.
+/// A token of an account that may read everything, as `gcloud auth print-access-token` prints it.
 pub const TOKEN: &str = "ya29.a0-of-the-surveyor";
 
-/// A service account. Its key was made for these tests and opens nothing else.
+/// A service account. Its key was made for these tests and gives access to nothing else.
 pub struct Account {
     mail: &'static str,
     key_id: &'static str,
     pem: &'static str,
 }
 
-/// May read all buckets.
+/// An account that may read all buckets.
 pub const SURVEYOR: Account = Account {
     mail: "surveyor@hills.iam.gserviceaccount.com",
     key_id: "5f1d",
     pem: include_str!("keys/surveyor.pem"),
 };
-/// Is known, and may read none.
+/// A valid account that may read none.
 pub const STRANGER: Account = Account {
     mail: "stranger@hills.iam.gserviceaccount.com",
     key_id: "08a7",
@@ -50,7 +50,7 @@ pub const STRANGER: Account = Account {
 };
 
 impl Account {
-    /// The file that Google hands out for an account, with the key of `other`.
+    /// Returns the account's file in Google's format, with the key of `other`.
     #[must_use]
     pub fn file_with_key_of(&self, other: &Self) -> String {
         json!({
@@ -67,7 +67,7 @@ impl Account {
         .to_string()
     }
 
-    /// The file that Google hands out for the account.
+    /// Returns the account's file in Google's format.
     #[must_use]
     pub fn file(&self) -> String {
         self.file_with_key_of(self)
@@ -84,7 +84,7 @@ impl Account {
     }
 }
 
-/// Serves the folders of a folder as buckets.
+/// Serves the subfolders of a folder as buckets.
 #[must_use]
 pub fn served(folder: &Path) -> Server {
     Server::of(folder, Google)
@@ -95,7 +95,7 @@ struct Google;
 impl Service for Google {
     fn answer(&self, request: &Parts, _: &str) -> Result<Answer, Refusal> {
         let path = request.uri.path();
-        // What a computer of Google's asks for a key of its own.
+        // The request of a computer in Google's cloud for a token.
         if path == "/computeMetadata/v1/instance/service-accounts/default/token" {
             let is_asked = request.headers.contains_key("metadata-flavor");
             return is_asked.then(|| token(TOKEN)).ok_or_else(|| denied("This"));
@@ -107,7 +107,7 @@ impl Service for Google {
                 _ => Err(denied("Anonymous caller")),
             };
         };
-        // A token is checked, even where none is needed.
+        // A token is checked even if none is needed.
         let said = said.to_str().ok();
         match said.and_then(|said| holder(said.strip_prefix("Bearer ")?)) {
             Some(mail) if mail == SURVEYOR.mail => Ok(file),
@@ -148,7 +148,7 @@ fn denied(who: &str) -> Refusal {
     refusal(StatusCode::FORBIDDEN, "AccessDenied", &message)
 }
 
-/// The account of a token; `None` if it is unknown or invalid.
+/// Returns the account of a token, or `None` if the token is unknown or invalid.
 fn holder(token: &str) -> Option<&'static str> {
     if token == TOKEN {
         return Some(SURVEYOR.mail);

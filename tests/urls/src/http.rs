@@ -1,4 +1,4 @@
-//! A server of a folder's files, in ranges, and what goes wrong on the way to it.
+//! A server of a folder's files, in ranges, with injected faults.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -16,7 +16,7 @@ use tokio::runtime::Runtime;
 use tokio::sync::watch;
 use tower_http::services::ServeDir;
 
-/// More than any file here has, bytes.
+/// Upper bound of the size of any file here, bytes.
 const LARGEST: usize = 1 << 30;
 
 /// A server on this machine.
@@ -32,45 +32,45 @@ pub enum Fault {
     /// Nothing.
     #[default]
     None,
-    /// The server says that it cannot answer.
+    /// The server reports an error.
     Error500,
-    /// It may not be read.
+    /// The file may not be read.
     Forbidden,
-    /// The line ends in the middle.
+    /// The connection ends in the middle.
     Cut,
-    /// Other bytes come than were asked for, and it reports it.
+    /// Another range is sent than requested, and declared.
     OtherRange,
-    /// Fewer bytes come than the answer's head promises.
+    /// Fewer bytes are sent than declared.
     Short,
-    /// More bytes come than were asked for, under the head of those that were.
+    /// More bytes are sent than requested, with the header of the requested ones.
     Endless,
-    /// A page for a browser comes, as of sites that have one for every name.
+    /// A page for a browser is sent, as by sites that have one for every name.
     Page,
-    /// Ranges are not known.
+    /// Ranges are not supported.
     NoRanges,
-    /// There is no such file, which a page of 64 MB says.
+    /// The file does not exist, with a page of 64 MB as the error.
     LongError,
-    /// Another URL has the file ([`Server::redirect`]).
+    /// The file is at another URL ([`Server::redirect`]).
     Redirect,
 }
 
 struct Shared {
     state: Mutex<Faults>,
-    /// Answers wait while it is closed.
+    /// False while answers are held back.
     is_open: watch::Sender<bool>,
 }
 
 #[derive(Default)]
 struct Faults {
     fault: Fault,
-    /// So many answers are faulty; then they are right again.
+    /// Number of faulty answers; the next ones are right again.
     count: usize,
-    /// Of files whose names end so.
+    /// Suffix of the affected files' names.
     of: String,
-    /// Only of what is behind a file's beginning.
+    /// True if only data after a file's beginning is affected.
     is_beyond: bool,
     latency: Duration,
-    /// Of files whose names end so, answers alone are held back; of all where there are none.
+    /// Suffixes of the files whose answers are held back; if empty, all are.
     held: Vec<String>,
     /// The version of all files.
     version: u32,
@@ -80,7 +80,7 @@ struct Faults {
     /// Target of redirects.
     redirect: String,
     bytes: usize,
-    /// Requests that wait for their answers, now and at most.
+    /// Requests that wait for their answers: now, and the most at once.
     at_once: [usize; 2],
 }
 
@@ -88,7 +88,7 @@ impl Server {
     /// Serves the files of a folder.
     ///
     /// # Panics
-    /// When there is no port.
+    /// If no port is free.
     #[must_use]
     pub fn of(folder: &Path) -> Self {
         let shared = Arc::new(Shared {
@@ -107,30 +107,30 @@ impl Server {
         }
     }
 
-    /// The URL of a file of the folder.
+    /// Returns the URL of a file of the folder.
     #[must_use]
     pub fn url(&self, name: &str) -> String {
         format!("{}/{name}", self.url)
     }
 
-    /// The next `count` answers are faulty.
+    /// Makes the next `count` answers faulty.
     pub fn fail(&self, fault: Fault, count: usize) {
         self.fail_at("", fault, count);
     }
 
-    /// All answers about a TIFF redirect to a URL.
+    /// Makes all answers about a TIFF redirect to a URL.
     pub fn redirect(&self, to: &str) {
         self.shared.state().redirect = to.to_owned();
         self.fail_at(".tif", Fault::Redirect, usize::MAX);
     }
 
-    /// Names of the headers of all requests so far, in small letters.
+    /// Returns the names of the headers of all requests up to now, in lower case.
     #[must_use]
     pub fn headers(&self) -> BTreeSet<String> {
         self.shared.state().headers.clone()
     }
 
-    /// The next `count` answers about files whose names end so are faulty.
+    /// Makes the next `count` answers about files with this suffix faulty.
     pub fn fail_at(&self, ending: &str, fault: Fault, count: usize) {
         let mut state = self.shared.state();
         (state.fault, state.count) = (fault, count);
@@ -138,41 +138,41 @@ impl Server {
         state.is_beyond = false;
     }
 
-    /// All answers about what is behind a file's beginning are faulty.
+    /// Makes all answers about data after a file's beginning faulty.
     pub fn fail_beyond(&self, fault: Fault) {
         self.fail_at("", fault, usize::MAX);
         self.shared.state().is_beyond = true;
     }
 
-    /// Each answer comes so much later.
+    /// Delays each answer by this time.
     pub fn set_latency(&self, latency: Duration) {
         self.shared.state().latency = latency;
     }
 
-    /// Holds answers back, or lets them go.
+    /// Holds answers back, or releases them.
     pub fn hold(&self, hold: bool) {
         self.shared.state().held.clear();
         self.shared.is_open.send_replace(!hold);
     }
 
-    /// Holds answers back about files whose names end so, in small or capital letters.
+    /// Holds answers about files with these suffixes back, in lower or upper case.
     pub fn hold_at(&self, endings: &[&str]) {
         self.shared.state().held = endings.iter().map(ToString::to_string).collect();
         self.shared.is_open.send_replace(false);
     }
 
-    /// All files are others now.
+    /// Changes the version of all files.
     pub fn change(&self) {
         self.shared.state().version += 1;
     }
 
-    /// Returns the number of requests that were waiting for their answers at once, at most.
+    /// Returns the most requests that waited for their answers at once.
     #[must_use]
     pub fn most_at_once(&self) -> usize {
         self.shared.state().at_once[1]
     }
 
-    /// Requests so far, their methods and paths, and bytes of the answers.
+    /// Returns the methods and paths of the requests up to now, and the bytes of the answers.
     #[must_use]
     pub fn seen(&self) -> (Vec<String>, usize) {
         let state = self.shared.state();
@@ -185,7 +185,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes a request; what goes wrong with it, how late it is answered, and the version.
+    /// Records a request. Returns its fault, its delay, and the version.
     fn next(&self, request: &Request) -> (Fault, Duration, String) {
         let mut state = self.state();
         let line = format!("{} {}", request.method(), request.uri());
@@ -261,7 +261,7 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
     Response::from_parts(head, body)
 }
 
-/// So many megabytes, which are counted as they are sent.
+/// This many megabytes, which are counted as they are sent.
 struct Page(Arc<Shared>, usize);
 
 impl axum::body::HttpBody for Page {
@@ -282,7 +282,7 @@ impl axum::body::HttpBody for Page {
     }
 }
 
-/// Some bytes, and then the line is gone.
+/// Some bytes, followed by a closed connection.
 struct Ending(Option<Bytes>);
 
 impl axum::body::HttpBody for Ending {

@@ -1,7 +1,7 @@
-//! Servers on this machine, with what goes wrong between them and a terrain.
+//! Servers on this machine, with injected faults between them and a terrain.
 //!
-//! A package of its own: servers, and what the program needs to reach them, take minutes
-//! to build, and no other test wants them.
+//! A separate package, because the servers and the program's code for them take minutes to build,
+//! and no other test needs them.
 
 pub mod azure;
 pub mod bucket;
@@ -15,7 +15,7 @@ use std::future::Future;
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 
-/// A port of this machine's loopback, and what serves it until it is dropped.
+/// Opens a port on this machine's loopback, and serves it until it is dropped.
 pub(crate) fn listening<S: Future<Output = ()> + Send + 'static>(
     serve: impl FnOnce(TcpListener) -> S,
 ) -> (u16, Runtime) {
@@ -29,7 +29,7 @@ pub(crate) fn listening<S: Future<Output = ()> + Send + 'static>(
     (port, runtime)
 }
 
-/// Returns true if there is a libgdal; without one, a test that wants it reports it.
+/// Returns true if there is a libgdal; otherwise a test that needs it prints a message.
 #[must_use]
 pub fn has_gdal() -> bool {
     let found = heightfield::gdal();

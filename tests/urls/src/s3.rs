@@ -1,4 +1,4 @@
-//! A server of buckets that speaks S3, with a key.
+//! A server of buckets with the S3 API, with a key.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use s3s::service::S3ServiceBuilder;
 use s3s_fs::FileSystem;
 use tokio::runtime::Runtime;
 
-/// The name and the key that the server accepts.
+/// The name and the key of the only user.
 pub const KEY: [&str; 2] = ["hand", "terrain"];
 
 /// A server on this machine.
@@ -19,10 +19,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves the folders of a folder as buckets.
+    /// Serves the subfolders of a folder as buckets.
     ///
     /// # Panics
-    /// When there is no port.
+    /// If no port is free.
     #[must_use]
     pub fn of(folder: &Path) -> Self {
         let mut builder = S3ServiceBuilder::new(FileSystem::new(folder).expect("a folder"));
@@ -33,7 +33,7 @@ impl Server {
                 let service = service.clone();
                 tokio::spawn(async move {
                     let server = Builder::new(TokioExecutor::new());
-                    // A client that goes away is no error of this server's.
+                    // A client that disconnects is not an error of this server.
                     let _ = server.serve_connection(TokioIo::new(socket), service).await;
                 });
             }
@@ -44,7 +44,7 @@ impl Server {
         }
     }
 
-    /// Returns its place.
+    /// Returns its address.
     #[must_use]
     pub fn endpoint(&self) -> &str {
         &self.url

@@ -1,4 +1,4 @@
-//! Faults of a server or the line to it: they are reported, and nothing wrong is rendered.
+//! Faults of a server or the connection to it: they are reported, and no wrong terrain is rendered.
 
 use hapterra::place::{Coordinates, PlaceError, Placement, PlacementOptions, Reach, Target};
 use hapterra::terrain::{HapticCells, HapticGrid};
@@ -79,7 +79,7 @@ fn long_page_of_an_error_is_not_read_to_its_end() {
     let told = open(&server, "hills.tif").expect_err("none");
     assert!(told.contains("there is no such file"), "{told}");
     let (requests, bytes) = server.seen();
-    // Besides what is on its way in the system's buffers.
+    // Besides the data in the system's buffers.
     assert!(bytes <= requests.len() * (16 << 20), "{bytes} bytes came");
 }
 
@@ -106,7 +106,7 @@ fn bytes_that_were_not_asked_for_are_not_taken() {
     }
 }
 
-/// A height, as soon as it has come.
+/// Returns a height as soon as it has arrived.
 fn comes(raster: &Raster, column: u32, row: u32) -> f64 {
     wait_for("the height", || {
         let height = raster.height(column, row);
@@ -156,7 +156,7 @@ fn notes_beside_a_url_are_read_as_beside_a_file() {
     assert!(told.contains("500"), "{told}");
 }
 
-/// The error is the server's, and not that there is no data.
+/// The error is the server's, and not a lack of data.
 #[test]
 fn place_on_a_terrain_whose_server_is_down_is_no_hole() {
     let (_folder, server) = hills();
@@ -194,7 +194,7 @@ fn a_page_for_every_name_is_no_neighbour() {
     }
 }
 
-/// Who plans a way over a terrain that does not come has to know.
+/// A planned path over terrain that does not arrive must fail with a message.
 #[test]
 fn what_did_not_come_is_told_before_anything_is_armed() {
     let (_folder, server) = hills();
@@ -238,7 +238,7 @@ fn missing_source_of_a_vrt_is_a_hole_and_the_others_are_read() {
     );
     std::fs::write(folder.path().join("both.vrt"), vrt).expect("written");
     let url = server.url("both.vrt");
-    // What is read as a whole is refused without a part of it.
+    // A file that is read as a whole is refused if a part is missing.
     let refused = Raster::open(&url, &OpenOptions::default()).expect_err("small");
     assert!(refused.to_string().contains("valleys.tif"), "{refused}");
     let in_blocks = OpenOptions {

@@ -1,4 +1,4 @@
-//! Blocks ahead of the hand are requested before its tiles.
+//! Blocks ahead of the hand are requested before their tiles.
 
 use std::time::Duration;
 
@@ -14,8 +14,8 @@ use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
 use heightfield::{OpenOptions, Raster};
 
-/// Requests for what two tiles beside each other need, and for what lies around a HIP: runs of
-/// pages that the layout of the file puts there.
+/// Requests for two adjacent tiles, and for the surroundings of a HIP: runs of pages, by the layout
+/// of the file.
 const OF_TWO_TILES: usize = 1;
 const OF_A_VIEW: usize = 1;
 
@@ -32,7 +32,7 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
     (folder, raster.expect("opens"), server)
 }
 
-/// Returns true if all of a tile is here.
+/// Returns true if all of a tile has arrived.
 fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
     let mut buffer = TileBuffer::default();
     let (_, status) = terrain.tile(key, &mut buffer).expect("there is one");
@@ -45,12 +45,12 @@ fn terrain(raster: &Raster) -> Terrain<'_> {
     terrain.non_blocking()
 }
 
-/// Requests so far.
+/// Returns the number of requests up to now.
 fn requests(server: &Server) -> usize {
     server.seen().0.len()
 }
 
-/// Requests so far, after time for those that must not be.
+/// Returns the number of requests up to now, after time for unwanted ones.
 fn requests_later(server: &Server) -> usize {
     pass(Duration::from_millis(100));
     requests(server)
@@ -62,7 +62,7 @@ fn tiles_read_ahead_need_no_request() {
     let terrain = terrain(&raster);
     let keys = [TileKey::new(0, 60, 20), TileKey::new(0, 61, 20)];
     let opened = requests(&server);
-    // It waits for nothing: the server holds its answers back for ever.
+    // It must not wait: the server holds its answers back forever.
     server.hold(true);
     terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
     let ahead = opened + OF_TWO_TILES;
@@ -72,7 +72,7 @@ fn tiles_read_ahead_need_no_request() {
         wait_until("a tile", || is_here(&terrain, key));
     }
     assert_eq!(requests(&server), ahead, "the tiles asked for nothing more");
-    // All of it, or what lies outside, is not read ahead.
+    // The whole field, or an area outside it, is not prefetched.
     terrain.grid().prefetch(0, [0, 0], [4200, 1800]);
     assert_eq!(requests_later(&server), ahead);
     terrain.grid().prefetch(0, [-900, -900], [-800, -800]);
@@ -80,7 +80,7 @@ fn tiles_read_ahead_need_no_request() {
     terrain.grid().prefetch(40, [i32::MAX; 2], [i32::MIN; 2]);
 }
 
-/// While the clutch is open, what the next view needs is fetched before the device asks for it.
+/// While the clutch is open, blocks of the next placement are fetched before any tile request.
 #[test]
 fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     let (_folder, raster, server) = hills();
@@ -110,8 +110,8 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     );
 }
 
-/// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: looks, one every
-/// 10 ms along 3000 cells, at which the tile under the HIP was not here; with answers 100 ms late.
+/// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: counts checks, one
+/// every 10 ms along 3000 cells, without the tile under the HIP; answers take 100 ms.
 #[test]
 #[ignore = "it prints figures, and takes as long as the hand"]
 fn looks_without_a_tile_at_100_ms() {

@@ -1,4 +1,4 @@
-//! Of a file at a URL what is touched is fetched, and is the same as of the file on disk.
+//! Only the requested parts of a file at a URL are fetched; they equal those of the file on disk.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ fn in_blocks(path: &Path) -> Raster {
     Raster::open(path, &options).expect("opens")
 }
 
-/// A folder with a file of these bytes, and a server of it.
+/// Creates a folder with a file of these bytes, and a server for it.
 fn served(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf, Server) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
@@ -91,7 +91,7 @@ fn neighbours_of_a_file_are_found_beside_it_at_its_server() {
     write("hills.prj", system.as_bytes()).expect("written");
     let server = Server::of(folder.path());
     let here = open(folder.path().join("hills.flt"));
-    // A key behind the path goes with all of them.
+    // A key after the path is sent with all of them.
     let there = open(server.url("hills.flt?key=a/b.c"));
     assert_eq!(there.format(), here.format());
     assert!(there.reference_system().is_some());
@@ -195,7 +195,7 @@ fn a_vrt_and_its_files_may_be_elsewhere() {
         let expected = f64::from(height(column, 599 - row));
         assert_eq!(raster.height(column, row), expected, "{column} {row}");
     }
-    // From here to elsewhere is another matter.
+    // A file on disk that refers to a server is another matter.
     let here = folder.path().join("here.vrt");
     std::fs::write(&here, vrt(&server.url("west.tif"), 0)).expect("written");
     let refused = Raster::open(&here, &OpenOptions::default()).expect_err("an address");
@@ -215,7 +215,7 @@ fn a_server_without_ranges_hands_over_all_of_a_file() {
     same_tiles(&here, &there, 0);
 }
 
-/// Every format, be it packed or with another file beside it.
+/// All formats, also packed or with a sidecar.
 #[test]
 fn real_files_are_the_same_from_a_server() {
     let Some(folder) = shared("dem/real") else {
@@ -291,7 +291,7 @@ fn files_at_a_url_lead_to_no_file_of_this_computer() {
     }
 }
 
-/// A tar file of one file.
+/// Returns a tar file of one file.
 fn tar(name: &str, bytes: &[u8]) -> Vec<u8> {
     let mut header = [0_u8; 512];
     let size = format!("{:011o}", bytes.len());
@@ -336,7 +336,7 @@ fn a_stac_at_a_url_is_refused_with_the_files_to_make_a_vrt_of() {
     assert_eq!(*files, [&west, "/vsicurl/https://other/east.tif"]);
 }
 
-/// Compares the files of a folder with the same from a server; how many were opened.
+/// Compares the files of a folder with the same files from a server. Returns the number opened.
 fn same_from_a_server(folder: &Path) -> u32 {
     let server = Server::of(folder);
     let mut compared = 0;

@@ -1,11 +1,11 @@
-//! Redirects of a server: followed where they give nothing away, refused with the host's name
-//! where they would take a key along.
+//! Redirects of a server: followed if they reveal nothing, refused with the host's name if they
+//! would pass on a key.
 
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
 use heightfield::{OpenOptions, Raster};
 
-/// Two servers, of which the first has no files and redirects to the second.
+/// Starts two servers: the first has no files and redirects to the second.
 fn servers(name: &str) -> (tempfile::TempDir, [Server; 2]) {
     let folder = tempfile::tempdir().expect("a folder");
     let bytes = cog(300, 200, 1, |column, row| (column + row) as f32);

@@ -1,4 +1,4 @@
-//! Pages of a file at a URL that are kept on disk for another run.
+//! Pages of a file at a URL that are cached on disk for another run.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use hapterra_url_tests::http::Server;
 use heightfield::disk_cache::DiskCache;
 use heightfield::{OpenOptions, Raster, Wait};
 
-/// Pages of what [`Bed::look`] looks at.
+/// Pages that [`Bed::look`] needs.
 const PAGES: usize = 50;
 
 fn height(column: u32, row: u32) -> f32 {
@@ -37,9 +37,9 @@ fn bed() -> Bed {
 }
 
 impl Bed {
-    /// Looks at places of fine and coarse levels; the heights, and the requests for it.
+    /// Reads heights at fine and coarse levels. Returns them, and the number of requests.
     fn look(&self, name: &str) -> (Vec<f64>, usize) {
-        // Another program: only the folder on disk is the same.
+        // Like another program: only the folder on disk is the same.
         let options = OpenOptions {
             disk_cache: DiskCache::at(self.kept.path(), 256 << 20),
             ..OpenOptions::default()
@@ -64,7 +64,7 @@ impl Bed {
         (heights, self.server.seen().0.len() - before)
     }
 
-    /// Waits until what came with the first look was written, each page in a file.
+    /// Waits until the pages of the first run are written, each to a file.
     fn settle(&self) {
         let is_whole = |path: &PathBuf| {
             let name = path.file_name().expect("a name").to_string_lossy();
@@ -77,7 +77,7 @@ impl Bed {
     }
 }
 
-/// All files in a folder and its folders.
+/// Returns all files in a folder and its subfolders.
 fn files(folder: &Path) -> Vec<std::path::PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let each = entries.flat_map(|entry| match entry.path().is_dir() {
@@ -93,7 +93,7 @@ fn a_second_run_asks_only_whether_the_file_is_the_same() {
     let (first, requests) = bed.look("hills.tif");
     assert!(requests > 10, "{requests}");
     bed.settle();
-    // The file's beginning, and the four files that may lie beside it.
+    // The file's beginning, and the four possible sidecars.
     let (second, again) = bed.look("hills.tif");
     assert_eq!(second, first);
     assert!(again <= 5, "{again} after {requests}");

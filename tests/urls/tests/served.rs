@@ -39,7 +39,7 @@ fn terrain(raster: &Raster) -> Terrain<'_> {
 
 const KEY: TileKey = TileKey::new(0, 20, 20);
 
-/// Bytes of the tile, where all of it has come.
+/// Returns the bytes of the tile if all of it has arrived.
 fn tile(terrain: &Terrain<'_>) -> Option<String> {
     let mut buffer = TileBuffer::default();
     let (heights, status) = terrain.tile(KEY, &mut buffer).expect("there is one");
@@ -54,7 +54,7 @@ fn comes(terrain: &Terrain<'_>) -> String {
 fn what_is_not_here_yet_is_asked_for_and_comes_later() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
-    // Who waited would wait for ever.
+    // A wait would never end.
     server.hold(true);
     for _ in 0..5 {
         assert_eq!(tile(&terrain), None);
@@ -96,7 +96,7 @@ fn all_that_a_touch_needs_is_asked_for_at_once() {
     });
 }
 
-/// The names that a world file may have, of a picture that says nothing of its place.
+/// The possible names of a world file, for a picture without a georeference.
 #[test]
 fn all_neighbours_that_may_be_are_looked_for_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -144,7 +144,7 @@ fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
         return;
     }
     let (folder, _, server) = hills();
-    // More than are looked into when it is opened.
+    // More than are opened at the start.
     const SOURCES: u32 = 40;
     let source = |number: u32| {
         format!(
@@ -167,7 +167,7 @@ fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
     let raster = Raster::open(server.url("hills.vrt"), &OpenOptions::default());
     let raster = raster.expect("opens");
     server.hold(true);
-    // Of each a place that was not looked at: some are open, and some are not.
+    // A point in each that was not read before: some files are open, and some are not.
     let places = (0..SOURCES).map(|number| (2200 * number + 20, 20));
     let places: Vec<(u32, u32)> = places.collect();
     for (column, row) in &places {
@@ -183,7 +183,7 @@ fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
     }
 }
 
-/// A line to a device from which nothing may come. The host's time stands still.
+/// A line to a device that may send nothing. The host's time is stopped.
 struct Line<'d> {
     device: &'d mut Native,
     is_mute: Rc<Cell<bool>>,
@@ -233,7 +233,7 @@ fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
     for _ in 0..100 {
         assert_eq!(look(&mut session), 0, "what has not come is not sent");
     }
-    // What was asked for is sent without being asked for again.
+    // Requested tiles are sent without another request.
     is_mute.set(true);
     server.hold(false);
     wait_until("a tile that has come", || look(&mut session) > 0);

@@ -1,28 +1,27 @@
-//! The data cache of an H743's core (ARM DDI 0403E, B2.2.7; ARM DDI 0489, 1.2): what it holds
-//! and the memory behind it does not is lost at a reset.
+//! The data cache of an H743's core (ARM DDI 0403E, B2.2.7; ARM DDI 0489, 1.2): data that is only
+//! in the cache is lost at a reset.
 //!
-//! Modelled: DC of CCR, and cleaning by address (DCCMVAC, DCCIMVAC), over the AXI SRAM. The
-//! worst cache is assumed: it writes nothing back without a command, and keeps everything.
-//! The worst memory, too: its buffer (RM0433, 2.4) holds the last line that was written, until
-//! the next one, and not only a word that is incomplete.
-//! Not modelled: sets and ways, an invalidation that drops what was written, other masters of
-//! the bus, and the instruction cache. No image uses DMA, and a test patches both the cache and
-//! the memory.
+//! Modelled: DC of CCR, and cleaning by address (DCCMVAC, DCCIMVAC), over the AXI SRAM. The worst
+//! cache is assumed: it writes back only on command, and keeps everything. The worst memory is
+//! assumed as well: its buffer (RM0433, 2.4) keeps the last line written until the next one, and
+//! not only an incomplete word. Not modelled: sets and ways, an invalidation that drops written
+//! data, other masters of the bus, and the instruction cache. No image uses DMA, and a test patches
+//! both the cache and the memory.
 
 use unicorn_engine::Unicorn;
 
-/// The memory that is cached: address and bytes. The tightly coupled memory is not.
+/// The cached memory: address and bytes. The tightly coupled memory is not cached.
 const CACHED: (u32, usize) = (0x2400_0000, 512 * 1024);
-/// CCR and its bit that switches the data cache on.
+/// CCR and its bit that enables the data cache.
 const CCR: u32 = 0xE000_ED14;
 const DC: u32 = 1 << 16;
-/// Clean a line, and clean and invalidate one, by an address in it.
+/// Registers that clean a line, or clean and invalidate it, by an address in it.
 const DCCMVAC: u32 = 0xE000_EF68;
 const DCCIMVAC: u32 = 0xE000_EF70;
 /// Bytes of a line.
 const LINE: usize = 32;
 
-/// The cache, as what the memory behind it holds while it is on. Off at first.
+/// The cache, represented by the content of the memory behind it while it is on. Off at first.
 #[derive(Default)]
 pub(super) struct DataCache {
     behind: Option<Vec<u8>>,
@@ -31,7 +30,7 @@ pub(super) struct DataCache {
 }
 
 impl DataCache {
-    /// Takes the core's write of a register.
+    /// Handles the core's write of a register.
     pub(super) fn follow(&mut self, core: &Unicorn<'_, ()>, register: u32, value: u32) {
         let (start, bytes) = CACHED;
         let held = |at: usize, bytes: usize| {
@@ -55,7 +54,7 @@ impl DataCache {
         }
     }
 
-    /// A test changes memory: both what is cached of it and what is behind.
+    /// Changes memory for a test: both the cached data and the data behind it.
     pub(super) fn patch(&mut self, address: u32, bytes: &[u8]) {
         let at = address.wrapping_sub(CACHED.0) as usize;
         let behind = self.behind.as_mut();
@@ -64,7 +63,7 @@ impl DataCache {
         }
     }
 
-    /// A reset switches it off. Where the memory is that it covered, and what that holds.
+    /// Switches it off at a reset. Returns the address of the covered memory, and its content.
     pub(super) fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
         self.buffered = None;
         self.behind.take().map(|behind| (CACHED.0, behind))

@@ -1,4 +1,4 @@
-//! Enters exceptions by priority and returns from them.
+//! Entry of exceptions by priority, and return from them.
 
 use unicorn_engine::{Context, RegisterARM};
 
@@ -6,22 +6,21 @@ use super::fault_injection::Load;
 use super::{Machine, Stop, THUMB};
 use crate::chip::Unreadable;
 
-/// Place where an exception's return leads: no memory is there.
+/// Return address of an exception, where there is no memory.
 pub(super) const EXC_RETURN: u64 = 0xFFFF_FFF8;
 /// Positions in the vector table.
 const NMI: u32 = 2;
 const HARD_FAULT: u32 = 3;
 const BUS_FAULT: u32 = 5;
-/// SHCSR and its bit that lets bus faults through; SHPR1 and where their priority
-/// is in it.
+/// SHCSR and its bit that enables bus faults; SHPR1 and the position of their priority.
 const BUS_FAULTS_ON: (u32, u32) = (0xE000_ED24, 1 << 17);
 const BUS_FAULTS_PRIORITY: (u32, u32) = (0xE000_ED18, 8);
-/// Place where an exception's frame has the place to go back to.
+/// Offset of the return address in an exception's frame.
 const PC_IN_FRAME: u32 = 24;
-/// Priority of an execution that no interrupt can be below.
+/// Priority of thread execution, below any interrupt.
 const THREAD: i16 = 256;
 
-/// An exception under way.
+/// An active exception.
 pub(super) struct Active {
     pub(super) context: Context,
     pub(super) vector: u32,
@@ -29,7 +28,7 @@ pub(super) struct Active {
 }
 
 impl Machine {
-    /// Priority of what is being executed, masks included.
+    /// Returns the execution priority, with the masks.
     fn priority(&self) -> i16 {
         let active = self.active.last().map_or(THREAD, |a| a.priority);
         let base = self.register(RegisterARM::BASEPRI) as i16 & 0xF0;
@@ -51,8 +50,8 @@ impl Machine {
         }
     }
 
-    /// Stacks what the architecture stacks (with room for the FPU's registers,
-    /// as with lazy stacking) and goes to the vector.
+    /// Stacks the architecture's frame (with room for the FPU's registers, as with lazy stacking)
+    /// and jumps to the vector.
     fn enter(&mut self, vector: u32, priority: i16) {
         let context = self.core.context_init().expect("saved");
         let registers = [
@@ -92,8 +91,8 @@ impl Machine {
         self.set_register(RegisterARM::PC, handler.into());
     }
 
-    /// Returns to the place in the exception's frame, which the handler may have changed.
-    /// BASEPRI and PRIMASK are not restored, so a handler that leaves one set is seen.
+    /// Returns to the address in the exception's frame, which the handler may have changed. BASEPRI
+    /// and PRIMASK are not restored, so a handler that leaves one set is detected.
     pub(super) fn leave(&mut self) {
         let Some(active) = self.active.pop() else {
             return;
@@ -129,12 +128,12 @@ impl Machine {
         None
     }
 
-    /// Raises what the chip raises when the core loads a word that cannot be read.
+    /// Raises the chip's exception for the load of a word that cannot be read.
     pub(super) fn fail_load(&mut self, address: u32) -> Option<Stop> {
         self.bus().report_unreadable(address);
         match self.chip.flash.unreadable {
             Unreadable::Nmi { .. } => {
-                // The load is done first.
+                // The load is completed first.
                 self.load.set(Load::Done);
                 let pc = self.register(RegisterARM::PC) | 1;
                 let done = self.core.emu_start(pc, EXC_RETURN, 0, 1);

@@ -9,17 +9,17 @@ use super::Machine;
 use crate::elf::Function;
 use crate::stopwatch::Stopwatch;
 
-/// The interrupt controller's first register that disables.
+/// The first disable register of the interrupt controller.
 const NVIC_ICER: u32 = 0xE000_E180;
 
-/// Load of a word of flash, which may fail.
+/// State of a load from a flash word that may fail.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Load {
     #[default]
     None,
-    /// It is about to load from this address.
+    /// A load from this address is next.
     Of(u32),
-    /// It has loaded.
+    /// The load is completed.
     Done,
 }
 
@@ -42,8 +42,7 @@ impl Machine {
             .expect("translated code is dropped");
     }
 
-    /// Counts calls of a function and the instructions executed in it, without what
-    /// it calls, from now on.
+    /// Counts, from now on, the calls of a function and the instructions in it without its callees.
     #[must_use]
     pub fn count(&mut self, function: Function) -> Rc<Cell<(u32, u32)>> {
         let counted = Rc::new(Cell::new((0, 0)));
@@ -73,15 +72,14 @@ impl Machine {
         stopwatch
     }
 
-    /// From now on the flash's word at `address` cannot be read, until it is
-    /// erased: what is left of a write that was cut off.
+    /// Makes the flash word at `address` unreadable until it is erased, like an interrupted write.
     pub fn make_unreadable(&mut self, address: u32) {
         let bytes = self.chip.flash.word;
         let load = Rc::clone(&self.load);
         let on_load = move |core: &mut Unicorn<'_, ()>, _: MemType, _: u64, _: usize, _: i64| {
             if load.get() == Load::None {
                 load.set(Load::Of(address));
-                // In front of the load.
+                // Before the load.
                 core.emu_stop().expect("stops");
             }
             true
@@ -90,7 +88,7 @@ impl Machine {
         let hook = self
             .core
             .add_mem_hook(HookType::MEM_READ, from, to, on_load);
-        // Code that was translated before does not ask it.
+        // Code translated earlier has no hook.
         self.core
             .ctl_flush_tb()
             .expect("translated code is dropped");
@@ -101,11 +99,11 @@ impl Machine {
         });
     }
 
-    /// From now on, a call of `function` becomes one of `panicking`, a function
-    /// of core's that takes only a source location: as if a line panicked.
+    /// Replaces calls of `function` by calls of `panicking`, a function of core's that takes only a
+    /// source location, as if a line panicked.
     pub fn call_instead(&mut self, function: Function, panicking: Function) {
         let (flash, bytes) = self.chip.memories[0];
-        // The end of flash, where no image reaches.
+        // The end of flash, which no image reaches.
         let text = flash + bytes - 64;
         let location = text + 32;
         self.patch(text, b"made/by/a/test.rs");
@@ -114,7 +112,7 @@ impl Machine {
             .flat_map(|w: &u32| w.to_le_bytes())
             .collect();
         self.patch(location, &words);
-        // ldr r0, [pc, #4]; ldr.w pc, [pc, #8]; nop; and what they load.
+        // ldr r0, [pc, #4]; ldr.w pc, [pc, #8]; nop; and their literals.
         let mut code = if function.address & 2 == 0 {
             vec![]
         } else {
@@ -126,7 +124,7 @@ impl Machine {
         self.patch(function.address, &code);
     }
 
-    /// Disables the interrupt of the supply's comparator, as if the program had lost it.
+    /// Disables the interrupt of the supply's comparator, like a faulty program.
     pub fn mask_supply_interrupt(&mut self) {
         let interrupt = self.chip.comparator.interrupt as u32;
         let clear_enable = NVIC_ICER + 4 * (interrupt / 32);
@@ -134,7 +132,7 @@ impl Machine {
             .write(clear_enable, 1 << (interrupt % 32), u32::MAX);
     }
 
-    /// Puts a function's own code back.
+    /// Restores a function's own code.
     pub fn restore(&mut self, function: Function) {
         let holds = |s: &&crate::elf::Segment| {
             (s.runs..s.runs + s.bytes.len() as u32).contains(&function.address)

@@ -1,15 +1,15 @@
-//! A debugger that halts the core, and a core that has locked up: time passes, and no
-//! instruction runs. And a probe that stops reading the log.
+//! A core halted by a debugger, and a core in lockup: time passes without instructions. Also a
+//! probe that stops reading the log.
 
 use super::{Machine, Stop};
 
-/// Nanoseconds between two looks.
+/// Nanoseconds between two checks.
 const LOOK_NS: u64 = 5_000;
 
 impl Machine {
-    /// Says to the chip what a debugger says when it attaches: the watchdog, the clock of embassy's
-    /// time and the gate of the duty cycles are to stop while the core is halted, and nothing else
-    /// is.
+    /// Configures the chip as a debugger does when it attaches: the watchdog, the clock of
+    /// embassy's time and the gate of the duty cycles stop while the core is halted, and nothing
+    /// else does.
     pub fn attach_debugger(&mut self) {
         let freeze = self.chip.freeze;
         for (register, bit) in [freeze.watchdog, freeze.clock]
@@ -23,14 +23,14 @@ impl Machine {
         }
     }
 
-    /// Feeds the watchdog as the supervisor does, so that a halt may take all of its time.
+    /// Feeds the watchdog like the supervisor, so that a halt may take all of its time.
     pub fn feed_watchdog(&mut self) {
         let mut bus = self.bus();
         let now_ns = bus.now_ns;
         bus.watchdog.restart(now_ns);
     }
 
-    /// Halts the core for so many milliseconds, or until the watchdog resets the chip.
+    /// Halts the core for this time, or until the watchdog resets the chip.
     pub fn halt_ms(&mut self, ms: u64) -> Stop {
         self.bus().is_halted = true;
         let end_ns = self.bus().now_ns + ms * 1_000_000;
@@ -46,16 +46,16 @@ impl Machine {
         }
     }
 
-    /// Lets a halted core run again.
+    /// Resumes a halted core.
     pub fn resume(&mut self) {
         self.bus().is_halted = false;
     }
 
-    /// Has the log's buffer full and not read any more, as a probe leaves it that is pulled
-    /// out: the channel is in the mode in which a writer waits for room.
+    /// Fills the log's buffer without a reader, as after a probe is pulled out: in the channel's
+    /// mode a writer waits for room.
     ///
     /// # Panics
-    /// When the image has no log.
+    /// If the image has no log.
     pub fn stop_reading_log(&mut self) {
         // SEGGER's control block: 16 bytes of name, two counts, then the first channel's name,
         // buffer, size, write and read position and flags.

@@ -26,7 +26,7 @@ use running::SLICE;
 /// The Thumb bit of the program status.
 const THUMB: u64 = 1 << 24;
 
-/// Reason for which the machine stopped.
+/// Cause of a stop of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The time is up.
@@ -35,9 +35,9 @@ pub enum Stop {
     Watchdog,
     /// The program has reset the chip.
     Software,
-    /// A condition of the caller's.
+    /// The caller's condition was met.
     Asked,
-    /// A fault in the handler of a hard fault, and where.
+    /// A fault in the handler of a hard fault, with its location.
     Lockup(String),
 }
 
@@ -51,36 +51,36 @@ pub struct Machine {
     bus: Rc<RefCell<Bus>>,
     active: Vec<Active>,
     unreadable: Vec<UnreadableWord>,
-    /// A load of a word that cannot be read.
+    /// State of a load from a word that cannot be read.
     load: Rc<Cell<Load>>,
-    /// The data cache, of a core that has one.
+    /// The data cache, on a core that has one.
     cache: Rc<RefCell<DataCache>>,
     /// Memory protection unit.
     protection: Protection,
-    /// Vectors taken since it was last cleared.
+    /// Vectors taken since the list was last cleared.
     pub taken: Vec<u32>,
-    /// Number of times that a hard fault was taken.
+    /// Number of hard faults.
     pub hard_faults: u32,
-    /// Instructions between two looks at time and interrupts.
+    /// Instructions between two checks of time and interrupts.
     pub slice: usize,
-    /// The haptic interrupt is raised out of turn at every n-th look that finds the core
+    /// If set, the haptic interrupt is raised out of turn at every n-th check that finds the core
     /// in a critical section or in another interrupt.
     pub raises_tick_every: Option<u32>,
-    /// Looks that found the core there.
+    /// Number of checks that found the core there.
     pub found_busy: u32,
-    /// Number of times that the haptic interrupt was raised out of turn.
+    /// Number of times the haptic interrupt was raised out of turn.
     pub raised: u32,
-    /// Number of times that the haptic interrupt was pending and could not be taken
-    /// although no tick was under way.
+    /// Number of times the haptic interrupt was pending and could not be taken although no tick was
+    /// running.
     pub delayed: u32,
-    /// Looks that found PRIMASK set although the haptic interrupt was let through.
+    /// Number of checks that found PRIMASK set with the haptic interrupt enabled.
     pub masked: u32,
 }
 
 impl Machine {
-    /// A powered-up chip with `image` in its flash, the switches as they are
-    /// when unattended: emergency stop not pressed, dead-man and clutch not held; amplifiers that are
-    /// ready and have no current monitors.
+    /// Creates a powered-up chip with `image` in its flash, and unattended switches: emergency stop
+    /// not pressed, dead-man and clutch not held; the amplifiers are ready and have no current
+    /// monitors.
     #[must_use]
     pub fn new(chip: &'static Chip, image: Image) -> Self {
         let model = if chip.is_m7 {
@@ -138,8 +138,8 @@ impl Machine {
         }
     }
 
-    /// Resets the chip. Memory keeps what it holds, but not what only the data cache did, and what
-    /// is outside of the chip sees no reset but a power-up.
+    /// Resets the chip. Memory keeps its content, except for data that was only in the data cache.
+    /// Parts outside the chip are reset only at a power-up.
     pub fn reset(&mut self, cause: Reset) {
         let inputs = self.chip;
         let before = self.bus.replace(Bus::new(self.chip, cause));
@@ -172,7 +172,7 @@ impl Machine {
         self.set_register(RegisterARM::PC, entry.into());
     }
 
-    /// The peripherals.
+    /// Returns the peripherals.
     #[must_use]
     pub fn bus(&self) -> std::cell::RefMut<'_, Bus> {
         self.bus.borrow_mut()
@@ -185,7 +185,7 @@ impl Machine {
         bus.raise_interrupts();
     }
 
-    /// Sets the supply's voltage, millivolts.
+    /// Sets the supply's voltage, mV.
     pub fn set_supply_mv(&mut self, mv: u32) {
         let mut bus = self.bus();
         bus.supply.mv = mv;
@@ -198,13 +198,13 @@ impl Machine {
         self.bus().output(self.chip.enable)
     }
 
-    /// Takes the effects on commands and enable pin since the last call.
+    /// Returns the effects on commands and enable pin since the last call.
     #[must_use]
     pub fn take_effects(&mut self) -> Vec<Effect> {
         std::mem::take(&mut self.bus().effects)
     }
 
-    /// A word of memory.
+    /// Returns a word of memory.
     #[must_use]
     pub fn word(&self, address: u32) -> u32 {
         let mut bytes = [0; 4];
@@ -214,7 +214,7 @@ impl Machine {
         u32::from_le_bytes(bytes)
     }
 
-    /// Bytes of memory.
+    /// Returns bytes of memory.
     #[must_use]
     pub fn bytes(&self, address: u32, count: usize) -> Vec<u8> {
         self.core
@@ -231,7 +231,7 @@ impl Machine {
     }
 }
 
-/// The chip at the end of a scripted host's cable.
+/// The chip on a scripted host's cable.
 impl Port for Machine {
     fn is_attached(&self) -> bool {
         self.bus().usb.is_attached()

@@ -1,8 +1,7 @@
-//! The memory protection unit (ARM DDI 0403E, B3.5) as far as an image uses it: regions with no
-//! access at all, and read-only regions, over the default map. Not modelled: other
-//! access, subregions, XN, and regions over each other. And exception entry where the stack cannot
-//! be written: the handler runs all the same (ARM DDI 0337, 5.12.1), and its frame holds
-//! what was there.
+//! The memory protection unit (ARM DDI 0403E, B3.5) as used by the images: regions without access,
+//! and read-only regions, over the default map. Not modelled: other access, subregions, XN, and
+//! overlapping regions. Also exception entry with a stack that cannot be written: the handler still
+//! runs (ARM DDI 0337, 5.12.1), and its frame has the old memory.
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -12,11 +11,11 @@ use unicorn_engine::{HookType, MemType, Prot, Unicorn};
 
 use super::Machine;
 
-/// The fault status and the address of a forbidden access.
+/// The fault status, and the address of a forbidden access.
 const CFSR: u32 = 0xE000_ED28;
 const MMFAR: u32 = 0xE000_ED34;
-/// Of CFSR: a data access was forbidden, to MMFAR; the stacking was; a bus fault of the
-/// stacking.
+/// Bits of CFSR: forbidden data access, with its address in MMFAR; forbidden stacking; bus fault of
+/// the stacking.
 const DACCVIOL: u32 = 1 << 1;
 const MSTKERR: u32 = 1 << 4;
 const MMARVALID: u32 = 1 << 7;
@@ -25,12 +24,12 @@ const STKERR: u32 = 1 << 12;
 /// Forbidden memory, and the last access to it.
 #[derive(Default)]
 pub(super) struct Protection {
-    /// Base and attributes of each region, as the registers had them.
+    /// Base and attributes of each region, from the registers.
     registers: [(u32, u32); 16],
     met: Rc<Cell<Option<u32>>>,
 }
 
-/// A region with less access than the default map gives, and what it has, of its base and
+/// Returns a region with less access than in the default map, and its access, from base and
 /// attributes.
 fn restricted((base, attributes): (u32, u32)) -> Option<(Range<u32>, Prot)> {
     let access = match attributes >> 24 & 7 {
@@ -43,7 +42,7 @@ fn restricted((base, attributes): (u32, u32)) -> Option<(Range<u32>, Prot)> {
 }
 
 impl Machine {
-    /// Notes the address of each forbidden access.
+    /// Records the address of each forbidden access.
     pub(super) fn watch_forbidden(&mut self) {
         let met = Rc::clone(&self.protection.met);
         let note = move |_: &mut Unicorn<'_, ()>, _: MemType, at: u64, _: usize, _: i64| {
@@ -54,7 +53,7 @@ impl Machine {
         self.core.add_mem_hook(all, 1, 0, note).expect("a hook");
     }
 
-    /// Forbids what the registers say now.
+    /// Applies the present registers.
     pub(super) fn protect(&mut self) {
         let registers = self.bus().nvic.regions();
         let before = std::mem::replace(&mut self.protection.registers, registers);
@@ -84,7 +83,7 @@ impl Machine {
         }
     }
 
-    /// Tells the program of the access that failed.
+    /// Reports the failed access to the program.
     pub(super) fn report_forbidden(&mut self) {
         if let Some(address) = self.protection.met.take() {
             self.raise_status(DACCVIOL | MMARVALID);
@@ -92,7 +91,7 @@ impl Machine {
         }
     }
 
-    /// Writes an exception's frame, where that can be.
+    /// Writes an exception's frame, as far as the memory is writable.
     pub(super) fn stack_frame(&mut self, stack: u32, frame: &[u8]) {
         let regions = self.protection.registers.into_iter();
         let mut regions = regions.filter_map(restricted);

@@ -1,4 +1,4 @@
-//! Runs the core: instructions and sleep between looks at interrupts.
+//! Execution of the core: instructions and sleep between checks of interrupts.
 
 use unicorn_engine::RegisterARM;
 
@@ -6,28 +6,28 @@ use super::exceptions::EXC_RETURN;
 use super::fault_injection::{Load, UnreadableWord};
 use super::{Machine, Stop};
 
-/// Instructions between two looks at time and interrupts, where nothing else is
-/// said. An instruction takes 8 ns: 1.34 cycles at 168 MHz.
+/// Default number of instructions between two checks of time and interrupts. An instruction takes 8
+/// ns: 1.34 cycles at 168 MHz.
 pub(super) const SLICE: usize = 200;
-/// Nanoseconds that an exception costs, whatever is done in it.
+/// Cost of an exception's entry and exit, ns, without its handler.
 const EXCEPTION_NS: u64 = 200;
-/// Nanoseconds between two looks while the core sleeps.
+/// Nanoseconds between two checks while the core sleeps.
 const SLEEP_NS: u64 = 5_000;
 
 impl Machine {
-    /// Returns the place where the core is.
+    /// Returns the location of the core.
     #[must_use]
     pub fn place(&self) -> String {
         let pc = self.register(RegisterARM::PC) as u32;
         format!("{pc:#x} {}", self.image.at(pc))
     }
 
-    /// Runs for so many milliseconds.
+    /// Runs for this number of milliseconds.
     pub fn run_ms(&mut self, ms: u64) -> Stop {
         self.run_until(ms, |_| false)
     }
 
-    /// Runs until a condition holds, for at most so many milliseconds.
+    /// Runs until a condition is met, for at most `ms` milliseconds.
     pub fn run_until(&mut self, ms: u64, mut is_met: impl FnMut(&mut Self) -> bool) -> Stop {
         let end_ns = self.bus().now_ns + ms * 1_000_000;
         loop {
@@ -54,7 +54,7 @@ impl Machine {
         }
     }
 
-    /// Runs until so many more haptic ticks have begun and ended.
+    /// Runs until this many more haptic ticks have begun and ended.
     pub fn run_ticks(&mut self, ticks: usize) -> Stop {
         let vector = self.chip.tick_interrupt as u32 + 16;
         let mut left = ticks;
@@ -67,7 +67,7 @@ impl Machine {
         })
     }
 
-    /// One slice of instructions, or one sleep, between looks at interrupts.
+    /// Runs one slice of instructions, or sleeps once, between checks of interrupts.
     fn step(&mut self) -> Option<Stop> {
         self.bus().raise_interrupts();
         self.erase();
@@ -109,7 +109,7 @@ impl Machine {
         }
     }
 
-    /// Returns true if the haptic interrupt is being handled.
+    /// Returns true if the haptic interrupt is active.
     #[must_use]
     pub fn is_ticking(&self) -> bool {
         let vector = self.chip.tick_interrupt as u32 + 16;
@@ -152,7 +152,7 @@ impl Machine {
             .any(|back| matches!(before(*back), Ok(0xBF20 | 0xBF30)))
     }
 
-    /// Sleeps until an interrupt is pending, at most a moment.
+    /// Sleeps until an interrupt is pending, at most for a moment.
     fn sleep(&mut self) {
         let pc = self.register(RegisterARM::PC) as u32 & !1;
         let here = self.word(pc & !3) >> (8 * (pc & 2)) & 0xFFFF;

@@ -1,5 +1,5 @@
-//! The cable between a chip and the scripted host, with what a host's controller keeps
-//! of every endpoint: its toggle.
+//! The cable between a chip and the scripted host, with the host controller's toggle of every
+//! endpoint.
 
 use hapterra_tests::usb::{Answer, Handshake};
 
@@ -7,22 +7,22 @@ use super::Peripheral;
 
 /// Endpoint numbers in each direction.
 const ENDPOINTS: usize = 16;
-/// Standard requests after which toggles start anew: SET_CONFIGURATION and, for an
-/// endpoint's halt, CLEAR_FEATURE.
+/// Standard requests that reset toggles: SET_CONFIGURATION and, for an endpoint's halt,
+/// CLEAR_FEATURE.
 const SET_CONFIGURATION: [u8; 2] = [0x00, 9];
 const CLEAR_HALT: [u8; 4] = [0x02, 1, 0, 0];
 
 /// A peripheral at the end of a cable.
 ///
-/// A packet whose toggle is not the expected one is taken for one that was sent again:
-/// it is acknowledged and thrown away (USB 2.0, 8.6), so what it held is lost.
+/// A packet with an unexpected toggle is treated as a repetition: it is acknowledged and dropped
+/// (USB 2.0, 8.6), so its content is lost.
 pub struct Cable {
     peripheral: Box<dyn Peripheral>,
     to_device: [bool; ENDPOINTS],
     to_host: [bool; ENDPOINTS],
-    /// A control transfer without data, which has its effect when it is done.
+    /// A control transfer without data, which takes effect at its end.
     under_way: Option<[u8; 8]>,
-    /// Packets of the device's that were thrown away.
+    /// Number of the device's packets that were dropped.
     pub thrown_away: u32,
 }
 
@@ -39,12 +39,12 @@ impl Cable {
         }
     }
 
-    /// A word that the core reads.
+    /// Returns a word for the core.
     pub fn read(&mut self, offset: u32) -> u32 {
         self.peripheral.read(offset)
     }
 
-    /// A word that the core writes, in the bytes of `mask`.
+    /// Writes a word from the core, in the bytes of `mask`.
     pub fn write(&mut self, offset: u32, value: u32, mask: u32) {
         self.peripheral.write(offset, value, mask);
     }
@@ -55,13 +55,13 @@ impl Cable {
         self.peripheral.is_asserting()
     }
 
-    /// Returns true if the device shows itself to a host.
+    /// Returns true if the device is attached to the bus.
     #[must_use]
     pub fn is_attached(&self) -> bool {
         self.peripheral.is_attached()
     }
 
-    /// The host resets the bus.
+    /// Resets the bus.
     pub fn bus_reset(&mut self) {
         self.to_device = [false; ENDPOINTS];
         self.to_host = [false; ENDPOINTS];
@@ -69,12 +69,12 @@ impl Cable {
         self.peripheral.bus_reset();
     }
 
-    /// The bus has been idle for 3 ms, as after an unplugging.
+    /// Signals that the bus has been idle for 3 ms, as after an unplugging.
     pub fn suspend(&mut self) {
         self.peripheral.suspend();
     }
 
-    /// The host begins a control transfer; what follows the SETUP is DATA1.
+    /// Begins a control transfer; the packets after the SETUP start with DATA1.
     pub fn setup(&mut self, request: [u8; 8]) -> Handshake {
         let hand = self.peripheral.setup(request);
         if hand == Handshake::Ack {
@@ -84,7 +84,7 @@ impl Cable {
         hand
     }
 
-    /// The host sends a packet.
+    /// Sends a packet.
     pub fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
         let toggle = &mut self.to_device[endpoint];
         let hand = self.peripheral.out(endpoint, packet, *toggle);
@@ -92,7 +92,7 @@ impl Cable {
         hand
     }
 
-    /// The host asks for a packet.
+    /// Requests a packet.
     pub fn take_in(&mut self, endpoint: usize) -> Answer {
         let (answer, toggle) = self.peripheral.take_in(endpoint);
         let expected = &mut self.to_host[endpoint];
@@ -112,7 +112,7 @@ impl Cable {
         answer
     }
 
-    /// Does what a control transfer that has ended means for the toggles.
+    /// Applies the effect of a finished control transfer to the toggles.
     fn take_effect(&mut self, request: [u8; 8]) {
         let [kind, number, value, high, index, ..] = request;
         if [kind, number] == SET_CONFIGURATION {

@@ -8,7 +8,7 @@ const CNTR: u32 = 0x40;
 const ISTR: u32 = 0x44;
 const DADDR: u32 = 0x4C;
 const BCDR: u32 = 0x58;
-/// Place where the packet memory begins behind the registers.
+/// Offset of the packet memory from the registers.
 const MEMORY: u32 = 0x400;
 
 /// Bits of an endpoint's register.
@@ -19,7 +19,7 @@ const SETUP: u16 = 1 << 11;
 const CTR_TX: u16 = 1 << 7;
 const DTOG_TX: u16 = 1 << 6;
 const STAT_TX: u16 = 0b11 << 4;
-/// A one that is written inverts these.
+/// Writing a one inverts these.
 const TOGGLED: u16 = DTOG_RX | STAT_RX | DTOG_TX | STAT_TX;
 const PLAIN: u16 = 0b111 << 8 | 0xF;
 /// Values of both STAT fields.
@@ -69,7 +69,7 @@ impl FullSpeed {
     }
 
     /// Writes an endpoint's register: some bits are written, some are inverted by a one, some are
-    /// cleared by a zero, and SETUP is the peripheral's.
+    /// cleared by a zero, and SETUP is read-only.
     fn write_endpoint(&mut self, index: usize, value: u16) {
         let old = self.endpoints[index];
         self.endpoints[index] =
@@ -80,7 +80,7 @@ impl FullSpeed {
         u16::from_le_bytes([self.memory[at], self.memory[at + 1]]).into()
     }
 
-    /// Puts a packet where the endpoint wants it; false if it does not fit.
+    /// Stores a packet in the endpoint's buffer. Returns false if it does not fit.
     fn store(&mut self, index: usize, packet: &[u8]) -> bool {
         let entry = 8 * index + 4;
         let (at, count) = (self.half(entry), self.half(entry + 2));
@@ -169,13 +169,13 @@ impl Peripheral for FullSpeed {
     }
 
     fn setup(&mut self, request: [u8; 8]) -> Handshake {
-        // Never refused, but only while nothing before it waits.
+        // Never refused, but accepted only if no earlier packet waits.
         if self.of(0) != Some(0) || self.endpoints[0] & CTR_RX != 0 || !self.store(0, &request) {
             return Handshake::Nak;
         }
         self.set_stat(0, STAT_RX, NAK);
         self.set_stat(0, STAT_TX, NAK);
-        // The SETUP itself is DATA0; what follows it is DATA1, in both directions.
+        // The SETUP itself is DATA0; the packets after it start with DATA1, in both directions.
         self.endpoints[0] |= CTR_RX | SETUP | DTOG_RX | DTOG_TX;
         Handshake::Ack
     }
@@ -186,7 +186,7 @@ impl Peripheral for FullSpeed {
         };
         let expected = self.endpoints[index] & DTOG_RX != 0;
         match (self.endpoints[index] & STAT_RX) >> 12 {
-            // Taken for the last packet, sent again: nothing is stored or reported.
+            // Treated as a repetition of the last packet: nothing is stored or reported.
             VALID if toggle != expected => return Handshake::Ack,
             VALID if self.store(index, packet) => {}
             STALL => return Handshake::Stall,

@@ -1,9 +1,8 @@
-//! Synopsys' OTG as a full-speed device, its FIFOs served by the core
-//! (RM0433, 57).
+//! Synopsys' OTG as a full-speed device, whose FIFOs the core serves (RM0433, 57).
 //!
-//! One thing is modelled as embassy's driver has it from working hardware and
-//! not as the manual says: after an OUT packet the endpoint stays enabled, with
-//! NAK set, and clearing NAK is enough for the next.
+//! One part is modelled after embassy's driver, which works on hardware, and not after the manual:
+//! after an OUT packet the endpoint stays enabled, with NAK set, and clearing NAK is enough for the
+//! next.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -29,7 +28,7 @@ const DIEPEMPMSK: u32 = 0x834;
 const IN: u32 = 0x900;
 const OUT: u32 = 0xB00;
 const FIFO: u32 = 0x1000;
-/// Offsets into an endpoint's block of 0x20.
+/// Offsets in an endpoint's block of 0x20.
 const CTL: u32 = 0x00;
 const INT: u32 = 0x08;
 const SIZE: u32 = 0x10;
@@ -58,7 +57,7 @@ const DONE: u32 = 1 << 0;
 const DISABLED: u32 = 1 << 1;
 const SETUP_DONE: u32 = 1 << 3;
 const EMPTY: u32 = 1 << 7;
-/// Kind of content of the receive FIFO.
+/// Kinds of entries in the receive FIFO.
 const OUT_DATA: u32 = 2;
 const OUT_DONE: u32 = 3;
 const SETUP_COMPLETE: u32 = 4;
@@ -90,7 +89,7 @@ impl Otg {
         self.set(at, self.get(at) | bits);
     }
 
-    /// Endpoints with an interrupt: IN below, OUT above.
+    /// Returns the endpoints with an interrupt: IN in the lower half, OUT in the upper.
     fn endpoints_asserting(&self) -> u32 {
         let mut all = 0;
         for i in 0..ENDPOINTS {
@@ -116,7 +115,7 @@ impl Otg {
         status
     }
 
-    /// The core takes the next status; what it announces happens.
+    /// Returns the next status to the core, and applies its event.
     fn pop_status(&mut self) -> u32 {
         let status = self.statuses.pop_front().unwrap_or(0);
         let endpoint = status & 0xF;
@@ -187,7 +186,7 @@ impl Otg {
         }
     }
 
-    /// Free words of an endpoint's transmit FIFO.
+    /// Returns the free words of an endpoint's transmit FIFO.
     fn space(&self, endpoint: u32) -> u32 {
         let at = match endpoint {
             0 => DIEPTXF0,
@@ -249,7 +248,7 @@ impl Peripheral for Otg {
 
     fn setup(&mut self, request: [u8; 8]) -> Handshake {
         for block in [IN, OUT] {
-            // What follows a SETUP is DATA1.
+            // The packets after a SETUP start with DATA1.
             self.set(block, self.get(block) & !STALL | NAK | DPID);
         }
         self.receive(SETUP_DATA, 0, &request);
@@ -272,10 +271,10 @@ impl Peripheral for Otg {
             (value & 0x7FF) as usize
         };
         if packet.len() > largest {
-            return Handshake::Nak; // a babble: never acknowledged
+            return Handshake::Nak; // babble: never acknowledged
         }
         if toggle != (value & DPID != 0) {
-            return Handshake::Ack; // taken for the last one, sent again
+            return Handshake::Ack; // treated as a repetition of the last one
         }
         self.set(control, (value | NAK) ^ DPID);
         self.receive(OUT_DATA, endpoint as u32, packet);

@@ -1,4 +1,4 @@
-//! Which material is in force, by docs/how-to/materials.md: the wanted one, and the even way to it.
+//! The active material, by docs/how-to/materials.md: the target, and the linear change to it.
 
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::Texture;
@@ -9,41 +9,41 @@ use crate::scene::materials::Materials;
 
 /// Ticks of a whole change: 0.1 s.
 const CHANGE: u32 = 100;
-/// Ticks after which nothing is left of a change: by the last places of a share that grows by a
-/// hundredth in each tick, next to nothing may be left of it after all of them.
+/// Ticks after which a change is complete: the sum of a hundred rounded steps may leave a tiny
+/// rest.
 const OVER: u32 = CHANGE + 2;
-/// That part of it.
+/// That rest, as a fraction.
 const LEFT: f64 = 5e-6;
-/// Ticks in which a texture goes out, or comes in: half of that.
+/// Ticks in which a texture fades out or in.
 const FADE: u32 = CHANGE / 2;
 
-/// Numbers that change evenly from one material to the next: stiffness, static, dynamic and viscous
-/// friction, damping.
+/// Numbers that change linearly from one material to the next: stiffness, static, dynamic and
+/// viscous friction, damping.
 type Numbers = [f64; 5];
 
-/// A material that may be in force.
+/// A possible active material.
 #[derive(Clone, Debug)]
 pub(super) struct ActiveMaterial {
-    /// The class of the wanted one.
+    /// The class of the target material.
     wanted: u8,
     from: Numbers,
-    /// Ticks of the change so far.
+    /// Ticks of the change up to now.
     done: u32,
     numbers: Numbers,
-    /// By so much the numbers may have been off when the change began.
+    /// Error bound of the numbers at the start of the change.
     unsure: Numbers,
-    /// The texture of which a share is rendered, and so many of [`FADE`] parts of it.
+    /// The texture that is rendered, and its share in units of 1/[`FADE`].
     texture: Texture,
     parts: u32,
     /// Oracle of its texture.
     judge: Option<TextureJudge>,
-    /// The share that this speed leaves.
+    /// The share of the texture at this speed.
     speed_share: f64,
     was_rendered: bool,
 }
 
 impl ActiveMaterial {
-    /// Before anything is rendered: the default.
+    /// Returns the default material, active before the first contact.
     pub(super) fn default(materials: &Materials) -> Self {
         let numbers = numbers(materials, 0);
         let texture = materials.table[0].texture;
@@ -61,17 +61,17 @@ impl ActiveMaterial {
         }
     }
 
-    /// The class of the material that is wanted.
+    /// Returns the class of the target material.
     pub(super) const fn wanted(&self) -> u8 {
         self.wanted
     }
 
-    /// Newtons a millimetre.
+    /// Returns the stiffness, N/mm.
     pub(super) const fn stiffness(&self) -> f64 {
         self.numbers[0]
     }
 
-    /// By so much that may be off.
+    /// Returns the error bound of the stiffness, N/mm.
     pub(super) fn unsure_stiffness(&self) -> f64 {
         self.unsure_numbers()[0]
     }
@@ -85,20 +85,20 @@ impl ActiveMaterial {
         }
     }
 
-    /// Returns true if friction may hold the proxy in the next tick: it does as long as something
-    /// is left of a change from it.
+    /// Returns true if friction may hold the proxy in the next tick, also during a change from a
+    /// material with friction.
     pub(super) fn may_rub(&self) -> bool {
         let [_, was_static, was_dynamic, was_viscous, _] = self.from;
         let was_rough = was_static + was_dynamic + was_viscous > 0.0;
         !self.friction().is_none() || (self.done < OVER && was_rough)
     }
 
-    /// N·s/m.
+    /// Returns the damping, N·s/m.
     pub(super) const fn damping(&self) -> f64 {
         self.numbers[4]
     }
 
-    /// By so much that may be off.
+    /// Returns the error bound of the damping, N·s/m.
     pub(super) fn unsure_damping(&self) -> f64 {
         self.unsure_numbers()[4]
     }
@@ -108,7 +108,7 @@ impl ActiveMaterial {
         self.friction_of(|i| self.numbers[i])
     }
 
-    /// The least and the most that it may be.
+    /// Returns the smallest and the largest possible friction.
     pub(super) fn frictions(&self) -> [Friction; 2] {
         let unsure = self.unsure_numbers();
         [-1.0, 1.0].map(|sign| self.friction_of(|i| (self.numbers[i] + sign * unsure[i]).max(0.0)))
@@ -123,18 +123,18 @@ impl ActiveMaterial {
         }
     }
 
-    /// The texture, if any, and how much of it is rendered.
+    /// Returns the texture, if any, and the share of it that is rendered.
     pub(super) fn texture(&self) -> Option<(&TextureJudge, f64)> {
         let share = self.speed_share * f64::from(self.parts) / f64::from(FADE);
         self.judge.as_ref().map(|judge| (judge, share))
     }
 
-    /// Returns true if nothing more will change on this material.
+    /// Returns true if the change to this material is complete.
     pub(super) fn is_settled(&self) -> bool {
         self.done >= OVER && self.parts == FADE
     }
 
-    /// Returns true if it behaves as another one from now on.
+    /// Returns true if it behaves like another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_rendered);
         let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);
@@ -147,8 +147,8 @@ impl ActiveMaterial {
             && (self.done >= OVER || pairs(|one| &one.from))
     }
 
-    /// One more tick of a contact whose proxy has these classes nearest: what may be in force
-    /// after it. Two are nearest on the line half way between two samples.
+    /// Returns the possible materials after another tick with these classes nearest to the proxy:
+    /// two of them on the line half way between two samples.
     pub(super) fn after(
         &self,
         materials: &Materials,
@@ -161,7 +161,7 @@ impl ActiveMaterial {
                 let each = nearest.iter().flat_map(|class| self.on(*class, materials));
                 each.collect()
             }
-            // What fades out does so as it was.
+            // A releasing contact keeps its material.
             ContactState::Releasing => vec![self.clone()],
             ContactState::Unseeded | ContactState::Free => vec![Self {
                 was_rendered: false,
@@ -176,7 +176,7 @@ impl ActiveMaterial {
         after
     }
 
-    /// A tick in which the proxy touches the ground of a class.
+    /// Returns the materials after a tick in contact with ground of a class.
     fn on(&self, class: u8, materials: &Materials) -> Vec<Self> {
         let mut next = self.clone();
         if class != self.wanted {
@@ -196,7 +196,7 @@ impl ActiveMaterial {
         next.fades(&texture, materials.cell_mm)
     }
 
-    /// The old texture goes out, then the new one comes in.
+    /// Fades the old texture out, then the new one in.
     fn fades(mut self, wanted: &Texture, cell_mm: f32) -> Vec<Self> {
         if self.texture == *wanted {
             self.parts = (self.parts + 1).min(FADE);
@@ -213,7 +213,7 @@ impl ActiveMaterial {
         if is_even || self.parts == 0 {
             return vec![other];
         }
-        // By the last places of its share, the old one may have another tick, of nothing.
+        // By rounding of its share, the old texture may have another tick with a share of zero.
         self.parts = 0;
         vec![other, self]
     }
@@ -226,7 +226,7 @@ impl ActiveMaterial {
     }
 }
 
-/// The numbers of a material, as stiff as the scene has it.
+/// Returns the numbers of a material, with the stiffness scaled to the scene's.
 fn numbers(materials: &Materials, class: u8) -> Numbers {
     let table = &materials.table;
     let scale = f64::from(materials.params.stiffness_n_per_mm / table[0].stiffness_n_per_mm);
@@ -240,7 +240,7 @@ fn numbers(materials: &Materials, class: u8) -> Numbers {
     ]
 }
 
-/// A judge of a texture in cells.
+/// Returns an oracle of a texture, in cells.
 fn judge(texture: &Texture, cell_mm: f32) -> Option<TextureJudge> {
     let is_some = texture.pattern != Texture::NONE.pattern;
     is_some.then(|| {

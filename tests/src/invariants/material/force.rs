@@ -1,23 +1,23 @@
-//! The force of a material in force, by docs/explanation/effects.md, in f64.
+//! The force of an active material, by docs/explanation/effects.md, in f64.
 
 use glam::DVec3;
 use hapterra_core::grid::GridPoint;
 
 use super::active_material::ActiveMaterial;
 
-/// Rounding, as a part of a force.
+/// Rounding, as a fraction of a force.
 const ROUNDING: f64 = 1e-5;
-/// Forces below this, N, count as none.
+/// Forces below this, N, count as zero.
 const LEAST_N: f64 = 1e-12;
 
 /// Conditions of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TickConditions<'p> {
-    /// From the HIP to the proxy, cells.
+    /// Vector from the HIP to the proxy, cells.
     pub(super) way: DVec3,
-    /// By so much it may be off, cells.
+    /// Its error bound, cells.
     pub(super) allowed: f64,
-    /// The proxy, where the textures are.
+    /// The proxy, for textures.
     pub(super) proxy: &'p GridPoint,
     /// The HIP's velocity, mm/s.
     pub(super) velocity_mm_s: DVec3,
@@ -27,17 +27,17 @@ pub(super) struct TickConditions<'p> {
     pub(super) cell_mm: f64,
 }
 
-/// A force, and by how much it may be off, N.
+/// An expected force and its error bound.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted {
     /// The force.
     pub(super) force_n: DVec3,
-    /// Its error.
+    /// Its error bound, N.
     pub(super) allowed_n: f64,
 }
 
 impl TickConditions<'_> {
-    /// The force where neither shading turns it nor a border fades it.
+    /// Returns the force without shading and edge fade.
     pub(super) fn force(&self, material: &ActiveMaterial) -> Wanted {
         let (mut stretch, mut allowed) = (self.way, self.allowed + ROUNDING * self.way.length());
         if self.way.length() > LEAST_N
@@ -45,7 +45,7 @@ impl TickConditions<'_> {
         {
             let added = judge.adds(self.way, self.proxy, share);
             stretch += added.wanted * share;
-            // The relief turns with the way, and is at most twice as steep as that.
+            // The relief turns with the displacement, and at most doubles the slope.
             allowed += added.allowed + 2.0 * self.allowed;
         }
         let newtons = material.stiffness() * self.cell_mm;
@@ -55,7 +55,7 @@ impl TickConditions<'_> {
         self.damped(material, spring, allowed)
     }
 
-    /// The spring's force, damped along itself.
+    /// Returns the spring's force, damped along its direction.
     fn damped(&self, material: &ActiveMaterial, spring: DVec3, allowed: f64) -> Wanted {
         let (size, damping) = (spring.length(), 1e-3 * material.damping());
         let fast_mm_s = self.velocity_mm_s.length();
@@ -68,7 +68,7 @@ impl TickConditions<'_> {
         let along = spring / size;
         let against = (damping * self.velocity_mm_s.dot(along)).clamp(-size, size);
         let force = shortened(spring - along * against, self.most_n);
-        // What is off of the spring's direction is off of the speed along it, and of the force.
+        // An error of the spring's direction is also one of the speed along it, and of the force.
         let fast = damping * fast_mm_s;
         let turned = (rounding / size).min(2.0);
         let allowed = (rounding + 2.0 * fast * (turned + ROUNDING)).min(3.0 * (size + rounding));
@@ -78,8 +78,8 @@ impl TickConditions<'_> {
         }
     }
 
-    /// The least and the largest size of a force whose direction shading has turned; also of one
-    /// that fades, of which the least is nothing.
+    /// Returns the smallest and largest size of a force turned by shading; the smallest is zero if
+    /// it fades.
     pub(super) fn sizes(&self, material: &ActiveMaterial, fades: bool) -> [f64; 2] {
         let depth = self.way.length();
         let off = self.allowed + ROUNDING * depth;
@@ -104,7 +104,7 @@ impl TickConditions<'_> {
             spring(most, newtons + unsure),
         );
         let damping = material.damping() + material.unsure_damping();
-        // Of a fast HIP damping takes next to all: it is the difference of two that are rounded.
+        // Damping of a fast HIP cancels nearly all force: a difference of two rounded values.
         let fast = 1e-3 * damping * self.velocity_mm_s.length() * (1.0 + ROUNDING);
         let least = if fades { 0.0 } else { (least - fast).max(0.0) };
         let most = (most + fast.min(most)).min(self.most_n);
@@ -115,7 +115,7 @@ impl TickConditions<'_> {
     }
 }
 
-/// A vector, shortened where it is longer than this.
+/// Returns a vector, shortened to a length of `most` if it is longer.
 fn shortened(vector: DVec3, most: f64) -> DVec3 {
     let length = vector.length();
     match length > most {

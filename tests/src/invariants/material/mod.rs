@@ -1,9 +1,9 @@
 //! Oracle of scenes with materials, by docs/how-to/materials.md and
 //! docs/explanation/effects.md.
 //!
-//! The oracle has the class of each sample, and computes in f64 the possible materials. Where
-//! a proxy lies on the line half way between two samples either class is right: then it follows
-//! both, until the force tells which one it is.
+//! The oracle has the class of each sample, and computes in f64 the possible materials. If a proxy
+//! lies on the line half way between two samples, both classes are valid: the oracle follows both
+//! until the force decides.
 
 mod active_material;
 mod force;
@@ -26,23 +26,23 @@ use crate::scene::terrain::Kind;
 use active_material::ActiveMaterial;
 use force::TickConditions;
 
-/// A place so near to the line half way between two samples has either class, cells.
+/// Distance from the line half way between two samples, cells, within which both classes are valid.
 const HALF_WAY: f64 = 1e-6;
-/// So many different courses are followed at most.
+/// Most alternatives that are followed.
 const FOLLOWED: usize = 256;
-/// Points a second: ticks.
+/// Ticks a second.
 const RATE_HZ: f64 = 1e3;
 
 /// Measurements of an oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Judged {
-    /// Points in contact whose force was judged: in whole, and by its size.
+    /// Points in contact whose full force was checked.
     pub in_whole: u64,
-    /// The same by its size alone: shading had turned it, or it faded.
+    /// Points in contact whose force was checked by size only, as shading turned it or it faded.
     pub by_size: u64,
-    /// Points in contact after too many courses were possible: those are not judged.
+    /// Points in contact that were not checked, after too many alternatives.
     pub open: u64,
-    /// Points in contact at which another material was on its way in.
+    /// Points in contact during a change of material.
     pub changing: u64,
     /// Points at which a proxy slid over a plane.
     pub sliding: u64,
@@ -51,7 +51,7 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// Adds what another judge learned.
+    /// Adds another oracle's measurements.
     pub fn add(&mut self, other: &Self) {
         self.in_whole += other.in_whole;
         self.by_size += other.by_size;
@@ -62,14 +62,14 @@ impl Judged {
     }
 }
 
-/// Judges the points of one scene in turn.
+/// Checks the points of one scene in turn.
 pub struct MaterialJudge<'g> {
     place: TickOracle<'g>,
     materials: &'g Materials,
     kind: Kind,
     shading: Shading,
     shift: [i32; 3],
-    /// Materials that may be in force; none if they are unknown.
+    /// Materials that may be active; empty if they are unknown.
     courses: Vec<ActiveMaterial>,
     before: Option<Replied>,
     point: usize,
@@ -78,7 +78,7 @@ pub struct MaterialJudge<'g> {
 }
 
 impl<'g> MaterialJudge<'g> {
-    /// A judge of a scene that lies so many cells away.
+    /// Creates the oracle of a scene that is shifted by this many cells.
     #[must_use]
     pub fn new(scene: &'g Scene, materials: &'g Materials, shift: [i32; 3]) -> Self {
         Self {
@@ -123,7 +123,7 @@ impl<'g> MaterialJudge<'g> {
         Ok(())
     }
 
-    /// The proxy is where a friction of the place before lets it be.
+    /// Checks that the proxy is where the friction of its last position allows it.
     fn place_is_right(&mut self, seen: &ObservedTick) -> Verdict {
         let touches = seen.output.state == ContactState::Touching;
         let is_open = self.courses.is_empty();
@@ -150,11 +150,11 @@ impl<'g> MaterialJudge<'g> {
         self.place.look_at_place(seen, is_rubbed)
     }
 
-    /// The force is that of a course which is possible.
+    /// Checks that the force is that of a possible material.
     fn force_is_right(&mut self, replied: &Replied, seen: &ObservedTick) -> Verdict {
         let TickRecord { state, proxy, .. } = replied.sample;
         let touches = state == ContactState::Touching;
-        // A place has one class, whichever of two that are equally near it is.
+        // A point keeps its class, whichever of two equally near classes it has.
         let stays = self
             .before
             .is_some_and(|before| before.sample.proxy == proxy);
@@ -188,7 +188,7 @@ impl<'g> MaterialJudge<'g> {
         state == Some(ContactState::Touching)
     }
 
-    /// Drops the courses with another force.
+    /// Drops the alternatives with another force.
     fn keep_rendered(
         &mut self,
         courses: &mut Vec<ActiveMaterial>,
@@ -234,7 +234,7 @@ impl<'g> MaterialJudge<'g> {
         Ok(())
     }
 
-    /// Along the spring no force is against it. Shading turns it by 60° at most.
+    /// Checks that no force acts against the spring, and that shading turns it by 60° at most.
     fn never_pulls(&self, output: &TickConditions<'_>, force: DVec3, replied: &Replied) -> Verdict {
         let (depth, size) = (output.way.length(), force.length());
         let is_even = self.materials.table.iter().all(|one| one.texture.is_none());
@@ -265,7 +265,7 @@ impl<'g> MaterialJudge<'g> {
         }
     }
 
-    /// The classes of the samples that are nearest to a place, each once.
+    /// Returns the classes of the samples nearest to a point, each once.
     fn nearest(&self, [x, y, _]: [f64; 3]) -> Vec<u8> {
         let along = |at: f64| {
             let [low, high] = [-HALF_WAY, HALF_WAY].map(|off| (at + off + 0.5).floor() as i32);
@@ -289,8 +289,8 @@ impl<'g> MaterialJudge<'g> {
     }
 }
 
-/// The contact of a point, as other judges see it. Where all of the spring is rendered, the
-/// displacement is the way to the proxy.
+/// Returns the contact of a point in the form of the other checks. If the whole spring is rendered,
+/// the displacement is the vector to the proxy.
 fn seen(replied: &Replied, shift: [i32; 3]) -> ObservedTick {
     let TickRecord {
         state, proxy, work, ..

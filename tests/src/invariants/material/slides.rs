@@ -13,15 +13,15 @@ use crate::invariants::oracle::Verdict;
 use crate::invariants::surface::{Patch, distance};
 use crate::scene::terrain::Kind;
 
-/// Displacements of a proxy in a tick that show its friction, and distances from the HIP, cells:
-/// friction over half a cell a tick is less exact (docs/explanation/effects.md).
+/// Displacements of a proxy in a tick, and distances from the HIP, for which friction is checked,
+/// cells: above half a cell a tick it is less exact (docs/explanation/effects.md).
 const SLIDES: std::ops::Range<f64> = 1e-4..0.5;
 const PRESSES: std::ops::Range<f64> = 1e-3..100.0;
-/// Part by which a proxy that trails by its speed may trail by more or less.
+/// Tolerance of the distance by which a proxy trails due to its speed, as a fraction.
 const SLACK: f64 = 0.031;
 
 impl MaterialJudge<'_> {
-    /// On a plane a proxy that slides, not too fast, ends where as much pulls as friction holds.
+    /// Checks that a proxy that slides on a plane, not too fast, ends where friction holds it.
     pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &ObservedTick) -> Verdict {
         let (friction, [_, most]) = (course.friction(), course.frictions());
         let Some(before) = self.before else {
@@ -54,7 +54,7 @@ impl MaterialJudge<'_> {
         let normal = DVec3::new(-east, -north, 1.0).normalize();
         let way = DVec3::from_array(seen.hip) - DVec3::from_array(seen.proxy);
         let presses = -way.dot(normal);
-        // A HIP in the surface does not press, and friction does not act.
+        // A HIP in the surface does not press, so friction does not act.
         if presses < PRESSES.start {
             return Ok(());
         }
@@ -62,7 +62,7 @@ impl MaterialJudge<'_> {
         let trails = f64::from(friction.viscous_s) * RATE_HZ * moved;
         let held = f64::from(friction.dynamic_mu) * presses + trails;
         self.judged.sliding += 1;
-        // The heights of a slope are rounded; places are, too.
+        // Heights of a slope and positions are rounded.
         let times = 1.0 + f64::from(friction.dynamic_mu + friction.viscous_s * RATE_HZ as f32);
         let place = seen.allowed_in_space(self.place.terrain) * (1.0 + east.hypot(north));
         let left = f64::from(most.viscous_s - friction.viscous_s) * RATE_HZ * moved;

@@ -1,9 +1,8 @@
-//! A server of containers that speaks Azure Blob Storage.
+//! A server of containers with the API of Azure Blob Storage.
 //!
-//! A request is signed with the account's key (`shared_key`), carries a shared access
-//! signature made with that key (`sas`), or the token of a program that is
-//! known by name (`principal`). The server computes signatures again by Microsoft's
-//! documented rules, and shares no code with the client.
+//! A request is signed with the account's key (`shared_key`), has a shared access signature made
+//! with that key (`sas`), or has the token of a registered program (`principal`). The server
+//! computes signatures again by Microsoft's documented rules, without code of the client.
 
 mod principal;
 mod sas;
@@ -28,12 +27,12 @@ pub struct Account {
     pub name: &'static str,
     /// Its key, in base 64.
     pub key: &'static str,
-    /// True if one of its containers may be public.
+    /// True if its containers may be public.
     is_public_allowed: bool,
 }
 
-/// An account as Microsoft makes them today: nothing of it is public. Its key was made for
-/// these tests and opens nothing else.
+/// An account with Microsoft's present defaults: nothing in it is public. Its key was made for
+/// these tests and gives access to nothing else.
 pub const SURVEYORS: Account = Account {
     name: "surveyors",
     key: "c3VydmV5b3JzIGtub3cgdGhlIGhpbGxzIGJ5IHRoZWlyIGhlaWdodHMsIGFuZCB0aGUgaGlsbHMgZG8gbm90Lg==",
@@ -47,14 +46,14 @@ pub const EMULATOR: Account = Account {
 };
 
 impl Account {
-    /// A shared access signature that lets who has it read a container until then, as
+    /// Returns a shared access signature with which a container may be read until a time such as
     /// `2030-01-31T00:00:00Z`.
     #[must_use]
     pub fn sas(&self, container: &str, until: &str) -> String {
         sas::made(self, container, until)
     }
 
-    /// The signature of a text, in base 64.
+    /// Returns the signature of a text, in base 64.
     fn signature(&self, text: &str) -> String {
         let key = BASE64_STANDARD.decode(self.key).expect("a key");
         let signature = sign(&Key::new(HMAC_SHA256, &key), text.as_bytes());
@@ -62,7 +61,7 @@ impl Account {
     }
 }
 
-/// Serves the folders of a folder as containers of an account.
+/// Serves the subfolders of a folder as containers of an account.
 #[must_use]
 pub fn served(folder: &Path, account: Account) -> Server {
     Server::of(folder, Microsoft(account))
@@ -77,7 +76,7 @@ impl Service for Microsoft {
         if path == principal::PATH {
             return principal::token_for(body);
         }
-        // An emulator is no host of the account's: the path begins with the account.
+        // An emulator is not a host of the account's: the path begins with the account.
         let own = format!("/{}/", account.name);
         let within = path.strip_prefix(&own);
         let path = within.map_or(path.to_owned(), |rest| format!("/{rest}"));
@@ -137,7 +136,7 @@ fn check_public(account: &Account, container: &str) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// A signature that does not hold.
+/// Returns the refusal of an invalid signature.
 fn failed(why: &str) -> Refusal {
     let message = format!(
         "Server failed to authenticate the request. Make sure the value of Authorization header is formed correctly including the signature. {why}"

@@ -1,5 +1,5 @@
-//! A service principal: a program with a name at Microsoft, which exchanges its secret
-//! for a token, by the rule of
+//! A service principal: a program registered at Microsoft, which exchanges its secret for a token,
+//! by the rule of
 //! <https://learn.microsoft.com/entra/identity-platform/v2-oauth2-client-creds-grant-flow>.
 
 use axum::http::StatusCode;
@@ -7,17 +7,17 @@ use axum::http::StatusCode;
 use super::shared_key::decoded;
 use crate::bucket::{Answer, Refusal, refusal, token};
 
-/// The tenant, the name and the secret of the one that is known.
+/// The tenant, name and secret of the only registered one.
 pub const PRINCIPAL: [&str; 3] = ["hills-tenant", "surveying", "under the stone"];
 
-/// The token that it gets, as `az account get-access-token` prints one.
+/// Its token, in the form that `az account get-access-token` prints.
 pub const TOKEN: &str = "eyJ0.of-the-surveying.program";
 
-/// Place where the secret is changed.
+/// Path for the exchange of the secret.
 pub(super) const PATH: &str = "/hills-tenant/oauth2/v2.0/token";
 
 /// # Errors
-/// When name or secret are not right.
+/// If name or secret are wrong.
 pub(super) fn token_for(body: &str) -> Result<Answer, Refusal> {
     let said = |name: &str| {
         let mut pairs = body.split('&').filter_map(|pair| pair.split_once('='));
@@ -37,7 +37,7 @@ pub(super) fn token_for(body: &str) -> Result<Answer, Refusal> {
 }
 
 /// # Errors
-/// When it is not the token of the one that is known.
+/// If it is not the token of the registered program.
 pub(super) fn check(said: &str) -> Result<(), Refusal> {
     let why = "Server failed to authenticate the request.";
     match said.strip_prefix("Bearer ") == Some(TOKEN) {

@@ -13,7 +13,7 @@ use crate::bucket::Refusal;
 /// The version of the rule.
 const VERSION: &str = "2023-11-03";
 
-/// Lets who has it read a container until then.
+/// Returns a signature with which a container may be read until this time.
 pub(super) fn made(account: &Account, container: &str, until: &str) -> String {
     let text = string_to_sign(
         account,
@@ -26,14 +26,14 @@ pub(super) fn made(account: &Account, container: &str, until: &str) -> String {
     format!("sp=r&se={until}&spr=https,http&sv={VERSION}&sr=c&sig={signature}")
 }
 
-/// Returns true if a request carries one.
+/// Returns true if a request has one.
 pub(super) fn is_in(request: &Parts) -> bool {
     let query = request.uri.query().unwrap_or_default();
     query.split('&').any(|pair| pair.starts_with("sig="))
 }
 
 /// # Errors
-/// When what a request carries was not made with the account's key, or holds no more.
+/// If a request's signature was not made with the account's key, or has expired.
 pub(super) fn check(account: &Account, request: &Parts, container: &str) -> Result<(), Refusal> {
     let query = request.uri.query().unwrap_or_default();
     let said = |name: &str| {

@@ -9,11 +9,11 @@ use percent_encoding::percent_decode_str;
 use super::{Account, failed};
 use crate::bucket::Refusal;
 
-/// A request may be so old, or from so far ahead.
+/// Largest difference of a request's time from the server's.
 const OLDEST: SignedDuration = SignedDuration::from_mins(15);
 
 /// # Errors
-/// When the request is not signed with the key of the account, or is too old.
+/// If the request is not signed with the key of the account, or is too old.
 pub(super) fn check(account: &Account, request: &Parts, said: &str) -> Result<(), Refusal> {
     let date = header(request, "x-ms-date");
     let date = if date.is_empty() {
@@ -69,7 +69,7 @@ fn header<'a>(request: &'a Parts, name: &str) -> &'a str {
         .unwrap_or_default()
 }
 
-/// The headers whose names are Microsoft's, in order, a line each.
+/// Returns Microsoft's own headers in order, one a line.
 fn own_headers(request: &Parts) -> String {
     let names = request.headers.keys().map(|name| name.as_str());
     let mut names: Vec<&str> = names.filter(|name| name.starts_with("x-ms-")).collect();
@@ -78,7 +78,7 @@ fn own_headers(request: &Parts) -> String {
     values(&names, line)
 }
 
-/// The account, the path as it is in the URL, and the query's parameters in order, a line each.
+/// Returns the account, the path as in the URL, and the query's parameters in order, one a line.
 fn resource(account: &str, request: &Parts) -> String {
     let query = request.uri.query().unwrap_or_default();
     let pairs = query.split('&').filter_map(|pair| pair.split_once('='));
@@ -94,7 +94,7 @@ fn values<T>(of: &[T], line: impl Fn(&T) -> String) -> String {
     of.iter().map(line).collect()
 }
 
-/// A part of a query without its escapes.
+/// Returns a part of a query without its escapes.
 pub(super) fn decoded(text: &str) -> String {
     percent_decode_str(text).decode_utf8_lossy().into_owned()
 }
@@ -105,7 +105,7 @@ mod tests {
 
     use super::*;
 
-    /// The example of Microsoft's page.
+    /// The example from Microsoft's page.
     #[test]
     fn a_string_to_sign_is_that_of_microsofts_example() {
         let request = Request::get("http://myaccount.blob.core.windows.net/mycontainer?restype=container&comp=metadata&timeout=20")

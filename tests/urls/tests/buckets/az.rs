@@ -7,7 +7,7 @@ use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills,
 
 /// The user's hint.
 const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
-/// Times before which a signature holds.
+/// Times before which a signature is valid.
 const ONE_DAY: &str = "2100-01-31T00:00:00Z";
 const LONG_AGO: &str = "2020-01-31T00:00:00Z";
 
@@ -29,7 +29,7 @@ impl Microsoft {
         }
     }
 
-    /// With the name of the account in the environment, and where it is.
+    /// Opens a file with the name of the account and its address in the environment.
     fn said(&self, name: &str, environment: &[(&str, &str)]) -> String {
         let server = [
             ("AZURE_STORAGE_ENDPOINT", self.server.endpoint()),
@@ -43,7 +43,7 @@ impl Microsoft {
         self.said(name, &[("AZURE_STORAGE_ACCOUNT_KEY", key)])
     }
 
-    /// As an emulator on this computer is asked, which is `Azurite` for most.
+    /// Opens a file as from an emulator on this computer, usually `Azurite`.
     fn said_by_emulator(&self, name: &str, environment: &[(&str, &str)]) -> String {
         let server = [
             ("AZURE_STORAGE_USE_EMULATOR", "true"),
@@ -65,7 +65,7 @@ fn a_file_opens_with_the_key_of_its_account_and_is_fetched_in_parts() {
     assert_fetched_in_parts(&microsoft.server.take_seen(), microsoft.hills.bytes);
 }
 
-/// The names of the environment of Microsoft's own command.
+/// The variables of Microsoft's own command.
 #[test]
 fn a_file_opens_with_what_is_set_for_microsofts_command() {
     let microsoft = Microsoft::start(SURVEYORS);
@@ -117,7 +117,7 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
     let _ = microsoft.server.take_seen();
     let output = with_secret(secret);
     assert!(output.contains("read GeoTIFF"), "{output}");
-    // The file and those that it may have beside it share a token.
+    // The file and its possible sidecars share a token.
     let Seen { requests, .. } = microsoft.server.take_seen();
     let changes = requests.iter().filter(|line| line.starts_with("POST"));
     assert_eq!(changes.count(), 1, "{requests:?}");
@@ -147,7 +147,7 @@ fn a_file_of_a_public_container_opens_without_a_key_and_no_other_does() {
     assert!(output.contains("read GeoTIFF"), "{output}");
     let told = microsoft.said(&url(), &nobody);
     assert_refused(&told, "NoAuthenticationInformation", HINT);
-    // Of most accounts nothing is public, which is answered with the status of a conflict.
+    // In most accounts nothing is public, and the answer has the status of a conflict.
     let microsoft = Microsoft::start(SURVEYORS);
     let told = microsoft.said(&url(), &nobody);
     assert_refused(&told, "PublicAccessNotPermitted", HINT);
@@ -219,7 +219,7 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
     );
 }
 
-/// A file on disk leads to no server.
+/// A file on disk never leads to a server.
 #[test]
 fn a_mosaic_here_that_names_a_container_is_refused() {
     let microsoft = Microsoft::start(SURVEYORS);

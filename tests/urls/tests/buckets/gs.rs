@@ -47,7 +47,7 @@ fn a_file_opens_with_the_key_of_an_account_and_is_fetched_in_parts() {
     assert_fetched_in_parts(&google.server.take_seen(), google.hills.bytes);
 }
 
-/// As `gcloud auth print-access-token` prints it, and as a computer of Google's is given one.
+/// A token from `gcloud auth print-access-token`, or from the metadata server of Google's cloud.
 #[test]
 fn a_file_opens_with_a_token() {
     let google = Google::start();
@@ -134,7 +134,7 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
     );
 }
 
-/// A file on disk leads to no server.
+/// A file on disk never leads to a server.
 #[test]
 fn a_mosaic_here_that_names_a_bucket_is_refused() {
     let google = Google::start();

@@ -1,5 +1,5 @@
-//! Files in buckets of servers that ask for a key. Keys come as the users of those services
-//! give them, in the environment: so each file is opened by a process of its own.
+//! Files in buckets of servers that require a key. Keys are in the environment, as users of those
+//! services set them, so each file is opened by a separate process.
 
 mod az;
 mod gs;

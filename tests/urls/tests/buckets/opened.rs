@@ -8,7 +8,7 @@ use hapterra_url_tests::bucket::Seen;
 use hapterra_url_tests::cog::cog;
 use heightfield::{OpenOptions, Raster};
 
-/// Names the file that the second process opens.
+/// Variable with the name of the file that the second process opens.
 const VARIABLE: &str = "HAPTERRA_TEST_BUCKET";
 /// Samples of a file here.
 const SIZE: [u32; 2] = [2000, 1200];
@@ -17,18 +17,17 @@ fn height(column: u32, row: u32) -> f32 {
     (column % SIZE[0] + 1000 * (row % 10)) as f32
 }
 
-/// A folder of buckets with the file `NAME`, and what more of it has to be known.
+/// A folder of buckets with the file `NAME`, and its expected values.
 pub(crate) struct Hills {
     pub(crate) folder: tempfile::TempDir,
     /// Bytes of the file.
     pub(crate) bytes: usize,
 }
 
-/// The file that each bucket has, by its key in a URL. The server is asked for it with
-/// other escapes.
+/// The file in each bucket, by its key in a URL. The request to the server has other escapes.
 pub(crate) const NAME: &str = "north%20ridge/hills-1.tif";
 
-/// A folder of buckets of these names, each with the file.
+/// Creates a folder of buckets with these names, each with the file.
 pub(crate) fn hills(buckets: &[&str]) -> Hills {
     let folder = tempfile::tempdir().expect("a folder");
     let bytes = cog(SIZE[0], SIZE[1], 2, height);
@@ -36,7 +35,7 @@ pub(crate) fn hills(buckets: &[&str]) -> Hills {
         let within = folder.path().join(bucket).join("north ridge");
         std::fs::create_dir_all(&within).expect("a bucket");
         std::fs::write(within.join("hills-1.tif"), &bytes).expect("written");
-        // A name with signs that mean something in a URL.
+        // A name with characters that have a meaning in a URL.
         let other = folder.path().join(bucket).join("50% #2.tif");
         std::fs::write(other, &bytes).expect("written");
     }
@@ -46,7 +45,7 @@ pub(crate) fn hills(buckets: &[&str]) -> Hills {
     }
 }
 
-/// Writes a mosaic of two files that lie side by side, and returns its path.
+/// Writes a mosaic of two adjacent files. Returns its path.
 pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
     let [width, rows] = SIZE;
     let source = |(index, file): (u32, &str)| {
@@ -69,12 +68,12 @@ pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
     path.display().to_string()
 }
 
-/// Returns the output of the second process: that it rendered the file, or the lines of a command
-/// that fails.
+/// Returns the output of the second process: a note that it rendered the file, or the messages of a
+/// failed command.
 pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
     process.args(["--exact", "opened::in_another_process", "--nocapture"]);
-    // The user who runs the tests may have keys, too.
+    // The user who runs the tests may have keys as well.
     for (key, _) in std::env::vars_os() {
         let key = key.to_string_lossy();
         if ["AWS_", "AZURE_", "GOOGLE_"]
@@ -86,7 +85,7 @@ pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
     }
     let nobodys = std::env::temp_dir().join("hapterra-nobody");
     process.env("HOME", nobodys);
-    // There are no keys at these places, as on a computer that is no cloud's.
+    // No keys are at these addresses, as on a computer outside of a cloud.
     process.env("GCE_METADATA_HOST", "127.0.0.1:1");
     process.env("GCE_METADATA_IP", "127.0.0.1:1");
     process.env("AWS_METADATA_ENDPOINT", "http://127.0.0.1:1");
@@ -100,7 +99,7 @@ pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
     String::from_utf8_lossy(&words).into_owned()
 }
 
-/// Of the file parts were sent, and nothing of the neighbours that it does not have.
+/// Checks that only parts of the file were sent, and nothing of the sidecars that it does not have.
 pub(crate) fn assert_fetched_in_parts(seen: &Seen, of: usize) {
     let Seen { requests, bytes } = seen;
     assert!(*bytes < of / 4, "{bytes} of {of}");
@@ -119,7 +118,7 @@ pub(crate) fn assert_fetched_in_parts(seen: &Seen, of: usize) {
     );
 }
 
-/// The message has the fault, the server's word, the file and the remedy.
+/// Checks that the message has the fault, the server's text, the file and the remedy.
 pub(crate) fn assert_refused(told: &str, word: &str, hint: &str) {
     let why = format!(
         "error: cannot read what is there: it may not be read without a key that opens it: the server says {word} ("
