@@ -1,4 +1,4 @@
-//! The state of the loop, and what changes it between ticks: commands and scenes.
+//! The state of the loop, and its changes between ticks: commands and scenes.
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::Contact;

@@ -4,7 +4,7 @@
 //! ```text
 //! HIP ─▶ contact ─▶ shading, material, texture ─▶ spring ─▶ clutch's share ─▶ damping, controller
 //!           ▲                   │
-//!           └──── friction ─────┘ of the material in force, from the next tick on
+//!           └──── friction ─────┘ of the current material, from the next tick on
 //! ```
 
 use glam::Vec3;

@@ -71,7 +71,7 @@ struct Sweeping {
     /// The proxy has waited for terrain, or the HIP has moved before the path ended: the force of
     /// the next contact has to fade in.
     was_late: bool,
-    /// Fade that stays in force if the path leads from the surface back to it.
+    /// Fade to keep if the path leads from the surface back to it.
     fade: f32,
     departures: Departures,
 }
@@ -127,7 +127,7 @@ pub struct Contact {
     hip: GridPoint,
     output: ContactOutput,
     /// True if the output stays the same while the HIP does not move: no work is left, and no force
-    /// fades. (Another field has a new contact; [`Self::surface_moved`] clears this.)
+    /// fades. (Another field gets a new contact; [`Self::surface_moved`] clears this.)
     at_rest: bool,
     settings: ContactSettings,
     phase: Phase,
@@ -231,7 +231,7 @@ impl Contact {
         }
     }
 
-    /// Moves the proxy for a HIP, in at most [`super::WORK_PER_TICK`] work units.
+    /// Moves the proxy for a HIP, with at most [`super::WORK_PER_TICK`] work units.
     ///
     /// The HIP is in cells: x east, y north, z up, the origin at the south-west sample at height
     /// zero. The maximum distance between the proxy and the surface's closest point is in
@@ -328,8 +328,7 @@ impl Contact {
         if !hip.is_same(&self.hip) {
             self.redirect(window, hip, known, &mut budget);
         }
-        // Bounded by the budget: among successive turns without work, none returns to the one
-        // before.
+        // Bounded by the budget: a series of turns without work never returns to the turn before.
         while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
         self.ends(&budget);

@@ -102,8 +102,8 @@ impl Tile {
     /// from the south.
     ///
     /// # Errors
-    /// [`TileError::Materials`] unless there are exactly 33 × 33 of them, each below `count`, and
-    /// the buffer was filled. The buffer is then vacant.
+    /// [`TileError::Materials`] unless the buffer was filled and there are exactly 33 × 33 of them,
+    /// each below `count`. On an error the buffer is left vacant.
     pub fn set_materials(
         &mut self,
         count: usize,

@@ -15,7 +15,7 @@ use crate::grid::{Altitude, Cell};
 pub enum CellContent {
     /// A patch.
     Patch(Corners),
-    /// No surface: no data, or outside the field.
+    /// No surface: no-data, or outside the field.
     Hole,
     /// The tile has not arrived yet.
     Missing,

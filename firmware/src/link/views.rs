@@ -25,7 +25,7 @@ pub(super) enum ClutchOfHost {
     LetGo,
     /// The host of this session.
     Held,
-    /// A host that has left: the clutch is to be released.
+    /// A host that has left: the clutch must be released.
     Forsaken,
 }
 

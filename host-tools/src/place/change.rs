@@ -50,7 +50,7 @@ pub enum PlacementChange {
     Reset,
 }
 
-/// Reason to refuse a change of placement, which stays as it is.
+/// Reason to refuse a change; the placement stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ChangeError {
     /// A place beyond the samples.

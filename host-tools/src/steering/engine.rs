@@ -36,13 +36,13 @@ pub struct Put<'r> {
 enum Stage<'r> {
     /// The clutch is closed, by the last report.
     Idle,
-    /// The clutch was requested, `samples` samples ago. `answered` tells this hold from the board's
-    /// clutch input, which may hold the clutch open already and release it before the request
-    /// arrives.
+    /// The clutch was requested `samples` samples ago. `answered` distinguishes this hold from the
+    /// board's clutch input, which may hold the clutch open already and release it before the
+    /// request arrives.
     Opening { samples: u32, answered: bool },
     /// The clutch is open.
     Open,
-    /// This placement and its terrain were sent.
+    /// This placement was sent; with its terrain.
     Putting(Box<(Laid, Terrain<'r>)>),
     /// The clutch was released, and is still reported open.
     Closing,
@@ -270,7 +270,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// Returns the position of the hand in a sample, in the placement in force.
+    /// Returns the position of the hand in a sample, in the current placement.
     fn hand(&self, sample: &TickRecord) -> Hand {
         let scale = self.terrain.scale();
         let touches = sample.state == ContactState::Touching;

@@ -9,7 +9,7 @@ use crate::terrain::index::{TILE_CELLS, TileIndex};
 use crate::terrain::tile::Tile;
 use crate::terrain::tile_blend::{Allowance, TileBlend, within};
 
-/// Rendered height at a sample, and whether it is a tile's.
+/// Rendered height at a sample, with its source: a tile or the fallback.
 #[derive(Clone, Copy)]
 struct BlendedHeight {
     height: f32,
