@@ -127,7 +127,7 @@ pub struct Contact {
     hip: GridPoint,
     output: ContactOutput,
     /// True if the output stays the same while the HIP does not move: no work is left, and no force
-    /// fades. (Another field gets a new contact; [`Self::surface_moved`] clears this.)
+    /// fades. (Another field gets a new contact; [`Contact::surface_moved`] clears this.)
     at_rest: bool,
     settings: ContactSettings,
     phase: Phase,

@@ -32,7 +32,7 @@ bitflags! {
         const DEAD_MAN_STILL_HELD = 1 << 10;
         /// The dead-man switch is not held.
         const DEAD_MAN_RELEASED = 1 << 11;
-        /// The force on arming would not be small.
+        /// The force must be small before arming, and is not.
         const FORCE_TOO_LARGE = 1 << 12;
         /// An amplifier reports that it is not ready, or its ready line is broken.
         const AMPLIFIER_NOT_READY = 1 << 13;
