@@ -1,4 +1,4 @@
-//! The state of the loop, and what changes it between ticks: commands and scenes.
+//! The state of the loop, and its changes between ticks: commands and scenes.
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::Contact;
@@ -11,49 +11,49 @@ use crate::renderer::Renderer;
 use crate::scene::{Health, HipCommand, Scene, SceneChange, Source};
 use crate::terrain::{Tile, TileKey, Window};
 
-/// From the beginning of a tick until its force acts, s, where a board says nothing else.
+/// Default time from the start of a tick until its force acts, s.
 pub const LATENCY_S: f32 = 0.1e-3;
 
 /// Command to the loop between ticks.
 pub enum Command<'t> {
-    /// A scene. The arm is disarmed, and force that was there goes out gently.
+    /// Render this scene. The arm is disarmed, and the last force ramps down.
     Scene(Scene),
-    /// No scene any more. The arm is disarmed likewise.
+    /// Drop the scene. The arm is disarmed in the same way.
     DropScene,
-    /// Another view of the scene, already checked. The arm stays armed where the clutch is
-    /// open; else it is as another scene.
+    /// Change the placement; already checked. The arm stays armed if the clutch is open; otherwise
+    /// this acts as another scene.
     SceneChange(SceneChange),
-    /// Hold the clutch, or let it go.
+    /// Hold or release the clutch.
     Clutch(ClutchHold),
-    /// The board's clutch input is held from now on, or no longer.
+    /// Set the state of the board's clutch input: true while it is held.
     ClutchInput(bool),
-    /// Mark the next tick, under a number that tells marks apart. The loop around the tick
-    /// raises the board's mark pin; nothing else follows from it.
+    /// Mark the next tick with this number. It only makes the loop around the tick raise the
+    /// board's mark pin.
     Mark(u8),
     /// A filled tile.
     Tile(&'t mut Tile),
-    /// A haptic interface point for one tick, in a scene fed by points.
+    /// A haptic interface point (HIP) for one tick of a replay.
     Hip(HipCommand),
     /// Arm, once nothing blocks it and the dead-man switch is pressed.
     Arm,
     /// Drop the scene and arm for a jog in its place: a small current in one motor
     /// for a limited time.
     Jog(Jog),
-    /// Disarm; force goes out gently.
+    /// Disarm; the force ramps down.
     Disarm,
-    /// These are the counts in the zero pose of the calibration record.
+    /// Set the encoder counts in the zero pose of the calibration record.
     Zero([i32; 3]),
     /// Clear the latched fault, if it is this one.
     ClearFault(Option<Fault>),
     /// Latch a fault found outside the tick.
     Trip(Fault),
-    /// Hold the outputs at these shares of full scale, -1 to 1, with the amplifiers off,
-    /// or no longer ([`Guard::hold`]).
+    /// Hold the outputs at these shares of full scale, -1 to 1, with the amplifiers off; `None`
+    /// ends that ([`Guard::hold`]).
     HoldOutputs(Option<[f32; 3]>),
 }
 
-/// A scene or view that cannot be rendered: its numbers are not valid, or its materials are not here.
-/// There is no scene from then on, and the arm is disarmed.
+/// Refusal of a scene or placement: its numbers are not valid, or its materials are missing. The
+/// loop then has no scene, and the arm is disarmed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the scene is not valid, or its materials are not those that came")]
 pub struct RefusedScene;
@@ -61,13 +61,13 @@ pub struct RefusedScene;
 /// Source of the next tick's HIP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HipSource {
-    /// There is no scene: nothing is rendered. The guard still looks at the arm.
+    /// No scene: nothing is rendered. The guard still monitors the arm.
     None,
     /// The encoders.
     Encoders,
-    /// Points.
+    /// Points of the host.
     Points {
-        /// True if one is being rendered.
+        /// True if a point is being rendered.
         pending: bool,
     },
 }
@@ -77,10 +77,10 @@ pub enum HipSource {
 pub struct Board {
     /// Ticks a second.
     pub rate: TickRate,
-    /// From the beginning of a tick until its force acts, s: what the board and its amplifiers
-    /// take.
+    /// Time from the start of a tick until its force acts, s: the delay of the board and its
+    /// amplifiers.
     pub latency_s: f32,
-    /// Temperatures of the motors; those of the air where nothing is known.
+    /// Temperatures of the motors; `None` if unknown: the motors then start at air temperature.
     pub motors: Option<Temperatures>,
     /// A fault that was found at boot.
     pub fault: Option<Fault>,
@@ -88,7 +88,7 @@ pub struct Board {
 
 /// All state of the loop over a window of `D × D` tiles.
 ///
-/// Fed by points, it is a replay: no arm is needed, and no force reaches one.
+/// With points as its source it renders a replay: no arm is needed, and none is driven.
 ///
 /// ```
 /// use hapterra_core::Vec3;
@@ -133,18 +133,19 @@ pub struct Board {
 /// assert_eq!((sample.state, sample.force_n), (ContactState::Touching, Vec3::Z * 0.5));
 /// # Ok::<(), hapterra_core::tick::RefusedScene>(())
 /// ```
-// In this order: what every tick reads lies within reach of its loads. 66 instructions of 1,245.
+// Field order: fields that every tick reads are within the offset range of its loads. This saves 66
+// of 1,245 instructions.
 #[repr(C)]
 pub struct Haptics<'t, const D: usize> {
     pub(crate) guard: Guard,
     pub(crate) clutch: Clutch,
     pub(crate) mechanism: Option<Kinematics>,
     pub(crate) scene: Option<Scene>,
-    /// Counts in the zero pose, once they are known.
+    /// Encoder counts in the zero pose, if known.
     pub(crate) zero: Option<[i32; 3]>,
     pub(crate) tick: u32,
     pub(crate) rate: TickRate,
-    /// Number of the view that is rendered.
+    /// Number of the rendered placement.
     pub(crate) view: u8,
     pub(crate) point: Option<HipCommand>,
     pub(crate) renderer: Renderer,
@@ -152,8 +153,8 @@ pub struct Haptics<'t, const D: usize> {
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {
-    /// A loop at this rate without calibration and scene: disarmed, with a fault that was found at
-    /// boot.
+    /// Creates a disarmed loop at this rate, without calibration and scene, and with the fault
+    /// found at boot, if any.
     #[must_use]
     pub fn new(
         tiles: [[&'t mut Tile; D]; D],
@@ -169,7 +170,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         Self::on_board(tiles, &board)
     }
 
-    /// The same on a board.
+    /// Creates a disarmed loop on a board.
     #[must_use]
     pub fn on_board(tiles: [[&'t mut Tile; D]; D], board: &Board) -> Self {
         let mut guard = Guard::new(board.rate, board.fault);
@@ -191,18 +192,18 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// Returns the temperatures of the motors, which a board keeps over a reset.
+    /// Returns the temperatures of the motors, which a board keeps across a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.guard.motors().temperatures()
     }
 
-    /// Takes a command between ticks. Returns a tile buffer that is free again, if there is
-    /// one: most tiles bring one in the place of another, those of a fallback stay besides, and
-    /// their buffers return one by one under a scene that has none.
+    /// Applies a command between ticks. Returns a tile buffer that has become free, if any. Most
+    /// tiles replace another one; those of a fallback occupy additional buffers, which are returned
+    /// one by one under a scene without fallback.
     ///
     /// # Errors
-    /// [`RefusedScene`]: a scene or view was not taken, and there is no scene any more.
+    /// [`RefusedScene`] if a scene or placement was refused; the loop then has no scene.
     pub fn accept(&mut self, command: Command<'t>) -> Result<Option<&'t mut Tile>, RefusedScene> {
         let mut back = None;
         match command {
@@ -214,7 +215,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::Mark(_) => {}
             Command::Tile(tile) => back = self.take_tile(tile),
             Command::Hip(HipCommand { seq, hip }) => {
-                // Whatever bits came over the wire.
+                // The link can deliver any bits.
                 let hip = hip.normalised();
                 self.point = Some(HipCommand { seq, hip });
             }
@@ -232,8 +233,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
         Ok(back.or_else(|| self.window.take_spare()))
     }
 
-    /// Swaps the arm's settings between ticks. The caller sees to it that the arm is disarmed; if
-    /// it is not, it is switched off.
+    /// Replaces the arm's settings between ticks. The arm should be disarmed; otherwise it is
+    /// switched off.
     pub fn configure(&mut self, mechanism: Kinematics) {
         self.guard.stop();
         self.guard.configure(&mechanism);
@@ -241,13 +242,13 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.renderer.restart(self.scene.as_ref());
     }
 
-    /// Takes a table of materials: that of the scene which follows with [`Haptics::accept`] before
-    /// another tick. One that is not valid has its scene refused.
+    /// Sets the table of materials for the scene that follows through [`Haptics::accept`] before
+    /// the next tick. A scene with an invalid table is refused.
     pub fn take_materials(&mut self, table: &MaterialTable) {
         self.renderer.take_materials(table);
     }
 
-    /// Returns the source of the next tick's HIP, by the scene in force.
+    /// Returns the source of the next tick's HIP in the current scene.
     #[must_use]
     pub fn source(&self) -> HipSource {
         match self.scene.as_ref().map(|scene| scene.source) {
@@ -259,8 +260,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// Takes a scene, or drops the one there is: force that was there goes out. Drops it for one that
-    /// it cannot take, too: its sender assumes it to be set.
+    /// Sets a scene, or drops the current one; the force ramps down. A refused scene also drops the
+    /// current one, because its sender assumes it to be set.
     fn take_scene(&mut self, scene: Option<Scene>) -> Result<(), RefusedScene> {
         let asked = scene.is_some();
         let scene = scene.filter(|scene| self.renderer.can_take(scene));
@@ -285,9 +286,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// Sets another placement. No force shows the change: the clutch of an arm is open,
-    /// and in a replay no arm is driven. A proxy that touched begins on the surface
-    /// where it was in the hand, as deep as before.
+    /// Sets another placement without a step in force: the clutch of an arm is open, and a replay
+    /// drives no arm. A proxy in contact starts on the surface at its position relative to the
+    /// hand, as deep as before.
     fn take_view(&mut self, view: &SceneChange) -> Result<(), RefusedScene> {
         let &SceneChange { scene, hip, .. } = view;
         let before = self.scene.as_ref();
@@ -308,7 +309,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if has_other_fallback || !view.keeps_tiles {
             self.window.lay(scene.fallback);
         }
-        // Whatever bits came over the wire.
+        // The link can deliver any bits.
         let hip = hip.normalised();
         self.renderer.take(
             Some(&scene),
@@ -321,7 +322,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         Ok(())
     }
 
-    /// The tip is somewhere else from now on, so nothing is driven meanwhile.
+    /// Sets the zero counts. The tip's position then jumps, so the outputs are switched off.
     fn take_zero(&mut self, counts: [i32; 3]) {
         self.guard.stop();
         self.guard.restart_counts();
@@ -329,8 +330,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.zero = Some(counts);
     }
 
-    /// Refuses a tile of an arm's scene whose slot holds the tile under the proxy, or a tile next to
-    /// it. Such a tile was requested for a place that the proxy has left.
+    /// Stores a tile. In a scene of an arm it is refused if its slot holds the tile under the
+    /// proxy, or a tile next to it: it was requested for a place that the proxy has left.
     fn take_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let level = self.window.level();
         let of_arm = self
@@ -354,25 +355,25 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.window.take(tile, in_use.map(|point| point.column()))
     }
 
-    /// The scene in force.
+    /// Returns the current scene.
     #[must_use]
     pub const fn scene(&self) -> Option<&Scene> {
         self.scene.as_ref()
     }
 
-    /// The contact of the last tick.
+    /// Returns the contact of the last tick.
     #[must_use]
     pub const fn contact(&self) -> &Contact {
         self.renderer.contact()
     }
 
-    /// The calibration in force.
+    /// Returns the current calibration.
     #[must_use]
     pub fn calibration(&self) -> Option<&Calibration> {
         self.mechanism.as_ref().map(Kinematics::calibration)
     }
 
-    /// The state of the guard and what was measured, after a tick.
+    /// Returns the state of the guard and the measured values after a tick.
     #[must_use]
     pub fn health(&self, sense: &GuardInputs, drive: &GuardOutputs) -> Health {
         let angles = |m: &Kinematics| m.angles(sense.counts, self.zero.unwrap_or_default());
@@ -387,7 +388,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// The state of the guard after a tick.
+    /// Returns the state of the guard after a tick.
     #[must_use]
     pub const fn report(&self) -> Report {
         self.guard.report()

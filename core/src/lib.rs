@@ -32,31 +32,31 @@
 //! # Ok::<(), hapterra_core::terrain::FieldError>(())
 //! ```
 //!
-//! Longer examples come with the crate, among them `forces_along_a_path`,
-//! `closed_loop` (the whole tick with a simulated arm) and `serve_tiles` (a host
-//! and a device that exchange the messages of the link in memory).
+//! The crate has longer examples, such as `forces_along_a_path`, `closed_loop` (the whole tick with
+//! a simulated arm) and `serve_tiles` (a host and a device that exchange the messages of the link
+//! in memory).
 //!
-//! Read the modules in this order to follow the data through one tick; each
-//! needs those before it only, which `tests/imports.rs` checks:
+//! Read the modules in this order to follow the data through one tick; each depends only on those
+//! before it, which `tests/imports.rs` checks:
 //!
 //! 1. [`phantom`] turns encoder counts into the tip position, and forces back
 //!    into motor currents.
 //! 2. [`grid`] places that tip over the terrain: an integer cell plus a
 //!    fraction, so that nothing depends on the distance from the origin.
-//! 3. [`terrain`] is what the device holds of the height field: a window of
-//!    tiles, and the rule by which it asks the host for more.
+//! 3. [`terrain`] stores the device's part of the height field: a window of tiles, and the rule for
+//!    its requests to the host.
 //! 4. [`contact`] moves the proxy over bilinear patches.
 //! 5. [`force`] turns proxy and HIP into newtons.
-//! 6. [`guard`] decides what may reach the amplifiers.
-//! 7. [`scene`] is what the loop is given to feel, and what it says of a tick. The
-//!    [`clutch`] lets another view in without a step in force.
-//! 8. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
-//!    second ([`rate::TickRate`]): counts, pose, HIP, feel, guard, currents. Contact and
-//!    effects are put together in `renderer.rs`, which `replay.rs` uses, too; commands and scene
-//!    changes between ticks are in `haptics.rs`.
-//! 9. [`wire`] is what travels between the device and the host.
+//! 6. [`guard`] limits forces and currents, and raises faults.
+//! 7. [`scene`] is the input of the loop, and its record of a tick. The [`clutch`] allows a change
+//!    of placement without a step in force.
+//! 8. [`tick`] combines them in one pure function, called 1,000 to 10,000 times a second
+//!    ([`rate::TickRate`]): counts, pose, HIP, force, guard, currents. `renderer.rs` combines
+//!    contact and effects, also for `replay.rs`; `haptics.rs` applies commands and scene changes
+//!    between ticks.
+//! 9. [`wire`] defines the messages between the device and the host.
 //!
-//! [`crc`] is beside them: the check sum of frames and records.
+//! [`crc`] is separate: the check sum of frames and records.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -66,7 +66,7 @@ extern crate std;
 #[cfg(test)]
 mod cases;
 
-/// The README's example, run.
+/// Runs the README's example as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,10 +1,10 @@
-//! The force of a HIP in a scene: contact and all effects, put together once. The arm's tick and
-//! replay both use it.
+//! The force of a HIP in a scene: contact and all effects, combined in one place for the arm's tick
+//! and for replay.
 //!
 //! ```text
 //! HIP ─▶ contact ─▶ shading, material, texture ─▶ spring ─▶ clutch's share ─▶ damping, controller
 //!           ▲                   │
-//!           └──── friction ─────┘ of the material in force, from the next tick on
+//!           └──── friction ─────┘ of the current material, from the next tick on
 //! ```
 
 use glam::Vec3;
@@ -18,7 +18,7 @@ use crate::rate::TickRate;
 use crate::scene::{Scene, Source};
 use crate::terrain::{TileIndex, Window};
 
-/// Tiles that one point of a replay may ask for, for each that the window holds.
+/// Maximum number of tiles that one point of a replay may request, per slot of the window.
 const TILES_PER_SLOT: u32 = 4;
 
 /// Source of the HIP's motion.
@@ -32,7 +32,7 @@ pub(crate) enum Mover<'a> {
         guard: &'a Guard,
         /// The arm's settings.
         mechanism: &'a Kinematics,
-        /// Its pose.
+        /// The arm's pose.
         pose: &'a Pose,
         /// The clutch's share of the force.
         clutch: f32,
@@ -47,8 +47,8 @@ impl Mover<'_> {
         }
     }
 
-    /// The inputs of damping and controller; none while no force follows the spring: with the
-    /// amplifiers off, while the last force goes out, and with an open clutch.
+    /// Returns the inputs of damping and passivity controller; `None` while no force follows the
+    /// spring: with the amplifiers off, while the last force ramps down, or with an open clutch.
     fn moment(&self, displacement_mm: Vec3, moved_mm: Vec3, rate: TickRate) -> Option<Moment> {
         Some(match *self {
             Self::Points => Moment {
@@ -89,24 +89,24 @@ struct RenderState {
     contact: Contact,
     /// Effects of the scene, if any.
     effects: Option<Effects>,
-    /// The HIP of the last tick that was done and driven.
+    /// The HIP of the last completed tick whose force followed the spring.
     before: Option<GridPoint>,
 }
 
-/// A replay's point that is not done.
+/// A point of a replay in progress.
 struct BegunPoint {
     /// The state before it.
     before: RenderState,
-    /// Number of times that it lacked another tile.
+    /// Number of times that another tile was missing.
     lacked: u32,
-    /// The last tile that it lacked.
+    /// The last missing tile.
     tile: Option<TileIndex>,
 }
 
 /// Progress of a replay's point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Progress {
-    /// The point was rendered: without this tile where it needs more than the window holds.
+    /// The point was rendered; without this tile, if it needs more tiles than the window stores.
     Done(Option<TileIndex>),
     /// Work is left for the next tick.
     GoesOn,
@@ -114,22 +114,22 @@ pub(crate) enum Progress {
     Lacks(TileIndex),
 }
 
-/// Contact and effects of the scene in force.
+/// Contact and effects of the current scene.
 pub(crate) struct Renderer {
     state: RenderState,
-    /// A replay's point that is not done.
+    /// A point of a replay in progress.
     point: Option<BegunPoint>,
     progress: Progress,
     rate: TickRate,
-    /// From the beginning of a tick until its force acts, s.
+    /// Time from the start of a tick until its force acts, s.
     latency_s: f32,
-    /// The materials of the next scene that has some, and their check sum.
+    /// The materials of the next scene with materials, and their check sum.
     materials: MaterialTable,
     materials_sum: u32,
 }
 
 impl Renderer {
-    /// Without a scene.
+    /// Creates a renderer without a scene.
     pub(crate) fn new(rate: TickRate, latency_s: f32) -> Self {
         Self {
             state: RenderState {
@@ -146,26 +146,27 @@ impl Renderer {
         }
     }
 
-    /// Takes a table of materials for the next scene.
+    /// Stores the table of materials for the next scene.
     pub(crate) fn take_materials(&mut self, table: &MaterialTable) {
         self.materials_sum = table.check_sum();
         self.materials.clone_from(table);
     }
 
-    /// Returns true if a scene's numbers are valid and its materials are here.
+    /// Returns true if a scene's numbers are valid and its materials are stored.
     pub(crate) fn can_take(&self, scene: &Scene) -> bool {
         let is_here = |sum: u32| sum == self.materials_sum && self.materials.is_valid();
         scene.is_valid() && scene.materials.is_none_or(is_here)
     }
 
-    /// Takes a scene that it can take, or none. The one door for all effects. `landing` is the HIP
-    /// of another view, and the displacement with which the proxy begins on its surface, cells.
+    /// Sets a scene that [`Self::can_take`] accepts, or none. All effects are created here.
+    /// `landing` is the HIP after a change of placement, and the displacement with which the proxy
+    /// starts on the surface, cells.
     pub(crate) fn take(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
         self.state.effects = scene.and_then(|scene| self.effects_of(scene));
         self.begin(scene, landing);
     }
 
-    /// Begins the contact of the same scene anew: the HIP is somewhere else.
+    /// Restarts the contact in the same scene, because the HIP has jumped.
     pub(crate) fn restart(&mut self, scene: Option<&Scene>) {
         self.begin(scene, None);
     }
@@ -184,7 +185,7 @@ impl Renderer {
         };
         if let Some(scene) = scene {
             if scene.materials.is_some() {
-                // A proxy that meets its first rough material has to know where it was before.
+                // On its first material with friction a proxy needs its previous position.
                 let friction = self.materials.some_friction();
                 self.state.contact.set_friction(friction);
             }
@@ -211,7 +212,7 @@ impl Renderer {
         }
     }
 
-    /// The force that a HIP wants, N, terrain frame: one tick.
+    /// Runs one tick. Returns the requested force at a HIP, N, terrain frame.
     #[inline(always)]
     pub(crate) fn step<const D: usize>(
         &mut self,
@@ -224,9 +225,9 @@ impl Renderer {
         self.force_n(window, scene, hip, mover)
     }
 
-    /// The same for a replay's point, as a transaction: where a tile is missing, nothing has
-    /// happened but that it is asked for. A point that needs more tiles than the window holds is
-    /// rendered as for an arm, with those that are here.
+    /// Runs one tick for a point of a replay, as a transaction: if a tile is missing, it is
+    /// requested and the state stays as it was. A point that needs more tiles than the window
+    /// stores is rendered with the stored ones, as for an arm.
     #[inline(never)]
     pub(crate) fn step_to_point<const D: usize>(
         &mut self,
@@ -241,7 +242,7 @@ impl Renderer {
             tile: None,
         });
         let (lacked, last) = (point.lacked, point.tile);
-        // Where the HIP is follows from the point.
+        // The HIP is the point's, not the one that the landing returns.
         let _ = self.state.contact.land(window);
         let output = *self.state.contact.step(window, &hip);
         let may_lack = lacked < TILES_PER_SLOT * (D * D) as u32;
@@ -285,7 +286,7 @@ impl Renderer {
         }
     }
 
-    // Apart, so that the tick of a scene without effects has nothing of them.
+    // Not inlined: the tick of a scene without effects does not need it.
     #[cold]
     #[inline(never)]
     fn with_effects<const D: usize>(
@@ -328,27 +329,27 @@ impl Renderer {
         }
     }
 
-    /// The contact of the last tick.
+    /// Returns the contact of the last tick.
     pub(crate) const fn contact(&self) -> &Contact {
         &self.state.contact
     }
 
-    /// The same, for the clutch and for tiles that move the surface.
+    /// Returns the contact, for the clutch and for tiles that move the surface.
     pub(crate) const fn contact_mut(&mut self) -> &mut Contact {
         &mut self.state.contact
     }
 
-    /// Returns true if the scene adds something to the spring's force.
+    /// Returns true if the scene has effects.
     pub(crate) const fn has_effects(&self) -> bool {
         self.state.effects.is_some()
     }
 
-    /// A tile without which the last force is not that of the whole terrain, besides the contact's.
+    /// Returns a tile that was missing for the last tick's effects, if any.
     fn missing(&self) -> Option<TileIndex> {
         self.state.effects.as_ref().and_then(Effects::missing)
     }
 
-    /// The tile that the last tick lacked, of an arm or a point.
+    /// Returns the tile that the last tick lacked, for an arm or a point.
     pub(crate) fn missing_tile(&self) -> Option<TileIndex> {
         match self.progress {
             Progress::Lacks(tile) | Progress::Done(Some(tile)) => Some(tile),
@@ -364,7 +365,7 @@ impl Renderer {
         matches!(self.progress, Progress::Done(_))
     }
 
-    /// The energy that the ticks have created and that was not taken back yet, mJ.
+    /// Returns the energy leak that is not dissipated yet, mJ.
     pub(crate) fn created_mj(&self) -> f32 {
         let effects = self.state.effects.as_ref();
         let damper = effects.and_then(|it| it.damper.as_ref());

@@ -1,7 +1,7 @@
 //! Input of a tick (scene, points) and its report (records, health).
 //!
-//! These types go into the tick and come out of it, and they travel on the wire
-//! as they are: any change to one of them is a new version of the wire's protocol.
+//! These types are inputs and outputs of the tick, and are sent on the link unchanged: a change to
+//! one of them needs a new protocol version.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -22,45 +22,46 @@ pub enum Source {
     Points,
 }
 
-/// A field, its placement under the arm, and its surface parameters. Checked as a
-/// whole before it is taken.
+/// A field, its placement under the arm, and its surface parameters. It is validated as a whole
+/// before use.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// Names this field, placement and surface parameters; tiles carry it.
+    /// Identifier of this field, placement and surface parameters; tile messages repeat it.
     pub epoch: u32,
     /// Decimation level of the tiles, 0 the finest.
     pub level: u8,
     /// Size in cells.
     pub size: FieldSize,
-    /// A whole height in cells that no sample exceeds.
+    /// Upper bound of all samples, whole cells.
     pub top: i32,
-    /// Coarse fallback where a tile has not arrived; none where ticks wait for their tiles.
+    /// Coarse fallback for tiles that have not arrived; `None` if ticks wait for their tiles.
     pub fallback: Option<Fallback>,
-    /// Millimetres of the arm's tip a cell.
+    /// Device millimetres per cell.
     pub cell_mm: f32,
-    /// The point of the terrain that is at the tip in the home pose.
+    /// Point of the terrain at the tip in the home pose.
     pub home: GridPoint,
-    /// Spring and limit.
+    /// Stiffness, friction, damping, texture and shading.
     pub params: SurfaceParams,
     /// Source of the haptic interface point (HIP).
     pub source: Source,
-    /// On an emulated board: let its clock stand still while the host owes a
-    /// tile, so that a slow host machine makes no difference to the contact.
+    /// True if an emulated board stops its clock while a requested tile is missing, so that a slow
+    /// host machine does not affect the contact.
     pub hold_clock: bool,
-    /// The check sum of the table of its materials
-    /// ([`MaterialTable::check_sum`](crate::force::MaterialTable::check_sum)); none where all
-    /// of it is of one material, that of the surface parameters. Tiles of a scene with materials carry a
-    /// material for each sample, but for its fallback.
+    /// Check sum of the scene's table of materials
+    /// ([`MaterialTable::check_sum`](crate::force::MaterialTable::check_sum)); `None` if the
+    /// surface parameters are its only material. Tiles of a scene with materials have a material
+    /// for each sample; its fallback has none.
     pub materials: Option<u32>,
 }
 
 impl Scene {
-    /// Returns true if every number is one that the loop can work with.
+    /// Returns true if every number is valid for the loop.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let top_ok = self.top.unsigned_abs() <= MAX_CELL.unsigned_abs() + 1;
         let cell_ok = self.cell_mm.is_finite() && self.cell_mm > 0.0;
-        // Points are answered from the tiles alone, so that no answer depends on what came when.
+        // A point is rendered from tiles alone, so that its answer does not depend on when they
+        // arrived.
         let fallback_ok = self.fallback.is_none_or(|fallback| {
             fallback.is_valid(self.level) && self.source == Source::Encoders
         });
@@ -68,27 +69,26 @@ impl Scene {
     }
 }
 
-/// Another view of the terrain for an arm that stays armed: another place, scale, height
-/// or stiffness. It is put in while the clutch is open, and rendered when that has closed.
+/// Change of placement for an arm that stays armed: another place, scale, height or stiffness. It
+/// is set while the clutch is open, and rendered when the clutch closes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneChange {
-    /// Counts the views of a scene from 1 on, wrapping; samples carry it.
+    /// Number of the placement in its scene, from 1, wrapping; tick records repeat it.
     pub number: u8,
-    /// The field, its scale and the surface parameters. Its home is where the device would begin if it
-    /// were restarted; while it runs the home follows from [`SceneChange::hip`].
+    /// The field, its scale and the surface parameters. A restarted device starts at its home; a
+    /// running device computes its position from [`SceneChange::hip`].
     pub scene: Scene,
-    /// The haptic interface point in the view, cells, for the tip where it was when the clutch
-    /// opened, or where it is when that closes ([`ClutchHold`](crate::clutch::ClutchHold)). In contact
-    /// its height is the device's: as deep as before.
+    /// The haptic interface point (HIP) in the new placement, cells, for the tip's position when
+    /// the clutch opened, or when it closes ([`ClutchHold`](crate::clutch::ClutchHold)). In contact
+    /// the device sets its height: as deep as before.
     pub hip: GridPoint,
-    /// True if the tiles that the device holds are those of this scene: only place and surface
-    /// differ.
+    /// True if the tiles on the device stay valid: only place and surface parameters differ.
     pub keeps_tiles: bool,
 }
 
 /// Time for which the mark pin of a board is high, ms.
 pub const MARK_PULSE_MS: u32 = 10;
-/// Time for which it is low after that, ms, before another mark is taken.
+/// Time for which the mark pin is low after that, ms, before the next mark.
 pub const MARK_GAP_MS: u32 = 10;
 
 /// A haptic interface point (HIP) for one tick.
@@ -103,16 +103,16 @@ pub struct HipCommand {
 /// One tick's record; not a sample of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TickRecord {
-    /// Tick since the scene was taken.
+    /// Number of the tick since the scene was set.
     pub tick: u32,
     /// Haptic interface point (HIP), cells over the terrain.
     pub hip: GridPoint,
     /// Proxy, cells over the terrain.
     pub proxy: GridPoint,
-    /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
-    /// are on; in a replay, that of the scene's surface parameters.
+    /// Commanded force, newtons: east, north, up. Zero while the amplifiers are off; in a replay,
+    /// the force by the scene's surface parameters.
     pub force_n: Vec3,
-    /// The view in which this was rendered ([`SceneChange::number`]); 0 for the scene as it was taken.
+    /// Number of the rendered placement ([`SceneChange::number`]); 0 for that of the scene.
     pub view: u8,
     /// State of the proxy.
     pub state: ContactState,
@@ -124,7 +124,7 @@ pub struct TickRecord {
     pub limits: Limits,
     /// Latched fault.
     pub fault: Option<Fault>,
-    /// Units of contact work spent.
+    /// Work units spent by the contact.
     pub work: u32,
     /// Cost of the tick before this one, clock ticks.
     pub cost: u32,
@@ -134,23 +134,23 @@ pub struct TickRecord {
     pub late: u32,
 }
 
-/// The state of the loop: the guard's, and what was measured and driven.
+/// State of the loop: the guard, and the measured and commanded values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Health {
     /// The guard.
     pub report: Report,
     /// Encoders and safety inputs.
     pub sense: GuardInputs,
-    /// The counts of the zero pose, once the arm was zeroed.
+    /// Encoder counts in the zero pose, if the arm was zeroed.
     pub zero: Option<[i32; 3]>,
-    /// Joint angles by the calibration, rad; as if zeroed at zero counts where
-    /// that has not been done.
+    /// Joint angles by the calibration, rad; for an arm that was not zeroed, as if zeroed at zero
+    /// counts.
     pub angles_rad: Vec3,
     /// Motor currents commanded, A.
     pub currents_a: Vec3,
     /// Winding temperatures by the thermal model, °C.
     pub winding_c: Vec3,
-    /// Energy that the ticks have created at the tip and that was not taken back yet, mJ; zero
-    /// where the passivity controller is off.
+    /// Energy leak at the tip that is not dissipated yet, mJ; zero if the passivity controller is
+    /// off.
     pub created_mj: f32,
 }

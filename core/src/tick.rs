@@ -1,13 +1,12 @@
 //! The tick: one pure function from encoder counts to amplifier currents.
 //!
 //! ```text
-//! counts ─▶ pose ─▶ HIP ─▶ feel ─▶ guard ─▶ currents
+//! counts ─▶ pose ─▶ HIP ─▶ force ─▶ guard ─▶ currents
 //! ```
 //!
-//! It reads nothing and writes nothing but its own state, never blocks, and
-//! does a bounded amount of work. Scenes, tiles, points and settings are
-//! handed to it between ticks by [`Haptics::accept`] and
-//! [`Haptics::configure`].
+//! It reads and writes only its own state and arguments, never blocks, and does a bounded amount of
+//! work. [`Haptics::accept`] and [`Haptics::configure`] set scenes, tiles, points and settings
+//! between ticks.
 
 use glam::Vec3;
 
@@ -24,24 +23,24 @@ use crate::terrain::SETTLING_MM_S;
 /// One tick's result.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
-    /// For the amplifiers.
+    /// Outputs to the amplifiers.
     pub drive: GuardOutputs,
-    /// For telemetry.
+    /// Record for telemetry.
     pub sample: TickRecord,
-    /// The number of the point that this tick answers.
+    /// Number of the point that this tick answers.
     pub answers: Option<u32>,
 }
 
 impl<const D: usize> Haptics<'_, D> {
-    /// One tick with what the encoders and safety inputs say. `watchdog_live`:
-    /// whether the board's watchdog is being fed.
+    /// Runs one tick with the encoders and safety inputs. `watchdog_live` is true if the board's
+    /// watchdog is being fed.
     pub fn tick(&mut self, sense: &GuardInputs, watchdog_live: bool) -> Outcome {
         let mut outcome = Outcome::default();
         self.tick_into(sense, watchdog_live, &mut outcome);
         outcome
     }
 
-    /// As [`Haptics::tick`], into a place that stays: nothing is copied.
+    /// Runs [`Haptics::tick`] and writes its outcome in place, without a copy.
     pub fn tick_into(&mut self, sense: &GuardInputs, watchdog_live: bool, outcome: &mut Outcome) {
         self.tick = self.tick.wrapping_add(1);
         let pose = self.watch(sense, watchdog_live);
@@ -51,12 +50,11 @@ impl<const D: usize> Haptics<'_, D> {
         }
     }
 
-    /// Follows the arm while nothing of it is rendered, in place of a tick: an arm that
-    /// is moved meanwhile keeps its zero, a jump of its encoders is noticed, and
-    /// its motors cool. Nothing is driven.
+    /// Monitors the arm in place of a tick, while nothing is rendered: an arm that is moved keeps
+    /// its zero, a jump of its encoders is detected, and its motors cool. Nothing is driven.
     ///
-    /// A board calls it in every tick of a replay in which no point is under way;
-    /// [`Haptics::tick_into`] sees to the others.
+    /// A board calls it in every tick of a replay in which no point is in progress, and
+    /// [`Haptics::tick_into`] in the others.
     pub fn follow(&mut self, sense: &GuardInputs, watchdog_live: bool) {
         self.watch(sense, watchdog_live);
     }
@@ -82,7 +80,7 @@ impl<const D: usize> Haptics<'_, D> {
         pose
     }
 
-    /// The full path: pose, haptic interface point, force, torques, currents.
+    /// Runs the full path: pose, haptic interface point, force, torques, currents.
     fn tick_arm(&mut self, pose: Option<&Pose>, outcome: &mut Outcome) {
         if let Some(scene) = &self.scene
             && scene.fallback.is_some()
@@ -90,7 +88,7 @@ impl<const D: usize> Haptics<'_, D> {
             self.settle(scene.cell_mm);
         }
         outcome.answers = None;
-        // The option is tested once: otherwise the compiler tests it where each number is used.
+        // Tested once here: otherwise the compiler tests the option where each number is used.
         let Some(pose) = pose else {
             return self.tick_without_arm(outcome);
         };
@@ -100,7 +98,7 @@ impl<const D: usize> Haptics<'_, D> {
         self.write_state(force_n, &mut outcome.sample);
     }
 
-    /// The force that the HIP wants, N, terrain frame.
+    /// Returns the requested force at the HIP, N, terrain frame.
     fn wanted_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
         let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) else {
             write_nothing(sample);
@@ -126,7 +124,7 @@ impl<const D: usize> Haptics<'_, D> {
         wanted_n
     }
 
-    /// The currents of a force, A, and of the arm's weight.
+    /// Sets the currents, A, for a force and for the arm's weight.
     #[inline]
     fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
         *drive = match &self.mechanism {
@@ -145,7 +143,7 @@ impl<const D: usize> Haptics<'_, D> {
         }
     }
 
-    /// The same without a calibration: no force is rendered, and nothing driven.
+    /// Runs a tick without a calibration: no force is rendered, and nothing is driven.
     #[cold]
     #[inline(never)]
     fn tick_without_arm(&mut self, outcome: &mut Outcome) {
@@ -158,20 +156,20 @@ impl<const D: usize> Haptics<'_, D> {
         self.write_state(Vec3::ZERO, sample);
     }
 
-    /// Lets the surface of a scene with a fallback move on to the tiles that have come.
-    // Apart, so that the tick of a scene without fallback has nothing of it.
+    /// Blends the surface of a scene with a fallback to the tiles that have arrived.
+    // Not inlined: the tick of a scene without fallback does not need it.
     #[cold]
     #[inline(never)]
     fn settle(&mut self, cell_mm: f32) {
-        // An infinite step would leave no trace of which tiles settle.
+        // An infinite step would erase the record of the tiles that blend in.
         let step = smaller(SETTLING_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
         if self.window.settle(step) {
             self.renderer.contact_mut().surface_moved(&self.window);
         }
     }
 
-    /// Writes the loop's state into the sample: all but the contact's output and what
-    /// the caller measures.
+    /// Writes the loop's state into the record, without the contact's output and the caller's
+    /// measurements.
     pub(crate) fn write_state(&self, force_n: Vec3, sample: &mut TickRecord) {
         let Report {
             mode,
@@ -193,8 +191,8 @@ impl<const D: usize> Haptics<'_, D> {
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
     }
 
-    /// Returns true if the proxy is over the fallback, over a tile that has not settled, or over nothing
-    /// where a fallback is on its way.
+    /// Returns true if the proxy is over the fallback, over a tile that still blends in, or over
+    /// missing terrain before the fallback arrives.
     fn is_over_coarse_ground(&self, sample: &TickRecord) -> bool {
         let cell = sample.proxy.column();
         let scene = self.scene.as_ref();
@@ -203,13 +201,13 @@ impl<const D: usize> Haptics<'_, D> {
     }
 }
 
-/// Writes the contact's output into the sample.
+/// Writes the contact's output into the record.
 pub(crate) fn write_output(hip: GridPoint, renderer: &Renderer, sample: &mut TickRecord) {
     write_contact(hip, renderer.contact().output(), sample);
     sample.missing_tile = renderer.missing_tile();
 }
 
-// A call: it is needed in several places.
+// Not inlined: it has several callers.
 #[inline(never)]
 fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut TickRecord) {
     sample.hip = hip;
@@ -218,14 +216,14 @@ fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut TickRecord
     sample.work = output.work;
 }
 
-/// No force is rendered.
+/// Writes a record without contact and force.
 #[cold]
 #[inline(never)]
 pub(crate) fn write_nothing(sample: &mut TickRecord) {
     write_contact(GridPoint::default(), &ContactOutput::default(), sample);
 }
 
-/// Returns the place where the tip is over the terrain.
+/// Returns the tip's position over the terrain.
 fn place(mechanism: &Kinematics, scene: &Scene, pose: &Pose) -> GridPoint {
     let moved_mm = to_terrain_frame(pose.tip_mm() - mechanism.home_mm());
     GridPoint::new(

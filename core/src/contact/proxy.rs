@@ -1,4 +1,4 @@
-//! The proxy: what a tick does, and what is remembered from tick to tick.
+//! The proxy: its motion in a tick, and its state between ticks.
 
 mod departures;
 mod in_air;
@@ -22,20 +22,20 @@ use departures::Departures;
 use landing::Landing;
 use with_friction::Rough;
 
-/// Phase of the proxy, with its memory.
-// The path is most of a contact's state, and there is no heap to put it on.
+/// Phase of the proxy, with the state of that phase.
+// The path is most of a contact's size, and without a heap it cannot be boxed.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 enum Phase {
     /// The HIP has not been above the surface yet.
     Unseeded,
-    /// The last tick ended free, with the proxy in the HIP.
+    /// The last tick ended free, with the proxy at the HIP.
     Free,
-    /// On a path through the air that is not at its end.
+    /// On an unfinished path through the air.
     Sweeping(Sweeping),
     /// On the surface.
     OnSurface(OnSurface),
-    /// The surface ended: the last force fades away.
+    /// The surface has ended: the last force ramps down.
     Releasing {
         proxy: GridPoint,
         displacement: Vec3,
@@ -44,22 +44,22 @@ enum Phase {
 }
 
 impl Phase {
-    /// Its name, and the phases in which a tick may end that begins in it. Nothing else begins
-    /// one but [`Contact::land`], after which a proxy that waited is on the surface.
+    /// Returns the phase's name, and the phases in which a tick that starts in it may end. Between
+    /// ticks only [`Contact::land`] changes the phase: a waiting proxy is then on the surface.
     #[cfg(test)]
     const fn exits(&self) -> (&'static str, &'static [&'static str]) {
         match self {
             // The HIP is above the surface.
             Self::Unseeded => ("unseeded", &["free"]),
-            // The path continues in the next tick; it has hit the surface; it leads under it from
-            // the side, or the HIP has leapt.
+            // Sweeping: the path continues in the next tick. On surface: it has hit the surface.
+            // Unseeded: it leads under the surface from the side, or the HIP has jumped.
             Self::Free => ("free", &["sweeping", "on surface", "unseeded"]),
-            // The same, and the path is at its end.
+            // Free: the path has reached the HIP. The others as above.
             Self::Sweeping(_) => ("sweeping", &["free", "on surface", "unseeded"]),
-            // The HIP is free; the path to it continues; the surface is lost; it has ended under the
-            // HIP, or the HIP has leapt.
+            // Free: the HIP is free. Sweeping: the path to it continues. Releasing: the surface is
+            // lost. Unseeded: the surface has ended over the HIP, or the HIP has jumped.
             Self::OnSurface(_) => ("on surface", &["free", "sweeping", "releasing", "unseeded"]),
-            // The force has faded, and the HIP is above the surface or not.
+            // The force has faded out. Free: the HIP is above the surface; otherwise unseeded.
             Self::Releasing { .. } => ("releasing", &["free", "unseeded"]),
         }
     }
@@ -68,10 +68,10 @@ impl Phase {
 #[derive(Clone, Debug)]
 struct Sweeping {
     path: Path,
-    /// The proxy had to wait for terrain, or the HIP has moved while the path was under way: the
-    /// force of the contact that follows may not come at once.
+    /// The proxy has waited for terrain, or the HIP has moved before the path ended: the force of
+    /// the next contact has to fade in.
     was_late: bool,
-    /// Fade that a hop from the surface to the surface keeps.
+    /// Fade to keep if the path leads from the surface back to it.
     fade: f32,
     departures: Departures,
 }
@@ -80,25 +80,25 @@ struct Sweeping {
 struct OnSurface {
     descent: Descent,
     leave: Leave,
-    /// Share of the force that is rendered: less than 1 at the boundary of the surface, and
-    /// while a contact comes in after a wait.
+    /// Share of the force that is rendered: less than 1 at the edge of the surface, and while a
+    /// contact fades in after a wait.
     fade: f32,
     departures: Departures,
-    /// The proxy is at rest, and the next tick may take the shortcut.
+    /// Data for the fast path of the next tick, if the proxy is at rest.
     follow: Option<Follow>,
 }
 
 /// Outcome of a tick's fast path.
 enum FastPath {
-    /// It has the answer.
+    /// The output is set.
     Taken,
-    /// It has none, but has the closest point of the patch that the proxy is on.
+    /// No output, but the closest point of the proxy's patch.
     Known(Place),
-    /// There is none.
+    /// The fast path does not apply.
     None,
 }
 
-/// Decision to continue a tick, or to end it with an answer.
+/// Decision to continue a tick, or to end it with an output.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
     GoesOn,
@@ -117,37 +117,37 @@ impl OnSurface {
     }
 }
 
-/// The proxy and what it remembers from tick to tick.
-// In this order: what every tick reads first lies within reach of its loads, which the phase
-// and what friction remembers are not.
+/// The proxy and its state between ticks.
+// Field order: fields that every tick reads come first, within the offset range of its loads. The
+// phase and the state of friction are beyond that range.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Contact {
     /// The HIP of the last tick.
     hip: GridPoint,
     output: ContactOutput,
-    /// The last answer is the answer again while the HIP has not moved: there
-    /// is nothing left to do, and no force is fading. (A field does not change;
-    /// another one comes with a new contact.)
+    /// True if the output stays the same while the HIP does not move: no work is left, and no force
+    /// fades. (Another field gets a new contact; [`Contact::surface_moved`] clears this.)
     at_rest: bool,
     settings: ContactSettings,
     phase: Phase,
-    /// The last answer: where the proxy was, and the displacement to it, if it touched.
+    /// Position and displacement of the proxy in the last output, if it touched.
     touched: Option<(GridPoint, Vec3)>,
-    /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
+    /// Start of the proxy on the surface after a change of placement, until the terrain there
+    /// arrives.
     landing: Option<Landing>,
-    /// Memory of friction, where the surface has some.
+    /// State of friction, if the surface has any.
     rough: Option<Rough>,
 }
 
 impl Contact {
-    /// A contact that waits to see the HIP above the surface.
+    /// Creates a contact that waits until the HIP is above the surface.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
         let rough = Rough::on(settings.friction);
         let is_smooth = rough.is_none();
         Self {
-            // A proxy that is held back does not follow the HIP.
+            // With friction the proxy does not follow the HIP.
             settings: ContactSettings {
                 fast_paths: settings.fast_paths && is_smooth,
                 ..settings
@@ -162,26 +162,26 @@ impl Contact {
         }
     }
 
-    /// The last tick's answer.
+    /// Returns the output of the last tick.
     #[must_use]
     pub const fn output(&self) -> &ContactOutput {
         &self.output
     }
 
-    /// The last step's answer was not rendered, because the next step continues it for the same
-    /// HIP: the last rendered answer is still the one `before` it.
+    /// Restores `before` as the last rendered output. The output of the last step was not rendered,
+    /// because the next step continues it for the same HIP.
     pub const fn resume(&mut self, before: &ContactOutput) {
         (self.output.state, self.output.proxy) = (before.state, before.proxy);
         self.output.displacement = before.displacement;
     }
 
-    /// The HIP of the last tick.
+    /// Returns the HIP of the last tick.
     pub(crate) const fn hip(&self) -> &GridPoint {
         &self.hip
     }
 
-    /// Share of the force: less than 1 where it fades at the edge of
-    /// the surface, or comes in after a wait.
+    /// Returns the share of the force: less than 1 while it fades at the edge of the surface, or
+    /// fades in after a wait.
     #[must_use]
     pub const fn edge_fade(&self) -> f32 {
         match &self.phase {
@@ -192,7 +192,7 @@ impl Contact {
         }
     }
 
-    /// The patch the proxy is on, while touching.
+    /// Returns the patch under the proxy, while it touches.
     #[must_use]
     pub const fn patch(&self) -> Option<Cell> {
         match &self.phase {
@@ -201,26 +201,26 @@ impl Contact {
         }
     }
 
-    /// The surface moves under the contact by a little: the next [`Self::step`] takes nothing that
-    /// was known of it for granted, also where the HIP has not moved. A free HIP that the
-    /// surface has passed touches it from then on, as deep as the surface went beyond it.
+    /// Prepares the contact for a surface that has moved a little: the next [`Self::step`] computes
+    /// the proxy again, even if the HIP has not moved. A free HIP that the surface has passed then
+    /// touches it, as deep as the surface has moved beyond it.
     #[inline(never)]
     pub fn surface_moved<const D: usize>(&mut self, window: &Window<'_, D>) {
         self.at_rest = false;
         if self.rough.is_some() {
             return;
         }
-        // No work is done before the next step.
+        // The work is done in the next step.
         self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
-    /// Sets the friction from the next step on. A proxy that was held is tested again.
+    /// Sets the friction from the next step on. That step tests a held proxy again.
     pub(crate) fn set_friction(&mut self, friction: Friction) {
         if let Some(rough) = &mut self.rough {
             self.at_rest &= !rough.takes(friction);
         } else if !friction.is_none() {
             self.rough = Rough::on(friction);
-            // A proxy that is held back does not follow the HIP.
+            // With friction the proxy does not follow the HIP.
             self.settings.fast_paths = false;
             self.at_rest = false;
             if let Phase::OnSurface(on) = &mut self.phase
@@ -231,12 +231,12 @@ impl Contact {
         }
     }
 
-    /// Moves the proxy for a HIP, in at most [`super::WORK_PER_TICK`] units of work.
+    /// Moves the proxy for a HIP, with at most [`super::WORK_PER_TICK`] work units.
     ///
-    /// The HIP is in cells: x east, y north, z up, the origin at the south-west sample
-    /// at height zero. How near the proxy is to the surface's closest point is in
-    /// `docs/explanation/contact.md`, and the soak judges it in every tick. The answer is finite
-    /// whatever the terrain.
+    /// The HIP is in cells: x east, y north, z up, the origin at the south-west sample at height
+    /// zero. The maximum distance between the proxy and the surface's closest point is in
+    /// `docs/explanation/contact.md`; the randomised stress test checks it in every tick. The
+    /// output is finite for any terrain.
     ///
     /// ```
     /// use hapterra_core::Vec3;
@@ -275,7 +275,7 @@ impl Contact {
         &self.output
     }
 
-    /// Answers as [`Self::step_in_full`] would, or changes nothing.
+    /// Sets the output that [`Self::step_in_full`] would set, or changes nothing.
     #[inline]
     fn take_fast_path<const D: usize>(
         &mut self,
@@ -309,8 +309,8 @@ impl Contact {
         }
     }
 
-    /// A tick without shortcuts. Of a proxy on the surface the `known` closest point of
-    /// its patch, if there is one, was found by the shortcut that was not taken.
+    /// Runs a tick without the fast path. `known` is the closest point of the proxy's patch, if the
+    /// fast path has computed it.
     #[inline(never)]
     fn step_in_full<const D: usize>(
         &mut self,
@@ -319,7 +319,7 @@ impl Contact {
         known: Option<Place>,
     ) {
         if self.rough.is_some() {
-            // Nothing was known: with friction no shortcut is taken.
+            // `known` is `None`: there is no fast path with friction.
             return self.step_on_rough_ground(window, hip);
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
@@ -328,14 +328,13 @@ impl Contact {
         if !hip.is_same(&self.hip) {
             self.redirect(window, hip, known, &mut budget);
         }
-        // Bounded by the budget: of the turns that follow one another without work,
-        // none returns to the one before.
+        // Bounded by the budget: a series of turns without work never returns to the turn before.
         while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
         self.ends(&budget);
     }
 
-    /// No arm moves by more than a window in a tick: a HIP that does begins anew.
+    /// Resets the contact if the HIP has moved by more than a window, which no arm does in a tick.
     fn gives_up_beyond_window<const D: usize>(&mut self, hip: &GridPoint) {
         let (from, to) = (self.hip.column(), hip.column());
         let way = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y));
@@ -344,7 +343,7 @@ impl Contact {
         }
     }
 
-    /// The end of a tick.
+    /// Ends a tick: stores its work, its missing tile and whether the proxy is at rest.
     fn ends(&mut self, budget: &Budget) {
         self.output.work = budget.spent();
         self.output.missing_tile = budget.missing();
@@ -364,7 +363,7 @@ impl Contact {
         self.touched = touched.then_some((*proxy, *displacement));
     }
 
-    /// The HIP has moved: a way under way now leads to its new place.
+    /// Redirects a path or a descent to the new position of the HIP.
     fn redirect<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -373,7 +372,7 @@ impl Contact {
         budget: &mut Budget,
     ) {
         match &mut self.phase {
-            // Its departures count on: it may return to where it left.
+            // The departures still count: the proxy may return to the point where it left.
             Phase::Sweeping(sweeping) => {
                 sweeping.path.redirect(hip);
                 sweeping.was_late = true;
@@ -397,8 +396,8 @@ impl Contact {
         }
     }
 
-    /// One step of what the proxy does. All but the usual ones are calls: the loop around
-    /// would set up 70 registers and addresses for them in every tick.
+    /// Runs one step of the current phase. The rare ones are calls: inlined, they would make the
+    /// loop set up 70 registers and addresses in every tick.
     fn turn<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -414,7 +413,7 @@ impl Contact {
         }
     }
 
-    /// The tick ends with this answer.
+    /// Sets the output and ends the tick.
     #[inline]
     fn answers(&mut self, output: ContactOutput) -> Turn {
         self.output = output;

@@ -8,7 +8,7 @@ use crate::contact::{Contact, Friction};
 use crate::scalar::root;
 use crate::terrain::{TileIndex, Window};
 
-/// The effects of a scene that has some.
+/// The effects of a scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effects {
     shader: Option<Shader>,
@@ -19,7 +19,7 @@ pub(crate) struct Effects {
 }
 
 impl Effects {
-    /// Of a scene without materials.
+    /// Creates the effects of a scene without materials; `None` if it has no effects.
     #[inline(never)]
     pub(crate) fn of(params: &SurfaceParams, context: &EffectContext) -> Option<Self> {
         let shader = Shader::of(params.shading);
@@ -35,7 +35,7 @@ impl Effects {
         })
     }
 
-    /// Of a scene with materials.
+    /// Creates the effects of a scene with materials.
     #[inline(never)]
     pub(crate) fn with_materials(
         table: &MaterialTable,
@@ -73,7 +73,8 @@ impl Effects {
         }
     }
 
-    /// The contact's displacement, turned by shading, as far as the controller lets it.
+    /// Returns the contact's displacement, turned by shading as far as the passivity controller
+    /// allows.
     fn shaded<const D: usize>(&mut self, window: &Window<'_, D>, contact: &Contact) -> Vec3 {
         let plain = contact.output().displacement;
         let Some(shader) = &mut self.shader else {
@@ -90,7 +91,7 @@ impl Effects {
         }
         let between = plain + (shaded - plain) * left;
         let squared = between.length_squared();
-        // At most 60° lie between the two, so it is no less than half as long.
+        // The two are at most 60° apart, so `between` is at least half as long as they are.
         if squared.is_normal() {
             between * root(size / squared)
         } else {
@@ -98,8 +99,8 @@ impl Effects {
         }
     }
 
-    /// The same on a material: it may be another one than in the tick before.
-    // Apart, so that scenes without materials have nothing of it.
+    /// Returns the displacement on a material, which may have changed since the last tick.
+    // Not inlined: scenes without materials do not need it.
     #[cold]
     #[inline(never)]
     fn on_material<const D: usize>(
@@ -125,7 +126,7 @@ impl Effects {
         }
     }
 
-    /// The rendered surface parameters, if they differ from the scene's.
+    /// Returns the rendered surface parameters: the material's, otherwise the scene's.
     pub(crate) fn params<'l>(&'l self, of_scene: &'l SurfaceParams) -> &'l SurfaceParams {
         self.material
             .as_ref()
@@ -137,7 +138,7 @@ impl Effects {
         self.material.as_ref().map(ActiveMaterial::friction)
     }
 
-    /// A tile without which the last displacement is not that of the whole terrain.
+    /// Returns a tile that was missing for the last displacement, if any.
     pub(crate) fn missing(&self) -> Option<TileIndex> {
         self.shader.as_ref().and_then(Shader::missing)
     }

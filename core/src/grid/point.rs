@@ -16,7 +16,7 @@ pub struct GridPoint {
 }
 
 impl GridPoint {
-    /// The point `offset` cells away from the lower corner of `cell`.
+    /// Creates the point `offset` cells away from the lower corner of `cell`.
     ///
     /// `offset` may lie outside `[0, 1)`; whole cells are carried over. A
     /// component that is not a number counts as zero, and cells are clamped to
@@ -32,8 +32,8 @@ impl GridPoint {
         }
     }
 
-    /// The point `height` cells above the cell's floor, at a place in `[0, 1)`
-    /// over it: [`Self::new`] where only the height may carry.
+    /// Creates the point `height` cells above the cell's floor, at a place in `[0, 1)` over it:
+    /// [`Self::new`] if only the height can carry over.
     #[inline]
     pub(crate) fn over([x, y, z]: [i32; 3], [u, v]: [f32; 2], height: f32) -> Self {
         let (z, fz) = if (0.0..1.0).contains(&height) {
@@ -47,19 +47,19 @@ impl GridPoint {
         }
     }
 
-    /// The point again, made valid whatever bits it came from (the wire).
+    /// Returns a valid point for any bits, such as those of a received message.
     #[must_use]
     pub fn normalised(self) -> Self {
         Self::new(self.cell, self.frac())
     }
 
-    /// The cell that holds the point: east, north and up.
+    /// Returns the cell that contains the point: east, north and up.
     #[must_use]
     pub const fn cell(&self) -> [i32; 3] {
         self.cell
     }
 
-    /// The cell's column and row: which patch the point is over or under.
+    /// Returns the cell's column and row: the patch over or under the point.
     #[must_use]
     pub const fn column(&self) -> Cell {
         Cell::new(self.cell[0], self.cell[1])
@@ -78,9 +78,9 @@ impl GridPoint {
         Vec3::from_array(self.frac)
     }
 
-    /// The displacement in cells from this point to `other`.
+    /// Returns the displacement in cells from this point to `other`.
     ///
-    /// Within 2⁻²⁴ cell, or half an ulp of the result where that is more.
+    /// Exact to 2⁻²⁴ cell, or to half an ulp of the result if that is more.
     #[must_use]
     pub fn to(&self, other: &Self) -> Vec3 {
         let part = other.frac() - self.frac();
@@ -91,7 +91,7 @@ impl GridPoint {
         )
     }
 
-    /// The point in cells relative to the lower corner of `cell`.
+    /// Returns the point in cells relative to the lower corner of `cell`.
     #[must_use]
     pub fn relative_to(&self, cell: [i32; 3]) -> Vec3 {
         Vec3::new(
@@ -101,7 +101,7 @@ impl GridPoint {
         )
     }
 
-    /// The point half-way to `other`, exact to 2⁻²⁴ cell at any distance.
+    /// Returns the point half-way to `other`, exact to 2⁻²⁴ cell at any distance.
     #[must_use]
     pub fn midpoint(&self, other: &Self) -> Self {
         let (x, fx) = half(self.cell[0], other.cell[0], self.frac[0] + other.frac[0]);
@@ -118,10 +118,9 @@ impl GridPoint {
         here < there || (here == there && self.frac[2] < other.frac[2])
     }
 
-    /// Returns true if this is `other`, bit for bit.
+    /// Returns true if both points have the same bits.
     ///
-    /// Every tick of a HIP at rest asks it, so it is written in a way that does not
-    /// become a call of `memcmp`.
+    /// Every tick of a HIP at rest calls it, so it avoids a call of `memcmp`.
     #[must_use]
     #[inline]
     pub fn is_same(&self, other: &Self) -> bool {
@@ -132,7 +131,7 @@ impl GridPoint {
         };
         let ([a, b, c, d, e, f], [g, h, i, j, k, l]) = (bits(self), bits(other));
         if cfg!(target_pointer_width = "64") {
-            // Two by two: a register holds both.
+            // In pairs: a register holds two words.
             let pair = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
             (pair(a, b) ^ pair(g, h)) | (pair(c, d) ^ pair(i, j)) | (pair(e, f) ^ pair(k, l)) == 0
         } else {
@@ -141,21 +140,20 @@ impl GridPoint {
     }
 }
 
-/// Cells that a place may be away from its cell for the quick way: far fewer than
-/// would bring a cell out of range back into it.
+/// Maximum offset of the fast path, cells: far too small to bring an out-of-range cell back into
+/// range.
 const NEAR: f32 = 1e6;
 
 /// `cell + offset` with the whole cells of `offset` carried over.
 ///
-/// Truncation stands in for `floor`, which the Cortex-M4F has no instruction
-/// for; the two corrections make it one.
+/// Truncation with two corrections replaces `floor`, for which the Cortex-M4F has no instruction.
 #[inline]
 fn carry(cell: i32, offset: f32) -> (i32, f32) {
-    // Nearly always: a place in its own patch.
+    // The usual case: a place in its own patch.
     if (0.0..1.0).contains(&offset) {
         return (cell.clamp(-MAX_CELL, MAX_CELL), offset);
     }
-    // Next often: a few cells away. Then nothing has to be bounded on the way.
+    // The next most frequent case: a few cells away, where nothing has to saturate.
     if offset.abs() < NEAR {
         let whole = offset as i32;
         let floor = whole - i32::from(offset < whole as f32);
@@ -169,7 +167,7 @@ fn carry(cell: i32, offset: f32) -> (i32, f32) {
     carry_far(cell, offset)
 }
 
-/// The same for anything at all.
+/// Carries any offset over.
 #[cold]
 fn carry_far(cell: i32, offset: f32) -> (i32, f32) {
     let whole = offset as i32;

@@ -12,9 +12,9 @@ bitflags! {
         const NO_CALIBRATION = 1 << 0;
         /// The arm has not been put into its zero pose since power-up.
         const NOT_ZEROED = 1 << 1;
-        /// There is nothing to feel.
+        /// No scene is loaded.
         const NO_SCENE = 1 << 2;
-        /// The scene is a replay: it is fed by points, not by the arm.
+        /// The scene is a replay: the HIP follows points of the host, not the arm.
         const REPLAY = 1 << 3;
         /// A fault is latched.
         const FAULT_LATCHED = 1 << 4;
@@ -26,16 +26,15 @@ bitflags! {
         const OUTSIDE_LIMITS = 1 << 7;
         /// The watchdog is not being fed.
         const WATCHDOG_NOT_LIVE = 1 << 8;
-        /// The host has not asked to arm, or has asked to disarm.
+        /// The host has not requested arming, or has requested disarming.
         const HOST_DISARMED = 1 << 9;
-        /// The dead-man switch was held when arming was asked for: it has to
-        /// be let go first.
+        /// The dead-man switch was held when arming was requested: it must be released first.
         const DEAD_MAN_STILL_HELD = 1 << 10;
         /// The dead-man switch is not held.
         const DEAD_MAN_RELEASED = 1 << 11;
-        /// The force that would be made now is not small yet.
+        /// The force must be small before arming, and is not.
         const FORCE_TOO_LARGE = 1 << 12;
-        /// An amplifier says that it is not ready, or its wire is broken.
+        /// An amplifier reports that it is not ready, or its ready line is broken.
         const AMPLIFIER_NOT_READY = 1 << 13;
         /// A converter's settings do not read back as they were written.
         const OUTPUTS_NOT_AS_SET = 1 << 14;
@@ -46,33 +45,33 @@ bitflags! {
     /// Reasons for a force below that of the scene. The bits are stable.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Limits: u16 {
-        /// The force was longer than the device may make.
+        /// The force was above the device's limit.
         const FORCE_CLAMPED = 1 << 0;
-        /// The force wanted to change faster than a hand could make it.
+        /// The force would have changed faster than its rate limit.
         const SLEW_LIMITED = 1 << 1;
         /// A motor current was above its peak.
         const CURRENT_LIMITED = 1 << 2;
-        /// A warm motor may have less than its peak, and it wanted more.
+        /// The current of a warm motor was above its derated limit.
         const THERMAL_DERATED = 1 << 3;
         /// The tip moves faster than the speed limit.
         const SPEED_LIMITED = 1 << 4;
-        /// Force is still coming in after arming.
+        /// The force ramps up after arming.
         const RAMPING = 1 << 5;
-        /// Force is going out before disarming.
+        /// The force ramps down before disarming.
         const FADING = 1 << 6;
-        /// Terrain that might be rendered here is not on the device yet.
+        /// A tile that may be needed here has not arrived yet.
         const TERRAIN_MISSING = 1 << 7;
         /// The force ramps down at the edge of the surface, or up after a wait.
         const EDGE_FADING = 1 << 8;
         /// The clutch is open: there is no force, and the HIP stays where it is over the terrain.
         const CLUTCH_OPEN = 1 << 9;
-        /// The clutch opens or closes: the force goes out, or comes in again.
+        /// The clutch opens or closes: the force ramps down, or up again.
         const CLUTCH_MOVES = 1 << 10;
         /// The clutch is held by the board's clutch input.
         const CLUTCH_INPUT = 1 << 11;
         /// Damping dissipates the energy leak of the sampled wall.
         const ENERGY_DISSIPATED = 1 << 12;
-        /// The ground under the proxy is coarser than the scene's level, or moves from there to it.
+        /// The surface under the proxy is the coarse fallback, or blends from it to the tile.
         const TERRAIN_COARSE = 1 << 13;
     }
 }
@@ -84,7 +83,7 @@ impl Blockers {
         .union(Self::DEAD_MAN_RELEASED)
         .union(Self::FORCE_TOO_LARGE);
 
-    /// The set bits one by one with what each means, and what to do.
+    /// Returns the name of each set bit, with its meaning and remedy.
     pub fn meanings(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
@@ -121,12 +120,12 @@ impl Blockers {
 }
 
 impl Limits {
-    /// The set bits one by one with what each means.
+    /// Returns the name and meaning of each set bit.
     pub fn meanings(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
 
-    /// Returns the meaning of one bit; of the lowest where there are more.
+    /// Returns the meaning of the lowest set bit.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());

@@ -1,8 +1,8 @@
-//! The fallback: a coarse image of all that the arm reaches, rendered where a tile is missing.
+//! The fallback: a coarse copy of the terrain in the arm's reach, rendered where a tile is missing.
 //!
-//! It is a wide tile under all of the reach and, within it, a near one of finer samples around the
-//! home pose, where the hand is most of the time. Where both are, the near one is rendered. The host
-//! makes the samples on its border those of the wide one, where that has some, so there is no
+//! It has a wide tile under the whole reach and a near one with finer samples around the home pose,
+//! where the hand is most of the time. Where both exist, the near one is rendered. The host sets
+//! the samples on its border to the heights of the wide one, where that has any, so there is no
 //! step between them.
 
 use serde::{Deserialize, Serialize};
@@ -17,20 +17,20 @@ use crate::scalar::{larger, smaller};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fallback {
-    /// Under all that the arm reaches.
+    /// Tile under the whole reach of the arm.
     pub wide: CoarseTile,
-    /// The finer one around the home pose, if there is one.
+    /// Finer tile around the home pose, if any.
     pub near: Option<CoarseTile>,
 }
 
-/// Tiles of a fallback, at most.
+/// Maximum number of tiles of a fallback.
 pub(super) const PARTS: usize = 2;
 
 impl Fallback {
-    /// Returns true if it is one that the loop can work with, in a scene of this level.
+    /// Returns true if the fallback is valid in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
-        // Otherwise two tiles would have one name.
+        // Otherwise two tiles would have one key.
         let is_finer = |near: CoarseTile| near.shift < self.wide.shift;
         let mut parts = self.parts().into_iter().flatten();
         self.near.is_none_or(is_finer) && parts.all(|part| part.is_valid(level))
@@ -40,18 +40,18 @@ impl Fallback {
         [Some(self.wide), self.near]
     }
 
-    /// The names of its tiles on the link, in a scene of this level.
+    /// Returns the keys of its tiles on the link, in a scene of this level.
     #[must_use]
     pub fn keys(&self, level: u8) -> [Option<TileKey>; PARTS] {
         self.parts().map(|part| part.map(|part| part.key(level)))
     }
 }
 
-/// The fallback of a window: where it lies, and the tiles of it that have come.
+/// The fallback of a window: its place, and its tiles that have arrived.
 pub(super) struct Laid<'t> {
-    /// Its place, if the scene has one.
+    /// Place of the fallback, if the scene has one.
     place: Option<Fallback>,
-    /// The tiles, once they have come; or their buffers.
+    /// The tiles that have arrived, or their vacant buffers.
     tiles: [Option<&'t mut Tile>; PARTS],
 }
 
@@ -61,7 +61,7 @@ impl<'t> Laid<'t> {
         tiles: [const { None }; PARTS],
     };
 
-    /// Takes another place. The buffers of the tiles before are kept for those of this one.
+    /// Sets another place. The buffers of the previous tiles are kept for the new ones.
     pub(super) fn lay(&mut self, place: Option<Fallback>) {
         self.place = place;
         for tile in self.tiles.iter_mut().flatten() {
@@ -73,7 +73,7 @@ impl<'t> Laid<'t> {
         self.place.is_some()
     }
 
-    /// Gives back a buffer of a tile that there is not to be any more.
+    /// Returns a buffer that the fallback no longer needs, if any.
     pub(super) fn take_spare(&mut self) -> Option<&'t mut Tile> {
         let parts = self.place.map_or([None; PARTS], |place| place.parts());
         let mut kept = parts.iter().zip(&mut self.tiles);
@@ -83,13 +83,13 @@ impl<'t> Laid<'t> {
         })
     }
 
-    /// Returns the place in it of a tile of this name, in a scene of this level.
+    /// Returns the index in `tiles` of the tile with this key, in a scene of this level.
     pub(super) fn part(&self, key: Option<TileKey>, level: u8) -> Option<usize> {
         let keys = self.place?.keys(level);
         key.and_then(|_| keys.into_iter().position(|part| part == key))
     }
 
-    /// Puts a tile where it belongs, and gives back the buffer that was there.
+    /// Stores a tile, and returns the replaced buffer.
     pub(super) fn put(&mut self, part: usize, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let Some(kept) = self.tiles.get_mut(part) else {
             return Some(tile);
@@ -99,8 +99,8 @@ impl<'t> Laid<'t> {
         Some(spent)
     }
 
-    /// The fallback, once all of it has come. A part alone is not rendered: the surface would
-    /// move at once when the other comes.
+    /// Returns the fallback once all its tiles have arrived. One tile alone is not rendered: the
+    /// surface would jump when the other arrives.
     pub(super) fn loaded(&self) -> Option<Coarse<'_>> {
         let place = self.place?;
         let [wide, near] = &self.tiles;
@@ -115,25 +115,25 @@ impl<'t> Laid<'t> {
     }
 }
 
-/// The tile in a buffer, where there is one.
+/// Returns the tile in a buffer, if any.
 fn come<'w>(buffer: &'w Option<&mut Tile>) -> Option<&'w Tile> {
     buffer.as_deref().filter(|tile| tile.key().is_some())
 }
 
-/// A fallback that has come.
+/// A fallback whose tiles have all arrived.
 pub(super) struct Coarse<'w> {
     wide: (CoarseTile, &'w Tile),
     near: Option<(CoarseTile, &'w Tile)>,
 }
 
 impl Coarse<'_> {
-    /// A whole height in cells that its heights are near.
+    /// Returns the base height of the wide tile, whole cells.
     pub(super) fn base(&self) -> i32 {
         self.wide.1.base()
     }
 
-    /// The height at a sample of the scene's level, in cells above `base`; NaN beyond it and where
-    /// a corner that counts is a hole.
+    /// Returns the height at a sample of the scene's level, in cells above `base`; NaN beyond the
+    /// fallback, and where a corner that counts has no data.
     #[inline(never)]
     fn height(&self, sample: Cell, base: i32) -> f32 {
         let of = |(place, tile): &(CoarseTile, &Tile)| {
@@ -144,7 +144,7 @@ impl Coarse<'_> {
         near.or_else(|| of(&self.wide)).unwrap_or(f32::NAN)
     }
 
-    /// The same at the corners of a cell, in the order of [`Tile::corners`].
+    /// Returns the heights at the corners of a cell, in the order of [`Tile::corners`].
     pub(super) fn corners(&self, cell: Cell, base: i32) -> [f32; 4] {
         let [is_over_near, touches_near] = match &self.near {
             Some((near, _)) => near.reaches(cell),
@@ -164,7 +164,7 @@ impl Coarse<'_> {
         self.corners_by_samples(cell, base)
     }
 
-    /// The same on borders and beside holes.
+    /// Returns the heights at the corners of a cell on a border or beside no-data.
     #[cold]
     #[inline(never)]
     fn corners_by_samples(&self, cell: Cell, base: i32) -> [f32; 4] {
@@ -175,8 +175,8 @@ impl Coarse<'_> {
         heights
     }
 
-    /// Lowest and highest over a tile of the scene's level, in cells above `base`; `None`
-    /// where nothing is known there.
+    /// Returns the lowest and highest height over a tile of the scene's level, in cells above
+    /// `base`; `None` if there is none.
     pub(super) fn range_over(&self, index: TileIndex, base: i32) -> Option<[f32; 2]> {
         let of = |(place, tile): &(CoarseTile, &Tile)| {
             let up = tile.base().wrapping_sub(base) as f32;
@@ -191,12 +191,12 @@ impl Coarse<'_> {
         Some([smaller(low, near[0]), larger(high, near[1])])
     }
 
-    /// Returns true if all of it is known to lie below `low`.
+    /// Returns true if all heights are below `low`.
     pub(super) fn is_below(&self, low: Altitude) -> bool {
         self.tiles().all(|tile| tile.is_below(low))
     }
 
-    /// Returns true if it has heights all over a tile of the scene's level.
+    /// Returns true if the fallback has a height everywhere over a tile of the scene's level.
     pub(super) fn covers(&self, index: TileIndex) -> bool {
         self.wide.0.covers(index) && self.tiles().all(Tile::is_whole)
     }

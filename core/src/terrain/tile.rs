@@ -8,11 +8,11 @@ use crate::grid::{Altitude, Cell, MAX_CELL};
 const BLOCKS: usize = TILE_CELLS >> BLOCK_SHIFT;
 const QUARTERS: usize = BLOCKS / 2;
 
-/// Most by which neighbouring samples may differ, cells: a wall of this height is all but
-/// vertical to a hand, and up to it the contact is exact.
+/// Maximum difference of neighbouring samples, cells: to a hand, a wall of this height is
+/// practically vertical, and the contact is exact up to it.
 pub const MAX_STEP_CELLS: f32 = 1e4;
 
-/// Reason for which the bytes of a tile were refused. The buffer is left vacant.
+/// Reason to refuse the data of a tile. The buffer is left vacant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TileError {
@@ -20,7 +20,7 @@ pub enum TileError {
     Length,
     /// The base lies outside ±[`MAX_CELL`].
     Base,
-    /// No packed heights of 33 × 33 samples, or more than these.
+    /// Not the packed heights of exactly 33 × 33 samples.
     Packed,
     /// Not 33 × 33 materials of the scene's table.
     Materials,
@@ -33,21 +33,20 @@ pub enum TileError {
 enum Content {
     /// No tile.
     Nothing,
-    /// A tile that is not the surface, or not yet.
+    /// A tile that is part of the fallback, or that is not rendered unchanged yet.
     Tile,
-    /// A tile that is the surface as it is.
+    /// A tile that is rendered unchanged.
     Surface,
 }
 
-/// One buffer of the window: 33 × 33 heights and their block maxima, and room for the materials
-/// of as many samples.
+/// One buffer of the window: 33 × 33 heights, their block maxima, and a material for each sample.
 #[derive(Clone, Debug)]
 pub struct Tile {
-    // Key and content lie side by side: a tick looks at both for each patch.
+    // Key and content are adjacent: a tick reads both for each patch.
     index: TileIndex,
     level: u8,
     content: Content,
-    /// No sample is a hole.
+    /// True if every sample has data.
     is_whole: bool,
     base: i32,
     /// Heights above `base` in cells, `[row][column]` from the south-west;
@@ -57,15 +56,15 @@ pub struct Tile {
     quarters: [[f32; QUARTERS]; QUARTERS],
     highest: f32,
     lowest: f32,
-    /// The tile came with materials.
+    /// True if the tile has materials.
     has_materials: bool,
-    /// Which material of the scene's table each sample has, as `posts`; not looked at
-    /// unless the tile came with them.
+    /// For each sample, in the order of `posts`, its index in the scene's table of materials; valid
+    /// only if `has_materials`.
     materials: [[u8; TILE_SAMPLES]; TILE_SAMPLES],
 }
 
 impl Tile {
-    /// A buffer that holds no tile.
+    /// A buffer without a tile.
     pub const VACANT: Self = Self {
         index: TileIndex::new(0, 0),
         level: 0,
@@ -81,7 +80,7 @@ impl Tile {
         materials: [[0; TILE_SAMPLES]; TILE_SAMPLES],
     };
 
-    /// Which tile this is; `None` for a vacant buffer.
+    /// Returns the tile's key; `None` for a vacant buffer.
     #[must_use]
     pub const fn key(&self) -> Option<TileKey> {
         match self.content {
@@ -93,18 +92,18 @@ impl Tile {
         }
     }
 
-    /// Forgets the tile; the buffer can be filled again.
+    /// Discards the tile; the buffer can be filled again.
     pub const fn vacate(&mut self) {
         self.content = Content::Nothing;
         self.has_materials = false;
     }
 
-    /// Says which material of the scene's table each sample of a filled tile has, by rows from
-    /// the south.
+    /// Sets the material of each sample of a filled tile, as an index in the scene's table, by rows
+    /// from the south.
     ///
     /// # Errors
-    /// [`TileError::Materials`] unless there are exactly 33 × 33 of them, each below `count`. The
-    /// buffer is left vacant, as where it was vacant before.
+    /// [`TileError::Materials`] unless the buffer was filled and there are exactly 33 × 33 of them,
+    /// each below `count`. On an error the buffer is left vacant.
     pub fn set_materials(
         &mut self,
         count: usize,
@@ -113,7 +112,7 @@ impl Tile {
         self.set_materials_from(count, &mut materials.into_iter())
     }
 
-    /// The same, once in an image.
+    /// [`Self::set_materials`] without generics: an image contains it once.
     #[inline(never)]
     fn set_materials_from(
         &mut self,
@@ -122,7 +121,7 @@ impl Tile {
     ) -> Result<(), TileError> {
         let mut is_right = self.content != Content::Nothing;
         for place in self.materials.as_flattened_mut() {
-            // One that is missing is beyond every table.
+            // A missing index becomes one beyond every table.
             *place = materials.next().unwrap_or(u8::MAX);
             is_right &= usize::from(*place) < count;
         }
@@ -134,8 +133,8 @@ impl Tile {
         Ok(())
     }
 
-    /// Which material of the scene's table the sample has that is so many east and north of the
-    /// south-west one of a patch, 0 or 1 each; `None` where the tile came without materials.
+    /// Returns the material of a sample, as an index in the scene's table. `east` and `north`, 0 or
+    /// 1, count from the south-west corner of a patch. `None` if the tile has no materials.
     pub(crate) fn material(&self, patch: Cell, [east, north]: [usize; 2]) -> Option<u8> {
         let [u, v] = within(patch);
         let row = self.materials.get(v + north)?;
@@ -143,24 +142,24 @@ impl Tile {
         self.has_materials.then_some(*material)
     }
 
-    /// Returns true if it is the surface over the patches of a tile of its level.
+    /// Returns true if this is the tile at `index`, and is rendered unchanged.
     #[inline]
     pub(super) fn is_surface_of(&self, index: TileIndex) -> bool {
         self.index == index && self.content == Content::Surface
     }
 
-    /// From now on the tile is the surface, as it is.
+    /// Marks the tile as rendered unchanged.
     pub(super) fn become_surface(&mut self) {
         if self.content == Content::Tile {
             self.content = Content::Surface;
         }
     }
 
-    /// Fills the buffer from heights in cells above `base`, given by column
-    /// and row in `0..33`. NaN is a hole; so is anything beyond ±[`MAX_CELL`].
+    /// Fills the buffer from heights in cells above `base`, given by column and row in `0..33`. NaN
+    /// is no-data; so is any height beyond ±[`MAX_CELL`].
     ///
     /// # Errors
-    /// [`TileError::Base`] when `base` is out of range, [`TileError::Step`] when it is too steep.
+    /// [`TileError::Base`] if `base` is out of range, [`TileError::Step`] if the tile is too steep.
     pub fn fill(
         &mut self,
         key: TileKey,
@@ -170,7 +169,7 @@ impl Tile {
         self.fill_with(key, base, &mut height)
     }
 
-    /// The same, once in an image however many functions tiles are filled from.
+    /// [`Self::fill`] without generics: an image contains it once.
     #[inline(never)]
     fn fill_with(
         &mut self,
@@ -196,7 +195,7 @@ impl Tile {
 
     /// Returns true if no neighbouring samples differ by more than [`MAX_STEP_CELLS`].
     pub(super) fn is_climbable(&self) -> bool {
-        // A hole has no step.
+        // NaN (no-data) makes no step.
         let steps = |a: f32, b: f32| (a - b).abs() > MAX_STEP_CELLS;
         let in_row = |row: &[f32; TILE_SAMPLES]| {
             let next = row.iter().skip(1);
@@ -214,7 +213,7 @@ impl Tile {
                 .any(|(south, north)| between(south, north))
     }
 
-    /// Forgets the tile, and makes every sample a hole.
+    /// Discards the tile, and sets every sample to no-data.
     pub(super) fn clear(&mut self) {
         self.vacate();
         self.posts = [[f32::NAN; TILE_SAMPLES]; TILE_SAMPLES];
@@ -228,7 +227,7 @@ impl Tile {
         }
     }
 
-    /// Makes a tile of the samples that were set.
+    /// Completes a tile from the samples that were set.
     pub(super) fn close(&mut self, key: TileKey, base: i32) {
         self.base = base;
         self.measure();
@@ -236,8 +235,8 @@ impl Tile {
         self.content = Content::Tile;
     }
 
-    /// Fills the buffer from a function of a sample's column and row in the whole
-    /// field, heights in cells above `base`; beyond the field there are holes.
+    /// Fills the buffer from a function of a sample's column and row in the whole field, heights in
+    /// cells above `base`; beyond the field the samples are no-data.
     ///
     /// # Errors
     /// As [`Self::fill`].
@@ -275,8 +274,7 @@ impl Tile {
         })
     }
 
-    /// Fills the buffer from [packed](super::packed) heights. The samples need no other
-    /// buffer.
+    /// Fills the buffer from [packed](super::packed) heights, without a second buffer.
     ///
     /// # Errors
     /// [`TileError::Packed`] unless the bytes are the packed heights of a tile, and no more.
@@ -291,14 +289,14 @@ impl Tile {
         Ok(())
     }
 
-    /// The integer height, in cells, that [`Self::corners`] counts from.
+    /// Returns the whole height, in cells, to which [`Self::corners`] is relative.
     #[must_use]
     pub const fn base(&self) -> i32 {
         self.base
     }
 
-    /// Heights above the base at the corners of a patch, whose column and row
-    /// are taken modulo 32: south-west, south-east, north-west, north-east.
+    /// Returns the heights above the base at the corners of a patch, whose column and row are taken
+    /// modulo 32: south-west, south-east, north-west, north-east.
     #[must_use]
     #[inline]
     pub fn corners(&self, cell: Cell) -> [f32; 4] {
@@ -307,9 +305,8 @@ impl Tile {
         [south[u], south[u + 1], north[u], north[u + 1]]
     }
 
-    /// Returns true if `low` is above the corners of the patches in the columns and rows
-    /// from `from` to `to` (taken modulo 32), at most two each way. NaN samples do
-    /// not count.
+    /// Returns true if `low` is above the corners of the patches in the columns and rows from
+    /// `from` to `to` (taken modulo 32), at most two in each direction. NaN samples do not count.
     #[must_use]
     #[inline]
     pub(super) fn is_below_around(&self, from: Cell, to: Cell, low: Altitude) -> bool {
@@ -317,46 +314,45 @@ impl Tile {
         let low = low.above(self.base);
         [v, v + 1, v1 + 1].into_iter().all(|row| {
             let row = &self.posts[row];
-            // NaN reaches nothing.
+            // False for NaN.
             let reaches = |post: f32| post >= low;
             !(reaches(row[u]) || reaches(row[u + 1]) || reaches(row[u1 + 1]))
         })
     }
 
-    /// The sample in a column and row of `0..33`, cells above the base; NaN beyond.
+    /// Returns the sample in a column and row of `0..33`, cells above the base; NaN beyond.
     #[must_use]
     pub(super) fn post(&self, col: usize, row: usize) -> f32 {
         let post = self.posts.get(row).and_then(|row| row.get(col));
         post.copied().unwrap_or(f32::NAN)
     }
 
-    /// Returns true if no sample is a hole.
+    /// Returns true if every sample has data.
     #[must_use]
     pub(super) const fn is_whole(&self) -> bool {
         self.is_whole
     }
 
-    /// Lowest and highest sample, cells above the base; no range where all are holes.
+    /// Returns the lowest and highest sample, cells above the base; `None` if all are no-data.
     #[must_use]
     pub(super) fn range(&self) -> Option<[f32; 2]> {
         (self.lowest <= self.highest).then_some([self.lowest, self.highest])
     }
 
-    /// Lowest whole height, in cells, that no sample of the tile exceeds.
+    /// Returns a whole height, in cells, above every sample of the tile; `i32::MIN` if all are
+    /// no-data.
     #[must_use]
     pub(super) fn top(&self) -> i32 {
         if self.highest == f32::NEG_INFINITY {
-            return i32::MIN; // all hole
+            return i32::MIN; // no data
         }
-        // One more where truncation rounded down or the height is whole: the
-        // comparison with it may then be `>=`.
+        // Above every sample, also if the height is whole: the comparison with it may then be `>=`.
         self.base
             .saturating_add(self.highest as i32)
             .saturating_add(1)
     }
 
-    /// Returns true if `low` is above every sample of the 8- or 16-cell block that
-    /// holds a cell.
+    /// Returns true if `low` is above every sample of the 8- or 16-cell block that contains a cell.
     #[inline]
     pub(super) fn block_is_below(&self, shift: u32, cell: Cell, low: Altitude) -> bool {
         let [u, v] = within(cell);
@@ -401,7 +397,7 @@ fn within(cell: Cell) -> [usize; 2] {
     [cell.x, cell.y].map(|c| c as usize % TILE_CELLS)
 }
 
-/// Lowest of the numbers, and whether none is NaN, which does not count.
+/// Returns the lowest of the numbers, and true if none is NaN; NaN does not count.
 #[inline(never)]
 fn lowest_of(numbers: &[f32]) -> (f32, bool) {
     let mut lowest = (f32::INFINITY, true);
@@ -414,7 +410,7 @@ fn lowest_of(numbers: &[f32]) -> (f32, bool) {
     lowest
 }
 
-/// Highest of the numbers in a square of them; NaN does not count.
+/// Returns the highest of the numbers in a square; NaN does not count.
 fn highest_of<const N: usize>(of: &[[f32; N]; N], col: usize, row: usize, side: usize) -> f32 {
     let rows = of.iter().skip(row).take(side);
     rows.flat_map(|numbers| numbers.iter().skip(col).take(side))
@@ -492,7 +488,7 @@ mod tests {
             );
             assert_eq!(tile.key(), None);
         }
-        // Heights of another tile have no materials of this one.
+        // Filling the buffer again discards its materials.
         tile.fill(KEY, 0, |_, _| 1.0).unwrap();
         assert_eq!(tile.material(Cell::new(0, 0), [0, 0]), None);
         tile.vacate();

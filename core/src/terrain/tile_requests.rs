@@ -1,11 +1,10 @@
-//! Which tiles to ask the host for, and when to ask again.
+//! Requests to the host for tiles, and their repetition.
 //!
-//! The requests follow from the tile that the loop lacks, from the positions of the proxy and
-//! the haptic interface point (HIP), and from the motion of the HIP.
-//! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, and one
-//! that is held is not asked for again. Over a fallback that time begins when an answer can
-//! come, so what the HIP will have left by then is not asked for either. Time is counted in ticks
-//! of a millisecond, whatever the rate of the loop.
+//! The requests follow from the missing tile, from the positions of the proxy and the haptic
+//! interface point (HIP), and from the motion of the HIP. A tile that the HIP cannot reach within
+//! [`HORIZON_TICKS`] is not requested, and a stored one is not requested again. Over a fallback
+//! that time begins when an answer can arrive, so tiles that the HIP will have left by then are not
+//! requested either. Time is counted in ticks of one millisecond at every rate of the loop.
 
 use heapless::Vec;
 
@@ -16,18 +15,18 @@ use crate::grid::Cell;
 
 /// Horizon of the HIP's extrapolated path, ticks.
 pub const HORIZON_TICKS: i32 = 200;
-/// Cells around proxy and HIP that are always wanted.
+/// Margin around proxy and HIP in which tiles are always requested, cells.
 pub const MARGIN_CELLS: i32 = 12;
-/// A tile asked for and not received is asked for again after this many ticks.
+/// Ticks after which an unanswered request is repeated.
 pub const RETRY_TICKS: u32 = 250;
-/// Tiles asked for and not yet received, at most.
+/// Maximum number of unanswered requests.
 pub const IN_FLIGHT: usize = 4;
-/// Weight of an answer beside those before it, in the mean time of answers.
+/// Weight of the latest answer in the mean answer time.
 const ANSWER_SHARE: f32 = 0.125;
-/// Places along the predicted path around which tiles are wanted.
+/// Number of steps along the predicted path at which tiles are requested.
 const LOOK_AHEAD: i32 = 8;
 
-/// Position and motion for which the loop needs terrain, as the last tick left them, in cells.
+/// Position and motion after the last tick, for which the loop needs terrain, in cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RequestHint {
     /// The tile without which the tick could not be completed.
@@ -41,13 +40,13 @@ pub struct RequestHint {
 }
 
 impl RequestHint {
-    /// The tile around which others are wanted: without it nothing continues.
+    /// Returns the tile around which others are requested: the missing one, otherwise the proxy's.
     fn centre(&self) -> TileIndex {
         self.missing_tile.unwrap_or(TileIndex::holding(self.proxy))
     }
 }
 
-/// Decides which tile of a `D × D` window to ask for next. No I/O, no clock.
+/// Selection of the next tile to request for a `D × D` window. No I/O, no clock.
 ///
 /// ```
 /// use hapterra_core::grid::Cell;
@@ -68,11 +67,11 @@ pub struct TileRequester<const D: usize> {
     level: u8,
     size: FieldSize,
     held: [[Option<TileKey>; D]; D],
-    /// The fallback's tiles, and whether each is held: they are wanted before all others.
+    /// The fallback's tiles, with true for each that is stored; they are requested before all
+    /// others.
     fallback: [Option<(TileKey, bool)>; PARTS],
     asked: Vec<(TileKey, u32), IN_FLIGHT>,
-    /// The tick in which something was last asked for, and in how many ticks the last answers
-    /// came.
+    /// Tick of the last search for a request, and mean answer time in ticks.
     now: u32,
     answer_ticks: f32,
 }
@@ -84,7 +83,7 @@ impl<const D: usize> Default for TileRequester<D> {
 }
 
 impl<const D: usize> TileRequester<D> {
-    /// A requester that wants nothing until a field is known.
+    /// Creates a requester that requests nothing until a field is set.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -98,34 +97,34 @@ impl<const D: usize> TileRequester<D> {
         }
     }
 
-    /// Takes a new field of `size` patches; nothing of it is held.
+    /// Sets a new field of `size` patches, none of whose tiles is stored.
     pub fn reset(&mut self, level: u8, size: FieldSize) {
         *self = Self::new();
         self.level = level;
         self.size = size;
     }
 
-    /// The field has this fallback, which is not held; or none. Fallbacks that are as coarse have
-    /// the same names: what was asked for before is to be forgotten ([`Self::forget_asked`]).
+    /// Sets the field's fallback, which is not stored yet, or none. Equally coarse fallbacks have
+    /// the same keys, so earlier requests must be discarded ([`Self::forget_asked`]).
     pub fn lay(&mut self, fallback: Option<Fallback>) {
         let keys = fallback.map_or([None; PARTS], |fallback| fallback.keys(self.level));
         self.fallback = keys.map(|key| key.map(|key| (key, false)));
     }
 
-    /// Forgets what was asked, as after the link was lost; held tiles stay.
+    /// Discards the open requests, for instance after the link was lost; stored tiles stay.
     pub fn forget_asked(&mut self) {
         self.asked.clear();
     }
 
-    /// Lets what was asked be so many ticks older, as where no ticks run while the
-    /// answers are waited for.
+    /// Makes the open requests `ticks` older, for a loop that runs no ticks while it waits for
+    /// answers.
     pub fn age(&mut self, ticks: u32) {
         for (_, at) in &mut self.asked {
             *at = at.wrapping_sub(ticks);
         }
     }
 
-    /// Tiles asked for and not yet received.
+    /// Returns the number of unanswered requests.
     #[must_use]
     pub fn in_flight(&self) -> usize {
         self.asked.len()
@@ -137,7 +136,7 @@ impl<const D: usize> TileRequester<D> {
         self.asked.iter().any(|(asked, _)| *asked == key)
     }
 
-    /// The tile was handed to the window.
+    /// Records that the tile was handed to the window.
     pub fn received(&mut self, key: TileKey) {
         if let Some((_, at)) = self.asked.iter().find(|(asked, _)| *asked == key) {
             let ticks = self.now.wrapping_sub(*at).min(RETRY_TICKS) as f32;
@@ -150,7 +149,7 @@ impl<const D: usize> TileRequester<D> {
         }
     }
 
-    /// The window did not keep the tile after all.
+    /// Records that the window has not kept the tile.
     pub fn lost(&mut self, key: TileKey) {
         match self.part_is_held(key) {
             Some(is_held) => *is_held = false,
@@ -158,7 +157,7 @@ impl<const D: usize> TileRequester<D> {
         }
     }
 
-    /// Returns the flag of a tile of the fallback: true if the tile is held.
+    /// Returns the flag of a fallback's tile: true if the tile is stored.
     fn part_is_held(&mut self, key: TileKey) -> Option<&mut bool> {
         let mut parts = self.fallback.iter_mut().flatten();
         parts.find_map(|(part, is_held)| (*part == key).then_some(is_held))
@@ -168,8 +167,8 @@ impl<const D: usize> TileRequester<D> {
         &mut self.held[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)]
     }
 
-    /// The next tile to ask for at tick `now`, most urgent first; `None` when
-    /// nothing is wanted or enough is under way. Call until `None`.
+    /// Returns the next tile to request at tick `now`, most urgent first; `None` if no tile is
+    /// needed or enough requests are open. Call until `None`.
     pub fn next_request(&mut self, now: u32, demand: &RequestHint) -> Option<TileKey> {
         if let Some(key) = self.next_repeat(now, demand) {
             return Some(key);
@@ -186,15 +185,15 @@ impl<const D: usize> TileRequester<D> {
         Some(key)
     }
 
-    /// The same of tiles that were asked for before and have not come: for a device that has no
-    /// room for more.
+    /// Returns the next tile whose request is overdue and is repeated: for a device without room
+    /// for more tiles.
     #[inline(never)]
     pub fn next_repeat(&mut self, now: u32, demand: &RequestHint) -> Option<TileKey> {
         self.now = now;
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
         let (level, centre) = (self.level, demand.centre());
         let is_near = |key: &TileKey| key.level != level || Self::reaches(centre, key.index);
-        // The proxy continued meanwhile: an answer now would push out a nearer tile.
+        // The proxy has moved on: an answer now would replace a nearer tile.
         self.asked
             .retain(|(key, at)| !is_overdue(at) || is_near(key));
         let (key, at) = self.asked.iter_mut().find(|(_, at)| is_overdue(at))?;
@@ -202,19 +201,20 @@ impl<const D: usize> TileRequester<D> {
         Some(*key)
     }
 
-    /// The missing tile, tiles around the proxy, around the HIP, along its path.
+    /// Returns the most urgent tile: the missing one, then those around the proxy, around the HIP
+    /// and along its path.
     ///
-    /// Only tiles nearer to the centre than half the torus are candidates, so
-    /// that none can push out a tile that is nearer.
+    /// Only tiles nearer to the centre than half the torus are candidates, so that none can replace
+    /// a nearer tile.
     fn most_urgent(&self, demand: &RequestHint) -> Option<TileKey> {
         let centre = demand.centre();
-        // Over a fallback nothing waits for a tile that the HIP has left when it comes.
+        // Over a fallback no tick needs a tile that the HIP leaves before it arrives.
         let first = if self.fallback[0].is_some() {
             self.answer_ticks
         } else {
             0.0
         };
-        // The casts saturate, so any velocity gives some cell.
+        // The casts saturate, so any velocity gives a valid cell.
         let after = |from: Cell, ticks: f32| {
             let [east, north] = demand.velocity.map(|v| (v * ticks) as i32);
             from.offset(east, north)
@@ -230,7 +230,7 @@ impl<const D: usize> TileRequester<D> {
             .or_else(|| places.find_map(|cell| self.around(cell, centre)))
     }
 
-    /// A wanted tile among those within the margin of a cell, its own first.
+    /// Returns a tile to request among those within the margin of a cell, the cell's own first.
     fn around(&self, cell: Cell, centre: TileIndex) -> Option<TileKey> {
         let m = MARGIN_CELLS;
         let near = [
@@ -248,7 +248,7 @@ impl<const D: usize> TileRequester<D> {
             .find_map(|(dx, dy)| self.candidate(TileIndex::holding(cell.offset(*dx, *dy)), centre))
     }
 
-    /// The tile as a request, unless outside, too far, held or asked for.
+    /// Returns the tile's key, unless it is outside, too far, stored or requested already.
     fn candidate(&self, index: TileIndex, centre: TileIndex) -> Option<TileKey> {
         let level = self.level;
         let key = TileKey { level, index };
@@ -257,8 +257,8 @@ impl<const D: usize> TileRequester<D> {
         (wanted && self.size.has_tile(index)).then_some(key)
     }
 
-    /// Returns true if a tile is among those around the centre that all have their own slot in the
-    /// torus: nearer than half of it.
+    /// Returns true if a tile is nearer to the centre than half the torus: each of these tiles has
+    /// its own slot.
     fn reaches(centre: TileIndex, TileIndex { col, row }: TileIndex) -> bool {
         let reach = (D as i32 - 1) / 2;
         col.abs_diff(centre.col).max(row.abs_diff(centre.row)) <= reach.unsigned_abs()
@@ -322,7 +322,7 @@ mod tests {
         assert_eq!(requester.next_request(0, &at(48, 48)), Some(near));
         requester.received(near);
         assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
-        // It is never too far away to be asked for again.
+        // The fallback is never too far away to be requested again.
         assert_eq!(drain(&mut requester, RETRY_TICKS, &at(400, 48)).len(), 2);
         assert!(requester.awaits(key));
         requester.received(key);
@@ -338,7 +338,7 @@ mod tests {
             Some(key)
         );
         requester.received(key);
-        // Another one of the same name is another.
+        // Another fallback with the same keys is requested anew.
         requester.lay(Some(fallback));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(near));
@@ -363,14 +363,14 @@ mod tests {
                     requester.received(TileKey::new(0, col, row));
                 }
             }
-            // One cell a tick: in 60 ticks the HIP is two tiles on.
+            // One cell a tick: in 60 ticks the HIP has moved two tiles on.
             let demand = RequestHint {
                 velocity: [1.0, 0.0],
                 ..at(16 * 32 + 16, 48)
             };
             let first = drain(&mut requester, 4000, &demand);
             assert_eq!(first.contains(&(16, 1)), !has_fallback, "{first:?}");
-            // A HIP that stands still is there when it comes.
+            // A HIP at rest is still there when the tile arrives.
             let first = drain(&mut requester, 4000, &at(16 * 32 + 16, 48));
             assert_eq!(first.contains(&(16, 1)), has_fallback, "{first:?}");
         }
@@ -413,7 +413,7 @@ mod tests {
         let (three, four) = (asked::<3>(), asked::<4>());
         let around: Vec<_> = three.iter().take(9).collect();
         assert!(four.iter().take(9).eq(around), "{three:?}");
-        // The tile far away has the place of one of them, which is asked for again.
+        // The distant tile has replaced one of them, which is requested again.
         assert_eq!(three.get(10), Some(&TileKey::new(0, 0, 0)));
         assert_eq!(four.get(10), Some(&TileKey::new(0, 1, 1)));
         assert_eq!((three.len(), four.len()), (11, 11));

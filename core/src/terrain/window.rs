@@ -1,4 +1,4 @@
-//! The window: the tiles a device holds, in a torus around the HIP.
+//! The window: the tiles that a device stores, in a torus around the HIP.
 
 mod late_tiles;
 
@@ -15,16 +15,16 @@ use crate::grid::{Altitude, Cell};
 pub enum CellContent {
     /// A patch.
     Patch(Corners),
-    /// No surface: no data, or outside the field.
+    /// No surface: no-data, or outside the field.
     Hole,
-    /// The tile is not here yet.
+    /// The tile has not arrived yet.
     Missing,
 }
 
 /// The corners of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corners {
-    /// Whole height, in cells, that the corner heights count from.
+    /// Whole height, in cells, to which the corner heights are relative.
     pub base: i32,
     /// South-west, south-east, north-west, north-east, cells above the base.
     pub heights: [f32; 4],
@@ -37,7 +37,7 @@ impl Corners {
         heights: [f32::NAN; 4],
     };
 
-    /// The heights in cells above another base; to the last places of the largest.
+    /// Returns the heights in cells above another base, exact to the last places of the largest.
     #[inline(never)]
     pub(crate) fn above(&self, base: i32) -> [f32; 4] {
         let lower = self.base.wrapping_sub(base) as f32;
@@ -45,8 +45,8 @@ impl Corners {
     }
 }
 
-/// `D × D` tiles; tile `(col, row)` always lives in slot `(col mod D, row mod D)`.
-/// If `D` is no power of two, there are no maxima above single tiles.
+/// `D × D` tiles; tile `(col, row)` is always stored in slot `(col mod D, row mod D)`. If `D` is
+/// not a power of two, there are no maxima over several tiles.
 ///
 /// ```
 /// use hapterra_core::grid::{Altitude, Cell};
@@ -75,10 +75,10 @@ impl Corners {
 /// assert!(window.is_clear(around, Altitude::new(2, 0.0)));
 /// ```
 ///
-/// The window owns its buffers as `&mut Tile`. Installing a tile swaps one
-/// reference, so a tick sees the old tile or the new one and nothing is copied.
-// In this order: what each tick reads first lies within reach of its loads, which the maxima and
-// the allowances of a large window are not.
+/// The window owns its buffers as `&mut Tile`. Installing a tile swaps one reference, so a tick
+/// reads either the old tile or the new one, and nothing is copied.
+// Field order: fields that each tick reads first are within the offset range of its loads. The
+// maxima and the allowances of a large window are beyond that range.
 #[repr(C)]
 pub struct Window<'t, const D: usize> {
     size: FieldSize,
@@ -91,8 +91,7 @@ pub struct Window<'t, const D: usize> {
 }
 
 impl<'t, const D: usize> Window<'t, D> {
-    /// A window without a field: every cell is a hole. What the tiles held is
-    /// forgotten.
+    /// Creates a window without a field: every cell is no-data. Discards the content of the tiles.
     #[must_use]
     pub fn new(slots: [[&'t mut Tile; D]; D]) -> Self {
         let none = FieldSize::default();
@@ -101,7 +100,7 @@ impl<'t, const D: usize> Window<'t, D> {
         window
     }
 
-    /// A window over a field whose tiles are all in their slots.
+    /// Creates a window over a field whose tiles are all in their slots.
     pub(super) fn holding(slots: [[&'t mut Tile; D]; D], size: FieldSize, top: i32) -> Self {
         let mut window = Self {
             slots,
@@ -121,9 +120,9 @@ impl<'t, const D: usize> Window<'t, D> {
         window
     }
 
-    /// Forgets every tile and takes a new field without fallback ([`Self::lay`]): its level, its
-    /// size, and a whole height in cells no sample exceeds.
-    // A call: the loop over the tiles is unrolled wherever it is inlined.
+    /// Discards every tile and sets a new field without fallback ([`Self::lay`]): its level, its
+    /// size, and an upper bound of its samples in whole cells.
+    // Not inlined: the loop over the tiles would be unrolled in each caller.
     #[inline(never)]
     pub fn reset(&mut self, level: u8, size: FieldSize, top: i32) {
         for tile in self.slots.as_flattened_mut() {
@@ -136,19 +135,19 @@ impl<'t, const D: usize> Window<'t, D> {
         self.lay(None);
     }
 
-    /// Puts `tile` in its slot and gives back the buffer that was there; gives
-    /// back `tile` itself when it is vacant, of another level, or outside.
+    /// Puts `tile` in its slot and returns the replaced buffer; returns `tile` itself if it is
+    /// vacant, of another level, or outside.
     ///
-    /// It is the surface at once ([`Self::take`] has the tiles over a fallback).
+    /// The tile is rendered unchanged at once; [`Self::take`] is for tiles over a fallback.
     ///
-    /// A buffer that returns with a key is that of a tile that is not held. The same
-    /// tile once more therefore gives back a vacant buffer.
+    /// A returned buffer with a key contains a tile that is not stored. If the same tile is
+    /// installed again, the returned buffer is therefore vacant.
     #[must_use]
     pub fn install(&mut self, tile: &'t mut Tile) -> &'t mut Tile {
         self.put(tile, false)
     }
 
-    /// The same of a tile that `settles`, where a fallback was rendered.
+    /// [`Self::install`] for a tile that blends in from the fallback if `settles` is true.
     pub(super) fn put(&mut self, tile: &'t mut Tile, settles: bool) -> &'t mut Tile {
         let Some(key) = tile.key().filter(|key| self.expects(*key)) else {
             return tile;
@@ -171,19 +170,19 @@ impl<'t, const D: usize> Window<'t, D> {
         key.level == self.level && self.size.has_tile(key.index)
     }
 
-    /// The field's level.
+    /// Returns the field's level.
     #[must_use]
     pub const fn level(&self) -> u8 {
         self.level
     }
 
-    /// A whole height in cells that no sample of the field exceeds.
+    /// Returns an upper bound of the field's samples, whole cells.
     #[must_use]
     pub const fn top(&self) -> i32 {
         self.top
     }
 
-    /// The tile now in the slot where `key` belongs.
+    /// Returns the key of the tile in the slot to which `key` belongs.
     #[must_use]
     pub fn occupant(&self, key: TileKey) -> Option<TileKey> {
         self.slots[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)].key()
@@ -210,8 +209,8 @@ impl<'t, const D: usize> Window<'t, D> {
         })
     }
 
-    /// The samples at the corners of a cell, also of one that is a hole: NaN where there is
-    /// none. `None` if the tile is not here yet.
+    /// Returns the samples at the corners of a cell, NaN for no-data. `None` if the tile has not
+    /// arrived yet.
     #[inline(never)]
     pub(crate) fn corners(&self, cell: Cell) -> Option<Corners> {
         if !self.has_cell(cell) {
@@ -232,18 +231,18 @@ impl<'t, const D: usize> Window<'t, D> {
 
     /// Returns true if everything in the box is known to lie below `low`.
     ///
-    /// `false` may also mean "cannot tell cheaply". Compares one number for the
-    /// whole field, then four nodes at most.
+    /// `false` may also mean "cannot tell cheaply". Compares one number for the whole field, then
+    /// at most four nodes.
     #[must_use]
     #[inline]
     pub fn is_clear(&self, span: CellBox, low: Altitude) -> bool {
         low.cell() >= self.top || self.box_is_clear(span.clipped(self.size), low)
     }
 
-    /// Returns true if all samples around a box of two patches a side at most are
-    /// known to lie below `low`, by the nine samples themselves.
+    /// Returns true if all samples around a box of at most 2 × 2 patches are known to lie below
+    /// `low`, by a comparison of the nine samples themselves.
     ///
-    /// `false` also where the box is larger, or not all in one tile that is held.
+    /// `false` also if the box is larger, or not inside one stored tile.
     #[must_use]
     #[inline]
     pub fn is_clear_nearby(&self, span: CellBox, low: Altitude) -> bool {
@@ -281,7 +280,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.part_is_below(shift, col, row, low)
     }
 
-    /// The same of a node that is a part of one tile.
+    /// [`Self::node_is_below`] for a node inside one tile.
     #[inline]
     fn part_is_below(&self, shift: u32, col: i32, row: i32, low: Altitude) -> bool {
         let up = TILE_SHIFT - shift;
@@ -293,7 +292,7 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// Whole height no sample under a node exceeds; `i32::MAX` when unknown.
+    /// Returns a whole height that no sample under a node exceeds; `i32::MAX` if unknown.
     fn node_top(&self, level: u32, col: i32, row: i32) -> i32 {
         if !self.size.has(col, row, TILE_SHIFT + level) {
             i32::MIN
@@ -301,15 +300,15 @@ impl<'t, const D: usize> Window<'t, D> {
             .held(TileIndex::new(col << level, row << level))
             .is_some()
         {
-            // The node is known only while all its tiles are held, so the
-            // south-west one tells which node the slot speaks of.
+            // A node is known only while all its tiles are stored, so its south-west tile
+            // identifies the node that the slot describes.
             self.pyramid.node(level, col, row)
         } else {
             i32::MAX
         }
     }
 
-    // A call: tiles come and settle in several places.
+    // Not inlined: it has several callers.
     #[inline(never)]
     pub(super) fn renew_maxima(&mut self, tile: TileIndex, top: i32) {
         self.pyramid.set(0, tile.col, tile.row, top);
@@ -323,15 +322,15 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// The tile, where it is the surface as it is.
+    /// Returns the tile, if it is rendered unchanged.
     #[inline]
     pub(super) fn held(&self, index: TileIndex) -> Option<&Tile> {
         let tile = &*self.slots[wrap::<D>(index.row)][wrap::<D>(index.col)];
-        // `install` takes tiles of the field's level only.
+        // `install` accepts tiles of the field's level only.
         tile.is_surface_of(index).then_some(tile)
     }
 
-    /// Returns true if the field has a cell there, be it a hole.
+    /// Returns true if the cell is in the field, with or without data.
     #[inline]
     pub(crate) fn has_cell(&self, cell: Cell) -> bool {
         self.size.has_cell(cell)

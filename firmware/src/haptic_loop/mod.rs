@@ -1,8 +1,8 @@
 //! The haptic loop, which the timer interrupt calls 1,000 to 10,000 times a second.
 //!
-//! It does only I/O and book-keeping around [`Haptics::tick_into`]: take what the
-//! link brought, read the encoders, tick, write the amplifiers, leave a record,
-//! measure what that cost. Everything it does is bounded and nothing waits.
+//! It does only I/O and book-keeping around [`Haptics::tick_into`]: it applies the link's commands,
+//! reads the encoders, runs the tick, writes the amplifiers, queues a record and measures the time.
+//! All its work is bounded, and it never waits.
 
 mod clutch_input;
 mod liveness;
@@ -28,7 +28,7 @@ use mark_pulse::Mark;
 use reporter::Reporter;
 use timing::Timing;
 
-/// The most commands taken in one tick; the rest wait for the next.
+/// Maximum number of commands applied in one tick; the rest wait for the next.
 const COMMANDS_PER_TICK: usize = 4;
 
 /// The amplifiers in either of their states.
@@ -48,13 +48,13 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     clock: C,
     timing: Timing,
     clutch_input: ClutchInput,
-    /// The last tick's outcome, kept in its place so that it need not be copied.
+    /// The last tick's outcome, written in place to avoid a copy.
     outcome: Outcome,
     liveness: Liveness,
     reporter: Reporter,
     mark: Mark,
     motor_log: MotorLog,
-    /// An answer that found the queue full. No other tick runs before it is out.
+    /// An answer for which the queue had no room. No other tick is rendered before it is queued.
     unsent: Option<QueuedTick>,
 }
 
@@ -88,16 +88,16 @@ where
         }
     }
 
-    /// Gives access to the board's encoders, for a caller that sets them.
+    /// Returns the board's encoders, for a caller that sets them.
     pub fn encoders_mut(&mut self) -> &mut E {
         &mut self.encoders
     }
 
-    /// Runs one tick. Returns what the amplifiers were left with.
+    /// Runs one tick. Returns the outputs to which the amplifiers were set.
     pub fn tick(&mut self) -> GuardOutputs {
         let began = self.timing.begin(&mut self.clock);
         if began.after_gap {
-            // First of all: the force of the last tick has acted for too long already.
+            // Before all else: the force of the last tick has acted for too long.
             self.drive(&GuardOutputs::default());
             self.give_to_haptics(Command::Trip(Fault::TickGap));
         }
@@ -121,19 +121,19 @@ where
         drive
     }
 
-    /// Returns the state to keep over a reset after this tick, if any: a copy of the
-    /// motors' temperatures, and which of the two it is. Called after each tick.
+    /// Returns the state to keep across a reset, if any: the index and the content of one of the
+    /// two copies of the motors' temperatures. Call it after each tick.
     pub fn motors_to_keep(&mut self) -> Option<(usize, Words)> {
         self.motor_log.tick(&self.haptics.temperatures())
     }
 
-    /// The level that the mark pin changes to after this tick, if it does.
+    /// Returns the new level of the mark pin, if this tick changes it.
     #[must_use]
     pub const fn mark_edge(&self) -> Option<bool> {
         self.mark.edge()
     }
 
-    /// The calibration in force.
+    /// Returns the current calibration.
     #[must_use]
     pub fn calibration(&self) -> Option<&Calibration> {
         self.haptics.calibration()
@@ -165,10 +165,10 @@ where
     }
 
     fn give_to_haptics(&mut self, command: Command<'t>) {
-        // A refused scene is none: what is rendered follows from the scene in force alone, and the
-        // guard says that there is none.
+        // A refused scene needs no handling: the loop then has no scene, and the guard reports
+        // that.
         if let Ok(Some(tile)) = self.haptics.accept(command) {
-            // The queue has room for every buffer there is.
+            // The queue has room for all buffers.
             let _ = self.ends.spent.enqueue(tile);
         }
     }
@@ -181,8 +181,7 @@ where
         }
     }
 
-    /// Runs the pure tick. A function of its own, and there once: the tick's code
-    /// is most of an image.
+    /// Runs the pure tick. Not inlined: its code is most of an image, which contains it once.
     #[inline(never)]
     fn run_tick(&mut self, sense: &GuardInputs, watchdog_live: bool) {
         self.haptics
@@ -208,8 +207,7 @@ where
         drive
     }
 
-    /// Renders the point under way. The encoders are read all the same: the arm may be
-    /// moved meanwhile.
+    /// Renders the current point. Also reads the encoders, because the arm may be moved meanwhile.
     fn render_point(&mut self, watchdog_live: bool) -> GuardOutputs {
         let drive = GuardOutputs::default();
         self.drive(&drive);
@@ -220,13 +218,13 @@ where
         if record.answers.is_some() {
             self.answer(record);
         } else {
-            // It only tells the link what holds the point up; the next one will, too.
+            // It only reports which tile the point lacks; the next record repeats that.
             let _ = self.ends.records.enqueue(record);
         }
         drive
     }
 
-    /// A tick of a replay without a point: nothing is rendered, and the arm is followed.
+    /// Runs a tick of a replay without a point: nothing is rendered, and the arm is monitored.
     fn follow_arm(&mut self, watchdog_live: bool) -> GuardOutputs {
         let drive = GuardOutputs::default();
         self.drive(&drive);
@@ -244,14 +242,14 @@ where
         }
     }
 
-    /// Reports where the guard stands, at once when that has changed and ten times a
-    /// second. Where the queue is full the next tick reports.
+    /// Reports the guard's state, at once after a change and ten times a second. If the queue is
+    /// full, the next tick reports.
     fn report(&mut self, sense: &GuardInputs, drive: &GuardOutputs) {
         let (report, marked) = (self.haptics.report(), self.mark.latest());
         if self.reporter.sends_report(&report, marked.number) && self.ends.health.ready() {
             let health = self.haptics.health(sense, drive);
             let epoch = self.haptics.scene().map(|scene| scene.epoch);
-            // There is room.
+            // `ready` has found room.
             let _ = self.ends.health.enqueue(LoopReport {
                 health,
                 epoch,
@@ -266,7 +264,7 @@ where
         self.unsent = self.ends.records.enqueue(record).err();
     }
 
-    /// Brings the amplifiers to what the tick asks for.
+    /// Sets the amplifiers to the outputs of the tick.
     fn drive(&mut self, drive: &GuardOutputs) {
         let power = self.power.take().map(|power| match (power, drive.enabled) {
             (Power::Off(off), false) => Power::Off(rested(off, drive)),
@@ -274,14 +272,14 @@ where
             (Power::Off(off), true) => Power::On(written(off.enable(), drive)),
             (Power::On(on), true) => Power::On(written(on, drive)),
         });
-        // An assignment would drop what is there, which is nothing; but with it
-        // the drivers' destructors, which can panic, would be part of the tick.
+        // An assignment would drop the old value. That is `None`, but the drivers' destructors,
+        // which can panic, would become part of the tick.
         mem::forget(mem::replace(&mut self.power, power));
     }
 }
 
-/// Hands the loop the table of a scene with materials, if it comes with one: a later scene's may
-/// wait behind a scene that continues with the table before.
+/// Sets the table of a scene with materials, if the queued table is this scene's. It may be a later
+/// scene's if this scene continues with the previous table.
 fn take_materials<const D: usize>(
     haptics: &mut Haptics<'_, D>,
     ends: &mut LoopEnds<'_>,
@@ -291,7 +289,7 @@ fn take_materials<const D: usize>(
         && table.check_sum() == sum
     {
         haptics.take_materials(table);
-        // It stays in its place until it was copied.
+        // The table stays in the queue until it is copied.
         drop(ends.materials.dequeue());
     }
 }

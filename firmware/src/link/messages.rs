@@ -1,4 +1,4 @@
-//! Handling of each message of the host.
+//! Handling of the host's messages.
 
 use hapterra_core::scene::{HipCommand, Scene};
 use hapterra_core::terrain::RETRY_TICKS;
@@ -16,7 +16,7 @@ use super::views::ClutchOfHost;
 use super::{Link, ReplayProgress, log};
 
 impl<const D: usize> Link<'_, D> {
-    /// Acts on a frame's decoded bytes.
+    /// Handles the decoded bytes of a frame.
     pub(super) fn on_content(
         &mut self,
         content: &[u8],
@@ -32,7 +32,7 @@ impl<const D: usize> Link<'_, D> {
         Ok(())
     }
 
-    /// Answers a host of another protocol. One of this protocol says hello, too.
+    /// Answers a host of another protocol. A host of this protocol also sends a hello.
     fn on_version_check(&mut self, check: VersionCheck) {
         if let VersionCheck::Asked { protocol } = check
             && protocol != PROTOCOL
@@ -118,7 +118,7 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::Hello(hello));
     }
 
-    /// Answers a host that only looks: whose the arm is stays as it is, and for how long.
+    /// Answers a host that only reads, without an effect on the open session or its time-out.
     fn on_look(&mut self, session: SessionNumber, message: &ToDevice<'_>) {
         match *message {
             ToDevice::Status { number } => self.tell_status(session, number),
@@ -141,7 +141,7 @@ impl<const D: usize> Link<'_, D> {
         self.say_in(session, &answer);
     }
 
-    /// Begins a session, which keeps the scene and what is held of it.
+    /// Opens a session; the scene and its stored tiles stay.
     fn open(&mut self, session: SessionNumber, hello: u8, room: CommandRoom) {
         self.forget_conversation();
         self.forsake_clutch();
@@ -149,7 +149,7 @@ impl<const D: usize> Link<'_, D> {
         self.session.open(session, hello, dropped);
         self.device.session_opened();
         log::opened(session, self.session.last().end, self.bad_frames);
-        // What the host before asked for and was not done yet is not done any more.
+        // An arming that the previous host requested, and that still waits, is cancelled.
         if self.device.is_being_armed() {
             self.command(room, Command::Disarm);
         }
@@ -163,8 +163,7 @@ impl<const D: usize> Link<'_, D> {
             epoch,
             report,
         });
-        // Where time stands still until a tile is there, the time-out for asking
-        // again would never come.
+        // If the clock stands still until a tile arrives, its request would never time out.
         if self.may_stand_still() {
             self.requester.age(RETRY_TICKS / 2);
         }
@@ -188,8 +187,8 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// The host has looked and goes: what drives continues, and what only waits to drive, or
-    /// to be stored, does not.
+    /// Detaches the host: an armed arm stays armed; arming or storing that still waits is
+    /// cancelled.
     fn on_detach(&mut self, state: SessionState, room: CommandRoom) {
         match state {
             SessionState::Closed | SessionState::Leaving => return,
@@ -208,7 +207,7 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::Detached);
     }
 
-    /// Disarms and drops the scene. The loop lets the force out by itself.
+    /// Disarms and drops the scene; the loop ramps the force down.
     pub(super) fn drop_scene(&mut self, room: CommandRoom) {
         let command = match self.scene {
             Some(_) => Command::DropScene,
@@ -218,14 +217,14 @@ impl<const D: usize> Link<'_, D> {
         self.command(room, command);
     }
 
-    /// Forgets the scene, which the loop drops or has dropped.
+    /// Discards the link's copy of the scene, which the loop drops or has dropped.
     pub(super) fn forget_scene(&mut self) {
         self.scene = None;
         self.forget_positions();
         self.requester.forget_asked();
     }
 
-    /// Forgets what belongs to the positions of one scene.
+    /// Discards the state that depends on positions in one scene.
     fn forget_positions(&mut self) {
         self.view = 0;
         self.clutch = ClutchOfHost::LetGo;
@@ -239,7 +238,7 @@ impl<const D: usize> Link<'_, D> {
         self.bad_frames = self.bad_frames.saturating_add(1);
     }
 
-    /// Drops pending messages and requests; keeps the scene and the held tiles.
+    /// Drops pending messages and requests; keeps the scene and the stored tiles.
     pub(super) fn forget_conversation(&mut self) {
         self.nothing_to_request_at = None;
         self.tx.clear();
@@ -266,7 +265,7 @@ impl<const D: usize> Link<'_, D> {
 
     pub(super) fn take_scene(&mut self, scene: Scene, room: CommandRoom) {
         let accepted = scene.is_valid() && self.has_materials_of(&scene);
-        // The very scene in force continues: its host returned.
+        // The same scene continues: its host has returned.
         if accepted && self.scene != Some(scene) {
             self.drop_scene_samples();
             self.requester.reset(scene.level, scene.size);
@@ -280,7 +279,7 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
-    /// Takes a point. Each is rendered once; one that was answered is answered
+    /// Queues a point. Each is rendered once; the last answer is repeated if its point arrives
     /// again.
     fn take_point(&mut self, point: HipCommand) {
         if self.renders_arm() || self.scene.is_none() {
@@ -321,7 +320,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Samples that were dropped here and by the loop.
+    /// Returns the number of samples dropped here and by the loop.
     pub(super) fn samples_dropped(&self) -> u32 {
         self.dropped.wrapping_add(self.ends.monitor.dropped())
     }

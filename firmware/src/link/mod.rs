@@ -1,25 +1,21 @@
 //! The device's end of the link, as a state machine without I/O.
 //!
-//! Bytes from the host go in through [`Link::receive`], bytes for the host come
-//! out of [`Link::transmit`], and [`Link::poll`] does what is due in between.
-//! Nothing here waits and nothing reads a clock: time is the loop's tick count.
-//! [`task::run`] wraps it for a board's reader and writer; tests and the native
-//! device call it directly, so that a test can play every fault of a link byte by
-//! byte.
+//! [`Link::receive`] reads bytes from the host, [`Link::transmit`] supplies bytes for the host, and
+//! [`Link::poll`] does the pending work. Nothing here waits or reads a clock: time is the loop's
+//! tick count. [`task::run`] connects it to a board's reader and writer; tests and the native
+//! device call it directly, so that a test can inject any fault of a link byte by byte.
 //!
 //! Guarantees:
-//! - Answers and requests go before telemetry. When the writer is slow,
-//!   telemetry is dropped and counted, nothing else.
-//! - A tile is requested only if there is a buffer to put it in.
-//! - Frames that are damaged, not requested, of another scene or of another session
-//!   change nothing.
-//! - A hello at any time (after a zero, which ends what an earlier host may
-//!   have left unfinished) opens a new session and keeps the scene and every
-//!   tile that is held, so a host that returns continues where it was.
-//! - A host that vanishes leaves the arm rendering what is held, but not for ever:
-//!   after the time that the host named the arm is disarmed.
-//! - Another view of a scene is put in only while no force is rendered; the arm stays armed.
-//! - Goodbye is answered when the amplifiers are off.
+//! - Answers and requests are sent before telemetry. If the writer is slow, only telemetry is
+//!   dropped, and it is counted.
+//! - A tile is requested only if a buffer is free for it.
+//! - Frames that are damaged, not requested, or of another scene or session change nothing.
+//! - A hello at any time (after a zero byte, which ends any unfinished frame) opens a new session
+//!   and keeps the scene and all stored tiles, so that a returning host continues where it was.
+//! - If the host falls silent, the arm renders the stored tiles until the host's time-out; then it
+//!   is disarmed.
+//! - A placement changes only while no force is rendered; the arm stays armed.
+//! - A goodbye is answered once the amplifiers are off.
 
 mod commands;
 mod device_state;
@@ -59,16 +55,16 @@ pub use tiles::fill_tile;
 use tx_queue::TxQueue;
 use views::ClutchOfHost;
 
-/// Samples kept for the writer; beyond them, new ones are dropped.
+/// Capacity for samples that wait for the writer; when it is full, new ones are dropped.
 const SAMPLES: usize = 16;
-/// Points a host may send ahead; beyond them, they are dropped.
+/// Points that a host may send ahead; further ones are dropped.
 pub const POINTS_AHEAD: usize = 16;
 
 /// The link's large buffers.
 pub(crate) struct Buffers {
     reader: FrameReader<MAX_FRAME>,
     tx: TxQueue,
-    /// Samples on their way to the writer.
+    /// Samples that wait for the writer.
     samples: Deque<TickRecord, SAMPLES>,
 }
 
@@ -99,24 +95,23 @@ pub struct Link<'t, const D: usize> {
     samples: &'t mut Deque<TickRecord, SAMPLES>,
     ends: LinkEnds<'t>,
     session: Session,
-    /// The session of the last host that only looks.
+    /// Session of the last host that only reads.
     looker: Option<SessionNumber>,
-    /// The loop had taken every command when its reports were last read.
+    /// True if the command queue was empty when the loop's reports were last read.
     commands_taken: bool,
-    /// Knowledge of arming, calibration and status.
+    /// State of arming, calibration and status.
     device: DeviceState,
-    /// The way into the loader in the chip's ROM.
+    /// Entry into the loader in the chip's ROM.
     loader: LoaderEntry,
     scene: Option<Scene>,
-    /// The table of materials that the loop was given last.
+    /// The last table of materials sent to the loop.
     materials: Option<KnownTable>,
-    /// Number of the view that was put in last; samples of another are older.
+    /// Number of the latest placement; samples with another number are older.
     view: u8,
     clutch: ClutchOfHost,
     requester: TileRequester<D>,
-    /// The millisecond in which the tile requester last had nothing to request, while
-    /// nothing has changed since. Its search is long, so it does not run at every
-    /// tick.
+    /// Millisecond in which the tile requester last found nothing to request; cleared by any
+    /// change. Its search is long, so it is not repeated in every tick.
     nothing_to_request_at: Option<u32>,
     request_hint: Option<RequestHint>,
     last_record: QueuedTick,
@@ -167,11 +162,10 @@ impl<'t, const D: usize> Link<'t, D> {
         }
     }
 
-    /// Takes bytes from the host and acts on every frame that ends in them.
+    /// Reads bytes from the host and handles every frame that ends in them.
     ///
-    /// Returns how many were taken. Fewer than given, even none, are taken while
-    /// the loop or the writer has to catch up first: offer the rest again after a
-    /// poll.
+    /// Returns the number of bytes read. It is less than the input, even zero, while the loop or
+    /// the writer has to catch up: pass the rest again after a poll.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
@@ -192,13 +186,14 @@ impl<'t, const D: usize> Link<'t, D> {
         taken
     }
 
-    /// Room for acting on a message, which may need one command, one table and one answer.
+    /// Returns room for one message, which may need one command, one table and one answer.
     fn room_for_message(&self) -> Option<CommandRoom> {
         let has_room = self.ends.materials.ready() && self.tx.has_room();
         self.room_for_command().filter(|_| has_room)
     }
 
-    /// The transport was interrupted: what was under way is lost.
+    /// Resets the link after an interruption of the transport: unfinished frames and pending
+    /// messages are lost.
     pub fn interrupted(&mut self) {
         if let Some(reader) = &mut self.reader {
             **reader = FrameReader::new();
@@ -206,12 +201,11 @@ impl<'t, const D: usize> Link<'t, D> {
         self.forget_conversation();
     }
 
-    /// Returns true if there is nothing for the loop to do until the host has spoken.
+    /// Returns true if the loop has nothing to do until a message of the host arrives.
     ///
-    /// True without a scene, between the points of a replay, and, in a scene
-    /// that asks for it ([`Scene::hold_clock`]), while the host owes a tile. An
-    /// emulated board then stops its clock, and a caller that runs the device in lock-step
-    /// does not tick; a real board keeps ticking.
+    /// True without a scene, between the points of a replay, and, with [`Scene::hold_clock`], while
+    /// a requested tile is missing. An emulated board then stops its clock, and a caller that runs
+    /// the device in lock-step runs no tick; a real board keeps ticking.
     #[must_use]
     pub fn may_stand_still(&self) -> bool {
         let waits = match &self.scene {
@@ -220,8 +214,8 @@ impl<'t, const D: usize> Link<'t, D> {
             Some(scene) if scene.hold_clock && self.requester.in_flight() > 0 => return true,
             Some(_) => false,
         };
-        // Commands have to reach the loop, force has to go out, and a host
-        // that closes has to get its answer.
+        // Commands have to reach the loop, the force has to ramp down, and a host that closes has
+        // to receive its answer.
         let leaves = self.session.is_leaving();
         waits
             && !(leaves && self.device.may_drive)
@@ -230,13 +224,13 @@ impl<'t, const D: usize> Link<'t, D> {
             && self.device.is_at_rest()
     }
 
-    /// Returns true if the scene in force is rendered through the encoders.
+    /// Returns true if the current scene is rendered through the encoders.
     fn renders_arm(&self) -> bool {
         self.scene.is_some_and(|s| s.source == Source::Encoders)
     }
 
-    /// Returns true if the arm is in use: the scene in force is rendered through the
-    /// encoders, or force is still going out.
+    /// Returns true if the arm is in use: the current scene is rendered through the encoders, or a
+    /// force still ramps down.
     #[must_use]
     pub fn drives_arm(&self) -> bool {
         self.renders_arm() || self.device.drives()
@@ -249,26 +243,26 @@ impl<'t, const D: usize> Link<'t, D> {
         LedPattern::of(&self.device.health.report, touching)
     }
 
-    /// A calibration that the host wants stored in the board's memory, until
-    /// [`Self::stored`] tells how that went. The arm is disarmed.
+    /// Returns the calibration to store in the board's memory, until [`Self::stored`] receives the
+    /// result. The arm is disarmed.
     #[must_use]
     pub fn to_store(&self) -> Option<Calibration> {
         self.device.to_store()
     }
 
-    /// Takes how storing the calibration went: [`Refusal::NoMemory`],
-    /// [`Refusal::MemoryFull`] or [`Refusal::MemoryFailed`].
+    /// Sets the result of storing the calibration; the errors are [`Refusal::NoMemory`],
+    /// [`Refusal::MemoryFull`] and [`Refusal::MemoryFailed`].
     pub fn stored(&mut self, result: Result<(), Refusal>) {
         self.device.stored(result);
     }
 
-    /// Returns true if the host has heard that the arm is disarmed, and is gone.
+    /// Returns true if the session has ended with a disarmed arm, and its last answer was sent.
     #[must_use]
     pub fn has_ended(&self) -> bool {
         self.session.state() == SessionState::Gone && self.tx.is_empty()
     }
 
-    /// The session's samples that were sent before the next message.
+    /// Returns the count of the session's samples that were sent before the next message.
     fn sample_count(&self) -> SampleCount {
         let waiting = if self.tx.telemetry_waits() {
             self.batch
@@ -287,7 +281,7 @@ impl<'t, const D: usize> Link<'t, D> {
         self.tx.push(session, message);
     }
 
-    /// Answers a point with what the loop rendered there.
+    /// Answers a point with the loop's record of it.
     fn answer_point(&mut self, record: QueuedTick) {
         let is_open = self.session.is_open();
         if let Some(seq) = record.answers.filter(|_| is_open) {

@@ -1,4 +1,4 @@
-//! Tiles on their way: which ones the link requests, and whose buffer is where.
+//! Tiles on the link: requests, and the owners of the buffers.
 
 use hapterra_core::terrain::{RequestHint, Tile, TileError};
 use hapterra_core::tick::Command;
@@ -11,12 +11,12 @@ use super::commands::CommandRoom;
 use crate::queues::QueuedTick;
 
 impl<'t, const D: usize> Link<'t, D> {
-    /// Takes back the tile buffers that the loop is done with.
+    /// Reclaims the tile buffers that the loop has returned.
     pub(super) fn reclaim_buffers(&mut self) {
         while let Some(tile) = self.ends.spent.dequeue() {
             self.nothing_to_request_at = None;
-            // A tile that the window refused returns under its own key, a tile
-            // that it replaced under the replaced one's: neither is held.
+            // A buffer returns with the key of a tile that the window has refused or replaced: that
+            // tile is not stored.
             if let Some(key) = tile.key() {
                 self.requester.lost(key);
             }
@@ -25,11 +25,11 @@ impl<'t, const D: usize> Link<'t, D> {
     }
 
     fn give_back(&mut self, tile: &'t mut Tile) {
-        // There are no more buffers than places.
+        // There is room for all buffers.
         let _ = self.spare.push(tile);
     }
 
-    /// Checks a tile in a spare buffer and hands it to the loop.
+    /// Fills a spare buffer with a tile, checks it and sends it to the loop.
     pub(super) fn take_tile(
         &mut self,
         message: &TileMessage<'_>,
@@ -56,7 +56,7 @@ impl<'t, const D: usize> Link<'t, D> {
         self.command(room, Command::Tile(tile));
     }
 
-    /// Requests tiles, each with a buffer that waits for it.
+    /// Requests tiles, each with a buffer reserved for it.
     pub(super) fn request_tiles(&mut self) {
         let (true, Some(scene)) = (self.session.is_open(), self.scene) else {
             return;
@@ -71,7 +71,7 @@ impl<'t, const D: usize> Link<'t, D> {
             return;
         }
         while self.tx.has_room() {
-            // A tile that was asked for has its buffer already.
+            // A tile that was requested before has its buffer already.
             let key = match self.spare.len() > self.requester.in_flight() {
                 true => self.requester.next_request(now, &request_hint),
                 false => self.requester.next_repeat(now, &request_hint),
@@ -89,7 +89,8 @@ impl<'t, const D: usize> Link<'t, D> {
 /// Fills a tile buffer from the host's message.
 ///
 /// # Errors
-/// When the message's heights are not those of a tile. The buffer is then to be vacated.
+/// [`TileError`] if the message's heights are not those of a tile. The caller then vacates the
+/// buffer.
 pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), TileError> {
     let key = message.key;
     let mut flat = |base, height| tile.fill(key, base, |_, _| height);
@@ -101,8 +102,8 @@ pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), TileE
     }
 }
 
-/// Says where the loop needs terrain after `record`, which followed `last`. The
-/// velocity is in cells a millisecond, the tile requester's unit of time, at every tick rate.
+/// Returns where the loop needs terrain after `record`, the successor of `last`. The velocity is in
+/// cells a millisecond, the tile requester's unit, at every tick rate.
 pub(super) fn request_hint(
     last: &QueuedTick,
     record: &QueuedTick,
@@ -110,8 +111,8 @@ pub(super) fn request_hint(
 ) -> RequestHint {
     let (last, sample) = (&last.sample, &record.sample);
     let ticks = sample.tick.wrapping_sub(last.tick);
-    // A new scene counts its ticks from one again, and a view has other cells: neither
-    // gives a velocity.
+    // A new scene restarts the count of ticks, and another placement has other cells: neither gives
+    // a velocity.
     let velocity = if ticks == 0 || ticks > 100 * ticks_per_ms || last.view != sample.view {
         [0.0; 2]
     } else {

@@ -1,7 +1,7 @@
-//! Other views of the scene in force, and the clutch that lets them in.
+//! Changes of the current scene's placement, and the clutch that allows them.
 //!
-//! The loop takes commands in their order. So every tile that follows a view in the queue
-//! is the view's own, and a tile of the one before is refused by its epoch.
+//! The loop applies commands in order. So every tile behind a placement in the queue belongs to it,
+//! and a tile of the previous placement is refused by its epoch.
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::guard::Limits;
@@ -13,24 +13,24 @@ use hapterra_core::wire::message::ToHost;
 use super::Link;
 use super::commands::CommandRoom;
 
-/// Views whose numbers are at most so far ahead are newer than the one in force; others are
-/// late, or sent twice.
+/// A placement is newer if its number is less than this ahead of the current one; otherwise it is
+/// late or repeated.
 const NEWER: u8 = 128;
 
-/// Who holds the clutch.
+/// Host that holds the clutch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ClutchOfHost {
-    /// No side.
+    /// No host.
     #[default]
     LetGo,
     /// The host of this session.
     Held,
-    /// A host that is gone: it is to be let go.
+    /// A host that has left: the clutch must be released.
     Forsaken,
 }
 
 impl<const D: usize> Link<'_, D> {
-    /// The host holds the clutch, or lets it go.
+    /// Sets the host's hold of the clutch.
     pub(super) fn set_clutch(&mut self, hold: ClutchHold, room: CommandRoom) {
         self.clutch = match hold {
             ClutchHold::LetGo => ClutchOfHost::LetGo,
@@ -39,14 +39,14 @@ impl<const D: usize> Link<'_, D> {
         self.command(room, Command::Clutch(hold));
     }
 
-    /// The host that may hold the clutch is gone.
+    /// Marks the clutch for release if the host that holds it has left.
     pub(super) fn forsake_clutch(&mut self) {
         if self.clutch == ClutchOfHost::Held {
             self.clutch = ClutchOfHost::Forsaken;
         }
     }
 
-    /// Lets the clutch of a host go that is gone.
+    /// Releases the clutch of a host that has left.
     pub(super) fn release_forsaken_clutch(&mut self) {
         if self.clutch == ClutchOfHost::Forsaken
             && let Some(room) = self.room_for_command()
@@ -55,7 +55,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Sets another placement, and answers; one that was sent twice is answered twice.
+    /// Sets another placement and answers; repeats the answer if the same one arrives again.
     pub(super) fn take_view(&mut self, view: SceneChange, room: CommandRoom) {
         let (epoch, ahead) = (view.scene.epoch, view.number.wrapping_sub(self.view));
         let is_again = ahead == 0 && self.scene == Some(view.scene);
@@ -70,8 +70,8 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
-    /// Returns true if no force is rendered now: the clutch is open, as the loop has reported since it is
-    /// held, or it is a replay between two points.
+    /// Returns true if no force is rendered: the host's clutch is reported open, or a replay is
+    /// between two points.
     fn may_change_view(&self, scene: &Scene) -> bool {
         let latest = &self.last_record.sample;
         let is_open = self.clutch == ClutchOfHost::Held

@@ -1,5 +1,5 @@
-//! Changes of a view while it is rendered: the view before and what is asked for make the next
-//! one, or say why not.
+//! Changes of a placement while it is rendered: the current placement and the requested changes
+//! give the next one, or an error with the reason.
 
 use hapterra_core::force::SurfaceParams;
 
@@ -7,14 +7,14 @@ use super::placement::{Placement, finest_level};
 use super::surface_change::{SurfaceChange, SurfaceError};
 use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 
-/// A sample of the file as large as this in the hand feels like one flat patch, mm.
+/// Maximum width of a file's sample in the hand, mm: a wider one feels like one flat patch.
 const MAX_CELL_MM: f64 = 50.0;
-/// The longer side of a terrain as small as this in the hand tells nothing any more, mm.
+/// Minimum longer side of a terrain in the hand, mm: a shorter one shows no detail.
 const SMALLEST_TERRAIN_MM: f64 = 5.0;
-/// Above this an arm most likely buzzes or kicks, N/mm: people hold 0.4 to 0.8 N/mm on a
-/// Premium 1.5 (`docs/reference/hardware.md`).
+/// Maximum stiffness, N/mm: above it an arm most likely buzzes or kicks. People hold 0.4 to 0.8
+/// N/mm on a Premium 1.5 (`docs/reference/hardware.md`).
 pub const STIFFEST_N_PER_MM: f32 = 1.0;
-/// A smaller change is not noticeable, N/mm.
+/// Minimum stiffness, N/mm: a softer surface is not noticeable.
 const SOFTEST_N_PER_MM: f32 = 0.005;
 /// Smallest and largest radius of a ball at the tip, device millimetres; 0 is a point.
 pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
@@ -22,47 +22,47 @@ pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
 /// Change of a placement during a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlacementChange {
-    /// Another place under the hand: so many device millimetres farther east and north.
+    /// Another place under the hand, this far away in device millimetres.
     Pan {
         /// Device millimetres east.
         east_mm: f64,
         /// Device millimetres north.
         north_mm: f64,
     },
-    /// The same in ground metres.
+    /// Another place under the hand, this far away in ground metres.
     PanGround {
         /// Ground metres east.
         east_m: f64,
         /// Ground metres north.
         north_m: f64,
     },
-    /// So many times larger, about the place under the hand.
+    /// Another scale: multiplied by this factor, about the place under the hand.
     Zoom(f64),
-    /// Heights so many times larger.
+    /// Other heights: multiplied by this factor.
     Exaggerate(f64),
-    /// A spring so many times stiffer.
+    /// Another stiffness: multiplied by this factor.
     Stiffness(f64),
-    /// Something else of the surface.
+    /// Another surface parameter.
     Surface(SurfaceChange),
-    /// A ball of another radius in device millimetres at the tip; 0 for a point.
+    /// Another radius of the ball at the tip, device millimetres; 0 for a point.
     Tip(f64),
-    /// Scale, heights, surface and tip of the beginning, at the place under the hand.
+    /// Initial scale, heights, surface and tip, at the place under the hand.
     Reset,
 }
 
-/// Reason for which a placement cannot be changed. It stays as it is.
+/// Reason to refuse a change; the placement stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ChangeError {
     /// A place beyond the samples.
     #[error("that place is outside of the terrain")]
     Outside,
-    /// Ground metres, of a file without a size.
+    /// Ground metres for a file without a cell size on the ground.
     #[error("the file does not state its cell size on the ground: pan by device millimetres")]
     NoGroundSize,
-    /// A factor that is none.
+    /// A factor that is not positive and finite.
     #[error("{0} is not a valid factor: it must be above zero, and finite")]
     Factor(f64),
-    /// Larger than there is detail.
+    /// A scale beyond the detail of the file.
     #[error(
         "a sample of the file would be {cell_mm:.0} mm wide in the hand: it has no more detail"
     )]
@@ -70,60 +70,60 @@ pub enum ChangeError {
         /// Device millimetres a haptic cell of level 0.
         cell_mm: f64,
     },
-    /// Smaller than can be rendered.
+    /// A terrain too small to render.
     #[error("the whole terrain would be {size_mm:.1} mm wide in the hand")]
     TooSmall {
-        /// Its longer side.
+        /// Longer side of the terrain, device millimetres.
         size_mm: f64,
     },
-    /// A spring that an arm cannot make.
+    /// A stiffness outside the valid range, N/mm.
     #[error(
         "a stiffness of {0:.3} N/mm: from {SOFTEST_N_PER_MM} to {STIFFEST_N_PER_MM} N/mm can be had"
     )]
     Stiffness(f32),
-    /// The same of a material of the scene.
+    /// A stiffness of a material above the maximum, N/mm.
     #[error(
         "the stiffest of the materials would have {0:.3} N/mm: up to {STIFFEST_N_PER_MM} N/mm can be had"
     )]
     Material(f32),
-    /// Something of the surface that cannot be had.
+    /// An invalid surface parameter.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-    /// A ball that no tip can have.
+    /// A tip radius outside [`TIPS_MM`].
     #[error("a tip of {0} mm: from {least} to {most} mm can be had", least = TIPS_MM[0], most = TIPS_MM[1])]
     Tip(f64),
-    /// Numbers that no terrain can be rendered at.
+    /// Numbers with which no terrain can be rendered.
     #[error(transparent)]
     Terrain(#[from] TerrainError),
-    /// A scale that none can have.
+    /// An invalid scale.
     #[error(transparent)]
     Scale(#[from] ScaleError),
 }
 
-/// A view, and its surface parameters.
+/// A placement and its surface parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laid {
     /// Place, scale, level and heights.
     pub view: Placement,
-    /// Stiffness and limit.
+    /// Stiffness, friction, damping, texture and shading.
     pub params: SurfaceParams,
 }
 
 /// Bounds of all placements of a session.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// The view of the beginning.
+    /// The initial placement.
     pub first: Laid,
     /// Resolution of the encoders at the tip, mm.
     pub resolution_mm: f64,
-    /// A level that the user has stated.
+    /// Level of detail, if the user has stated one.
     pub level: Option<u8>,
-    /// Radius of the ball of the beginning, device millimetres; 0 for a point.
+    /// Initial radius of the ball at the tip, device millimetres; 0 for a point.
     pub tip_mm: f64,
 }
 
-/// The HIP, and the place of the terrain about which the placement changes: device
-/// millimetres of the view in force.
+/// The HIP and the proxy, device millimetres of the current placement. The placement changes about
+/// the proxy, or about the HIP in the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
     /// The HIP.
@@ -133,12 +133,12 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// The place that a view is changed at.
+    /// Returns the place about which the placement changes.
     fn at_mm(&self) -> [f64; 3] {
         self.proxy_mm.unwrap_or(self.hip_mm)
     }
 
-    /// Returns true if the cells of a terrain at this place are others than they are rendered
+    /// Returns true if the terrain's cells at this place differ from the rendered ones
     /// ([`HapticGrid::measured_anew`]).
     #[must_use]
     pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
@@ -151,27 +151,26 @@ impl Hand {
     }
 }
 
-/// Another view, and where the HIP is in it.
+/// A changed placement, and the HIP in it.
 #[derive(Clone)]
 pub struct Changed<'r> {
-    /// The view.
+    /// The new placement and its surface parameters.
     pub laid: Laid,
     /// Its terrain.
     pub terrain: Terrain<'r>,
-    /// The HIP, device millimetres of the new view. Its height over the place under
-    /// the hand is what it was.
+    /// The HIP, device millimetres of the new placement. Its height over the place under the hand
+    /// is unchanged.
     pub hip_mm: [f64; 3],
-    /// True if the heights that this follows from have been read. If not, the HIP has the
-    /// height of before, and the same changes give the right one when they have come.
+    /// True if the heights under the hand have been read. Otherwise the HIP keeps its old height,
+    /// and the same changes give the right one after the heights have been read.
     pub ground_is_known: bool,
 }
 
 impl Bounds {
-    /// Applies changes one after the other, at the place under the hand. Cells are then
-    /// as large as they are there.
+    /// Applies changes in order, at the place under the hand. The cells are then measured there.
     ///
     /// # Errors
-    /// [`ChangeError`] of the first that cannot be had; then nothing is changed.
+    /// [`ChangeError`] of the first invalid change; then nothing is changed.
     pub fn apply<'r>(
         &self,
         terrain: &Terrain<'r>,
@@ -210,7 +209,7 @@ impl Bounds {
         })
     }
 
-    /// One change, at a place in haptic cells of level 0.
+    /// Applies one change, at a place in haptic cells of level 0.
     fn step(
         &self,
         grid: &mut HapticGrid<'_>,
@@ -241,13 +240,13 @@ impl Bounds {
             }
             PlacementChange::Stiffness(factor) => {
                 let stiffness = params.stiffness_n_per_mm * factor_of(factor)? as f32;
-                // A stiffness of the user's own may go down, and return.
+                // An initial stiffness above the maximum may be reduced and restored.
                 let most = STIFFEST_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
                 if !(SOFTEST_N_PER_MM..=most).contains(&stiffness) {
                     return Err(ChangeError::Stiffness(stiffness));
                 }
                 params.stiffness_n_per_mm = stiffness;
-                // Other materials of the scene become as much stiffer.
+                // The scene's other materials become stiffer by the same factor.
                 if let Some(materials) = grid.materials() {
                     let stiffest = |params| materials.table().hardest(params).stiffness_n_per_mm;
                     let (now, first) = (stiffest(params), stiffest(&self.first.params));
@@ -279,8 +278,8 @@ impl Bounds {
     }
 }
 
-/// The HIP in the view that comes after: beside the place under the hand as far as before,
-/// and as high over its ground, or as deep; and whether both grounds are known.
+/// Returns the HIP in the new placement, with the same offset from the place under the hand and the
+/// same height over its ground, and true if both ground heights are known.
 fn hip_after(
     (before, after): (&Terrain<'_>, &Terrain<'_>),
     hand: &Hand,
@@ -297,7 +296,7 @@ fn hip_after(
         None => ground_of(before, [at_mm[0], at_mm[1]], place_before),
     };
     let (ground_after, after_is_known) = ground_of(after, [east, north], at);
-    // Over a hole the height stays what it is.
+    // At no-data the height stays the same.
     let risen = ground_before
         .zip(ground_after)
         .map_or(0.0, |(before, after)| after - before);
@@ -305,8 +304,9 @@ fn hip_after(
     (hip_mm, before_is_known && after_is_known)
 }
 
-/// The ground at a place, in millimetres and in haptic cells of level 0. Where the terrain's level
-/// is coarse and not here yet it is that of the finest level. And whether it is known: no-data is.
+/// Returns the ground height in mm at a place, given in millimetres and in haptic cells of level 0,
+/// and true if it is known (no-data is known). If a coarse level has not been read here yet, the
+/// finest level is used.
 fn ground_of(terrain: &Terrain<'_>, [east, north]: [f64; 2], at: [f64; 2]) -> (Option<f64>, bool) {
     let (ground, status) = terrain.read_height_mm(east, north);
     if ground.is_some() || status.is_complete() {
@@ -331,7 +331,7 @@ fn within(grid: &HapticGrid<'_>, at: [f64; 2]) -> Result<(), ChangeError> {
     inside.then_some(()).ok_or(ChangeError::Outside)
 }
 
-/// Refuses what is too large or too small, unless it comes nearer to what is not.
+/// Refuses a scale that is too large or too small, unless the factor brings it closer to the limit.
 fn check_size(grid: &HapticGrid<'_>, view: &Placement, factor: f64) -> Result<(), ChangeError> {
     let cell_mm = view.scale.cell_mm();
     let size_mm = f64::from(grid.columns().max(grid.rows()) - 1) * cell_mm;

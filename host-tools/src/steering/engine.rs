@@ -1,4 +1,4 @@
-//! Changes of the placement by the user, done with a device.
+//! Changes of the placement by the user, applied to a device.
 
 use std::time::{Duration, Instant};
 
@@ -13,16 +13,16 @@ use crate::link::{Event, HostRequest};
 use crate::place::{Bounds, Changed, Hand, Laid, PlacementChange};
 use crate::terrain::Terrain;
 
-/// Changes that wait for the clutch to open; they are done at once.
+/// Maximum number of changes that wait for the clutch to open; they are then applied together.
 const WAITING: usize = 64;
-/// The clutch opens in 100 ticks of a millisecond; a device that has not opened it after so
-/// many samples is not going to.
+/// Samples after which a clutch that has not opened counts as failed; it opens in 100 ticks of a
+/// millisecond.
 const SAMPLES_TO_OPEN: u32 = 5_000;
 
-/// For so long the ground under the hand in another view is waited for, with the clutch open.
+/// Maximum wait for the ground under the hand in the new placement, with the clutch open.
 const GROUND_WITHIN: Duration = Duration::from_secs(2);
 
-/// A view that is to be put in.
+/// A placement to set on the device.
 pub struct Put<'r> {
     /// Message to the device.
     pub view: SceneChange,
@@ -36,35 +36,35 @@ pub struct Put<'r> {
 enum Stage<'r> {
     /// The clutch is closed, by the last report.
     Idle,
-    /// The clutch was asked to open, so many samples ago, and whether that was answered: the
-    /// board's clutch input may hold it open already, and let go before the host's request is there.
+    /// The clutch was requested `samples` samples ago. `answered` distinguishes this hold from the
+    /// board's clutch input, which may hold the clutch open already and release it before the
+    /// request arrives.
     Opening { samples: u32, answered: bool },
     /// The clutch is open.
     Open,
-    /// This placement was sent, of this terrain.
+    /// This placement was sent; with its terrain.
     Putting(Box<(Laid, Terrain<'r>)>),
     /// The clutch was released, and is still reported open.
     Closing,
 }
 
-/// The engine behind keys and commands: from [`Steer`] to what a device is asked, by what it
-/// samples.
+/// Engine behind keys and commands: turns each [`Steer`] into requests to a device, by its samples.
 pub struct Steering<'r> {
     bounds: Bounds,
     now: Laid,
     terrain: Terrain<'r>,
-    /// Number of the view in force on the device.
+    /// Number of the current placement on the device.
     number: u8,
     waiting: Vec<PlacementChange>,
     /// The user holds the clutch.
     held: bool,
     /// The board's clutch input holds it open.
     by_input: bool,
-    /// The user took the clutch, and may have gone far since the cells were measured.
+    /// The user has held the clutch, and may be far from where the cells were measured.
     measures: bool,
     /// Requested hold of the clutch.
     asked: ClutchHold,
-    /// Since when the ground of another view has been awaited.
+    /// Start of the wait for the ground of the new placement.
     awaits: Option<Instant>,
     stage: Stage<'r>,
     asks: Vec<HostRequest>,
@@ -73,7 +73,7 @@ pub struct Steering<'r> {
 }
 
 impl<'r> Steering<'r> {
-    /// Begins with the view that is served first.
+    /// Creates an engine with the initial placement.
     #[must_use]
     pub fn new(bounds: Bounds, terrain: Terrain<'r>) -> Self {
         Self {
@@ -94,19 +94,19 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// The view in force, by the last report, and its surface parameters.
+    /// Returns the current placement, by the last report, and its surface parameters.
     #[must_use]
     pub const fn now(&self) -> &Laid {
         &self.now
     }
 
-    /// The terrain of the view in force.
+    /// Returns the terrain of the current placement.
     #[must_use]
     pub const fn terrain(&self) -> &Terrain<'r> {
         &self.terrain
     }
 
-    /// Returns true if nothing that was wanted is under way.
+    /// Returns true if no request of the user is pending.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
         let rests = match self.stage {
@@ -117,7 +117,7 @@ impl<'r> Steering<'r> {
         rests && self.waiting.is_empty() && !self.measures
     }
 
-    /// Takes what the user wants.
+    /// Queues a request of the user.
     pub fn steer(&mut self, steer: Steer) {
         match steer {
             Steer::Clutch(held) => {
@@ -125,34 +125,34 @@ impl<'r> Steering<'r> {
                 self.held = held;
             }
             Steer::Change(change) if self.waiting.len() < WAITING => self.waiting.push(change),
-            // A key that is stuck.
+            // Only a stuck key fills the queue.
             Steer::Change(_) => {}
         }
     }
 
-    /// Lines for the user, in their order.
+    /// Returns the pending lines for the user, in order.
     pub fn lines(&mut self) -> Vec<String> {
         std::mem::take(&mut self.lines)
     }
 
-    /// Returns the requests to the device now.
+    /// Returns the pending requests to the device.
     pub fn asks(&mut self) -> Vec<HostRequest> {
         std::mem::take(&mut self.asks)
     }
 
-    /// The view that is to be put in now.
+    /// Returns the placement to set now, if any.
     pub fn take_put(&mut self) -> Option<Put<'r>> {
         self.put.take()
     }
 
-    /// Takes what the device tells.
+    /// Handles an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Sample(sample) => self.on_sample(sample),
             Event::Viewed { view, taken } => self.on_viewed(view, *taken),
             Event::Opened { resumed, .. } => {
-                // A clutch is let go with its session, and a device that was restarted begins
-                // with this view.
+                // A session's end releases its clutch, and a restarted device starts with this
+                // placement.
                 self.stage = Stage::Idle;
                 self.asked = ClutchHold::LetGo;
                 if !resumed {
@@ -187,7 +187,7 @@ impl<'r> Steering<'r> {
             .push(HostRequest::Request(Request::Clutch { hold }));
     }
 
-    /// Holds the clutch: for the user the terrain goes with the hand, for another view alone
+    /// Holds the clutch. For the user the terrain follows the hand; only for a change of placement
     /// it stays in its place.
     fn hold(&mut self) {
         self.clutch(match self.held {
@@ -209,7 +209,7 @@ impl<'r> Steering<'r> {
             self.measures = self.hand(sample).is_far_from_measure(&self.terrain);
         }
         self.by_input = is_taken;
-        // The user takes the terrain along while another view is on its way.
+        // The user has taken the clutch during a change of placement: the terrain follows the hand.
         if self.held && self.asked == ClutchHold::InPlace {
             self.hold();
         }
@@ -232,15 +232,15 @@ impl<'r> Steering<'r> {
                 }
             }
             Stage::Open if sample.view == self.number => self.go_on(sample),
-            // The board's clutch input may hold it on.
+            // The board's clutch input may still hold the clutch open.
             Stage::Closing if !is_open || by_input => self.stage = Stage::Idle,
             _ => {}
         }
     }
 
-    /// With an open clutch: the next view, or the end.
+    /// Continues with an open clutch: sends the next placement, or releases the clutch.
     fn go_on(&mut self, sample: &TickRecord) {
-        // A proxy that has yet to land says nothing of the ground.
+        // The ground height is unknown until the proxy has landed.
         if sample.missing_tile.is_some() {
             return;
         }
@@ -270,7 +270,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// Returns the position of the hand in a sample, in the placement in force.
+    /// Returns the position of the hand in a sample, in the current placement.
     fn hand(&self, sample: &TickRecord) -> Hand {
         let scale = self.terrain.scale();
         let touches = sample.state == ContactState::Touching;
@@ -280,8 +280,8 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// The view that changes make; none where its ground has not been read yet, if that is
-    /// waited for.
+    /// Returns the placement after the changes; `None` if its ground has not been read yet and
+    /// `waits` is true.
     fn next_view(
         &self,
         changes: &[PlacementChange],

@@ -1,4 +1,4 @@
-//! The engine against devices that do what no good one does, or that are restarted.
+//! Tests of the engine with devices that misbehave or restart.
 
 use super::*;
 use crate::link::hello;
@@ -10,7 +10,7 @@ use heightfield::Raster;
 
 const ZOOM: Steer = Steer::Change(PlacementChange::Zoom(2.0));
 
-/// An engine over a plane, at 1 mm a cell.
+/// Runs `look` on an engine over a plane, at 1 mm a cell.
 fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
     with_raster(
         &Raster::from_fn(65, 65, |x, _| x as f32).expect("raster"),
@@ -61,12 +61,12 @@ fn answer(steering: &mut Steering<'_>, hold: ClutchHold) {
     steering.on_event(&Event::Answered { request, result });
 }
 
-/// Wants a zoom, and has the clutch opened for it.
+/// Requests a zoom, for which the clutch starts to open.
 fn open(steering: &mut Steering<'_>) {
     steering.steer(ZOOM);
     samples(steering, Limits::empty(), 1);
     assert_eq!(asked(steering), Some(ClutchHold::InPlace));
-    // Open by the board's input, before the answer: the host's hold is not there yet.
+    // The board's input holds it open before the answer: the host's hold has not arrived.
     samples(steering, Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT, 3);
     assert!(steering.take_put().is_none());
     answer(steering, ClutchHold::InPlace);
@@ -74,7 +74,7 @@ fn open(steering: &mut Steering<'_>) {
     assert!(steering.take_put().is_none(), "the clutch still opens");
 }
 
-/// Opens the clutch, and takes the view that is put in.
+/// Opens the clutch, and returns the change that is sent.
 fn put(steering: &mut Steering<'_>) -> SceneChange {
     open(steering);
     samples(steering, Limits::CLUTCH_OPEN, 1);
@@ -109,7 +109,7 @@ fn a_view_that_is_not_taken_leaves_everything_as_it_was_and_is_told() {
         assert_eq!(steering.lines().len(), 1);
         samples(steering, Limits::CLUTCH_OPEN, 1);
         assert_eq!(asked(steering), Some(ClutchHold::LetGo));
-        // The next one has the same number: the first was never there.
+        // The next one has the same number, because the first was refused.
         samples(steering, Limits::empty(), 1);
         assert_eq!(put(steering).number, 1);
     });
@@ -141,7 +141,7 @@ fn unopened_clutch_or_silent_device_is_given_up() {
     }
 }
 
-/// A proxy that has yet to land says nothing of the ground under it.
+/// The ground height is unknown until the proxy has landed.
 #[test]
 fn a_view_waits_for_the_tile_under_the_proxy() {
     with(|steering| {
@@ -160,7 +160,7 @@ fn a_view_waits_for_the_tile_under_the_proxy() {
     });
 }
 
-/// It begins anew with the view that is in force, under the number 0.
+/// A restarted device starts with the current placement, as number 0.
 #[test]
 fn restarted_device_counts_placements_from_zero() {
     for (resumed, number) in [(false, 1), (true, 2)] {
@@ -176,7 +176,7 @@ fn restarted_device_counts_placements_from_zero() {
     }
 }
 
-/// The board's switch holds it on: the host has let go all the same.
+/// The board's switch still holds the clutch; the host has released it.
 #[test]
 fn a_clutch_that_the_boards_input_holds_open_is_let_go_by_the_host() {
     with(|steering| {
@@ -190,7 +190,7 @@ fn a_clutch_that_the_boards_input_holds_open_is_let_go_by_the_host() {
     });
 }
 
-/// Ten degrees from south to north, 1 mm a cell of 0.05°.
+/// Returns a raster of ten degrees from south to north, in cells of 0.05°.
 fn degrees() -> Raster {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("degrees.asc");
@@ -202,8 +202,8 @@ fn degrees() -> Raster {
     Raster::open(path, &Default::default()).expect("opens")
 }
 
-/// The hand goes so many millimetres north of the middle by itself, or by the clutch: no view
-/// was asked for.
+/// Returns a sample with the hand `north_mm` north of the middle, by its own motion or with the
+/// clutch; no change was requested.
 fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> TickRecord {
     let cell_mm = steering.terrain.scale().cell_mm();
     let middle = steering.terrain.grid().of_ground([11.0, 55.0]);
@@ -252,7 +252,7 @@ fn far_clutch_measures_cells_again() {
             assert!(!put.view.keeps_tiles);
             viewed(steering, &put.view, true);
             assert!((metres(steering).expect("known") / before - 1.0).abs() < 1e-12);
-            // Once, and then it is let go when the user lets it go.
+            // The cells are measured once; the clutch is released when the user releases it.
             let open = TickRecord {
                 view: 1,
                 hip: put.view.hip,

@@ -1,8 +1,8 @@
-//! The fallback of a scene: coarse tiles under all that the arm reaches.
+//! The fallback of a scene: coarse tiles under the arm's whole reach.
 //!
-//! A device feels it where a tile has not come yet. Its samples are those of the terrain at
-//! every so many-th sample of the scene's level, or what the file's overviews have there; they
-//! need not be more exact, because the surface moves on to the tiles when these come.
+//! A device renders it where a tile has not arrived yet. Its samples are every 2ⁿ-th sample of the
+//! scene's level, or the values of the file's overviews there. They need not be more exact, because
+//! the surface blends to the tiles when these arrive.
 
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::Scene;
@@ -13,17 +13,17 @@ use heightfield::{ReadStatus, ReadTracker};
 use super::tiler::range;
 use super::{Terrain, TileBuffer, identity};
 
-/// Ratio of the near tile's spacing to the wide one's, as a power of two: it reaches a quarter as
-/// far as the wide one.
+/// Power of two by which the near tile's samples are closer than the wide one's: it reaches a
+/// quarter as far.
 const NEAR_IS_FINER: u8 = 2;
 
 impl Terrain<'_> {
-    /// A scene of this terrain with a fallback under all that an arm reaches. `reach_mm` is the
-    /// rectangle around that: west, south, east and north of the tip in its home pose, device
-    /// millimetres ([`crate::place::Reach::sides_mm`]).
+    /// Returns a scene of this terrain with a fallback under the arm's whole reach. `reach_mm` is
+    /// the rectangle around the reach: west, south, east and north of the tip in its home pose,
+    /// device millimetres ([`crate::place::Reach::sides_mm`]).
     ///
-    /// The scene stays as it is where none of the terrain lies in there, or all of it fits into four
-    /// tiles, which the device holds anyway.
+    /// The scene has no fallback if none of the terrain lies in the rectangle, or if all of it fits
+    /// into four tiles, which the device stores anyway.
     #[must_use]
     pub fn underlaid(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
         let mut scene = Scene {
@@ -45,7 +45,7 @@ impl Terrain<'_> {
         fallback.is_valid(self.level()).then_some(fallback)
     }
 
-    /// The finest tile that spans the rectangle.
+    /// Returns the finest tile that spans the rectangle.
     fn wide(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<CoarseTile> {
         let home = self.scale().to_mm(&scene.home);
         let size = self.size();
@@ -56,7 +56,7 @@ impl Terrain<'_> {
                 side(reach_mm[axis]).floor(),
                 side(reach_mm[axis + 2]).ceil(),
             ];
-            // Also where a number is none.
+            // `None` also for NaN.
             (to >= 0.0 && from <= last).then(|| [from.max(0.0), to.min(last)])
         };
         let (east, north) = (along(0)?, along(1)?);
@@ -64,15 +64,15 @@ impl Terrain<'_> {
         let spans = |shift: &u8| (TILE_CELLS as f64) * f64::from(*shift).exp2() >= cells;
         let shift = (CoarseTile::LEAST_SHIFT..=CoarseTile::MAX_SHIFT).find(spans)?;
         Some(CoarseTile {
-            // Whole numbers of cells inside of the field.
+            // Whole numbers of cells inside the field.
             first: Cell::new(east[0] as i32, north[0] as i32),
             shift,
         })
     }
 
-    /// The heights of a tile that a device with this scene asks for, as they are sent: of the
-    /// scene's level, or of its fallback. `None` if there is no such tile. And whether they are
-    /// complete.
+    /// Returns the heights of a tile that a device with this scene requests, as they are sent, and
+    /// whether they are complete: a tile of the scene's level, or of its fallback. `None` if there
+    /// is no such tile.
     #[must_use]
     pub fn tile_of<'b>(
         &self,
@@ -109,15 +109,15 @@ impl Terrain<'_> {
         }
     }
 
-    /// The height of a coarse tile's sample, in cells. Beyond the field it continues as it ends
-    /// there.
+    /// Returns the height of a coarse tile's sample, in cells; beyond the field, that of its
+    /// border.
     fn coarse_sample(&self, tile: &CoarseTile, place: [usize; 2], reads: &ReadTracker) -> f64 {
         let size = self.size();
         let sample = |first: i32, place: usize, last: i32| {
             let at = i64::from(first) + ((place as i64) << tile.shift);
             at.clamp(0, i64::from(last)) as u32
         };
-        // Its samples are so many cells of the ground apart.
+        // The level at which samples are as far apart as those of the tile.
         let shift = tile.shift.saturating_sub(self.parts().ilog2() as u8);
         let level = self.level().saturating_add(shift);
         let column = sample(tile.first.x, place[0], size[0]);
@@ -125,8 +125,8 @@ impl Terrain<'_> {
         self.cells_at(level, [column, row], reads)
     }
 
-    /// A sample of the near tile: on its border the height that the wide one has there, so that the
-    /// surface continues evenly. Where that has none, its own.
+    /// Returns a sample of the near tile. On its border it is the wide tile's height there, so that
+    /// the surface continues evenly; if that has none, the near tile's own.
     fn near_sample(
         &self,
         wide: &CoarseTile,
@@ -142,7 +142,7 @@ impl Terrain<'_> {
         }
     }
 
-    /// The height of the wide tile at a sample of the near one, in cells; NaN at a hole.
+    /// Returns the height of the wide tile at a sample of the near one, in cells; NaN at no-data.
     fn between_samples(
         &self,
         wide: &CoarseTile,
@@ -161,7 +161,7 @@ impl Terrain<'_> {
         let weighed = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, up)| {
             let along = |share: f64, next: usize| if next == 1 { share } else { 1.0 - share };
             let weight = along(east, right) * along(north, up);
-            // A corner without weight does not count, also where it is a hole.
+            // A corner without weight does not count, even if it has no data.
             match weight > 0.0 {
                 true => weight * self.coarse_sample(wide, [col + right, row + up], reads),
                 false => 0.0,
@@ -171,8 +171,8 @@ impl Terrain<'_> {
     }
 }
 
-/// The finer tile within a wide one, around a cell as far as it can be; none where it would be no
-/// finer. Every border of the wide one's cells goes through its samples.
+/// Returns the finer tile within a wide one, centred on a cell as far as possible; `None` if it
+/// would not be finer. Its samples include the borders of the wide one's cells.
 fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
     let shift = wide.shift.saturating_sub(NEAR_IS_FINER);
     let near = CoarseTile {
@@ -189,14 +189,14 @@ fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
     (near.shift < wide.shift).then_some(CoarseTile { first, ..near })
 }
 
-/// The heights of a coarse tile, by those of its samples.
+/// Returns the heights of a coarse tile, from a function of its samples.
 fn coarse_tile(buffer: &mut TileBuffer, sample: impl Fn(usize, usize) -> f64) -> Heights<'_> {
     for (index, height) in buffer.heights.iter_mut().enumerate() {
         *height = sample(index % TILE_SAMPLES, index / TILE_SAMPLES);
     }
     match range(buffer.heights.as_slice()) {
         None => Heights::Hole,
-        // Nothing is known of what its samples are multiples of.
+        // The samples have no known unit.
         Some((low, high, _)) => buffer.above(low, high, &[]),
     }
 }

@@ -1,4 +1,4 @@
-//! A tick with friction: the proxy is held, or walks behind the HIP.
+//! A tick with friction: the proxy is held, or follows the HIP.
 
 use glam::Vec3;
 
@@ -12,28 +12,28 @@ use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::GridPoint;
 use crate::terrain::Window;
 
-/// A proxy that slides sticks again when it has not moved for so long, s: longer than
-/// a slow hand waits for its next encoder count.
+/// Time without motion after which a sliding proxy sticks again, s: longer than a slow hand needs
+/// for its next encoder count.
 const STICKS_AFTER_S: f32 = 0.02;
 
-/// Memory of a contact with friction.
+/// State of a contact with friction.
 #[derive(Clone, Debug)]
 pub(super) struct Rough {
     friction: Friction,
     motion: Motion,
     stage: Stage,
-    /// The proxy at the start of the tick, or where it met the surface in it.
+    /// Position of the proxy at the start of the tick, or where it met the surface during the tick.
     from: GridPoint,
     /// The part of the displacement that friction held when the proxy last moved, cells.
     held: Vec3,
 }
 
-/// Which coefficient holds the proxy.
+/// Coefficient that holds the proxy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Motion {
     /// The static one.
     Sticks,
-    /// The dynamic one: it has moved, and since then been still for so many ticks.
+    /// The dynamic one: the proxy has moved, and then rested for `still` ticks.
     Slides { still: u32 },
 }
 
@@ -42,14 +42,15 @@ enum Motion {
 enum Stage {
     /// The proxy has not moved in this tick: the cone at rest decides.
     Begins,
-    /// It has, on so many straight ways, the last ones of them inside of one patch.
+    /// The proxy has moved along `ways` straight segments, the last `inside` of them within one
+    /// patch.
     GoesOn { ways: u32, inside: u32 },
     /// Descent without friction: the proxy moves to the closest point.
     Descends,
 }
 
 impl Rough {
-    /// Of a surface that is rough.
+    /// Creates the state for a surface with friction; `None` without friction.
     pub(super) fn on(friction: Friction) -> Option<Self> {
         (!friction.is_none()).then(|| Self {
             friction,
@@ -60,14 +61,14 @@ impl Rough {
         })
     }
 
-    /// Takes other coefficients. Returns true if they differ.
+    /// Sets the coefficients. Returns true if they have changed.
     pub(super) fn takes(&mut self, friction: Friction) -> bool {
         let is_other = self.friction != friction;
         self.friction = friction;
         is_other
     }
 
-    /// The coefficient that holds a proxy before it moves.
+    /// Returns the coefficient that holds a proxy before it moves.
     const fn mu_at_rest(&self) -> f32 {
         match self.motion {
             Motion::Sticks => self.friction.static_mu,
@@ -77,7 +78,7 @@ impl Rough {
 }
 
 impl Contact {
-    /// The part of the last displacement that friction holds rather than the surface, cells.
+    /// Returns the part of the last displacement that friction holds, not the surface, cells.
     pub(crate) fn held_back(&self) -> Vec3 {
         match &self.rough {
             Some(rough) => rough.held * -self.edge_fade(),
@@ -105,7 +106,7 @@ impl Contact {
         self.counts_stillness();
     }
 
-    /// Begins a tick: from where the proxy is.
+    /// Starts a tick's walk at the proxy.
     fn begins_to_walk<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -125,7 +126,7 @@ impl Contact {
         }
     }
 
-    /// The walk begins where the proxy is.
+    /// Starts the walk at the entry of the descent; off the surface, at the last proxy.
     #[inline(never)]
     fn walks_from_here<const D: usize>(&mut self, window: &Window<'_, D>) {
         let at = match &self.phase {
@@ -135,18 +136,18 @@ impl Contact {
         self.walks_from(at.unwrap_or(self.output.proxy));
     }
 
-    /// The motion of the tick counts from there.
+    /// Starts the walk at a point, from which the motion of the tick is measured.
     fn walks_from(&mut self, at: GridPoint) {
         let Some(rough) = &mut self.rough else { return };
         rough.from = at;
         rough.stage = match rough.friction.is_none() {
-            // A material without friction, in a scene that has others.
+            // A material without friction, in a scene with other materials.
             true => Stage::Descends,
             false => Stage::Begins,
         };
     }
 
-    /// One step of what the proxy does.
+    /// Runs one step of the tick.
     fn walks_on<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -171,7 +172,7 @@ impl Contact {
         }
     }
 
-    /// On the surface: where friction lets the proxy come to.
+    /// Moves the proxy on the surface as far as friction allows.
     #[inline(never)]
     fn follows_the_pull<const D: usize>(
         &mut self,
@@ -229,8 +230,8 @@ impl Contact {
         }
     }
 
-    /// The answer of a proxy on a rough surface. Its place is counted from the surface, not from the
-    /// HIP: a proxy that is held has the same bits for every HIP.
+    /// Sets the output of a proxy on a surface with friction. Its position is computed from the
+    /// surface, not from the HIP, so a held proxy has the same bits for every HIP.
     #[inline(never)]
     pub(super) fn is_held_at<const D: usize>(
         &mut self,
@@ -251,8 +252,8 @@ impl Contact {
         self.touches_at(window, hip, touched, came, budget)
     }
 
-    /// Counts how long the proxy has not moved, by the answers that count, and whether the next
-    /// answer is this one again.
+    /// Counts the ticks without motion, by converged outputs, and clears `at_rest` while the proxy
+    /// may still move.
     fn counts_stillness(&mut self) {
         let before = self.touched.map(|(proxy, _)| proxy);
         let tick_s = self.settings.rate.tick_s();
@@ -273,7 +274,8 @@ impl Contact {
                 rough.motion = Motion::Sticks;
             }
         }
-        // The viscous part of a motion ends with it: the proxy continues though the HIP rests.
+        // Viscous friction ends with the motion, so the proxy continues to creep after the HIP
+        // rests.
         let creeps = rough.friction.viscous_s > 0.0 && way != Some(0.0);
         self.at_rest &= rough.motion == Motion::Sticks && !creeps;
     }

@@ -1,5 +1,5 @@
-//! Content of a window where the surface is not a tile of the scene's level: before it arrives,
-//! and while it settles ([`TileBlend`](super::TileBlend)).
+//! Content of a window where no tile of the scene's level is rendered unchanged: before it arrives,
+//! and while it blends in ([`TileBlend`](super::TileBlend)).
 
 use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
@@ -9,7 +9,7 @@ use crate::terrain::index::{TILE_CELLS, TileIndex};
 use crate::terrain::tile::Tile;
 use crate::terrain::tile_blend::{Allowance, TileBlend, within};
 
-/// A height that is rendered at a sample, and whether it is a tile's.
+/// Rendered height at a sample, with its source: a tile or the fallback.
 #[derive(Clone, Copy)]
 struct BlendedHeight {
     height: f32,
@@ -17,9 +17,8 @@ struct BlendedHeight {
 }
 
 impl<'t, const D: usize> Window<'t, D> {
-    /// Lays a fallback under the field, or none; the tiles that are held are the surface as
-    /// they are. The buffers of the fallback before are kept for this one
-    /// ([`Self::take_spare`]).
+    /// Sets the field's fallback, or none; the stored tiles are rendered unchanged. The buffers of
+    /// the previous fallback are kept for this one ([`Self::take_spare`]).
     pub fn lay(&mut self, fallback: Option<Fallback>) {
         self.fallback.lay(fallback);
         self.tile_blend = TileBlend::NOTHING;
@@ -35,19 +34,18 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// Gives back a buffer that held a tile of a fallback, where there is to be none any more.
-    /// There may be another.
+    /// Returns one buffer that the fallback no longer needs, if any. There may be another.
     #[must_use]
     pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
         self.fallback.take_spare()
     }
 
-    /// Takes a tile that was asked for: one of the field, or of the fallback. Gives back a buffer,
-    /// if one is left over.
+    /// Stores a requested tile, of the field or of the fallback. Returns a buffer, if one is left
+    /// over.
     ///
-    /// `blended` are the cells of proxy and HIP. A tile of the field settles where the surface rendered there
-    /// depends on it: it, or one beside it that is not the surface, has one of them. Any other
-    /// is the surface at once, as with [`Self::install`].
+    /// `blended` are the cells of proxy and HIP. A tile of the field blends in if the surface at
+    /// one of these cells depends on it: the cell is in this tile, or in a neighbour that is not
+    /// rendered unchanged. Any other tile is rendered unchanged at once, as with [`Self::install`].
     #[must_use]
     pub fn take(&mut self, tile: &'t mut Tile, blended: [Cell; 2]) -> Option<&'t mut Tile> {
         if !self.fallback.is_wanted() {
@@ -68,15 +66,15 @@ impl<'t, const D: usize> Window<'t, D> {
         Some(self.put(tile, settles))
     }
 
-    /// Returns true if a patch is that of its tile, and not of the fallback, nor between the two.
+    /// Returns true if a patch is rendered from its tile alone, without the fallback.
     #[must_use]
     #[inline]
     pub fn is_settled(&self, cell: Cell) -> bool {
         self.held(TileIndex::holding(cell)).is_some()
     }
 
-    /// Blends arrived tiles in by at most `step` cells. Returns true if the surface may have changed
-    /// since the tick before.
+    /// Blends arrived tiles in by at most `step` cells. Returns true if the surface may have
+    /// changed since the last tick.
     pub fn settle(&mut self, step: f32) -> bool {
         let has_changed = core::mem::take(&mut self.tile_blend.has_changed);
         if self.tile_blend.count == 0 {
@@ -112,8 +110,8 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// A tile has come into the slot of `index`: it settles if it is to, and the fallback was rendered
-    /// there. One that was there before continues as it was.
+    /// Records a tile that has arrived in the slot of `index`. It blends in if `settles` is true
+    /// and the fallback was rendered there. If the same tile was there before, its blend continues.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
         let (row, col) = TileBlend::<D>::slot(index);
         self.tile_blend.has_changed = self.fallback.is_wanted();
@@ -130,7 +128,8 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// Returns the largest distance of a tile's samples from the coarse fallback, cells; `None` where that is not rendered.
+    /// Returns the maximum distance of a tile's samples from the coarse fallback, cells; `None` if
+    /// no fallback is rendered there.
     fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
         let [lowest, highest] = tile.range()?;
         let [low, high] = self.fallback.loaded()?.range_over(index, tile.base())?;
@@ -138,7 +137,7 @@ impl<'t, const D: usize> Window<'t, D> {
         (far > 0.0).then_some(far)
     }
 
-    /// Returns the content of a cell of the field whose tile is not the surface.
+    /// Returns the content of a cell of the field whose tile is missing or blends in.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
@@ -149,7 +148,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let own = self.tile_here(index);
         let base = own.map_or(under.base(), Tile::base);
         let coarse = under.corners(cell, base);
-        // As far as no other tile has the same samples.
+        // The heights, if no other tile shares the samples.
         let alone = match own {
             Some(tile) => {
                 let (own, allowed) = (tile.corners(cell), self.tile_blend.allowed(index));
@@ -166,14 +165,14 @@ impl<'t, const D: usize> Window<'t, D> {
         match (sw + se + nw + ne).is_nan() {
             false => CellContent::Patch(Corners { base, heights }),
             true if are_of_tiles => CellContent::Hole,
-            // What the fallback does not know may yet come.
+            // Where the fallback has no height, the tile may still bring one.
             true => CellContent::Missing,
         }
     }
 
-    /// Puts the heights that are rendered at the corners of a cell which are on its tile's border in the
-    /// place of those that `alone` has, with or without its tile. Returns whether every corner without
-    /// a height is one of a tile.
+    /// Replaces the heights of `alone` at those corners of a cell that are on its tile's border by
+    /// the rendered ones. `alone` was computed from the cell's own tile, if it is there, and the
+    /// fallback. Returns true if every corner without a height is a tile's.
     #[inline(never)]
     fn blend_on_border(
         &self,
@@ -199,8 +198,8 @@ impl<'t, const D: usize> Window<'t, D> {
         are_of_tiles
     }
 
-    /// The height rendered at a sample that several tiles may share, in cells above `base`.
-    // A call: four copies of it would be a kilobyte.
+    /// Returns the height rendered at a sample that several tiles may share, in cells above `base`.
+    // Not inlined: four copies of it would be a kilobyte.
     #[inline(never)]
     fn blended(&self, sample: Cell, coarse: f32, base: i32) -> BlendedHeight {
         let mut blended = BlendedHeight {
@@ -232,7 +231,7 @@ impl<'t, const D: usize> Window<'t, D> {
         blended
     }
 
-    /// The tile of the field in its slot, whether it is the surface or not.
+    /// Returns the tile if it is in its slot, rendered unchanged or not.
     #[inline(never)]
     fn tile_here(&self, index: TileIndex) -> Option<&Tile> {
         let (row, col) = TileBlend::<D>::slot(index);
@@ -242,12 +241,12 @@ impl<'t, const D: usize> Window<'t, D> {
             .then_some(tile)
     }
 
-    /// Which material of the scene's table the sample nearest to a place on a patch has; `None`
-    /// where the patch's tile is not here, or came without materials.
+    /// Returns the material of the sample nearest to a place on a patch, as an index in the scene's
+    /// table; `None` if the patch's tile is missing or has no materials.
     pub(crate) fn material_near(&self, patch: Cell, place: &GridPoint) -> Option<u8> {
         let [x, y, _] = place.cell();
         let frac = place.frac();
-        // A place on the far border of its patch may be counted from the next one.
+        // The cell of a place on the far border of its patch may be the next one.
         let is_far = |at: i32, frac: f32, patch: i32| {
             usize::from(at.wrapping_sub(patch) as f32 + frac >= 0.5)
         };
@@ -263,12 +262,12 @@ impl<'t, const D: usize> Window<'t, D> {
         let Some(under) = self.fallback.loaded() else {
             return false;
         };
-        // Where neither a tile nor the fallback has heights, anything may be.
+        // Without a height of a tile or the fallback, the surface is unknown.
         let is_known = self.tile_here(index).is_some() || under.covers(index);
         if !(is_known && under.is_below(low)) {
             return false;
         }
-        // A border that is shared is rendered as the neighbour has it.
+        // On a shared border the surface may have the neighbour's heights.
         (0..9).all(|place| {
             let near = self.tile_here(index.offset(place % 3 - 1, place / 3 - 1));
             near.is_none_or(|tile| tile.is_below(low))
