@@ -11,8 +11,8 @@ use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 const MAX_CELL_MM: f64 = 50.0;
 /// Minimum longer side of a terrain in the hand, mm: a shorter one shows no detail.
 const SMALLEST_TERRAIN_MM: f64 = 5.0;
-/// Maximum stiffness, N/mm: above it an arm most likely buzzes or kicks. People hold 0.4 to 0.8
-/// N/mm on a Premium 1.5 (`docs/reference/hardware.md`).
+/// Maximum stiffness, N/mm: above it an arm most likely buzzes or kicks
+/// (`docs/explanation/stability.md`).
 pub const STIFFEST_N_PER_MM: f32 = 1.0;
 /// Minimum stiffness, N/mm: a softer surface is not noticeable.
 const SOFTEST_N_PER_MM: f32 = 0.005;
