@@ -405,8 +405,7 @@ HapterraStatus hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain
  * `hapterra_terrain_height_mm`. The radius is at most 8 cells. Applies to the current heights, and
  * to contacts that begin later.
  */
-HapterraStatus hapterra_terrain_set_tip(struct HapterraTerrain *terrain,
-                                        double tip_mm);
+HapterraStatus hapterra_terrain_set_tip(struct HapterraTerrain *terrain, double tip_mm);
 
 /**
  * Sets the material of each sample: the index of one of the surfaces of `hapterra_contact_begin`,
