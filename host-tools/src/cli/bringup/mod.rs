@@ -108,7 +108,10 @@ fn bring_up<A: Attendant>(
             }
         }
     }
-    say("complete       every step is passed: set the amplifiers' limits to the motors' peak");
+    say(
+        "complete       every step is passed: do \"After the eleven steps\" of \
+         docs/how-to/bring-up.md before any larger force",
+    );
     Ok(())
 }
 
