@@ -12,7 +12,7 @@ pub(super) struct Format {
     pub(super) begins: fn(head: &[u8]) -> bool,
     /// Extensions in lower case. Inside an archive, a file with one of them is a terrain.
     pub(super) extensions: &'static [(&'static str, Claim)],
-    /// Whether the file has parts from which the user may choose.
+    /// Parts of the file from which the user may choose.
     pub(super) parts: Parts,
     /// Reads the heights of a file.
     pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, RasterError>,

@@ -1,4 +1,4 @@
-//! Whether a read waits for heights that are not in memory, and whether it was complete.
+//! Behaviour of a read if heights are not in memory, and completeness of its result.
 
 use std::cell::Cell;
 

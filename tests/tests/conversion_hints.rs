@@ -165,7 +165,7 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
             "grid.tif",
             "+proj=nzmg +lat_0=-41 +lon_0=173 +x_0=2510000 +y_0=6023150 +ellps=intl",
             "2600000 6030000 2640000 6000000",
-            // Of the middle, from gdaltransform.
+            // The middle, converted by gdaltransform.
             [174.31, -41.07],
         ),
         (

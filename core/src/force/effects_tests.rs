@@ -187,7 +187,7 @@ fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
         );
         assert!(left > 0.99, "{what}: {left} of the turn");
     }
-    // Where an edge gives more than a millijoule, part of the turn is rendered.
+    // At an edge that creates more than a millijoule, part of the turn is rendered.
     let [_, _, left] = slid(2.0, 0.3, 3.0, 50.0);
     assert!((0.75..0.9).contains(&left), "{left} of the turn");
 }

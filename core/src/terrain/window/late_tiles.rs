@@ -165,7 +165,7 @@ impl<'t, const D: usize> Window<'t, D> {
         match (sw + se + nw + ne).is_nan() {
             false => CellContent::Patch(Corners { base, heights }),
             true if are_of_tiles => CellContent::Hole,
-            // Where the fallback has no height, the tile may still bring one.
+            // If the fallback has no height here, the tile may have one.
             true => CellContent::Missing,
         }
     }

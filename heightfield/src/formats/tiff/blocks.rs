@@ -107,7 +107,7 @@ pub(super) type Opened = (Arc<TiffFile>, Option<Arc<RemoteFile>>);
 /// Number of the main file; the overview file beside it is the next.
 const MAIN: usize = 0;
 
-/// What is known of a file before its blocks are read.
+/// Properties of a file that are read before its blocks.
 #[derive(Clone, Copy)]
 pub(super) struct Known<'k> {
     /// Its name for warnings.
