@@ -72,8 +72,11 @@ def test_example_in_the_readme_draws_forces(tmp_path):
 def test_examples_of_the_tutorial_run_in_their_order(tmp_path):
     page = Path(__file__).parents[2] / "docs/tutorials/array-to-forces.md"
     examples = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.S)
-    assert len(examples) == 4
-    subprocess.run([sys.executable, "-c", "\n".join(examples)], cwd=tmp_path, check=True)
+    outputs = re.findall(r"```text\n(.*?)```", page.read_text("utf-8"), re.S)
+    assert (len(examples), len(outputs)) == (4, 2)
+    command = [sys.executable, "-c", "\n".join(examples)]
+    ran = subprocess.run(command, cwd=tmp_path, check=True, stdout=subprocess.PIPE, text=True)
+    assert ran.stdout == "".join(outputs)
     assert (tmp_path / "forces.png").stat().st_size > 5000
 
 

@@ -36,7 +36,7 @@ def test_bad_numbers_have_the_text_of_the_command():
 def test_missing_program_is_named_with_what_to_install(monkeypatch):
     monkeypatch.delenv("HAPTERRA_LAB", raising=False)
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(CommandError, match="cargo install --path bench --bin hapterra-lab"):
+    with pytest.raises(CommandError, match="cargo install --locked --path bench --bin hapterra-lab"):
         stability()
 
 

@@ -60,10 +60,7 @@ fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
             .expect("a number");
         // 390 m in 150 to 450 mm.
         assert!((0.8..2.7).contains(&metres), "{scale}");
-        assert!(
-            scale.contains("at level 0 a haptic cell is 10 m"),
-            "{scale}"
-        );
+        assert!(scale.contains("at level 0 a cell is 10 m"), "{scale}");
     }
 }
 
@@ -76,29 +73,26 @@ fn place_scale_and_level_are_taken_and_said() {
             &["--at", "5100,7150", "--scale", "4m/mm"][..],
             [
                 "place          x 5100, y 7150",
-                "4 ground metres a device millimetre; at level 0 a haptic cell is 10 m, 2.5 mm",
+                "4 ground metres a device millimetre; at level 0 a cell is 10 m, 2.5 mm",
             ],
         ),
         (
             &["--at", "5100,7150"],
             [
                 "x 5100, y 7150",
-                "10 ground metres a device millimetre; at level 0 a haptic cell is 10 m, 1 mm",
+                "10 ground metres a device millimetre; at level 0 a cell is 10 m, 1 mm",
             ],
         ),
         (
             &["--at=5100,7150", "--scale", "2mm/cell", "--level", "2"],
             [
                 "x 5100, y 7150",
-                "5 ground metres a device millimetre; at level 2 a haptic cell is 40 m, 8 mm",
+                "5 ground metres a device millimetre; at level 2 a cell is 40 m, 8 mm",
             ],
         ),
         (
             &["--bbox", "5100,7100,5200,7150"],
-            [
-                "place          x 5150, y 7",
-                "at level 0 a haptic cell is 10 m",
-            ],
+            ["place          x 5150, y 7", "at level 0 a cell is 10 m"],
         ),
     ] {
         let run = hapterra("run", &file, more);

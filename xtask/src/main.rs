@@ -26,6 +26,7 @@ mod soak;
 mod test;
 mod view;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
@@ -100,19 +101,17 @@ fn main() -> ExitCode {
 }
 
 fn command() -> Result<ExitCode> {
+    if is_help(std::env::args_os().skip(1)) {
+        print!("{HELP}");
+        return Ok(ExitCode::SUCCESS);
+    }
     let mut words = lexopt::Parser::from_env();
     let Some(word) = words.next()? else {
         bail!("say what to do:\n\n{HELP}");
     };
     let name = match word {
-        Long("help") | Short('h') => "help".into(),
         Value(name) => name.string()?,
         other => return Err(other.unexpected().into()),
-    };
-    let is_help = |word: &std::ffi::OsStr| word == "-h" || word == "--help";
-    let name = match words.raw_args()?.peek().is_some_and(is_help) {
-        true => "help".into(),
-        false => name,
     };
     match name.as_str() {
         "demo" => {
@@ -174,12 +173,18 @@ fn command() -> Result<ExitCode> {
                 "miri" => miri::miri()?,
                 "setup" => setup()?,
                 "deny" => deny::check_all()?,
-                "help" => print!("{HELP}"),
                 _ => bail!("there is no command {plain}:\n\n{HELP}"),
             }
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns true if the words before `--` ask for help. Words after it belong to another program.
+fn is_help(words: impl Iterator<Item = OsString>) -> bool {
+    words
+        .take_while(|word| word != "--")
+        .any(|word| word == "-h" || word == "--help" || word == "help")
 }
 
 fn setup() -> Result<()> {
@@ -304,6 +309,14 @@ mod tests {
         assert_eq!(request(&[]).unwrap(), test::Request::default());
         let message = request(&["--test"]).unwrap_err().to_string();
         assert!(message.contains("after `--`"), "{message}");
+    }
+
+    #[test]
+    fn help_is_found_before_two_dashes_only() {
+        let asks = |words: &[&str]| is_help(words.iter().map(OsString::from));
+        assert!(asks(&["demo", "--touch", "--help"]));
+        assert!(asks(&["test", "-h"]));
+        assert!(!asks(&["demo", "--", "--help"]));
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub(crate) fn hapterra(features: &[&str]) -> Result<PathBuf> {
         "hapterra",
     ]);
     timed(
-        "building the hapterra command",
+        "building the command `hapterra` (the first time, this takes minutes)",
         || run(build.args(features)),
     )?;
     Ok(built("release", "hapterra"))

@@ -191,10 +191,10 @@ fn programs_take_every_command_line_of_the_pages() {
 #[test]
 fn wrong_lines_are_found() {
     let page = "```sh\nhapterra info FILE --fell  # a comment\nhapterra info\ncargo xtask sing\n\
-                cargo xtask view --tset\ncargo install --path no/where\n```\n\
+                cargo xtask view --tset\ncargo install --locked --path no/where\n```\n\
                 Text with `hapterra stability` and `cargo run -p nothing`.\n";
     let right = "```sh\nhapterra info FILE --json  # a comment\nhapterra run FILE --device \\\n  native\n\
-                 cargo xtask test -- --test usb\ncargo install --path host-tools\n```\n\
+                 cargo xtask test -- --test usb\ncargo install --locked --path host-tools\n```\n\
                  Text with `hapterra run`, `hapterra.read()` and `cargo run -r -p hapterra-lab -- synth`.\n";
     let found = |text: &str| {
         let lines = lines(Path::new("page.md"), text);

@@ -31,6 +31,13 @@ pub const MODELS: [(&str, Model); 5] = [
     ("other", Model::Other),
 ];
 
+/// Returns a model's name in files and on the command line.
+#[must_use]
+pub fn model_name(model: Model) -> &'static str {
+    let known = MODELS.iter().find(|(_, known)| *known == model);
+    known.map_or("other", |(name, _)| *name)
+}
+
 /// Error of reading a calibration file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", path.display())]
@@ -220,8 +227,7 @@ impl File {
 /// Angles are in radians for that reason, with degrees beside them.
 #[must_use]
 pub fn to_toml(record: &Calibration) -> String {
-    let known = MODELS.iter().find(|(_, model)| *model == record.model);
-    let model = known.map_or("other", |(name, _)| *name);
+    let model = model_name(record.model);
     let (stops, thermal) = (&record.limits, &record.thermal);
     let v = |v: Vec3| format!("{:?}", v.to_array());
     let degrees = |v: Vec3| {

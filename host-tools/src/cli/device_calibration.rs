@@ -4,6 +4,7 @@ use hapterra_core::phantom::{Calibration, Model};
 
 use super::bringup::PATIENCE;
 use super::failure::{Failure, OrHint};
+use crate::calibrate::file;
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 
 /// Reads a device's calibration without taking it from its host. If it has none, returns its
@@ -22,7 +23,8 @@ pub(super) fn calibration_of(
         None => {
             let model = control.status()?.model.unwrap_or(Model::Premium15);
             tell(format!(
-                "the device has no calibration: the terrain is placed for a {model:?}"
+                "the device has no calibration: the terrain is placed for a {}",
+                file::model_name(model)
             ));
             model.preset()
         }

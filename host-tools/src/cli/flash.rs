@@ -119,7 +119,7 @@ fn without_probes(args: &Args) -> Failure {
 
 /// Hint for a build without this feature.
 #[cfg(not(feature = "probe"))]
-pub(super) const WITHOUT: &str = "add --dfu for an update over USB; or, in a checkout, type: cargo install --path host-tools --features probe; or, with probe-rs' own command (cargo install probe-rs-tools --locked): cargo xtask flash BOARD";
+pub(super) const WITHOUT: &str = "add --dfu for an update over USB; or, in a checkout, type: cargo install --locked --path host-tools --features probe; or, with probe-rs' own command (cargo install probe-rs-tools --locked): cargo xtask flash BOARD";
 
 #[cfg(test)]
 mod tests {

@@ -38,7 +38,6 @@ use super::terminal::shared_keyboard::{self, DeviceKeys};
 use super::terminal::writer::tell;
 use super::terminal::{interrupt, partial_files};
 use super::viewing::{ToBeShown, Viewing};
-use crate::link::Timeouts;
 use crate::output::keep_apart;
 use crate::steering::keys::KEYS;
 use devices::{OneDevice, ServedDevice};
@@ -81,7 +80,7 @@ pub struct Args {
     /// Disarm after this time without a message from here, as 10s
     ///
     /// The device does so by itself; a number alone is in seconds.
-    #[arg(long, value_name = "TIME", default_value_t = Timeouts::REAL_SILENCE_S, value_parser = silence)]
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = silence)]
     pub silence: u16,
 
     /// Serve a real board without a complete log of hapterra bringup
@@ -259,4 +258,15 @@ fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
         )),
     }
     device_keys
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::Timeouts;
+
+    #[test]
+    fn the_default_of_silence_is_the_sessions() {
+        assert_eq!(silence("30s"), Ok(Timeouts::REAL_SILENCE_S));
+    }
 }

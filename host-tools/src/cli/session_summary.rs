@@ -125,11 +125,10 @@ impl SessionSummary {
         let lines = placing::picture_lines(view, &file);
         let picture = SessionPicture {
             title,
-            subtitle: &format!(
-                "{}; rendered by {}",
-                in_words(terrain),
-                kind_of_device(&self.device)
-            ),
+            subtitles: [
+                &in_words(terrain),
+                &format!("rendered by {}", kind_of_device(&self.device)),
+            ],
             surface: Surface {
                 height_mm: &height_mm,
                 size_mm: terrain.size_mm(),
@@ -152,7 +151,9 @@ pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
     let (mm, level) = (terrain.grid().tip_mm(), terrain.level());
     let cell_size = placing::short(terrain.scale().cell_mm());
     (mm > 0.0).then(|| {
-        format!("rendered with a ball of {mm} mm over level {level}, on cells of {cell_size} mm")
+        format!(
+            "rendered with a ball of {mm} mm over level {level}, on haptic cells of {cell_size} mm"
+        )
     })
 }
 

@@ -7,11 +7,12 @@ use hapterra_core::wire::status::{
 };
 
 use super::failure::Failure;
-use super::options::device::Device;
+use super::options::device::{Device, DeviceChoice};
 use super::report::put;
 use super::session_summary;
 use super::terminal::writer::{say, show};
-use crate::link::EMULATED;
+use crate::calibrate::file::model_name;
+use crate::link::{DeviceAddress, EMULATED};
 use heightfield::printable_text::printable;
 
 /// Arguments of `hapterra status`.
@@ -37,7 +38,13 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
         let status = args.device.look(|control| Ok(control.fresh_status()?))?;
-        return put(&text(&status));
+        put(&text(&status))?;
+        if args.device.device == DeviceChoice::There(DeviceAddress::Native) {
+            say(
+                "note           each command starts a new native device, without a calibrated zero pose",
+            );
+        }
+        return Ok(());
     }
     args.device.talk(|control| {
         if args.disarm {
@@ -85,7 +92,9 @@ fn text(status: &Status) -> String {
 }
 
 fn calibration(status: &Status) -> String {
-    let model = status.model.map_or(String::new(), |m| format!("{m:?}, "));
+    let model = status
+        .model
+        .map_or(String::new(), |model| format!("{}, ", model_name(model)));
     match status.calibration {
         CalibrationSource::None => "none: type hapterra calibrate".into(),
         CalibrationSource::Refused(bad) => {

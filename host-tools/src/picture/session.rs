@@ -18,8 +18,8 @@ use crate::replay::Record;
 pub struct SessionPicture<'a> {
     /// First line, large: the terrain.
     pub title: &'a str,
-    /// Second line: the settings, and the size of a cell in device millimetres.
-    pub subtitle: &'a str,
+    /// Lines below it: the terrain's size and cells; the device.
+    pub subtitles: [&'a str; 2],
     /// The terrain.
     pub surface: Surface<'a>,
     /// Records in order of time, terrain frame.
@@ -32,7 +32,7 @@ pub struct SessionPicture<'a> {
 
 const WIDTH_PX: i32 = 1600;
 const MARGIN_PX: i32 = 30;
-const HEADER_PX: i32 = 96;
+const HEADER_PX: i32 = 122;
 const HEIGHTS_PX: i32 = 290;
 const FORCES_PX: i32 = 300;
 const GAP_PX: i32 = 26;
@@ -89,7 +89,10 @@ impl SessionPicture<'_> {
     fn header(&self, area: &Area<'_>) -> Result<(), PictureError> {
         let (title, line) = (style::bold(32, &INK), style::text(20, &SOFT_INK));
         axes::write(area, self.title, (0, px(34)), title, HPos::Left)?;
-        axes::write(area, self.subtitle, (0, px(68)), line, HPos::Left)
+        for (text, y) in self.subtitles.into_iter().zip([68, 94]) {
+            axes::write(area, text, (0, px(y)), line.clone(), HPos::Left)?;
+        }
+        Ok(())
     }
 
     /// Returns the session's own figures, then the caller's.

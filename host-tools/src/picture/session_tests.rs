@@ -31,7 +31,7 @@ fn walk() -> Vec<Record> {
 fn session<'a>(records: &'a [Record], size_mm: [f64; 2]) -> SessionPicture<'a> {
     SessionPicture {
         title: "Hills",
-        subtitle: "by formula · 1 cell = 1 mm",
+        subtitles: ["by formula · 1 cell = 1 mm", "by a path"],
         surface: Surface {
             height_mm: &hills,
             size_mm,

@@ -53,7 +53,7 @@ def lab() -> list[str]:
     if not named:
         raise CommandError(
             "there is no program hapterra-lab on the PATH",
-            "in a clone: cargo install --path bench --bin hapterra-lab; or name it in HAPTERRA_LAB",
+            "in a clone: cargo install --locked --path bench --bin hapterra-lab; or name it in HAPTERRA_LAB",
         )
     return [named]
 

@@ -27,7 +27,7 @@ def stability(
 ) -> pandas.DataFrame:
     """Tests on a virtual arm, by ``hapterra-lab stability``, which stiffness of a surface is
     unstable; docs/explanation/stability.md describes the trials. The program ``hapterra-lab`` is not
-    part of this package: in a clone, ``cargo install --path bench --bin hapterra-lab``.
+    part of this package: in a clone, ``cargo install --locked --path bench --bin hapterra-lab``.
 
     Parameters
     ----------

@@ -179,11 +179,17 @@ fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, 
     let held = control.calibration()?;
     let (mut record, whence) = match (&args.from, args.model, held) {
         (Some(path), _, _) => (file::read(path)?, path.display().to_string()),
-        (None, Some(model), _) => (model.preset(), format!("the preset of {model:?}")),
-        (None, None, Some(held)) => (held, format!("what the device holds ({:?})", held.model)),
+        (None, Some(model), _) => (
+            model.preset(),
+            format!("the preset {}", file::model_name(model)),
+        ),
+        (None, None, Some(held)) => {
+            let name = file::model_name(held.model);
+            (held, format!("the record on the device ({name})"))
+        }
         (None, None, None) => (
             Model::Premium15.preset(),
-            "the preset of Premium15 (the device holds none; --model chooses another)".into(),
+            "the preset premium-1.5 (the device has no record; --model selects another)".into(),
         ),
     };
     for setting in &args.set {

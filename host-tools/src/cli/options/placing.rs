@@ -139,16 +139,16 @@ pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
     format!("slopes and lengths are off by up to {percent:.2} %")
 }
 
-/// Describes the scale of a placement, and a haptic cell of its level.
+/// Describes the scale of a placement, and a cell of its level.
 pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
     let (level, cell_mm) = (view.level, short(view.haptic_cell_mm()));
     match (view.ground_m_per_mm(), view.haptic_cell_m()) {
         (Some(scale), Some(cell_m)) => format!(
-            "{} ground metres a device millimetre; at level {level} a haptic cell is {} m, {cell_mm} mm at the device",
+            "{} ground metres a device millimetre; at level {level} a cell is {} m, {cell_mm} mm at the device",
             short(scale),
             short(cell_m)
         ),
-        _ => format!("at level {level} a haptic cell is {cell_mm} mm at the device"),
+        _ => format!("at level {level} a cell is {cell_mm} mm at the device"),
     }
 }
 
@@ -164,11 +164,11 @@ pub(in crate::cli) fn picture_lines(
     let cell_mm = short(view.haptic_cell_mm());
     lines.push(match view.haptic_cell_m() {
         Some(metres) => (
-            format!("haptic cell, level {}", view.level),
+            format!("cell, level {}", view.level),
             format!("{} m, {cell_mm} mm", short(metres)),
         ),
         None => (
-            format!("haptic cell, level {}", view.level),
+            format!("cell, level {}", view.level),
             format!("{cell_mm} mm"),
         ),
     });
