@@ -17,8 +17,8 @@ const MAX_AMPLITUDE_MM: f32 = 0.2;
 ///
 /// Parameters
 /// ----------
-/// stiffness : N/mm between the haptic interface point (HIP) and the proxy; 0.5.
-/// max_force : N, the limit of the force; 8.5.
+/// stiffness : N/mm between the haptic interface point (HIP) and the proxy, 0 or more; 0.5.
+/// max_force : N, the limit of the force, 0 or more; 8.5.
 /// friction : Coulomb's coefficient while the proxy slides, 0 to 10; 0, frictionless.
 /// static_friction : the same until it begins to slide; as friction.
 /// viscous_friction : s, 0 to 1; the delay of the proxy; 0.

@@ -3,6 +3,7 @@
 import os
 import sys
 
+import numpy as np
 import pytest
 
 import hapterra
@@ -42,5 +43,7 @@ def test_missing_program_is_named_with_what_to_install(monkeypatch):
 
 def test_without_pandas_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match="pip install pandas"):
+    with pytest.raises(ImportError, match="to_dataframe returns a DataFrame: pip install pandas"):
+        hapterra.to_dataframe(np.zeros(0, hapterra.STEP))
+    with pytest.raises(ImportError, match="stability returns a DataFrame: pip install pandas"):
         hapterra.stability()

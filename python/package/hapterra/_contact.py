@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._dataframe import pandas_for
 from ._native import Surface
 from ._terrain import Terrain
 
@@ -159,8 +160,7 @@ class Contact:
 def to_dataframe(steps: npt.NDArray[np.void]) -> pandas.DataFrame:
     """Returns the steps of ``Contact.run`` as a DataFrame. Columns are named as in
     ``hapterra replay``'s CSV, except ``state``, which has the names of ``State``."""
-    import pandas
-
+    pandas = pandas_for("hapterra.to_dataframe")
     columns = {"t_s": steps["t_s"]}
     for field, name in (("hip_mm", "{}_mm"), ("proxy_mm", "proxy_{}_mm"), ("force_n", "force_{}_n")):
         for axis, letter in enumerate("xyz"):

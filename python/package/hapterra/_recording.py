@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._command import Word, options, run
+from ._dataframe import pandas_for
 
 if TYPE_CHECKING:
     import pandas
@@ -47,8 +48,7 @@ class Recording:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Returns the steps as a DataFrame, whose ``attrs`` are the settings."""
-        import pandas
-
+        pandas = pandas_for("to_dataframe")
         frame = pandas.DataFrame(self.steps)
         frame.attrs.update(self.settings)
         return frame

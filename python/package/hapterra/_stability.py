@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Union
 
 from ._command import lab, options, run
+from ._dataframe import pandas_for
 
 if TYPE_CHECKING:
     import pandas
@@ -58,10 +59,7 @@ def stability(
     CommandError
         For numbers out of bounds, with the command's text, or without ``hapterra-lab``.
     """
-    try:
-        import pandas
-    except ImportError as error:
-        raise ImportError("hapterra.stability returns a DataFrame: pip install pandas") from error
+    pandas = pandas_for("hapterra.stability")
     asked = options(
         rate=rate,
         stiffness=stiffness,
