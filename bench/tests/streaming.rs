@@ -67,7 +67,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
         // A fallback avoids no-data at any speed, and a slow hand never needs it.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.coarse();
-            let seen = [straight, turning, row.holes_underlaid];
+            let seen = [straight, turning, row.no_data_over_fallback];
             assert_eq!(seen, [Some(0); 3], "{row:?}");
         }
         let held = |row: &Row| [row.held_straight, row.held_turning];
@@ -162,7 +162,7 @@ fn the_kept_figures_are_of_all_sizes_and_latencies_and_within_their_bounds() {
                 };
                 assert!(row.peak_mb < Some(MAX_MB), "{row:?}");
                 assert!(row.held_straight.is_some() && row.missing()[1][2].is_some());
-                assert_eq!(row.holes_underlaid, Some(0), "{row:?}");
+                assert_eq!(row.no_data_over_fallback, Some(0), "{row:?}");
             }
         }
     }

@@ -35,11 +35,11 @@ fn terrain_that_no_disk_holds_is_refused_before_it_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let huge = ["plane", "--size", "4000000000x4000000000"];
     let refused = synth(&huge, &folder.path().join("huge.tif"));
-    let said = output_text(&refused);
-    assert_eq!(refused.status.code(), Some(1), "{said}");
+    let stated = output_text(&refused);
+    assert_eq!(refused.status.code(), Some(1), "{stated}");
     assert!(
-        said.contains("GB are free") && said.contains("hint:"),
-        "{said}"
+        stated.contains("GB are free") && stated.contains("hint:"),
+        "{stated}"
     );
     assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
 }
@@ -50,10 +50,13 @@ fn file_name_reaches_the_terminal_without_control_characters() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("x\u{1b}]0;owned\u{7}\u{202e}.tif");
     let made = synth(&["plane", "--size", "8"], &file);
-    let said = output_text(&made);
-    assert!(made.status.success() && said.contains("wrote"), "{said}");
+    let stated = output_text(&made);
+    assert!(
+        made.status.success() && stated.contains("wrote"),
+        "{stated}"
+    );
     let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-    assert!(!said.contains(controls), "{said:?}");
+    assert!(!stated.contains(controls), "{stated:?}");
 }
 
 #[cfg(unix)]

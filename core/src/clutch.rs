@@ -210,7 +210,7 @@ impl Clutch {
                     *there = landed;
                 }
                 hip = *there;
-                if !is_held && !contact.is_landing() {
+                if !is_held && !contact.is_onset() {
                     self.owed_mm += from_home_mm(scene) - *tip_mm;
                     self.owed_mm = match self.carries {
                         true => Vec3::ZERO,

@@ -56,7 +56,7 @@ impl Mover<'_> {
                 moved_mm,
                 velocity_mm_s: moved_mm * rate.hz() as f32,
                 asked_n: Vec3::ZERO,
-                most_n: 0.0,
+                max_n: 0.0,
                 shares: Shares::ALL,
             },
             Self::Arm {
@@ -71,7 +71,7 @@ impl Mover<'_> {
                     moved_mm,
                     velocity_mm_s: to_terrain_frame(guard.tip_velocity_mm_s(mechanism, pose)),
                     asked_n: guard.force_n(),
-                    most_n: guard.most_force_n(),
+                    max_n: guard.most_force_n(),
                     shares: Shares {
                         clutch,
                         ramp,
@@ -159,11 +159,11 @@ impl Renderer {
     }
 
     /// Sets a scene that [`Self::can_take`] accepts, or none. All effects are created here.
-    /// `landing` is the HIP after a change of placement, and the displacement with which the proxy
+    /// `onset` is the HIP after a change of placement, and the displacement with which the proxy
     /// starts on the surface, cells.
-    pub(crate) fn take(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
+    pub(crate) fn take(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
         self.state.effects = scene.and_then(|scene| self.effects_of(scene));
-        self.begin(scene, landing);
+        self.begin(scene, onset);
     }
 
     /// Restarts the contact in the same scene, because the HIP has jumped.
@@ -171,15 +171,15 @@ impl Renderer {
         self.begin(scene, None);
     }
 
-    fn begin(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
+    fn begin(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
         let settings = ContactSettings::AT_1_KHZ
             .at_rate(self.rate)
             .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm));
         (self.point, self.progress) = (None, Progress::Done(None));
-        self.state.contact = match landing {
+        self.state.contact = match onset {
             Some((hip, displacement)) => {
                 let at = GridPoint::new(hip.cell(), hip.frac() + displacement);
-                Contact::landing(settings, at, displacement)
+                Contact::onset(settings, at, displacement)
             }
             None => Contact::new(settings),
         };

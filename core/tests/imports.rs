@@ -245,19 +245,21 @@ fn stated_order() -> BTreeMap<String, usize> {
     let mut order = BTreeMap::new();
     let mut place = 0;
     for line in include_str!("../src/lib.rs").lines() {
-        let Some(said) = line.strip_prefix("//! ") else {
+        let Some(stated) = line.strip_prefix("//! ") else {
             place = 0;
             continue;
         };
-        if let Some((number, _)) = said.split_once(". ") {
+        if let Some((number, _)) = stated.split_once(". ") {
             place = number.parse().unwrap_or(place);
         }
-        let linked = said
+        let linked = stated
             .split("[`")
             .skip(1)
             .filter_map(|rest| rest.split_once("`]"));
         // A private module is listed by its file name.
-        let files = said.split('`').filter_map(|word| word.strip_suffix(".rs"));
+        let files = stated
+            .split('`')
+            .filter_map(|word| word.strip_suffix(".rs"));
         let names = linked.map(|(name, _)| name).chain(files);
         for name in names.filter(|name| place > 0 && !name.contains("::")) {
             order.entry(name.to_owned()).or_insert(place);

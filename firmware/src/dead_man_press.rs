@@ -15,7 +15,7 @@ pub(crate) struct PressWait {
     /// The tick of the request.
     began: u32,
     /// Max ticks of the wait.
-    patience: u32,
+    timeout: u32,
     seen_open: bool,
 }
 
@@ -24,7 +24,7 @@ impl PressWait {
     pub(crate) const fn new(now: u32, ticks_per_ms: u32) -> Self {
         Self {
             began: now,
-            patience: PRESS_MS * ticks_per_ms,
+            timeout: PRESS_MS * ticks_per_ms,
             seen_open: false,
         }
     }
@@ -35,7 +35,7 @@ impl PressWait {
             // A press while armed has another purpose.
             return Some(Err(Refusal::NotWhileArmed));
         }
-        if now.wrapping_sub(self.began) > self.patience {
+        if now.wrapping_sub(self.began) > self.timeout {
             return Some(Err(Refusal::NotPressed));
         }
         let is_pressed = health.sense.dead_man && self.seen_open;

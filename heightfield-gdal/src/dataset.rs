@@ -201,10 +201,10 @@ impl Dataset {
     pub fn geo_transform(&self) -> Option<[f64; 6]> {
         let mut numbers = [0.0; 6];
         // SAFETY: the array has space for six numbers.
-        let said = unsafe {
+        let stated = unsafe {
             (self.loaded.functions.GDALGetGeoTransform)(self.handle, numbers.as_mut_ptr())
         };
-        (said == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
+        (stated == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
     }
 
     /// Returns the reference system as GDAL's WKT.

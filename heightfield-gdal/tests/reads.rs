@@ -67,8 +67,8 @@ fn windows_and_buffers_that_do_not_fit_are_refused() {
             columns,
             rows,
         };
-        let said = Band::read(&band, window, &mut vec![0_u8; room]);
-        assert!(matches!(said, Err(Error::Window { .. })), "{said:?}");
+        let stated = Band::read(&band, window, &mut vec![0_u8; room]);
+        assert!(matches!(stated, Err(Error::Window { .. })), "{stated:?}");
     };
     refused([0, 0, 4, 3], 11);
     refused([0, 0, 4, 3], 13);

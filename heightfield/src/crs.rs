@@ -243,10 +243,10 @@ mod tests {
             (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9,
             "{a:?} {b:?}"
         );
-        let said = feet.other_unit().expect("said");
+        let stated = feet.other_unit().expect("said");
         assert!(
-            said.contains("0.3048006") && metres.other_unit().is_none(),
-            "{said}"
+            stated.contains("0.3048006") && metres.other_unit().is_none(),
+            "{stated}"
         );
         assert!(!metres.has_unit_of(&feet));
     }

@@ -161,9 +161,9 @@ impl Decoded {
 
     /// Adds a remark if more samples are in memory than would be for a file that is read in
     /// windows.
-    pub(super) fn tell_if_whole(&mut self, most_bytes: u64) {
+    pub(super) fn tell_if_whole(&mut self, max_bytes: u64) {
         if let Storage::Held { samples, .. } = &self.storage
-            && samples.bytes() as u64 > most_bytes
+            && samples.bytes() as u64 > max_bytes
         {
             let megabytes = samples.bytes() / 1_000_000;
             let why = self.why_whole.as_deref();

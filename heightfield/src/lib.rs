@@ -540,7 +540,7 @@ impl Raster {
     pub fn memory_bytes(&self) -> usize {
         match &self.source.storage {
             Storage::Held { samples, .. } => samples.bytes(),
-            Storage::Blocks(blocks) => blocks.most_bytes(),
+            Storage::Blocks(blocks) => blocks.max_bytes(),
         }
     }
 

@@ -34,10 +34,10 @@ fn not_a_number(word: &str) -> Option<f64> {
 
 /// Returns the beginning of a text from a file, for a remark.
 pub(super) fn beginning(text: &str) -> String {
-    const MOST: usize = 40;
+    const MAX: usize = 40;
     let shown = |c: char| if c.is_control() { '?' } else { c };
-    let mut beginning: String = text.chars().take(MOST).map(shown).collect();
-    if text.chars().nth(MOST).is_some() {
+    let mut beginning: String = text.chars().take(MAX).map(shown).collect();
+    if text.chars().nth(MAX).is_some() {
         beginning.push('…');
     }
     beginning

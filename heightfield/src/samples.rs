@@ -194,4 +194,4 @@ impl Samples {
 
 /// One bit per sample: no-data that no sample value marks (alpha 0 in a grey picture, a missing
 /// tile of a sparse file).
-pub(super) type HoleMask = fixedbitset::FixedBitSet;
+pub(super) type NoDataMask = fixedbitset::FixedBitSet;

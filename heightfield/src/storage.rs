@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::blocks::{BlockReader, Blocks};
-use super::samples::{HoleMask, SampleType, Samples};
+use super::samples::{NoDataMask, SampleType, Samples};
 use crate::disk_cache::DiskCache;
 
 /// The samples of a raster, in the file's order and type.
@@ -15,7 +15,7 @@ pub(super) enum Storage {
         /// `columns × rows` samples, the file's first row first.
         samples: Samples,
         /// No-data that no value marks.
-        mask: Option<HoleMask>,
+        mask: Option<NoDataMask>,
     },
     /// In the file.
     Blocks(Arc<Blocks>),
@@ -79,7 +79,7 @@ impl Storage {
     }
 
     /// Marks no-data in samples that are in memory.
-    pub(super) fn set_holes(&mut self, holes: Option<HoleMask>) {
+    pub(super) fn set_no_data(&mut self, holes: Option<NoDataMask>) {
         if let Self::Held { mask, .. } = self {
             *mask = holes.filter(|holes| !holes.is_clear());
         }

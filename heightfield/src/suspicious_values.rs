@@ -105,8 +105,11 @@ mod tests {
     #[test]
     fn values_that_stand_for_no_data_elsewhere_are_named() {
         for value in LOW.into_iter().chain(HIGH) {
-            let said = remarks(&[367.0, value, 400.0], false);
-            assert!(said.contains(&format!("--input no-data={value}")), "{said}");
+            let stated = remarks(&[367.0, value, 400.0], false);
+            assert!(
+                stated.contains(&format!("--input no-data={value}")),
+                "{stated}"
+            );
         }
         assert!(remarks(&[0.0, 367.0, 960.0], false).contains("--input no-data=0"));
         assert!(remarks(&[f64::INFINITY, f64::NEG_INFINITY, 1.0], false).starts_with("2 of"));

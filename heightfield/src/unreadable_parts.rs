@@ -8,7 +8,7 @@ use super::RasterError;
 use super::blocks::Part;
 
 /// Max stored parts: further ones are read, and reported, again.
-const MOST: usize = 1 << 16;
+const MAX: usize = 1 << 16;
 /// After this many warnings, one reports that there are more.
 const WARNINGS: usize = 8;
 
@@ -38,7 +38,7 @@ impl UnreadableParts {
     /// Warns once per part of an image that cannot be read.
     pub(super) fn warn(&self, image: usize, part: &Part, fault: &RasterError) {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() < MOST && !known.insert((image, [part.column, part.row])) {
+        if known.len() < MAX && !known.insert((image, [part.column, part.row])) {
             return;
         }
         if known.len() <= WARNINGS {

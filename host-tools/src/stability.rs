@@ -79,9 +79,9 @@ fn warnings_of(
     tick_hz: u32,
     latency_us: u16,
 ) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let Some(rate) = TickRate::new(tick_hz) else {
-        return told;
+        return reported;
     };
     let scale = table.stiffness_scale(params);
     for material in table.materials() {
@@ -91,11 +91,11 @@ fn warnings_of(
             warning(&params, rate, latency_us),
             too_fine(&params.texture, rate),
         ];
-        told.extend(warnings.into_iter().flatten());
+        reported.extend(warnings.into_iter().flatten());
     }
-    told.sort();
-    told.dedup();
-    told
+    reported.sort();
+    reported.dedup();
+    reported
 }
 
 /// Returns the warning about a texture too fine for a slow hand.
@@ -172,11 +172,11 @@ mod tests {
 
     use super::*;
 
-    fn told(stiffness_n_per_mm: f32, hz: u32, controller: Controller) -> String {
-        told_late(stiffness_n_per_mm, hz, SHORT_US, controller)
+    fn reported(stiffness_n_per_mm: f32, hz: u32, controller: Controller) -> String {
+        reported_late(stiffness_n_per_mm, hz, SHORT_US, controller)
     }
 
-    fn told_late(
+    fn reported_late(
         stiffness_n_per_mm: f32,
         hz: u32,
         latency_us: u16,
@@ -210,13 +210,13 @@ mod tests {
             },
             ..soft
         };
-        let told = |materials: &[Material], params: &SurfaceParams| {
+        let reported = |materials: &[Material], params: &SurfaceParams| {
             let table = MaterialTable::new(materials).expect("some");
             warnings_of(params, &table, 1000, SHORT_US).join("; ")
         };
         let params = SurfaceParams::PREMIUM;
-        assert_eq!(told(&[soft, soft], &params), "");
-        let both = told(&[soft, stiff, fine, stiff], &params);
+        assert_eq!(reported(&[soft, soft], &params), "");
+        let both = reported(&[soft, stiff, fine, stiff], &params);
         assert_eq!(both.matches("a stiffness of 8 N/mm").count(), 1, "{both}");
         assert!(both.contains("wavelength of 0.3 mm"));
         // A scene of twice the stiffness doubles that of each material.
@@ -224,12 +224,12 @@ mod tests {
             stiffness_n_per_mm: 1.0,
             ..params
         };
-        assert!(told(&[soft, stiff], &twice).contains("a stiffness of 16 N/mm"));
+        assert!(reported(&[soft, stiff], &twice).contains("a stiffness of 16 N/mm"));
     }
 
     #[test]
     fn a_texture_is_warned_of_that_fades_under_a_slow_hand() {
-        let told = |wavelength_mm, hz| {
+        let reported = |wavelength_mm, hz| {
             let texture = Texture {
                 pattern: Pattern::Grain,
                 wavelength_mm,
@@ -237,13 +237,13 @@ mod tests {
             };
             too_fine(&texture, TickRate::new(hz).expect("a rate")).unwrap_or_default()
         };
-        let fine = told(0.3, 1000);
+        let fine = reported(0.3, 1000);
         assert!(
             fine.contains("from 38 mm/s on") && fine.contains("from 0.4 mm on"),
             "{fine}"
         );
         assert_eq!(
-            [told(0.3, 2000), told(0.4, 1000)],
+            [reported(0.3, 2000), reported(0.4, 1000)],
             [String::new(), String::new()]
         );
         assert_eq!(too_fine(&Texture::NONE, TickRate::DEFAULT), None);
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
-        let told = |stiffness_n_per_mm| {
+        let reported = |stiffness_n_per_mm| {
             let params = SurfaceParams {
                 stiffness_n_per_mm,
                 texture: Texture {
@@ -264,27 +264,27 @@ mod tests {
             };
             warning(&params, TickRate::DEFAULT, SHORT_US).unwrap_or_default()
         };
-        assert_eq!(told(1.0), "");
-        let shakes = told(3.1);
+        assert_eq!(reported(1.0), "");
+        let shakes = reported(3.1);
         assert!(
             shakes.contains("may be unstable on a texture above 3 N/mm"),
             "{shakes}"
         );
-        assert!(!told(3.0).contains("shake"));
+        assert!(!reported(3.0).contains("shake"));
     }
 
     #[test]
     fn a_surface_is_warned_of_by_the_rate() {
         for (stiffness, hz) in [(0.5, 1000), (1.0, 1000), (2.0, 2000), (2.0, 10_000)] {
-            assert_eq!(told(stiffness, hz, Controller::On), "", "{hz}");
+            assert_eq!(reported(stiffness, hz, Controller::On), "", "{hz}");
         }
-        let trembles = told(1.5, 1000, Controller::On);
+        let trembles = reported(1.5, 1000, Controller::On);
         assert!(
             trembles.contains("the tip vibrates above 1 N/mm"),
             "{trembles}"
         );
         let shakes = |stiffness, hz, controller| {
-            told(stiffness, hz, controller).contains("a light grasp is unstable above")
+            reported(stiffness, hz, controller).contains("a light grasp is unstable above")
         };
         assert!(shakes(3.5, 1000, Controller::Off) && !shakes(3.5, 1000, Controller::On));
         assert!(shakes(6.5, 1000, Controller::On) && !shakes(6.5, 3000, Controller::On));
@@ -293,17 +293,18 @@ mod tests {
 
     #[test]
     fn a_surface_is_warned_of_by_the_latency() {
-        let trembles = told_late(1.5, 1000, 1231, Controller::On);
+        let trembles = reported_late(1.5, 1000, 1231, Controller::On);
         assert!(
             trembles.contains("above 1 N/mm at 1000 ticks a second and 1.23 ms to the motors"),
             "{trembles}"
         );
         let shakes = |stiffness, controller| {
-            told_late(stiffness, 1000, 1231, controller).contains("a light grasp is unstable above")
+            reported_late(stiffness, 1000, 1231, controller)
+                .contains("a light grasp is unstable above")
         };
         assert!(shakes(1.5, Controller::Off) && !shakes(1.5, Controller::On));
         assert!(shakes(4.0, Controller::On) && !shakes(3.0, Controller::On));
         // Stable without the latency.
-        assert!(!told_late(4.0, 1000, SHORT_US, Controller::On).contains("unstable"));
+        assert!(!reported_late(4.0, 1000, SHORT_US, Controller::On).contains("unstable"));
     }
 }

@@ -32,15 +32,22 @@ fn an_image_fits_its_board_and_no_other() {
             continue;
         };
         let output = check(board, &image);
-        let said = output_text(&output);
-        assert!(output.status.success(), "{board}: {said}");
-        assert!(said.contains("flash") && said.contains("RAM"), "{said}");
+        let stated = output_text(&output);
+        assert!(output.status.success(), "{board}: {stated}");
+        assert!(
+            stated.contains("flash") && stated.contains("RAM"),
+            "{stated}"
+        );
         for (other, _) in images.iter().filter(|(other, _)| *other != board) {
             let output = check(other, &image);
-            let said = output_text(&output);
-            assert_eq!(output.status.code(), Some(1), "{board} as {other}: {said}");
-            assert!(said.contains("built for"), "{said}");
-            assert!(said.contains("--board"), "{said}");
+            let stated = output_text(&output);
+            assert_eq!(
+                output.status.code(),
+                Some(1),
+                "{board} as {other}: {stated}"
+            );
+            assert!(stated.contains("built for"), "{stated}");
+            assert!(stated.contains("--board"), "{stated}");
         }
     }
 }
@@ -68,11 +75,14 @@ fn own_checkout_is_built_wherever_it_is_run() {
         .env("CARGO", &cargo)
         .output()
         .expect("it runs");
-    let said = output_text(&output);
+    let stated = output_text(&output);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let root = fs::canonicalize(root.expect("a folder above")).expect("there");
     let started = format!("\n{}\n", root.display());
-    assert!(format!("\n{said}").contains(&started), "{started}: {said}");
-    assert!(said.contains("source         "), "{said}");
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        format!("\n{stated}").contains(&started),
+        "{started}: {stated}"
+    );
+    assert!(stated.contains("source         "), "{stated}");
+    assert_eq!(output.status.code(), Some(1), "{stated}");
 }

@@ -41,15 +41,15 @@ fn answer(mut host: TcpStream) {
     let mut epoch = None;
     while let Ok(read @ 1..) = host.read(&mut chunk) {
         let mut bytes = &chunk[..read];
-        let mut said = vec![];
+        let mut stated = vec![];
         while !bytes.is_empty() {
             let (taken, content) = reader.push(bytes);
             bytes = &bytes[taken..];
             if let Some(Ok(content)) = content {
-                said.extend(answer_to(content, &mut epoch));
+                stated.extend(answer_to(content, &mut epoch));
             }
         }
-        if host.write_all(&said).is_err() {
+        if host.write_all(&stated).is_err() {
             return;
         }
         if let Some((session, epoch)) = epoch {
@@ -66,11 +66,11 @@ fn answer(mut host: TcpStream) {
 type Taken = Option<(SessionNumber, u32)>;
 
 fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
-    let Some(heard) = frames::said_by_host(content) else {
+    let Some(received) = frames::stated_by_host(content) else {
         return vec![];
     };
-    let session = heard.session;
-    match heard.message {
+    let session = received.session;
+    match received.message {
         ToDevice::Hello(hello) => {
             let device = DeviceHello {
                 opened_by: 1,

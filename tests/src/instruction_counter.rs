@@ -259,8 +259,8 @@ impl CountingBoard {
             .args(["-icount", &format!("shift={SHIFT},sleep=off")])
             .output()
             .expect("QEMU starts");
-        let said = String::from_utf8_lossy(&ran.stderr);
-        assert!(ran.status.success(), "{}: {said}", ran.status);
+        let stated = String::from_utf8_lossy(&ran.stderr);
+        assert!(ran.status.success(), "{}: {stated}", ran.status);
         let mut counted = records(folder, "ticks.bin");
         if let Some(follow) = self.follow {
             add_cycles(&mut counted, &follow(&self.image, folder));
@@ -412,7 +412,7 @@ impl Frames {
         let mut room = [0; MAX_TABLE_BYTES];
         self.add(&ToDevice::MaterialScene(MaterialScene {
             scene: *scene,
-            table: table_bytes(&materials.told(), &mut room),
+            table: table_bytes(&materials.reported(), &mut room),
         }));
     }
 

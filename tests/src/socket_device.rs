@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::hapterra_binary;
-use crate::link_campaign::frames::said_by_host;
+use crate::link_campaign::frames::stated_by_host;
 use crate::terrain_file;
 use crate::timeouts::{HANG, wait_until};
 use hapterra::link::{ControlSession, Native, Tcp, Transport};
@@ -141,10 +141,10 @@ fn serve(
         // A few milliseconds of its time pass.
         device.pass(TICKS);
         seen.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
-        let said = device
+        let stated = device
             .receive(&mut chunk, Duration::ZERO)
             .expect("in memory");
-        if stream.write_all(&chunk[..said]).is_err() {
+        if stream.write_all(&chunk[..stated]).is_err() {
             return;
         }
     }
@@ -155,9 +155,9 @@ fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
     while !bytes.is_empty() {
         let (taken, content) = reader.push(bytes);
         bytes = &bytes[taken..];
-        let count = match content.and_then(Result::ok).and_then(said_by_host) {
-            Some(said) if matches!(said.message, ToDevice::Hello(_)) => &seen.unheard_hellos,
-            Some(said) if said.message == ToDevice::Bye => &seen.unheard_byes,
+        let count = match content.and_then(Result::ok).and_then(stated_by_host) {
+            Some(stated) if matches!(stated.message, ToDevice::Hello(_)) => &seen.unheard_hellos,
+            Some(stated) if stated.message == ToDevice::Bye => &seen.unheard_byes,
             _ => continue,
         };
         count.fetch_add(1, Ordering::Relaxed);

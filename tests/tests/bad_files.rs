@@ -49,18 +49,18 @@ fn info(path: &Path) -> Output {
 /// Checks for an exit code of 0 with a report, or of 1 with the fault and a remedy.
 fn assert_ends_well(path: &Path) -> bool {
     let output = info(path);
-    let told = String::from_utf8_lossy(&output.stderr);
-    let context = format!("{}: {:?}\n{told}", path.display(), output.status);
-    assert!(!told.contains("panicked"), "{context}");
+    let reported = String::from_utf8_lossy(&output.stderr);
+    let context = format!("{}: {:?}\n{reported}", path.display(), output.status);
+    assert!(!reported.contains("panicked"), "{context}");
     match output.status.code() {
         Some(0) => assert!(!output.stdout.is_empty(), "{context}"),
         Some(1) => {
-            let is_told = |line: &str| line.starts_with("error: ");
+            let is_reported = |line: &str| line.starts_with("error: ");
             // On a slow machine, lines about progress come first.
-            assert!(told.lines().any(is_told), "{context}");
-            assert!(told.contains("hint: "), "{context}");
+            assert!(reported.lines().any(is_reported), "{context}");
+            assert!(reported.contains("hint: "), "{context}");
             let name = path.file_name().expect("a name").to_string_lossy();
-            assert!(told.contains(name.as_ref()), "which file? {context}");
+            assert!(reported.contains(name.as_ref()), "which file? {context}");
         }
         _ => panic!("{context}"),
     }
@@ -143,9 +143,15 @@ fn an_error_says_what_where_and_what_next() {
         .output()
         .expect("the binary runs");
     assert_eq!(output.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(told.contains("error: cannot read the file: "), "{told}");
-    assert!(told.contains("(no-such-terrain.tif)\nhint: "), "{told}");
+    let reported = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        reported.contains("error: cannot read the file: "),
+        "{reported}"
+    );
+    assert!(
+        reported.contains("(no-such-terrain.tif)\nhint: "),
+        "{reported}"
+    );
 
     let usage = Command::new(hapterra_binary())
         .arg("info")
@@ -194,7 +200,7 @@ fn damaged_copies_of_good_files_never_panic() {
     let Some(folder) = shared("dem") else {
         return;
     };
-    const LARGEST: u64 = 300_000;
+    const MAX: u64 = 300_000;
     const COPIES: usize = 60;
     let tries = std::env::temp_dir().join(format!("hapterra-fuzz-{}", std::process::id()));
     std::fs::create_dir_all(&tries).expect("a folder for tries");
@@ -202,7 +208,7 @@ fn damaged_copies_of_good_files_never_panic() {
     let (mut copies, mut opened, mut panicked) = (0, 0, 0);
     for sub in ["variants", "tiff_ok", "real"] {
         for path in files_in(&folder.join(sub)) {
-            let small = path.metadata().expect("its length").len() <= LARGEST;
+            let small = path.metadata().expect("its length").len() <= MAX;
             let raw = path.extension().is_some_and(|e| e == "raw" || e == "csv");
             if !small || raw {
                 continue;
@@ -242,13 +248,13 @@ fn pipes_and_devices_are_refused_unopened() {
         assert!(made.expect("mkfifo runs").success());
         path
     };
-    let told = |path: &Path| String::from_utf8_lossy(&info(path).stderr).into_owned();
+    let reported = |path: &Path| String::from_utf8_lossy(&info(path).stderr).into_owned();
     for (path, kind) in [
         (pipe("pipe.tif"), "it is a pipe (FIFO)"),
         ("/dev/zero".into(), "it is a character device"),
     ] {
         assert!(!assert_ends_well(&path));
-        assert!(told(&path).contains(kind), "{}", told(&path));
+        assert!(reported(&path).contains(kind), "{}", reported(&path));
     }
     // All other input files of commands are refused as well.
     let hills = folder.path().join("hills.tif");
@@ -273,8 +279,8 @@ fn pipes_and_devices_are_refused_unopened() {
             .stderr(Stdio::piped())
             .spawn();
         let output = end_of(child.expect("the binary starts"));
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(told.contains("a pipe (FIFO)"), "{words:?}: {told}");
+        let reported = String::from_utf8_lossy(&output.stderr);
+        assert!(reported.contains("a pipe (FIFO)"), "{words:?}: {reported}");
     }
 }
 
@@ -326,10 +332,10 @@ fn texts_of_files_reach_the_terminal_without_control_characters() {
     ] {
         let output = Command::new(hapterra_binary()).args(words).output();
         let output = output.expect("it runs");
-        let told = [output.stdout, output.stderr].concat();
-        let told = String::from_utf8(told).expect("text");
+        let reported = [output.stdout, output.stderr].concat();
+        let reported = String::from_utf8(reported).expect("text");
         let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-        assert!(!told.contains(controls), "{words:?}: {told:?}");
-        assert!(!told.is_empty(), "{words:?}");
+        assert!(!reported.contains(controls), "{words:?}: {reported:?}");
+        assert!(!reported.is_empty(), "{words:?}");
     }
 }

@@ -23,12 +23,12 @@ const LATE_RAD_S: f64 = 0.3;
 
 thread_local! {
     /// Messages, one a line.
-    static SAID: RefCell<String> = const { RefCell::new(String::new()) };
+    static STATED: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
 fn say(line: &str) {
     println!("{line}");
-    SAID.with_borrow_mut(|text| *text += &format!("{line}\n"));
+    STATED.with_borrow_mut(|text| *text += &format!("{line}\n"));
 }
 
 /// Runs the walk with a user, and checks the speeds of the joints.
@@ -48,7 +48,7 @@ fn walked_unwatched(
     record: Calibration,
     log: &mut Log,
 ) -> Result<(), BringupError> {
-    SAID.take();
+    STATED.take();
     loop {
         let device = user.device(record);
         match walked_once(user, device, log) {
@@ -115,7 +115,7 @@ fn an_arm_without_mistakes_comes_to_the_end() {
     walked(&mut user, RECORD, &mut log).expect("to the end");
     assert_eq!(log.next(), None);
     assert_eq!(log.entries.len(), Step::ALL.len());
-    assert_eq!(SAID.take(), transcript());
+    assert_eq!(STATED.take(), transcript());
 }
 
 #[test]
@@ -125,12 +125,12 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
     let mut log = Log::default();
     walked(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
     assert_eq!(log.next(), Some(Step::Motor2));
-    let error = SAID.take() + "error: " + &log.entries.last().expect("one").result + "\n";
+    let error = STATED.take() + "error: " + &log.entries.last().expect("one").result + "\n";
     assert!(error.contains("step 8 of 11: motor 2"));
     // The next start is at this step, and the arm must be zeroed again.
     let ended = walked(&mut user, RECORD, &mut log);
     assert!(ended.is_err());
-    let text = SAID.take();
+    let text = STATED.take();
     assert!(
         text.starts_with("step 8 of 11") && text.contains("zero pose"),
         "{text}"
@@ -139,7 +139,7 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
     let mut record = RECORD;
     record.motor_sign.y = -1.0;
     walked(&mut user, record, &mut log).expect("to the end");
-    let text = SAID.take();
+    let text = STATED.take();
     assert!(text.starts_with("the calibration is another one"), "{text}");
     assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
@@ -259,14 +259,14 @@ fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
         let wiring = Wiring::RIGHT.with_gain(0, gain);
         let mut user = Another::careless(VirtualUser::at(VirtualBench::new(model, wiring)));
         user.user.says = say;
-        SAID.take();
+        STATED.take();
         let mut log = Log::default();
         let mut ended = Ok(Walked::BoardWasOff);
         while let Ok(Walked::BoardWasOff) = ended {
             let device = user.user.device(RECORD);
             ended = walked_once(&mut user, device, &mut log);
         }
-        let text = SAID.take();
+        let text = STATED.take();
         assert!(text.contains("the jog ended with fault 22"), "{text}");
         let fastest = user.user.bench().borrow().fastest_rad_s();
         println!("fastest {fastest:?} rad/s");

@@ -6,14 +6,14 @@ use hapterra_tests::repository;
 
 #[test]
 fn nothing_that_goes_wrong_gets_past_the_guard() {
-    let tally = run(SEED, 60, &mut |_, _| {}).expect("no violation");
-    assert!(tally.armed >= 60_000);
+    let stats = run(SEED, 60, &mut |_, _| {}).expect("no violation");
+    assert!(stats.armed >= 60_000);
     for kind in Kind::ALL {
-        assert!(tally.injected_of(kind) > 0, "{kind:?} was not tried");
+        assert!(stats.injected_of(kind) > 0, "{kind:?} was not tried");
     }
     // Otherwise the bounds would never have been tested.
-    assert!(tally.extremes.force_n > 4.0, "{:?}", tally.extremes);
-    assert!(tally.extremes.current_a > 2.0, "{:?}", tally.extremes);
+    assert!(stats.extremes.force_n > 4.0, "{:?}", stats.extremes);
+    assert!(stats.extremes.current_a > 2.0, "{:?}", stats.extremes);
 }
 
 #[test]

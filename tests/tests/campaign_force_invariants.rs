@@ -51,7 +51,7 @@ fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
 }
 
 /// Returns the verdict on one tick, 2 mm deep.
-fn said(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
+fn stated(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
     let sample = TickRecord {
         limits,
         ..at(0, -4.0, force_n)
@@ -67,10 +67,13 @@ fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
     };
     for params in [PARAMS, shaded] {
         for force_n in [Vec3::Z, Vec3::ZERO, Vec3::new(1.0, 0.0, 0.01)] {
-            assert_eq!(said(&params, force_n, Limits::empty()), Ok(()));
+            assert_eq!(stated(&params, force_n, Limits::empty()), Ok(()));
         }
-        assert!(said(&params, -Vec3::Z * 0.01, Limits::empty()).is_err());
-        assert_eq!(said(&params, -Vec3::Z * 0.01, Limits::SLEW_LIMITED), Ok(()));
+        assert!(stated(&params, -Vec3::Z * 0.01, Limits::empty()).is_err());
+        assert_eq!(
+            stated(&params, -Vec3::Z * 0.01, Limits::SLEW_LIMITED),
+            Ok(())
+        );
     }
 }
 
@@ -86,10 +89,10 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
         },
         ..plain
     };
-    let most = |params: &SurfaceParams, most_n: f32| {
-        let force = |newtons: f32| said(params, Vec3::Z * newtons, Limits::empty());
-        assert_eq!(force(most_n), Ok(()), "{params:?}");
-        assert!(force(1.01 * most_n).is_err(), "{params:?}");
+    let most = |params: &SurfaceParams, max_n: f32| {
+        let force = |newtons: f32| stated(params, Vec3::Z * newtons, Limits::empty());
+        assert_eq!(force(max_n), Ok(()), "{params:?}");
+        assert!(force(1.01 * max_n).is_err(), "{params:?}");
     };
     most(&plain, 1.0);
     most(&PARAMS, 2.0);
@@ -124,23 +127,23 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
     });
     let out = (0..20).map(|i| (-1.5 + 0.1 * i as f32, 1.0 + more));
     let dips = dip.cycle().take(30 * (times - 1));
-    let mut told = false;
+    let mut reported = false;
     for (tick, (height, times)) in (0..).zip(into.chain(dips).chain(out)) {
         let spring_n = -0.25 * height.min(0.0);
         let sample = at(tick, height, Vec3::Z * spring_n * times);
-        told |= watch.look(&sample, is_calm).is_err();
+        reported |= watch.look(&sample, is_calm).is_err();
     }
-    (told, watch.most_given_mj)
+    (reported, watch.max_given_mj)
 }
 
 #[test]
 fn a_contact_that_gives_is_told_with_the_controller_on() {
     // A spring that is sampled in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
     // and twice 0.75 mm.
-    let (told, given) = tap(&PARAMS, 0.0, true);
-    assert!(!told && (given - 0.0229).abs() < 0.001, "{given}");
-    let (told, given) = tap(&PARAMS, 0.5, true);
-    assert!(told && given > 0.05, "{given}");
+    let (reported, given) = tap(&PARAMS, 0.0, true);
+    assert!(!reported && (given - 0.0229).abs() < 0.001, "{given}");
+    let (reported, given) = tap(&PARAMS, 0.5, true);
+    assert!(reported && given > 0.05, "{given}");
     // Not checked during a fault or without the controller.
     assert_eq!(tap(&PARAMS, 0.5, false), (false, 0.0));
     assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
@@ -149,10 +152,10 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
         ..PARAMS
     };
     // Shading may give 0.2 mJ more, and 0.2 times 0.375 N times 0.5 mm and 0.75 mm.
-    let (told, given) = tap(&shaded, 0.99, true);
-    assert!(!told && given > 0.1, "{given}");
-    let (told, given) = taps(&shaded, 0.99, true, 3);
-    assert!(told && given > 0.344, "{given}");
+    let (reported, given) = tap(&shaded, 0.99, true);
+    assert!(!reported && given > 0.1, "{given}");
+    let (reported, given) = taps(&shaded, 0.99, true, 3);
+    assert!(reported && given > 0.344, "{given}");
 }
 
 /// Presses 2 mm deep at rest during the ramp, from the confirmation on, with `times` times the
@@ -189,7 +192,7 @@ fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
 fn a_tap_in_the_ramp_that_gives_is_told() {
     let tapped = |more: f32| {
         let mut watch = watch(&PARAMS, None);
-        let mut told = false;
+        let mut reported = false;
         for tick in 0..1500_u32 {
             let share = tick as f32 / 2000.0;
             let phase = tick.saturating_sub(1000) % 200;
@@ -206,18 +209,18 @@ fn a_tap_in_the_ramp_that_gives_is_told() {
                 },
                 ..at(tick, height, Vec3::Z * spring_n)
             };
-            told |= watch.look(&sample, true).is_err();
+            reported |= watch.look(&sample, true).is_err();
         }
-        (told, watch.most_given_mj)
+        (reported, watch.max_given_mj)
     };
-    let (told, given) = tapped(0.0);
-    assert!(!told, "{given}");
+    let (reported, given) = tapped(0.0);
+    assert!(!reported, "{given}");
     assert!(tapped(0.5).0);
 }
 
 #[test]
 fn a_force_that_grows_on_its_way_out_is_told() {
-    let told = |second_n: f32| {
+    let reported = |second_n: f32| {
         let mut watch = watch(&PARAMS, None);
         let fades = |tick, force_n| TickRecord {
             mode: Mode::Fading,
@@ -226,12 +229,12 @@ fn a_force_that_grows_on_its_way_out_is_told() {
         };
         watch.look(&fades(0, 1.0), true).is_ok() && watch.look(&fades(1, second_n), true).is_err()
     };
-    assert!(!told(0.99) && !told(1.0) && told(1.01));
+    assert!(!reported(0.99) && !reported(1.0) && reported(1.01));
 }
 
 #[test]
 fn a_force_with_an_open_clutch_is_told() {
-    let told = |limits| {
+    let reported = |limits| {
         let mut watch = watch(&PARAMS, None);
         let open = |tick, force_n| TickRecord {
             limits,
@@ -240,23 +243,23 @@ fn a_force_with_an_open_clutch_is_told() {
         let _ = watch.look(&open(0, Vec3::ZERO), true);
         watch.look(&open(1, Vec3::Z * 0.5), true).is_err()
     };
-    assert!(told(Limits::CLUTCH_OPEN));
-    assert!(!told(Limits::CLUTCH_OPEN | Limits::SLEW_LIMITED));
+    assert!(reported(Limits::CLUTCH_OPEN));
+    assert!(!reported(Limits::CLUTCH_OPEN | Limits::SLEW_LIMITED));
 }
 
 #[test]
 fn a_tip_that_swings_is_told_and_tremor_is_not() {
-    let told = |hz: f32, amplitude_mm: f32| {
+    let reported = |hz: f32, amplitude_mm: f32| {
         let mut watch = watch(&PARAMS, None);
-        let mut told = false;
+        let mut reported = false;
         for tick in 0..1000_u32 {
             let turn = std::f32::consts::TAU * hz * tick as f32 * 1e-3;
             let height = -4.0 + 2.0 * amplitude_mm * turn.sin();
             let sample = at(tick, height, Vec3::Z * -0.25 * height);
-            told |= watch.look(&sample, true).is_err();
+            reported |= watch.look(&sample, true).is_err();
         }
-        told
+        reported
     };
-    assert!(told(40.0, 0.4) && told(25.0, 2.0));
-    assert!(!told(11.2, 0.4) && !told(40.0, 0.14));
+    assert!(reported(40.0, 0.4) && reported(25.0, 2.0));
+    assert!(!reported(11.2, 0.4) && !reported(40.0, 0.14));
 }

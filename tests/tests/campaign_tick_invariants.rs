@@ -48,8 +48,8 @@ impl Tick {
 
     fn judged(&self) -> (Watch, Result<(), String>) {
         let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        let said = watch.drive(&self.drive, &self.sense, ZERO, &self.truth);
-        (watch, said)
+        let stated = watch.drive(&self.drive, &self.sense, ZERO, &self.truth);
+        (watch, stated)
     }
 
     fn verdict(&self) -> String {
@@ -80,8 +80,8 @@ const fn up(newtons: f64) -> [f64; 3] {
 
 #[test]
 fn a_tick_as_it_should_be_passes_and_is_measured() {
-    let (watch, said) = Tick::pushing(up(7.6)).judged();
-    assert_eq!(said, Ok(()));
+    let (watch, stated) = Tick::pushing(up(7.6)).judged();
+    assert_eq!(stated, Ok(()));
     let seen = watch.extremes;
     // The reported pose is in whole counts.
     assert!((seen.read_force_n - 7.6).abs() < 0.01, "{seen:?}");
@@ -163,8 +163,8 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
     tick.truth.counts[1] += OFF_COUNTS as i32;
     assert!(tick.verdict().contains("at the tip"));
     tick.truth.counts[1] += 1;
-    let (watch, said) = tick.judged();
-    assert_eq!(said, Ok(()));
+    let (watch, stated) = tick.judged();
+    assert_eq!(stated, Ok(()));
     let seen = watch.extremes;
     assert!(
         seen.misled.force_n > f64::from(record.max_force_n),
@@ -178,8 +178,8 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
 fn a_singular_pose_is_counted_not_judged() {
     let mut tick = Tick::pushing(up(7.6));
     tick.truth.q_rad = [0.0, 1.4, 0.2];
-    let (watch, said) = tick.judged();
-    assert_eq!(said, Ok(()));
+    let (watch, stated) = tick.judged();
+    assert_eq!(stated, Ok(()));
     assert_eq!(watch.extremes.singular_ticks, 1);
 }
 
@@ -208,14 +208,18 @@ fn a_command_that_is_held_is_judged_by_what_is_true() {
 fn motors_taken_for_colder_than_they_are_are_told() {
     let watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let mut tick = Tick::pushing(up(1.0));
-    let told =
+    let reported =
         |believed_c: f32, tick: &Tick| watch.warmth(Vec3::new(90.0, 90.0, believed_c), &tick.truth);
     tick.truth.winding_c = [90.0, 30.0, 80.0];
-    assert_eq!(told(100.0, &tick), Ok(()));
-    assert_eq!(told(79.5, &tick), Ok(()));
+    assert_eq!(reported(100.0, &tick), Ok(()));
+    assert_eq!(reported(79.5, &tick), Ok(()));
     // A reset clears it.
-    assert!(told(25.0, &tick).expect_err("cold").contains("winding 3"));
-    assert!(told(f32::NAN, &tick).is_err());
+    assert!(
+        reported(25.0, &tick)
+            .expect_err("cold")
+            .contains("winding 3")
+    );
+    assert!(reported(f32::NAN, &tick).is_err());
 }
 
 #[test]
@@ -250,7 +254,7 @@ fn sample(tick: u32, force_n: Vec3) -> TickRecord {
 }
 
 /// Returns the result for the last of these samples; the others pass.
-fn told(samples: &[TickRecord]) -> Result<(), String> {
+fn reported(samples: &[TickRecord]) -> Result<(), String> {
     let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let (last, before) = samples.split_last().expect("one");
     for sample in before {
@@ -263,28 +267,31 @@ fn told(samples: &[TickRecord]) -> Result<(), String> {
 fn each_wrong_force_that_is_told_is_told_of() {
     let push = |newtons: f32| Vec3::Z * newtons;
     assert_eq!(
-        told(&[sample(1, push(7.65)), sample(2, push(6.65))]),
+        reported(&[sample(1, push(7.65)), sample(2, push(6.65))]),
         Ok(())
     );
     // The tick between them was not received.
-    assert_eq!(told(&[sample(1, push(7.65)), sample(3, push(1.0))]), Ok(()));
-    let nan = told(&[sample(1, push(f32::NAN))]).expect_err("no number");
+    assert_eq!(
+        reported(&[sample(1, push(7.65)), sample(3, push(1.0))]),
+        Ok(())
+    );
+    let nan = reported(&[sample(1, push(f32::NAN))]).expect_err("no number");
     assert!(nan.contains("not a number"));
-    let much = told(&[sample(1, push(7.66))]).expect_err("much");
+    let much = reported(&[sample(1, push(7.66))]).expect_err("much");
     assert!(much.contains("above the clamp"));
-    let step = told(&[sample(1, push(2.0)), sample(2, push(3.01))]).expect_err("a step");
+    let step = reported(&[sample(1, push(2.0)), sample(2, push(3.01))]).expect_err("a step");
     assert!(step.contains("changed by"));
     let mut disarmed = sample(1, push(0.1));
     disarmed.mode = Mode::Disarmed;
     assert!(
-        told(&[disarmed])
+        reported(&[disarmed])
             .expect_err("disarmed")
             .contains("amplifiers off")
     );
     let mut faulted = sample(1, push(0.1));
     faulted.fault = Some(Fault::EncoderJump);
     assert!(
-        told(&[faulted])
+        reported(&[faulted])
             .expect_err("a fault")
             .contains("amplifiers off")
     );

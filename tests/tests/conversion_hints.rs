@@ -68,10 +68,10 @@ fn hint_of(words: &[&str], file: &Path) -> String {
     let output = output.expect("it runs");
     let opens = output.status.success();
     assert!(!opens, "{words:?} opens {}", file.display());
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    let hint = told
+    let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+    let hint = reported
         .split_once("hint: ")
-        .unwrap_or_else(|| panic!("no hint in {told}"));
+        .unwrap_or_else(|| panic!("no hint in {reported}"));
     hint.1.trim().to_owned()
 }
 
@@ -300,8 +300,8 @@ fn a_check_sum_tells_a_whole_file_from_a_cut_one() {
         .collect();
     std::fs::write(&cut, damaged).expect("written");
     let hint = hint(&cut);
-    let sum = |told: &str| {
-        let line = told.lines().find(|line| line.contains("Checksum="));
+    let sum = |reported: &str| {
+        let line = reported.lines().find(|line| line.contains("Checksum="));
         line.map(str::trim).map(str::to_owned)
     };
     let of_cut = sum(&follow(at, &hint, "gdalinfo"));

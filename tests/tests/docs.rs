@@ -173,7 +173,7 @@ fn cut_tables_are_found() {
 }
 
 /// Checks a page with this table.
-fn told(page: &str) -> (usize, Vec<String>) {
+fn reported(page: &str) -> (usize, Vec<String>) {
     const TABLE: &str = "state,median,share\nsliding,1218,0.04567\n\"chain, free\",1144,2.04e-6\n\
                          twice,1,1\ntwice,2,2\nempty,,1\n";
     let folder = tempfile::tempdir().expect("a folder");
@@ -196,9 +196,13 @@ fn a_figure_of_the_table_is_right_to_the_digits_shown() {
         ("chain, free, share", "2e-6"),
         ("twice / 2, share", "2"),
     ] {
-        assert_eq!(told(&figure(place, shown)), (1, vec![]), "{place} {shown}");
+        assert_eq!(
+            reported(&figure(place, shown)),
+            (1, vec![]),
+            "{place} {shown}"
+        );
     }
-    assert_eq!(told("No figure of a table: 17."), (0, vec![]));
+    assert_eq!(reported("No figure of a table: 17."), (0, vec![]));
 }
 
 #[test]
@@ -210,13 +214,13 @@ fn cells_of_a_table_are_compared() {
         )
     };
     let right = "| sliding | 1,218 | 0.05 |\n| free | 1144 | |";
-    assert_eq!(told(&table(right)), (3, vec![]));
-    let (count, wrong) = told(&table("| sliding | 1,217 | 0.05 |\n| free | 1144 | 2e-6 |"));
+    assert_eq!(reported(&table(right)), (3, vec![]));
+    let (count, wrong) = reported(&table("| sliding | 1,217 | 0.05 |\n| free | 1144 | 2e-6 |"));
     assert_eq!((count, wrong.len()), (4, 1), "{wrong:?}");
     assert!(wrong[0].contains("the page says 1,217"), "{wrong:?}");
-    let (_, wrong) = told(&table("| sliding | 1,218 | 0.05 |"));
+    let (_, wrong) = reported(&table("| sliding | 1,218 | 0.05 |"));
     assert!(wrong[0].contains("2 rows are named, 1 shown"), "{wrong:?}");
-    let (_, wrong) = told(&table("| sliding | 1,218 |\n| free | 1144 | |"));
+    let (_, wrong) = reported(&table("| sliding | 1,218 |\n| free | 1144 | |"));
     assert!(wrong[0].contains("number of columns"), "{wrong:?}");
 }
 
@@ -237,10 +241,11 @@ fn a_figure_that_is_not_the_tables_is_found() {
         ("twice, median", "1", "more than one row"),
         ("empty, median", "1", "is no number"),
     ] {
-        let (figures, wrong) = told(&figure(place, shown));
+        let (figures, wrong) = reported(&figure(place, shown));
         assert_eq!((figures, wrong.len()), (1, 1), "{place} {shown}");
         assert!(wrong[0].contains(why), "{wrong:?}");
     }
-    let (_, wrong) = told("<!-- from no.csv: a, b -->1 and <!-- from t.csv: sliding, median 1218");
+    let (_, wrong) =
+        reported("<!-- from no.csv: a, b -->1 and <!-- from t.csv: sliding, median 1218");
     assert_eq!(wrong.len(), 2, "{wrong:?}");
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use hapterra_tests::reader::Reader;
 use heightfield::{OpenOptions, Raster, RasterError};
 
-const HOLE: (u32, u32) = (3, 4);
+const NO_DATA: (u32, u32) = (3, 4);
 
 fn path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -28,7 +28,7 @@ fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &
     for row in 0..rows {
         for column in 0..columns {
             let found = raster.height(column, rows - 1 - row);
-            if (column, row) == HOLE {
+            if (column, row) == NO_DATA {
                 assert!(found.is_nan(), "{name}: {found} in the hole");
             } else {
                 let wanted = height(column, row) + 1000.0 * f64::from(band - 1);

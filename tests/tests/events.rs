@@ -54,7 +54,7 @@ fn example(name: &str) -> Option<Example> {
 }
 
 /// Returns the lines that an example prints for these events.
-fn said(mut example: Example, events: &[Value]) -> Vec<String> {
+fn stated(mut example: Example, events: &[Value]) -> Vec<String> {
     for event in events {
         writeln!(example.line, "{event}").expect("taken");
     }
@@ -72,9 +72,9 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 /// Returns true if numbers agree except in the last digit, which the JSON reader here rounds.
-fn near(told: &[f64], recorded: &[f64]) -> bool {
+fn near(reported: &[f64], recorded: &[f64]) -> bool {
     let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-12 * b.abs();
-    told.len() == recorded.len() && told.iter().zip(recorded).all(is_near)
+    reported.len() == recorded.len() && reported.iter().zip(recorded).all(is_near)
 }
 
 /// Writes hills to a folder.
@@ -105,11 +105,14 @@ impl Telling {
             .stderr(Stdio::piped())
             .spawn()
             .expect("started");
-        let mut told = BufReader::new(child.stderr.take().expect("piped"));
+        let mut reported = BufReader::new(child.stderr.take().expect("piped"));
         let mut address = None;
         while address.is_none() {
             let mut line = String::new();
-            assert!(told.read_line(&mut line).expect("a line") > 0, "no address");
+            assert!(
+                reported.read_line(&mut line).expect("a line") > 0,
+                "no address"
+            );
             let rest = line.strip_prefix("events         ");
             address = rest.map(|rest| rest.trim().to_owned());
         }
@@ -130,7 +133,7 @@ impl Telling {
             events,
             coming,
             stuck,
-            stderr: spawn(move || told.lines().map_while(Result::ok).collect()),
+            stderr: spawn(move || reported.lines().map_while(Result::ok).collect()),
         }
     }
 
@@ -168,21 +171,21 @@ fn run_sends_events_that_the_examples_speak_and_sound() {
     let events = Telling::start(&[&words[..], &more].concat(), "0,10").end();
     judge(&events, &record);
     if let Some(example) = example("speak_heights.py") {
-        let heights = said(example, &events);
+        let heights = stated(example, &events);
         let of = |kind: &'static str| events.iter().filter(move |event| event["event"] == *kind);
-        let told: Vec<_> = of("contact")
+        let reported: Vec<_> = of("contact")
             .filter(|event| event["touching"] == true)
             .chain(of("place"))
             .map(|event| format!("{:.0} metres", event["height_m"].as_f64().expect("m")))
             .collect();
         assert!(!heights.is_empty());
         assert!(
-            heights.iter().all(|height| told.contains(height)),
+            heights.iter().all(|height| reported.contains(height)),
             "{heights:?}"
         );
     }
     if let Some(example) = example("sound_impacts.py") {
-        let knocks = said(example, &events);
+        let knocks = stated(example, &events);
         let contacts = events.iter().filter(|event| event["speed_mm_s"].is_f64());
         assert_eq!(knocks.len(), contacts.count(), "{knocks:?}");
         assert!(knocks.iter().all(|knock| knock.starts_with("knock at ")));
@@ -414,8 +417,8 @@ fn run_ends_disarmed_when_its_input_ends() {
         "--end-with-input",
     ];
     let refused = hapterra(&words).output().expect("started");
-    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(told.contains("hint: add --commands -"), "{told}");
+    let reported = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(reported.contains("hint: add --commands -"), "{reported}");
 }
 
 /// A real arm is zeroed only by the answer to the right question.
@@ -452,11 +455,11 @@ fn a_port_that_is_taken_is_an_error_before_anything_is_armed() {
     let port = taken.local_addr().expect("an address").port().to_string();
     let words = ["run", text(&hills), "--device", "native", "--events", &port];
     let run = hapterra(&words).output().expect("started");
-    let told = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert_eq!(run.status.code(), Some(1), "{told}");
+    let reported = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(1), "{reported}");
     assert!(
-        told.contains(&format!("on port {port} of 127.0.0.1")),
-        "{told}"
+        reported.contains(&format!("on port {port} of 127.0.0.1")),
+        "{reported}"
     );
-    assert!(told.contains("hint: name another port"), "{told}");
+    assert!(reported.contains("hint: name another port"), "{reported}");
 }

@@ -99,8 +99,8 @@ impl<'t> Slide<'t> {
         rate: usize,
         device: &mut dyn Stepped,
     ) -> (Vec<TickRecord>, Client<'t>) {
-        let (arming, patience) = (Some(Arming::VIRTUAL), Timeouts::REAL_TIME);
-        let mut client = Client::numbered(self.terrain, scene, arming, patience, SEED);
+        let (arming, timeout) = (Some(Arming::VIRTUAL), Timeouts::REAL_TIME);
+        let mut client = Client::numbered(self.terrain, scene, arming, timeout, SEED);
         let (mut out, mut is_open) = (vec![], false);
         client.greet(ms(0), &mut out);
         // Without a scene the device's time stops, and the line carries everything.
@@ -226,14 +226,14 @@ fn holds(
     name: &str,
     slide: &Slide<'_>,
     scene: &Scene,
-    (samples, tally): &(Vec<TickRecord>, LinkStats),
+    (samples, stats): &(Vec<TickRecord>, LinkStats),
 ) {
-    assert_eq!(tally.lost + tally.dropped, 0, "{name}");
+    assert_eq!(stats.lost + stats.dropped, 0, "{name}");
     let ground = judged(slide.terrain, samples);
     let stated = slide.stated_error_mm(scene);
     eprintln!(
         "{name}: {ground:?}, fallback off by up to {stated:.3} mm, {} tiles",
-        tally.tiles
+        stats.tiles
     );
     // Until the fallback has arrived, only its absence is known.
     let comes = samples
@@ -259,7 +259,7 @@ fn holds(
 fn in_memory(slide: &Slide<'_>, scene: Scene) -> (Vec<TickRecord>, LinkStats) {
     let mut device = InMemory::new(slide.rig.clone());
     let (samples, client) = slide.rendered(scene, BYTES_A_TICK, &mut device);
-    (samples, client.tally().clone())
+    (samples, client.stats().clone())
 }
 
 /// Same as [`in_memory`] on the emulated board; then closes the session.
@@ -272,7 +272,7 @@ fn on_board(
     let (emulator, lines) = Emulator::start(qemu, image).expect("starts");
     let mut board = OnBoard::new(lines.link, lines.plant, slide.rig.clone());
     let (samples, mut client) = slide.rendered(scene, REAL_BYTES_A_TICK, &mut board);
-    let rendered = (samples, client.tally().clone());
+    let rendered = (samples, client.stats().clone());
     let mut out = vec![];
     client.leave(ms(slide.ticks), &mut out);
     move_arm_while(&mut board.plant, &mut board.arm, || {

@@ -61,8 +61,8 @@ fn an_encoder_off_by_two_ticks_jumps_makes_no_force_above_the_records() {
             counts[axis] += off;
             let pose = mechanism.pose(counts, [0; 3]);
             for direction in directions() {
-                let told = direction * WORKING_SHARE * record.max_force_n;
-                let torques = pose.torques_nm(told) + mechanism.gravity_nm(&pose);
+                let reported = direction * WORKING_SHARE * record.max_force_n;
+                let torques = pose.torques_nm(reported) + mechanism.gravity_nm(&pose);
                 let currents = mechanism.currents_a(torques).to_array();
                 let torque = std::array::from_fn(|i| {
                     let drive = &model.drive[i];

@@ -76,19 +76,19 @@ fn elf(program: &[u8]) -> Vec<u8> {
 /// the call returned, F if it faulted.
 fn writes_a_file(path: &Path) -> Vec<u8> {
     let path = path.to_str().expect("text").as_bytes();
-    let told = |what: u8| send(UART0, &[what]);
+    let reported = |what: u8| send(UART0, &[what]);
     let code = |block: u32| {
         // ldr r1, block; movs r0, #1 (SYS_OPEN); bkpt 0xAB; b past the literal; block
         let code = [0x4901_u16, 0x2001, 0xBEAB, 0xE001];
         let code = code.into_iter().flat_map(u16::to_le_bytes);
         code.chain(block.to_le_bytes()).collect::<Vec<_>>()
     };
-    let stores = 2 * (told(0).len() * STORE + 4);
+    let stores = 2 * (reported(0).len() * STORE + 4);
     let block = (CODE + code(0).len() + stores) as u32;
     let arguments = [block + 12, 4, path.len() as u32]; // mode "w"
     let data: Vec<u8> = arguments.into_iter().flat_map(u32::to_le_bytes).collect();
     let data = [&data, path, &[0]].concat();
-    image(&code(block), &told(b'R'), &told(b'F'), &data)
+    image(&code(block), &reported(b'R'), &reported(b'F'), &data)
 }
 
 #[test]
@@ -98,11 +98,11 @@ fn an_image_cannot_reach_the_hosts_files() {
     let (target, path) = (folder.path().join("taken"), folder.path().join("image.elf"));
     fs::write(&path, writes_a_file(&target)).expect("written");
     let (emulator, mut lines) = Emulator::start(&qemu, &path).expect("started");
-    let mut told = [0];
-    let n = lines.link.receive(&mut told, HANG).expect("stands");
+    let mut reported = [0];
+    let n = lines.link.receive(&mut reported, HANG).expect("stands");
     assert_eq!(n, 1, "nothing came");
     assert!(!target.exists(), "the image made a file");
-    assert_eq!(told, *b"F", "the call was let through");
+    assert_eq!(reported, *b"F", "the call was let through");
     drop(emulator);
 }
 
@@ -115,9 +115,9 @@ fn what_an_image_reports_does_not_control_the_terminal() {
     stores.push((AIRCR, RESET));
     fs::write(&path, image(&[], &stores, &[], &[])).expect("written");
     // It may end before its lines are connected.
-    let said = match Emulator::start(&qemu, &path) {
+    let stated = match Emulator::start(&qemu, &path) {
         Ok((emulator, _)) => emulator.finish().expect_err("it failed").to_string(),
         Err(error) => error.to_string(),
     };
-    assert!(said.contains("\\u{1b}[2Jall is well\\u{7}"), "{said}");
+    assert!(stated.contains("\\u{1b}[2Jall is well\\u{7}"), "{stated}");
 }

@@ -159,7 +159,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
                 base: 0,
                 height: 1.5,
             },
-            _ => Heights::Hole,
+            _ => Heights::NoData,
         };
         let depth = random.between(-2.0, 3.0) as f32;
         let hip = GridPoint::new([10, 10, 0], Vec3::new(0.3, 0.4, depth));
@@ -168,7 +168,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             key,
             heights,
         };
-        let said = match random.below(7) {
+        let stated = match random.below(7) {
             0 => ToDevice::Tile(tile),
             5 => ToDevice::MaterialScene(MaterialScene {
                 scene: hapterra_core::scene::Scene {
@@ -199,7 +199,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             },
             _ => ToDevice::Hip(HipCommand { seq, hip }),
         };
-        line.extend(wire::message(&said));
+        line.extend(wire::message(&stated));
     }
     let chunks = line.chunks(255);
     chunks

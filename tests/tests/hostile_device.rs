@@ -83,11 +83,11 @@ fn serve(mut stream: TcpStream) -> std::io::Result<()> {
     stream.set_read_timeout(Some(Duration::from_millis(1)))?;
     let (mut device, mut epoch) = (device(), 0);
     let mut reader = FrameReader::<MAX_FRAME>::new();
-    let (mut heard, mut chunk) = ([0; 4096], [0; 512]);
+    let (mut received, mut chunk) = ([0; 4096], [0; 512]);
     loop {
-        match stream.read(&mut heard) {
+        match stream.read(&mut received) {
             Ok(0) => return Ok(()),
-            Ok(n) => device.send(&heard[..n])?,
+            Ok(n) => device.send(&received[..n])?,
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
             Err(error) => return Err(error),
         }

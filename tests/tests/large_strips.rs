@@ -200,8 +200,9 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     write(&damaged);
     let (code, text) = info(&["--cache", cache]);
     assert_eq!(code, Some(1), "{text}");
-    let is_told = text.contains("packed.tif") && text.contains("cannot be unpacked from row 0 on");
-    assert!(is_told && !text.contains("no surface"), "{text}");
+    let is_reported =
+        text.contains("packed.tif") && text.contains("cannot be unpacked from row 0 on");
+    assert!(is_reported && !text.contains("no surface"), "{text}");
     write(&packed[..3]);
     let (code, text) = info(&["--cache", cache]);
     assert_eq!(code, Some(1), "{text}");

@@ -6,14 +6,14 @@ use hapterra_tests::repository;
 
 #[test]
 fn link_faults_change_no_force_never_hang_and_are_reported() {
-    let tally = run(SEED, 60, &mut |_, _| {}).expect("no violation");
+    let stats = run(SEED, 60, &mut |_, _| {}).expect("no violation");
     for kind in Kind::ALL {
-        assert!(tally.runs_with(kind) > 0, "{kind:?} was not tried");
+        assert!(stats.runs_with(kind) > 0, "{kind:?} was not tried");
     }
     // Otherwise the bounds would never have been tested.
-    assert!(tally.extremes.force_n > 2.0, "{:?}", tally.extremes);
-    assert!(tally.touching > 5_000, "{tally:?}");
-    assert!(tally.agreed() > 3, "{tally:?}");
+    assert!(stats.extremes.force_n > 2.0, "{:?}", stats.extremes);
+    assert!(stats.touching > 5_000, "{stats:?}");
+    assert!(stats.agreed() > 3, "{stats:?}");
 }
 
 #[test]

@@ -80,11 +80,11 @@ fn force_is_the_same_over_a_bad_link() {
             OfflineDevice::open(&terrain, params, Box::new(link), AT_ONCE).expect("opened");
         let got = walk(&mut replayer);
         assert!(expected == got, "{fault:?} changed the force");
-        let tally = replayer.tally();
-        eprintln!("{fault:?}: {} transfers harmed, {tally:?}", harmed.borrow());
+        let stats = replayer.stats();
+        eprintln!("{fault:?}: {} transfers harmed, {stats:?}", harmed.borrow());
         assert!(*harmed.borrow() > 50, "no harm, no test");
         if fault != Fault::Twice {
-            assert!(tally.bad_frames > 0);
+            assert!(stats.bad_frames > 0);
         }
     }
 }
@@ -154,12 +154,12 @@ fn telemetry_that_is_lost_is_counted() {
             .expect("goes on");
     }
     session.say_goodbye(&mut |_| {}).expect("confirmed");
-    let tally = session.tally();
+    let stats = session.stats();
     // Losses before the first and after the last sample received are counted as well.
-    eprintln!("{last} ticks, {tally:?}");
-    assert!(tally.lost + tally.dropped > 100, "no harm, no test");
-    assert_eq!((tally.sessions, tally.uncertain), (1, 0));
-    assert_eq!((tally.samples + tally.lost, tally.dropped), made.get());
+    eprintln!("{last} ticks, {stats:?}");
+    assert!(stats.lost + stats.dropped > 100, "no harm, no test");
+    assert_eq!((stats.sessions, stats.uncertain), (1, 0));
+    assert_eq!((stats.samples + stats.lost, stats.dropped), made.get());
 }
 
 #[test]
@@ -191,7 +191,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     let before = watch(&mut session, 4500);
     assert_eq!(before.mode, Mode::Armed);
     assert_eq!(before.state, ContactState::Touching);
-    let fetched = session.tally().tiles;
+    let fetched = session.stats().tiles;
     drop(session);
     // It dies in the middle of a frame, and is away for half a second.
     device.borrow_mut().send(&[7; 30]).expect("sent");
@@ -207,7 +207,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     assert_eq!(after.state, ContactState::Touching);
     assert!(after.tick >= before.tick + 500, "its time went on");
     assert_eq!((after.mode, after.fault), (Mode::Armed, None));
-    let again = session.tally().tiles;
+    let again = session.stats().tiles;
     assert!(again < fetched, "{again} tiles again after {fetched}");
 }
 

@@ -227,7 +227,7 @@ fn a_host_of_another_version_may_speak_at_any_moment() {
 #[test]
 fn a_host_whose_device_is_taken_is_told_so_at_once() {
     let ticks = agree(&Plan::default()).ticks;
-    let mut told = 0;
+    let mut reported = 0;
     // Once alone, and once with its notification lost.
     for (at, late) in (0..ticks)
         .step_by(MOMENTS)
@@ -246,10 +246,10 @@ fn a_host_whose_device_is_taken_is_told_so_at_once() {
         assert!(report.ticks < at + late + 1_300, "{report:?} in {plan:?}");
         // Its own open comes after the other host's, or its close before.
         let is_its_own = at == 0 || at + 200 > ticks;
-        assert!(report.end == End::Told || is_its_own, "{plan:?}");
-        told += u32::from(report.end == End::Told);
+        assert!(report.end == End::Reported || is_its_own, "{plan:?}");
+        reported += u32::from(report.end == End::Reported);
     }
-    assert!(told > 40, "{told}");
+    assert!(reported > 40, "{reported}");
 }
 
 #[test]
@@ -324,7 +324,7 @@ fn a_device_of_another_version_is_told_and_never_driven() {
         ..Plan::default()
     });
     let report = report.expect("nothing wrong");
-    assert!(report.end == End::Told && !report.driven && report.ticks < 100);
+    assert!(report.end == End::Reported && !report.driven && report.ticks < 100);
     // A device that received other firmware in between reports it after its reset.
     for at in (0..ticks).step_by(MOMENTS) {
         let other = Interruption::OtherDevice;
@@ -335,7 +335,10 @@ fn a_device_of_another_version_is_told_and_never_driven() {
         };
         let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
         let is_late = at + 100 > ticks;
-        assert!(report.end == End::Told || is_late, "{report:?} in {plan:?}");
+        assert!(
+            report.end == End::Reported || is_late,
+            "{report:?} in {plan:?}"
+        );
         assert!(report.ticks < at + 3_000, "{report:?} in {plan:?}");
     }
 }
@@ -373,16 +376,16 @@ fn the_line_may_be_cut_one_way_at_any_moment() {
 
 #[test]
 fn whatever_goes_wrong_at_random_the_end_is_agreed_or_told() {
-    let (mut agreed, mut told) = (0, 0);
+    let (mut agreed, mut reported) = (0, 0);
     for seed in 0..400 {
         let plan = Plan::random(seed);
         match check(&plan) {
             Ok(report) if report.end == End::Agreed => agreed += 1,
-            Ok(_) => told += 1,
+            Ok(_) => reported += 1,
             Err(wrong) => panic!("{wrong:?} in {plan:?}"),
         }
     }
-    eprintln!("{agreed} agreed, {told} told");
+    eprintln!("{agreed} agreed, {reported} told");
     assert!(agreed > 200, "hardly ever agreed: {agreed}");
 }
 
@@ -396,7 +399,7 @@ fn a_dead_line_ends_in_a_word_and_not_in_a_hang() {
                 ..Plan::default()
             };
             let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
-            assert_eq!(report.end, End::Told, "{plan:?}");
+            assert_eq!(report.end, End::Reported, "{plan:?}");
             // Four seconds, five times; three for the close.
             assert!(report.ticks < 30_000, "{report:?} in {plan:?}");
         }

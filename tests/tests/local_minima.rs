@@ -47,14 +47,16 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     let seen = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
     for (tick, now) in seen.iter().enumerate() {
-        let told = judge.all(now);
-        let told = told.iter().any(|v| v.invariant == Invariant::LocalMinimum);
+        let reported = judge.all(now);
+        let reported = reported
+            .iter()
+            .any(|v| v.invariant == Invariant::LocalMinimum);
         if let Some(is_right) = rests_right(&scene.terrain, now) {
             found.judged += 1;
             if !is_right {
                 found.wrong.push(tick);
             }
-            if is_right == told {
+            if is_right == reported {
                 found.disputed.push(tick);
             }
         }
@@ -211,13 +213,13 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
 
 /// Cuts at most 200 × 200 patches from the middle of a raster, with the lowest sample near zero.
 fn cut(raster: &Raster, steepness: f64) -> Terrain {
-    const MOST: u32 = 200;
+    const MAX: u32 = 200;
     let scale = HapticGrid::new(raster, HapticCells::Stored)
         .cells_per_vertical_unit()
         .unwrap_or(1.0)
         * steepness;
     let lowest = raster.summary().lowest;
-    let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(MOST + 1));
+    let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(MAX + 1));
     let first = [(raster.columns() - width) / 2, (raster.rows() - height) / 2];
     let rows: Vec<Vec<f64>> = (0..height)
         .map(|row| {

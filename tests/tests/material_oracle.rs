@@ -5,7 +5,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::{Material, Pattern, Shading, Texture};
 use hapterra_tests::invariants::Invariant;
-use hapterra_tests::invariants::material::{Judged, MaterialJudge};
+use hapterra_tests::invariants::material::{Judged, MaterialOracle};
 use hapterra_tests::scene::loop_replay::{Replay, Replied, replay};
 use hapterra_tests::scene::materials::Materials;
 use hapterra_tests::scene::run::{Execution, Scene};
@@ -66,7 +66,7 @@ impl Way {
     /// Returns the oracle's result if one point is changed: the violation with its point, and the
     /// measurements.
     fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, Judged) {
-        let mut judge = MaterialJudge::new(&self.scene, &self.materials, [0; 3]);
+        let mut judge = MaterialOracle::new(&self.scene, &self.materials, [0; 3]);
         for (point, rendered) in self.rendered.iter().enumerate() {
             let mut rendered = *rendered;
             if point == at {

@@ -123,25 +123,28 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
             .args(more)
             .output()
             .expect("started");
-        let said = String::from_utf8_lossy(&run.stdout).into_owned();
+        let stated = String::from_utf8_lossy(&run.stdout).into_owned();
         let complained = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{said}{complained}");
+        assert!(run.status.success(), "{stated}{complained}");
         assert!(out.join("fractal.png").exists());
-        (std::fs::read(out.join("fractal.csv")).expect("there"), said)
+        (
+            std::fs::read(out.join("fractal.csv")).expect("there"),
+            stated,
+        )
     };
     let (native, _) = demo("native", &["--device".as_ref(), "native".as_ref()]);
-    let (emulated, said) = demo("emulated", &["--device".as_ref(), device.as_ref()]);
-    assert!(said.contains(", 0 late"), "{said}");
-    assert!(said.contains("0 lost on the link, 0 dropped"), "{said}");
+    let (emulated, stated) = demo("emulated", &["--device".as_ref(), device.as_ref()]);
+    assert!(stated.contains(", 0 late"), "{stated}");
+    assert!(stated.contains("0 lost on the link, 0 dropped"), "{stated}");
     let lines = |csv: &[u8]| csv.iter().filter(|b| **b == b'\n').count();
     assert!(lines(&native) > 5400, "{} lines", lines(&native));
     // All but the device, which the recording names.
-    let told = String::from_utf8_lossy(&emulated).into_owned();
+    let reported = String::from_utf8_lossy(&emulated).into_owned();
     assert!(
-        told.contains("# board = \"mps2-an386\""),
+        reported.contains("# board = \"mps2-an386\""),
         "it names its board"
     );
-    let as_native = told.replacen("\"mps2-an386\"", "\"native\"", 1);
+    let as_native = reported.replacen("\"mps2-an386\"", "\"native\"", 1);
     assert!(native == as_native.as_bytes(), "the recordings differ");
 }
 
@@ -176,14 +179,14 @@ fn interrupted_emulated_demo_ends_in_order() {
     assert!(signal.expect("kill runs").success());
     let rest: Vec<String> = lines.map_while(Result::ok).collect();
     let ended = demo.wait_with_output().expect("it ends");
-    let told = rest.join("\n") + &String::from_utf8_lossy(&ended.stderr);
-    assert!(ended.status.success(), "{told}");
+    let reported = rest.join("\n") + &String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success(), "{reported}");
     for word in ["report", "panicked", "signal", "error: "] {
-        assert!(!told.contains(word), "{word} in {told}");
+        assert!(!reported.contains(word), "{word} in {reported}");
     }
     assert!(
-        told.contains("fractal.csv") && told.contains("fractal.png"),
-        "{told}"
+        reported.contains("fractal.csv") && reported.contains("fractal.png"),
+        "{reported}"
     );
     assert!(folder.path().join("fractal.csv").is_file());
 }

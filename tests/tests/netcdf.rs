@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use heightfield::{OpenOptions, Raster, RasterError, Wait, gdal};
 
 const SIZE: (u32, u32) = (90, 70);
-const HOLE: (u32, u32) = (3, 4);
+const NO_DATA: (u32, u32) = (3, 4);
 
 const FILES: [&str; 11] = [
     "big_endian.nc",
@@ -144,7 +144,7 @@ fn every_storage_holds_the_exact_field() {
                     "packed.nc" if wanted > 300.0 => {
                         assert!(found.is_nan(), "{name}: {column} {row}");
                     }
-                    _ if (column, row) == HOLE => {
+                    _ if (column, row) == NO_DATA => {
                         assert!(found.is_nan(), "{name}: {column} {row}: {found}");
                     }
                     _ => assert_eq!(found, wanted, "{name}: {column} {row}"),

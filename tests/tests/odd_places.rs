@@ -158,7 +158,7 @@ fn sheared_map_is_rendered_in_its_true_shape() {
     assert!(sheared >= 5, "{sheared}");
 }
 
-fn said(file: &str) -> String {
+fn stated(file: &str) -> String {
     let output = Command::new(hapterra_binary())
         .args(["info", &format!("{FOLDER}/{file}.tif")])
         .output()
@@ -185,9 +185,9 @@ fn info_says_what_its_longitudes_and_latitudes_are() {
         ("modis", ["west 1111950.500", "of its own datum, "]),
         ("feet", ["unit of 0.304", "WGS 84, usually within 4 m"]),
     ] {
-        let said = said(file);
+        let stated = stated(file);
         for part in parts {
-            assert!(said.contains(part), "{part} in:\n{said}");
+            assert!(stated.contains(part), "{part} in:\n{stated}");
         }
     }
 }
@@ -205,20 +205,20 @@ fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
         (to[0] - from[0]).abs() < 1e-6 && to[1] > from[1],
         "{from:?} {to:?}"
     );
-    let said = said("sheared");
-    assert!(said.contains("the grid is sheared"), "{said}");
+    let stated = stated("sheared");
+    assert!(stated.contains("the grid is sheared"), "{stated}");
     assert!(
-        said.contains("by -16.7°") || said.contains("by 16.7°"),
-        "{said}"
+        stated.contains("by -16.7°") || stated.contains("by 16.7°"),
+        "{stated}"
     );
-    assert!(!said.contains("rotated"), "{said}");
+    assert!(!stated.contains("rotated"), "{stated}");
 }
 
 /// A map in feet whose heights have no unit is rendered 3.28 times too steep if they are in feet as
 /// well: every command reports it until the unit is stated.
 #[test]
 fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
-    let told = |file: &str, more: &[&str]| {
+    let reported = |file: &str, more: &[&str]| {
         let output = Command::new(hapterra_binary())
             .args(["info", "--json", &format!("{FOLDER}/{file}")])
             .args(more)
@@ -227,23 +227,23 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         let unit = report["vertical"]["metres_per_unit"].as_f64();
         let from = report["vertical"]["unit_from"].as_str().map(str::to_owned);
-        let said = String::from_utf8(output.stderr).expect("text");
-        (said, unit.expect("a unit"), from.expect("a source"))
+        let stated = String::from_utf8(output.stderr).expect("text");
+        (stated, unit.expect("a unit"), from.expect("a source"))
     };
-    let (said, unit, from) = told("feet.tif", &[]);
+    let (stated, unit, from) = reported("feet.tif", &[]);
     assert!(
-        said.contains("3.28 times too steep: --input height-unit=us-ft"),
-        "{said}"
+        stated.contains("3.28 times too steep: --input height-unit=us-ft"),
+        "{stated}"
     );
     assert_eq!((unit, from.as_str()), (1.0, "assumed"));
-    let (said, unit, from) = told("feet.tif", &["--input", "height-unit=us-ft"]);
-    assert_eq!((said.as_str(), from.as_str()), ("", "option"));
+    let (stated, unit, from) = reported("feet.tif", &["--input", "height-unit=us-ft"]);
+    assert_eq!((stated.as_str(), from.as_str()), ("", "option"));
     assert!((unit - 1200.0 / 3937.0).abs() < 1e-12, "{unit}");
-    let (said, ..) = told("nad27.tif", &[]);
-    assert!(said.contains("--input height-unit="), "{said}");
+    let (stated, ..) = reported("nad27.tif", &[]);
+    assert!(stated.contains("--input height-unit="), "{stated}");
     // Metres on the ground, or a unit stated in the file, need no note.
-    let (said, ..) = told("rotated.tif", &[]);
-    assert_eq!(said, "");
+    let (stated, ..) = reported("rotated.tif", &[]);
+    assert_eq!(stated, "");
 }
 
 /// Unknown projections are named, with a remedy.
@@ -263,10 +263,10 @@ fn a_projection_that_is_not_known_is_named_with_what_to_do() {
             ])
             .output()
             .expect("it runs");
-        let said = String::from_utf8(output.stderr).expect("text");
+        let stated = String::from_utf8(output.stderr).expect("text");
         assert!(!output.status.success());
         for part in [name, "--at X,Y", "gdalwarp -t_srs EPSG:4326"] {
-            assert!(said.contains(part), "{part} in:\n{said}");
+            assert!(stated.contains(part), "{part} in:\n{stated}");
         }
     }
 }

@@ -109,11 +109,11 @@ fn gaps_of_a_vrt_without_no_data_are_said_to_be_heights() {
     );
     let raster = Raster::open(&path, &OpenOptions::default()).expect("read by GDAL");
     assert_eq!((raster.height(0, 7), raster.height(0, 0)), (100.5, 0.0));
-    let said = raster
+    let stated = raster
         .remarks()
         .iter()
         .any(|remark| remark.contains("-vrtnodata"));
-    assert!(said, "{:?}", raster.remarks());
+    assert!(stated, "{:?}", raster.remarks());
 }
 
 /// Writes a VRT of 5 × 8 samples; a file has their northern half.
@@ -268,8 +268,8 @@ fn labels_beside_planetary_images_are_opened() {
     std::fs::write(&image, samples).expect("written");
     let raster = Raster::open(&image, &OpenOptions::default()).expect("by its label");
     assert_eq!((raster.height(0, 2), raster.height(3, 0)), (0.0, 11.0));
-    let said = raster.remarks().join(" ");
-    assert!(said.contains("MOON.LBL"), "{said}");
+    let stated = raster.remarks().join(" ");
+    assert!(stated.contains("MOON.LBL"), "{stated}");
 }
 
 /// ENVI's samples have any extension, and a unit beside a zone is the unit of the coordinates.
@@ -325,15 +325,15 @@ fn formats_are_named_where_there_is_no_libgdal() {
         let path = at.join(name);
         std::fs::write(&path, head).expect("written");
         let output = memory_limit::info_without_gdal(&path, &[]);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{told}");
+        let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{reported}");
         for part in [
             format,
             "read through GDAL",
             "apt install",
             "then this works",
         ] {
-            assert!(told.contains(part), "{name}: {part} in {told}");
+            assert!(reported.contains(part), "{name}: {part} in {reported}");
         }
     }
     let old = std::process::Command::new(hapterra_binary())
@@ -343,9 +343,9 @@ fn formats_are_named_where_there_is_no_libgdal() {
         .env("STAND_IN_VERSION", "3030200")
         .output()
         .expect("it runs");
-    let told = String::from_utf8_lossy(&old.stderr).into_owned();
+    let reported = String::from_utf8_lossy(&old.stderr).into_owned();
     for part in ["is GDAL 3.3.2", "from 3.4.0"] {
-        assert!(told.contains(part), "{told}");
+        assert!(reported.contains(part), "{reported}");
     }
 }
 
@@ -390,8 +390,8 @@ fn slow_libgdal_holds_up_no_tick() {
         .stdin(std::process::Stdio::null())
         .output()
         .expect("it runs");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{told}");
+    let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{reported}");
     let mut rows = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .from_path(&recording)
@@ -409,8 +409,8 @@ fn slow_libgdal_holds_up_no_tick() {
         );
         assert_eq!(&row[late], "0", "tick {number}");
         // Before the first one the device has no terrain at all.
-        let is_hole = number > 1 && row[limits].contains("TERRAIN_MISSING");
-        assert!(!is_hole, "tick {number}: {}", &row[limits]);
+        let is_no_data = number > 1 && row[limits].contains("TERRAIN_MISSING");
+        assert!(!is_no_data, "tick {number}: {}", &row[limits]);
     }
     let coarse = rows
         .iter()

@@ -113,8 +113,11 @@ fn reports_of(mut judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Violatio
 
 /// Returns the invariants that the last of these ticks breaks.
 fn broken_of(judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Invariant> {
-    let told = reports_of(judge, ticks);
-    told.iter().map(|violation| violation.invariant).collect()
+    let reported = reports_of(judge, ticks);
+    reported
+        .iter()
+        .map(|violation| violation.invariant)
+        .collect()
 }
 
 /// Checks that the oracle reports the forged tick by this invariant alone, and the correct tick by
@@ -174,9 +177,9 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     let ridge = ridge();
     let judge = || TickOracle::new(&ridge).with_friction(friction);
     let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
-    let told = |ticks: &[ObservedTick]| -> Vec<Invariant> { broken_of(judge(), ticks) };
+    let reported = |ticks: &[ObservedTick]| -> Vec<Invariant> { broken_of(judge(), ticks) };
     assert_eq!(
-        told(&[edge(20.1)]),
+        reported(&[edge(20.1)]),
         [Cone],
         "45° downhill, and friction for 39°"
     );
@@ -274,7 +277,7 @@ fn a_force_that_is_textured_otherwise_is_found() {
         ..touching([x, 10.5, 1.5], [x, 10.5, 2.0])
     };
     let (crest, slope) = ([0.0, 0.6], [-std::f64::consts::TAU / 48.0, 0.5]);
-    let told = |honest: Option<ObservedTick>, last: ObservedTick| -> Vec<Invariant> {
+    let reported = |honest: Option<ObservedTick>, last: ObservedTick| -> Vec<Invariant> {
         let mut judge = TickOracle::new(&flat).with_texture(grating);
         for seen in honest
             .iter()
@@ -284,15 +287,18 @@ fn a_force_that_is_textured_otherwise_is_found() {
             // The fade-in is not checked here.
             let _ = judge.all(seen);
         }
-        let told = judge.all(&last);
-        told.iter().map(|violation| violation.invariant).collect()
+        let reported = judge.all(&last);
+        reported
+            .iter()
+            .map(|violation| violation.invariant)
+            .collect()
     };
     let plain = [0.0, 0.5];
-    assert_eq!(told(None, on(10.25, plain)), [], "it comes in");
-    assert_eq!(told(None, on(10.25, crest)), [Invariant::Texture]);
+    assert_eq!(reported(None, on(10.25, plain)), [], "it comes in");
+    assert_eq!(reported(None, on(10.25, crest)), [Invariant::Texture]);
     for (x, honest) in [(10.25, crest), (10.0, slope)] {
         let rested = Some(on(x, honest));
-        assert_eq!(told(rested, on(x, honest)), []);
+        assert_eq!(reported(rested, on(x, honest)), []);
         for forged in [
             [0.0, 0.605],
             [0.01, 0.6],
@@ -301,15 +307,15 @@ fn a_force_that_is_textured_otherwise_is_found() {
             [0.0, -0.6],
         ] {
             assert_eq!(
-                told(rested, on(x, forged)),
+                reported(rested, on(x, forged)),
                 [Invariant::Texture],
                 "{forged:?}"
             );
         }
         // Too fast: no texture at all.
-        assert_eq!(told(rested, on(x + 0.25, plain)), [], "to the bit");
+        assert_eq!(reported(rested, on(x + 0.25, plain)), [], "to the bit");
         assert_eq!(
-            told(rested, on(x + 0.26, [0.0, 0.500_001])),
+            reported(rested, on(x + 0.26, [0.0, 0.500_001])),
             [Invariant::Texture]
         );
     }
@@ -427,7 +433,7 @@ fn a_contact_that_pulls_is_found() {
 /// the HIP first leads over no-data, while the proxy is before the corner.
 #[test]
 fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
-    let hole = Terrain::from_fn(Kind::Holes, SIZE, |x, y| match (x, y) {
+    let hole = Terrain::from_fn(Kind::NoData, SIZE, |x, y| match (x, y) {
         (19, 21) => f32::NAN,
         _ => 0.0_f32.max((20 - x) as f32),
     });

@@ -53,7 +53,7 @@ struct Touching<'t> {
     session: Session<'t>,
     steering: Steering<'t>,
     samples: Vec<TickRecord>,
-    said: Vec<String>,
+    stated: Vec<String>,
     /// True if the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
 }
@@ -95,8 +95,8 @@ fn pressed_at<T>(
     let foot = Rc::clone(&pedal);
     let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
         .meddled_with(Box::new(move |_, sense, _| sense.clutch = foot.get()));
-    let (arming, patience) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
-    let opened = Session::open(&terrain, scene, arming, Box::new(device), patience);
+    let (arming, timeout) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
+    let opened = Session::open(&terrain, scene, arming, Box::new(device), timeout);
     let bounds = Bounds {
         first: Laid { view, params },
         resolution_mm: RESOLUTION_MM,
@@ -107,14 +107,14 @@ fn pressed_at<T>(
         session: opened.expect("opened").0,
         steering: Steering::new(bounds, terrain.clone()),
         samples: vec![],
-        said: vec![],
+        stated: vec![],
         pedal,
     };
     // Armed, lowered, and at rest.
     touching.run_to(6_000);
     let played = play(&mut touching);
-    let tally = touching.session.tally();
-    assert_eq!(tally.lost + tally.dropped, 0);
+    let stats = touching.session.stats();
+    assert_eq!(stats.lost + stats.dropped, 0);
     touching
         .session
         .say_goodbye(&mut |_| {})
@@ -140,7 +140,7 @@ impl Touching<'_> {
         if let Some(put) = self.steering.take_put() {
             self.session.put_view(put.view, put.terrain).expect("said");
         }
-        self.said.extend(self.steering.lines());
+        self.stated.extend(self.steering.lines());
     }
 
     fn run_to(&mut self, tick: u32) {
@@ -164,7 +164,7 @@ impl Touching<'_> {
                 return self.run(700);
             }
         }
-        panic!("{steer:?} is never done: {:?}", self.said);
+        panic!("{steer:?} is never done: {:?}", self.stated);
     }
 
     fn change(&mut self, change: PlacementChange) -> TickRecord {
@@ -180,21 +180,21 @@ impl Touching<'_> {
     }
 }
 
-/// Checks that the arm stays armed, that no tick changes the force by more than `most_n`, and that
+/// Checks that the arm stays armed, that no tick changes the force by more than `max_n`, and that
 /// no force exceeds the one at the start.
-fn judge(samples: &[TickRecord], most_n: f32) {
+fn judge(samples: &[TickRecord], max_n: f32) {
     // The hand is pushed back, and its damping adds to the press during the motion.
-    judge_press(samples, most_n, 1.03);
+    judge_press(samples, max_n, 1.03);
 }
 
 /// Same as `judge`, with a limit of `most_times` the first force while the hand is pushed back.
-fn judge_press(samples: &[TickRecord], most_n: f32, most_times: f32) {
+fn judge_press(samples: &[TickRecord], max_n: f32, most_times: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         assert_eq!(after.mode, Mode::Armed, "tick {}", after.tick);
         assert_eq!(after.fault, None);
         let change = (after.force_n - before.force_n).length();
-        assert!(change <= most_n, "tick {}: {change} N at once", after.tick);
+        assert!(change <= max_n, "tick {}: {change} N at once", after.tick);
         let share = MAX_SLEW_N_PER_S / 1_000.0;
         assert!(change <= share, "tick {}: {change} N", after.tick);
         let (force, first) = (after.force_n.length(), samples[0].force_n.length());
@@ -253,15 +253,15 @@ fn force_makes_no_step_while_zooming_through_eight_levels() {
         for level in (0..8).rev() {
             let sample = touching.change(PlacementChange::Zoom(2.0));
             assert_pressed(&sample, &before, &format!("zoomed to level {level}"));
-            assert_eq!(touching.level(), level, "{:?}", touching.said);
+            assert_eq!(touching.level(), level, "{:?}", touching.stated);
         }
         for level in 1..=8 {
             let sample = touching.change(PlacementChange::Zoom(0.5));
             assert_pressed(&sample, &before, &format!("back to level {level}"));
-            assert_eq!(touching.level(), level, "{:?}", touching.said);
+            assert_eq!(touching.level(), level, "{:?}", touching.stated);
         }
         assert_eq!(touching.samples.last().map(|last| last.view), Some(16));
-        assert_eq!(touching.said, [""; 0]);
+        assert_eq!(touching.stated, [""; 0]);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }
@@ -308,7 +308,7 @@ fn force_makes_no_step_while_panning_and_scaling() {
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.level(), 8);
-        assert_eq!(touching.said, [""; 0]);
+        assert_eq!(touching.stated, [""; 0]);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }
@@ -340,7 +340,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             let sample = touching.change(PlacementChange::Surface(change));
             assert_eq!(sample.state, ContactState::Touching, "{change:?}");
         }
-        assert_eq!(touching.said, [""; 0]);
+        assert_eq!(touching.stated, [""; 0]);
         let params = touching.steering.now().params;
         let wanted = SurfaceParams {
             friction: Friction {
@@ -363,9 +363,9 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
         };
         touching.change(PlacementChange::Surface(friction));
         assert!(
-            touching.said[0].contains("a friction of 11"),
+            touching.stated[0].contains("a friction of 11"),
             "{:?}",
-            touching.said
+            touching.stated
         );
         assert_eq!(touching.steering.now().params, wanted, "it stays as it was");
         let reset = touching.change(PlacementChange::Reset);
@@ -391,11 +391,11 @@ fn a_tip_set_while_it_presses_makes_no_step() {
             // A ball rests beside a point's position, where the slope differs.
             let share = sample.force_n.length() / first.force_n.length();
             assert!((0.95..1.05).contains(&share), "{wanted_mm} mm: {share}");
-            assert_eq!(tip(touching), (wanted_mm, is_ball), "{:?}", touching.said);
+            assert_eq!(tip(touching), (wanted_mm, is_ball), "{:?}", touching.stated);
         }
-        assert_eq!(touching.said, [""; 0]);
+        assert_eq!(touching.stated, [""; 0]);
         touching.change(PlacementChange::Tip(-1.0));
-        assert!(touching.said[0].contains("a tip of -1 mm: from 0 to 100 mm"));
+        assert!(touching.stated[0].contains("a tip of -1 mm: from 0 to 100 mm"));
         assert_eq!(tip(touching), (1.0, true), "it stays as it was");
         let reset = touching.change(PlacementChange::Reset);
         assert_rendered(&reset, "by a point again");
@@ -465,7 +465,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         let closed = touching.run(900);
         assert_rendered(&closed, "let go meanwhile");
         assert_eq!(closed.view, 4);
-        assert_eq!(touching.said, [""; 0]);
+        assert_eq!(touching.stated, [""; 0]);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }
@@ -481,13 +481,17 @@ fn what_cannot_be_had_changes_nothing_and_is_told() {
         };
         let before = touching.last();
         assert_pressed(&touching.change(far), &before, "after a place outside");
-        assert!(touching.said[0].contains("outside"), "{:?}", touching.said);
+        assert!(
+            touching.stated[0].contains("outside"),
+            "{:?}",
+            touching.stated
+        );
         assert_pressed(
             &touching.change(PlacementChange::Stiffness(50.0)),
             &before,
             "after too much",
         );
-        assert_eq!(touching.said.len(), 2);
+        assert_eq!(touching.stated.len(), 2);
         assert_eq!(touching.samples.last().map(|last| last.view), Some(0));
         judge(&touching.samples[began..], GENTLE_N);
     });
@@ -592,7 +596,7 @@ fn a_far_pan(axis: usize) {
         let cells = touching.steering.terrain().clone();
         touching.change(PlacementChange::Stiffness(0.9));
         assert!(touching.steering.terrain().has_tiles_of(&cells));
-        assert_eq!(touching.said, [""; 0]);
+        assert_eq!(touching.stated, [""; 0]);
         judge_press(&touching.samples[began..], GENTLE_N, most + 0.01);
     });
 }

@@ -96,10 +96,10 @@ fn place_scale_and_level_are_taken_and_said() {
         ),
     ] {
         let run = hapterra("run", &file, more);
-        let told = output_text(&run);
-        assert!(run.status.success(), "{more:?}: {told}");
+        let reported = output_text(&run);
+        assert!(run.status.success(), "{more:?}: {reported}");
         for part in parts {
-            assert!(told.contains(part), "{more:?}: {part} in {told}");
+            assert!(reported.contains(part), "{more:?}: {part} in {reported}");
         }
     }
     let flat = output_text(&hapterra(
@@ -163,10 +163,13 @@ fn what_cannot_be_placed_is_an_error_that_says_the_bounds_and_what_to_do() {
     ] {
         for command in ["run", "demo"] {
             let run = hapterra(command, &file, more);
-            let told = output_text(&run);
-            assert_eq!(run.status.code(), Some(1), "{command} {more:?}: {told}");
+            let reported = output_text(&run);
+            assert_eq!(run.status.code(), Some(1), "{command} {more:?}: {reported}");
             for part in parts {
-                assert!(told.contains(part), "{command} {more:?}: {part} in {told}");
+                assert!(
+                    reported.contains(part),
+                    "{command} {more:?}: {part} in {reported}"
+                );
             }
         }
     }

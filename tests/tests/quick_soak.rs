@@ -6,9 +6,9 @@ use hapterra_tests::soak::{Broken, LinkStats, Until, soak};
 const SEED: u64 = 2027;
 
 fn thousand(surface: Surface) -> LinkStats {
-    let tally = soak(SEED, surface, 0, Until::Scenes(1000), 2, |_| {});
-    println!("{tally}");
-    let total = tally.total();
+    let stats = soak(SEED, surface, 0, Until::Scenes(1000), 2, |_| {});
+    println!("{stats}");
+    let total = stats.total();
     let [waiting, free, touching, _] = total.states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
     // Repeated, shifted, in another window, mirrored or turned.
@@ -28,22 +28,22 @@ fn thousand(surface: Surface) -> LinkStats {
     );
     assert!(100 * judged.open < judged.in_whole, "{judged:?}");
     assert!(twins.iter().all(|n| *n >= 20), "{twins:?}");
-    tally
+    stats
 }
 
 fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
     let rough = surface.option();
-    let told: Vec<String> = broken
+    let reported: Vec<String> = broken
         .map(|b| {
             let (kind, what, number) = (b.kind, &b.what, b.number);
             format!("{kind:?}: {what}\n    again: cargo xtask soak --seed {SEED} --scene {number}{rough}")
         })
         .collect();
     assert!(
-        told.is_empty(),
+        reported.is_empty(),
         "{} scenes\n{}",
-        told.len(),
-        told.join("\n")
+        reported.len(),
+        reported.join("\n")
     );
 }
 
@@ -54,11 +54,11 @@ fn everything_holds_in_a_thousand_random_scenes() {
 
 #[test]
 fn everything_holds_with_friction_too() {
-    let tally = thousand(Surface::Rough);
-    let judged = tally.total().on_materials;
+    let stats = thousand(Surface::Rough);
+    let judged = stats.total().on_materials;
     assert!(
         judged.rubbed > 20_000 && judged.sliding > 1_000,
         "{judged:?}"
     );
-    none(Surface::Rough, tally.broken.iter());
+    none(Surface::Rough, stats.broken.iter());
 }

@@ -14,7 +14,7 @@ use heightfield::{CellUnit, OpenOptions, PngChannel, Raster, RasterError, Wait, 
 const COLUMNS: usize = 512;
 const ROWS: usize = 400;
 /// Marks no-data in `tujunga_i16_holes.raw`.
-const HOLE: i16 = -32768;
+const NO_DATA: i16 = -32768;
 
 fn open(path: &Path) -> Raster {
     Raster::open(path, &OpenOptions::default()).unwrap_or_else(|error| panic!("{error}"))
@@ -27,7 +27,7 @@ fn truth_i16(folder: &Path, name: &str) -> Vec<f64> {
     let stored = samples.iter().map(|&bytes| i16::from_le_bytes(bytes));
     stored
         .map(|value| {
-            if value == HOLE {
+            if value == NO_DATA {
                 f64::NAN
             } else {
                 value.into()
@@ -170,7 +170,7 @@ fn an_srtm_tile_knows_its_place_and_its_voids() {
     let stored = samples.iter().map(|&bytes| i16::from_be_bytes(bytes));
     let truth: Vec<f64> = stored
         .map(|value| {
-            if value == HOLE {
+            if value == NO_DATA {
                 f64::NAN
             } else {
                 value.into()

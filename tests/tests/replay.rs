@@ -242,19 +242,19 @@ fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
     let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
     render(&mut replayer, [30.0, 50.5, 7.0]);
     let mut last = render(&mut replayer, [30.0, 50.5, 4.0]);
-    let mut largest_step = 0.0f32;
+    let mut max_step = 0.0f32;
     let mut x = 30.0;
     while x < 45.0 {
         x += 0.005;
         let sample = render(&mut replayer, [x, 50.5, 4.0]);
-        largest_step = largest_step.max((sample.force_n - last.force_n).length());
+        max_step = max_step.max((sample.force_n - last.force_n).length());
         last = sample;
     }
     assert_eq!(
         (last.state, last.force_n.length()),
         (ContactState::Unseeded, 0.0)
     );
-    assert!(largest_step < 0.03, "a kick of {largest_step} N in a tick");
+    assert!(max_step < 0.03, "a kick of {max_step} N in a tick");
     while x > 30.0 {
         x -= 0.05;
         let sample = render(&mut replayer, [x, 50.5, 4.0]);

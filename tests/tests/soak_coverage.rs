@@ -179,7 +179,7 @@ fn all_that_is_promised_of_materials_is_drawn() {
         is("one material alone", table.len() == 1);
         is(
             "as many materials as there may be",
-            table.len() == MaterialTable::MOST,
+            table.len() == MaterialTable::MAX,
         );
         is("some like ice, some with friction", {
             any(|m| m.friction.is_none()) && any(|m| !m.friction.is_none())

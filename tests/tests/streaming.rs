@@ -41,15 +41,15 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
         assert!(sample.force_n.is_finite());
     }
     assert_eq!(touched, steps as u32 - 1, "lost contact on the way");
-    let tally = replayer.tally();
+    let stats = replayer.stats();
     let all = u64::from(SIDE / 32).pow(2);
     eprintln!(
         "{} tiles sent of {all}, {} again; window {window}",
-        tally.tiles, tally.again
+        stats.tiles, stats.again
     );
     // It passed over far more tiles than it can store, and requested far fewer than all.
-    assert!(tally.tiles > 2 * window && tally.tiles < all / 4);
-    assert!(tally.again < tally.tiles / 4);
+    assert!(stats.tiles > 2 * window && stats.tiles < all / 4);
+    assert!(stats.again < stats.tiles / 4);
     if let (Some(before), Some(after)) = (before, peak_mib()) {
         let field = f64::from(SIDE) * f64::from(SIDE) * 4.0 / 1024.0 / 1024.0;
         eprintln!("{before:.0} MiB with the raster of {field} MiB, {after:.0} MiB at most");
@@ -80,7 +80,7 @@ fn coarser_levels_feel_the_same_terrain_with_fewer_tiles() {
                 assert!((force - expected).abs() < 1e-4, "level {level}: {force}");
             }
         }
-        replayer.tally().tiles
+        replayer.stats().tiles
     });
     assert!(tiles[1] * 4 < tiles[0], "{tiles:?}");
 }

@@ -10,7 +10,7 @@ use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::{Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::scene::TickRecord;
 use hapterra_tests::invariants::observed_tick::ObservedTick;
-use hapterra_tests::invariants::texture::TextureJudge;
+use hapterra_tests::invariants::texture::TextureOracle;
 use hapterra_tests::whole_field::position;
 use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::{OpenOptions, Raster};
@@ -106,7 +106,7 @@ fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
         for texture in [GRAIN, GRATING] {
             let textured = circle(&terrain, SurfaceParams { texture, ..params });
             assert_eq!(plain.len(), textured.len());
-            let mut judge = TextureJudge::new(texture);
+            let mut judge = TextureOracle::new(texture);
             let (mut touched, mut most) = (0, 0.0_f32);
             for (tick, (plain, textured)) in plain.iter().zip(&textured).enumerate() {
                 assert_eq!(plain.proxy, textured.proxy);

@@ -44,8 +44,8 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
         // Until the board disconnects.
         scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
         let link = Box::new(lines.link);
-        let (scene, patience) = (placed.scene(), Timeouts::EMULATED);
-        let opened = Session::open(&terrain, scene, Some(Arming::VIRTUAL), link, patience);
+        let (scene, timeout) = (placed.scene(), Timeouts::EMULATED);
+        let opened = Session::open(&terrain, scene, Some(Arming::VIRTUAL), link, timeout);
         let (mut session, _) = opened.expect("opened");
         let (mut samples, mut status): (Vec<TickRecord>, Option<Status>) = (vec![], None);
         let mut asked = false;
@@ -53,7 +53,7 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
             session
                 .poll(Duration::from_millis(100), &mut |event| match event {
                     Event::Sample(sample) => samples.push(*sample),
-                    Event::Status(told) => status = Some(told.clone()),
+                    Event::Status(reported) => status = Some(reported.clone()),
                     _ => {}
                 })
                 .expect("goes on");

@@ -275,12 +275,12 @@ fn tiles_go_in_and_samples_come_out() {
         let ticks = ticks(session, 400);
         let gaps = ticks.windows(2).filter(|w| w[1] != w[0] + 1).count();
         assert!(ticks.len() > 100 && gaps == 0, "{} {gaps}", ticks.len());
-        let tally = session.tally();
-        assert_eq!((tally.bad_frames, tally.lost, tally.again), (0, 0, 0));
+        let stats = session.stats();
+        assert_eq!((stats.bad_frames, stats.lost, stats.again), (0, 0, 0));
         // Each needs many packets, even when packed.
         assert!(
-            tally.tiles >= 4 && tally.tile_bytes > 4 * 16 * PACKET as u64,
-            "{tally:?}"
+            stats.tiles >= 4 && stats.tile_bytes > 4 * 16 * PACKET as u64,
+            "{stats:?}"
         );
     });
 }
@@ -297,7 +297,7 @@ fn half_a_transfer(board: &Rc<RefCell<Board>>) {
 fn a_reset_of_the_bus_in_a_transfer_costs_a_handshake_and_no_terrain() {
     visit(|session, board| {
         let before = *ticks(session, 200).last().expect("samples");
-        let tiles = session.tally().tiles;
+        let tiles = session.stats().tiles;
         half_a_transfer(board);
         let found = enumerate(&mut *board.borrow_mut()).expect("again");
         let device = resume(session, link(board, &found));
@@ -307,7 +307,7 @@ fn a_reset_of_the_bus_in_a_transfer_costs_a_handshake_and_no_terrain() {
             after.first().is_some_and(|tick| *tick > before),
             "no new start"
         );
-        assert_eq!(session.tally().tiles, tiles, "nothing is sent again");
+        assert_eq!(session.stats().tiles, tiles, "nothing is sent again");
     });
 }
 

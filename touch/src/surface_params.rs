@@ -57,7 +57,7 @@ pub enum SurfaceError {
         dynamic_mu: f32,
     },
     /// There are too many materials.
-    #[error("{0} materials besides the surface itself: give at most {most}", most = MaterialTable::MOST - 1)]
+    #[error("{0} materials besides the surface itself: give at most {most}", most = MaterialTable::MAX - 1)]
     Materials(usize),
     /// There are materials, which scale the stiffness, but the stiffness is zero.
     #[error("a surface with materials has a stiffness of 0 N/mm: give more")]
@@ -92,7 +92,7 @@ impl Surface {
     /// # Errors
     /// [`SurfaceError`].
     pub fn with_materials(self, materials: &[Material]) -> Result<Self, SurfaceError> {
-        let mut all = [Material::of(&self.params); MaterialTable::MOST];
+        let mut all = [Material::of(&self.params); MaterialTable::MAX];
         let Some(others) = all.get_mut(1..=materials.len()) else {
             return Err(SurfaceError::Materials(materials.len()));
         };
@@ -158,12 +158,8 @@ fn check(params: &SurfaceParams) -> Result<(), SurfaceError> {
     } = params;
     within("stiffness, N/mm,", *stiffness_n_per_mm, 0.0..=f32::MAX)?;
     within("max_force, N,", *max_force_n, 0.0..=f32::MAX)?;
-    within(
-        "dynamic friction",
-        friction.dynamic_mu,
-        0.0..=Friction::MOST,
-    )?;
-    within("static friction", friction.static_mu, 0.0..=Friction::MOST)?;
+    within("dynamic friction", friction.dynamic_mu, 0.0..=Friction::MAX)?;
+    within("static friction", friction.static_mu, 0.0..=Friction::MAX)?;
     let most_s = Friction::MAX_VISCOUS_S;
     within("viscous friction, s,", friction.viscous_s, 0.0..=most_s)?;
     if friction.static_mu < friction.dynamic_mu {
@@ -184,12 +180,8 @@ fn check(params: &SurfaceParams) -> Result<(), SurfaceError> {
         shortest..=longest,
     )?;
     let steepest_mm = texture.wavelength_mm * Texture::STEEPEST;
-    let most_mm = steepest_mm.min(Texture::MAX_AMPLITUDE_MM);
-    within(
-        "texture amplitude, mm,",
-        texture.amplitude_mm,
-        0.0..=most_mm,
-    )?;
+    let max_mm = steepest_mm.min(Texture::MAX_AMPLITUDE_MM);
+    within("texture amplitude, mm,", texture.amplitude_mm, 0.0..=max_mm)?;
     within(
         "texture direction, degrees,",
         texture.direction_deg,

@@ -45,7 +45,7 @@ impl RrdFile {
 /// End of a stream.
 pub struct Ended {
     /// True if the writer ended the stream; otherwise it was killed.
-    pub is_told: bool,
+    pub is_reported: bool,
     /// Error of the file for rerun's own viewer. The page continues without it.
     pub rrd: Result<()>,
 }
@@ -63,11 +63,11 @@ pub fn draw(
 ) -> Result<Ended> {
     let mut from = BufReader::with_capacity(1 << 16, from);
     let mut drawing: Option<Drawing> = None;
-    let (mut told, mut is_told, mut file) = (false, false, Ok(rrd));
+    let (mut reported, mut is_reported, mut file) = (false, false, Ok(rrd));
     greeted(&mut from)?;
     while let Some(message) = read(&mut from)? {
         if message == Message::End {
-            is_told = true;
+            is_reported = true;
             break;
         }
         let has_samples = matches!(message, Message::Samples(_));
@@ -78,8 +78,8 @@ pub fn draw(
         file = file.and_then(|rrd| written(rrd, &entries));
         history.put(entries)?;
         let is_live = drawing.as_ref().is_some_and(Drawing::is_live);
-        if has_samples && is_live && !told {
-            told = true;
+        if has_samples && is_live && !reported {
+            reported = true;
             on_scene();
         }
     }
@@ -89,14 +89,14 @@ pub fn draw(
         history.put(rest)?;
     }
     let rrd = file.and_then(|rrd| rrd.map_or(Ok(()), RrdFile::finish));
-    history.end(match is_told {
-        true => End::Told,
+    history.end(match is_reported {
+        true => End::Reported,
         false => End::Lost,
     })?;
-    if !told && drawing.is_some() {
+    if !reported && drawing.is_some() {
         on_scene();
     }
-    Ok(Ended { is_told, rrd })
+    Ok(Ended { is_reported, rrd })
 }
 
 fn written(mut rrd: Option<RrdFile>, entries: &[Entry]) -> Result<Option<RrdFile>> {

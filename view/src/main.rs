@@ -22,10 +22,10 @@ const LINGER: Duration = Duration::from_secs(15);
 const LOOK: Duration = Duration::from_millis(100);
 
 fn main() -> ExitCode {
-    let said = std::env::var_os(OPTIONS).unwrap_or_default();
-    let said = said.to_string_lossy().into_owned();
+    let stated = std::env::var_os(OPTIONS).unwrap_or_default();
+    let stated = stated.to_string_lossy().into_owned();
     let words = std::env::args_os().skip(1);
-    let words = words.chain(said.split_whitespace().map(OsString::from));
+    let words = words.chain(stated.split_whitespace().map(OsString::from));
     let shown = Options::read(words).and_then(|options| match options {
         Some(options) => show(&options),
         None => {
@@ -54,9 +54,9 @@ fn show(options: &Options) -> Result<()> {
         );
     }
     let url = server.url();
-    let mut is_told = false;
+    let mut is_reported = false;
     let mut on_scene = || {
-        is_told = true;
+        is_reported = true;
         tell(&format!("view           {url}"));
         if options.browser {
             open(&url);
@@ -68,8 +68,8 @@ fn show(options: &Options) -> Result<()> {
             "hapterra-view: warning: {why:#}: it is not complete"
         ));
     }
-    if is_told {
-        linger(&history, options.linger, &watched(ended.is_told));
+    if is_reported {
+        linger(&history, options.linger, &watched(ended.is_reported));
     }
     let kept = history.kept();
     if kept.cut > 0 {
@@ -85,11 +85,11 @@ fn show(options: &Options) -> Result<()> {
 /// runs.
 fn watched(has_ended: bool) -> Arc<AtomicBool> {
     let is_gone = Arc::new(AtomicBool::new(!has_ended));
-    let told = Arc::clone(&is_gone);
+    let reported = Arc::clone(&is_gone);
     // Without a thread, `hapterra` counts as running.
     let _ = std::thread::Builder::new().spawn(move || {
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-        told.store(true, Ordering::Release);
+        reported.store(true, Ordering::Release);
     });
     is_gone
 }
@@ -104,9 +104,9 @@ fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
         }
         // Pages that received everything are not counted any more, so only the time since they
         // connected remains as a criterion.
-        let patience = linger.unwrap_or(LINGER);
+        let timeout = linger.unwrap_or(LINGER);
         let may_go = linger.is_some() || kept.came > 0 || is_gone.load(Ordering::Acquire);
-        if may_go && kept.pages == 0 && alone_since.elapsed() >= patience {
+        if may_go && kept.pages == 0 && alone_since.elapsed() >= timeout {
             return;
         }
         std::thread::sleep(LOOK);

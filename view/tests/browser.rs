@@ -247,11 +247,11 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
     drop(browser);
     demo.interrupt();
     assert!(demo.end());
-    let told = demo.words();
+    let reported = demo.words();
     for figure in [" run, 0 late", " 0 lost on the link, 0 dropped"] {
-        assert!(told.contains(figure), "{told}");
+        assert!(reported.contains(figure), "{reported}");
     }
-    assert!(!told.contains("not shown"), "{told}");
+    assert!(!reported.contains("not shown"), "{reported}");
     check(&Csv::read(&folder.join("fractal.csv")), &entities(&live));
     remove(&folder);
 }
@@ -362,8 +362,8 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
     drop(browser);
     demo.interrupt();
     assert!(demo.end());
-    let told = demo.words();
-    assert!(!told.contains("not shown"), "{told}");
+    let reported = demo.words();
+    assert!(!reported.contains("not shown"), "{reported}");
     remove(&folder);
 }
 
@@ -402,7 +402,7 @@ fn killed(who: Killed, says: &str) {
     let until = Instant::now() + HANG;
     while !{ browser.value(&page, "document.getElementById('said').textContent") }
         .as_str()
-        .is_some_and(|said| said.contains(says))
+        .is_some_and(|stated| stated.contains(says))
     {
         assert!(Instant::now() < until, "the page does not say so");
         std::thread::sleep(Duration::from_millis(200));
@@ -413,11 +413,11 @@ fn killed(who: Killed, says: &str) {
         assert!(demo.goes_on());
         demo.interrupt();
         assert!(demo.end());
-        let told = demo.words();
-        assert!(told.contains(" 0 lost on the link, 0 dropped"), "{told}");
+        let reported = demo.words();
+        assert!(reported.contains(" 0 lost on the link, 0 dropped"), "{reported}");
         assert!(
-            told.contains("were not shown: the viewer was slow, or gone"),
-            "{told}"
+            reported.contains("were not shown: the viewer was slow, or gone"),
+            "{reported}"
         );
     }
     // No page is open any more.

@@ -136,16 +136,16 @@ fn a_stream_of_another_version_or_of_none_is_named() {
 
 #[test]
 fn a_page_hears_whether_the_session_ended_or_hapterra_is_gone() {
-    for (is_told, last) in [(true, 0), (false, u32::MAX - 1)] {
+    for (is_reported, last) in [(true, 0), (false, u32::MAX - 1)] {
         let (mut viewer, port) = live("");
         let mut page = reading(port, 1000);
-        if is_told {
+        if is_reported {
             assert!(viewer.tell(&Message::End));
         }
         viewer.hang_up();
         let mut rest = Vec::new();
         page.read_to_end(&mut rest).expect("the stream ends");
-        assert!(rest.ends_with(&u32::to_le_bytes(last)), "{is_told}");
+        assert!(rest.ends_with(&u32::to_le_bytes(last)), "{is_reported}");
     }
 }
 

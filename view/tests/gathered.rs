@@ -18,21 +18,21 @@ const BATCH: u64 = 16;
 
 /// Messages to a page: events, and their rows by entity and number.
 #[derive(Default)]
-struct Told {
+struct Reported {
     entries: usize,
-    most_ns: u64,
+    max_ns: u64,
     rows: BTreeMap<(String, String), (i64, String)>,
     /// Static entries, by entity and part.
     standing: BTreeMap<(String, BTreeSet<String>), Vec<String>>,
 }
 
-fn told(feed: Feed) -> Told {
-    let mut told = Told::default();
-    feed.flatten().for_each(|chunk| told.add(&chunk));
-    told
+fn reported(feed: Feed) -> Reported {
+    let mut reported = Reported::default();
+    feed.flatten().for_each(|chunk| reported.add(&chunk));
+    reported
 }
 
-impl Told {
+impl Reported {
     fn add(&mut self, chunk: &Chunk) {
         let entity = chunk.entity_path().to_string();
         let all = chunk.components().list_arrays();
@@ -45,7 +45,7 @@ impl Told {
         }
         let (_, times) = chunk.timelines().iter().next().expect("a timeline");
         self.entries += 1;
-        self.most_ns = self.most_ns.max(times.time_range().abs_length());
+        self.max_ns = self.max_ns.max(times.time_range().abs_length());
         let columns: Vec<_> = all.collect();
         for (i, (row, time)) in chunk.row_ids().zip(times.times_raw()).enumerate() {
             let values = columns
@@ -78,7 +78,7 @@ fn the_same_rows_come_in_far_fewer_entries() {
     let port = viewer.port();
     let reading = |path: &'static str| {
         let feed = Feed::open(port, path);
-        std::thread::spawn(move || told(feed))
+        std::thread::spawn(move || reported(feed))
     };
     let pages = [reading("/feed"), reading("/feed?gathered")];
     go_on(&mut viewer, 100, TICKS / 2);
@@ -87,7 +87,7 @@ fn the_same_rows_come_in_far_fewer_entries() {
     assert!(viewer.tell(&Message::End));
     let [fine, gathered] = pages.map(|page| page.join().expect("the stream is read"));
     let amid = amid.join().expect("the stream is read");
-    let late = told(Feed::open(port, "/feed"));
+    let late = reported(Feed::open(port, "/feed"));
     assert!(viewer.end());
 
     assert!(fine.rows.len() > 1000, "{}", fine.rows.len());
@@ -99,9 +99,9 @@ fn the_same_rows_come_in_far_fewer_entries() {
         let (entries, of) = (other.entries, of.entries);
         assert!(4 * entries < of, "{entries} of {of}");
         assert!(
-            (other.most_ns as f64) < most_s * 1e9,
+            (other.max_ns as f64) < most_s * 1e9,
             "{} ns",
-            other.most_ns
+            other.max_ns
         );
     }
     assert!(20 * gathered.entries < fine.entries, "{}", gathered.entries);

@@ -34,16 +34,16 @@ fn the_time_until_a_browser_shows_the_terrain() {
     demo.tells("device ");
     let session = Instant::now();
     let address = demo.address();
-    let said = session.elapsed();
+    let stated = session.elapsed();
     let page = browser.open(&address);
-    let (mut started, mut told) = (None, None);
+    let (mut started, mut reported) = (None, None);
     loop {
         let mut is_so = |expression: &str| { browser.value(&page, expression) } == true;
         if started.is_none() && is_so("window.hapterra?.isStarted") {
             started = Some(session.elapsed());
         }
-        if told.is_none() && is_so("window.hapterra?.pieces > 0") {
-            told = Some(session.elapsed());
+        if reported.is_none() && is_so("window.hapterra?.pieces > 0") {
+            reported = Some(session.elapsed());
         }
         let picture = browser.picture(&page);
         let colours = browser.colours(&page, &picture, TERRAIN, &[]);
@@ -55,7 +55,7 @@ fn the_time_until_a_browser_shows_the_terrain() {
     }
     let shown = session.elapsed();
     println!(
-        "from the session's begin: address {said:?}, viewer started {started:?}, first piece {told:?}, terrain seen {shown:?}"
+        "from the session's begin: address {stated:?}, viewer started {started:?}, first piece {reported:?}, terrain seen {shown:?}"
     );
     drop(browser);
     demo.interrupt();

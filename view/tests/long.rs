@@ -26,7 +26,7 @@ const PAGE_BYTES: u64 = 5 << 28;
 #[derive(Clone, Copy, Debug, Default)]
 struct OfPage {
     bytes: u64,
-    told: u64,
+    reported: u64,
     /// Time since it was loaded or reloaded.
     age_s: f64,
     /// The device's second that it shows.
@@ -37,7 +37,7 @@ fn of_page(browser: &mut Browser, page: &Page) -> OfPage {
     let mut number = |expression: &str| browser.number(page, expression).unwrap_or(0.0);
     OfPage {
         bytes: number("window.hapterra?.memory") as u64,
-        told: number("window.hapterra?.bytes") as u64,
+        reported: number("window.hapterra?.bytes") as u64,
         age_s: number("performance.now() / 1000"),
         shown_s: number("window.hapterra?.shown?.()"),
     }
@@ -57,7 +57,7 @@ fn touching(into: &Path) -> Option<Command> {
 
 /// Returns the lines of a session's summary about late ticks, lost samples, and tiles that were
 /// requested but not delivered.
-fn harm(told: &str) -> Vec<&str> {
+fn harm(reported: &str) -> Vec<&str> {
     let good = [
         ("ticks ", " run, 0 late"),
         ("telemetry ", " 0 lost on the link, 0 dropped"),
@@ -67,11 +67,11 @@ fn harm(told: &str) -> Vec<&str> {
     };
     let missing = good
         .iter()
-        .filter(|good| !told.lines().any(|line| is_good(&line, good)))
+        .filter(|good| !reported.lines().any(|line| is_good(&line, good)))
         .map(|(_, figure)| *figure);
     // The link reports frames that were not understood, requests without an answer and sessions
     // with an unknown end.
-    let of_link = told.lines().filter(|line| line.starts_with("link "));
+    let of_link = reported.lines().filter(|line| line.starts_with("link "));
     missing.chain(of_link).collect()
 }
 
@@ -88,8 +88,8 @@ fn each_harm_is_found_alone() {
         good.replace("0 dropped", "3 dropped"),
         unanswered,
     ];
-    for told in &bad {
-        assert_eq!(harm(told).len(), 1, "{told}");
+    for reported in &bad {
+        assert_eq!(harm(reported).len(), 1, "{reported}");
     }
 }
 
@@ -127,10 +127,10 @@ fn ten_minutes_of_history_stay_bounded() {
             *most = now.max(*most);
         }
         let [host, viewer_now, page_now] = figures.map(|bytes| bytes >> 20);
-        let (age, told) = (of_page.age_s, of_page.told >> 20);
+        let (age, reported) = (of_page.age_s, of_page.reported >> 20);
         let (shown, is) = (of_page.shown_s, since.elapsed().as_secs_f64());
         println!(
-            "{minute} | {host} | {viewer_now} | {page_now}, {age:.0} | {told} | {shown:.1}, {is:.1}"
+            "{minute} | {host} | {viewer_now} | {page_now}, {age:.0} | {reported} | {shown:.1}, {is:.1}"
         );
         // Once each: reloaded, opened twice, closed; at the end the viewer is killed.
         match minutes - minute {
@@ -145,10 +145,10 @@ fn ten_minutes_of_history_stay_bounded() {
     drop(browser);
     demo.interrupt();
     let ended_well = demo.end();
-    let told = demo.words();
-    println!("{told}\nmost, bytes: {most:?}");
-    assert!(ended_well, "{told}");
-    assert_eq!(harm(&told), Vec::<&str>::new(), "{told}");
+    let reported = demo.words();
+    println!("{reported}\nmost, bytes: {most:?}");
+    assert!(ended_well, "{reported}");
+    assert_eq!(harm(&reported), Vec::<&str>::new(), "{reported}");
     let bounds = [HOST_BYTES, VIEWER_BYTES, PAGE_BYTES];
     let are_kept = most.iter().zip(bounds).all(|(most, bound)| *most < bound);
     assert!(are_kept, "{most:?}");

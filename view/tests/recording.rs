@@ -32,8 +32,8 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     let folder = folder("demo");
     let live = folder.join("live.rrd");
     demo.args(["demo", "--device", "native", "--duration", "4s", "--view"]);
-    let said = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
-    assert!(!said.contains("not shown"), "{said}");
+    let stated = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
+    assert!(!stated.contains("not shown"), "{stated}");
     let recording = folder.join("fractal.csv");
     let csv = Csv::read(&recording);
     let shown = entities(&live);

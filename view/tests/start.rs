@@ -14,43 +14,43 @@ use common::{Running, Viewer, folder, hapterra};
 
 /// Entities in the order in which a page receives them, true for static ones, and the time at which
 /// the coarsest level was complete.
-struct Told {
+struct Reported {
     entities: Vec<(String, bool)>,
     whole: Option<(usize, Duration)>,
 }
 
 /// Reads a page's stream up to the first event.
-fn told(port: u16) -> Told {
+fn reported(port: u16) -> Reported {
     let began = Instant::now();
-    let mut told = Told {
+    let mut reported = Reported {
         entities: vec![],
         whole: None,
     };
     for chunk in Feed::open(port, "/feed").flatten() {
         let entity = chunk.entity_path().to_string();
         if entity.starts_with("/terrain/layer0/") {
-            told.whole = Some((told.entities.len(), began.elapsed()));
+            reported.whole = Some((reported.entities.len(), began.elapsed()));
         }
-        told.entities.push((entity, chunk.is_static()));
+        reported.entities.push((entity, chunk.is_static()));
         if !chunk.is_static() {
             break;
         }
     }
-    told
+    reported
 }
 
 /// Checks that no finer layer and no event precedes the complete coarse level.
-fn check(told: &Told, finer: &[&str]) -> Duration {
-    let (last, after) = told.whole.expect("the coarsest level");
+fn check(reported: &Reported, finer: &[&str]) -> Duration {
+    let (last, after) = reported.whole.expect("the coarsest level");
     let first = |begin: &str| {
-        let mut entities = told.entities.iter();
+        let mut entities = reported.entities.iter();
         entities.position(|(entity, _)| entity.starts_with(begin))
     };
     for finer in finer {
-        let first = first(finer).unwrap_or_else(|| panic!("{finer} of {:?}", told.entities));
-        assert!(last < first, "{finer}: {:?}", told.entities);
+        let first = first(finer).unwrap_or_else(|| panic!("{finer} of {:?}", reported.entities));
+        assert!(last < first, "{finer}: {:?}", reported.entities);
     }
-    let happened = told.entities.iter().position(|(_, stands)| !stands);
+    let happened = reported.entities.iter().position(|(_, stands)| !stands);
     assert!(last < happened.expect("something happened"));
     after
 }
@@ -74,9 +74,9 @@ fn a_page_is_told_the_coarse_whole_before_anything_finer() {
     for message in &messages {
         assert!(viewer.tell(message));
     }
-    let told = told(viewer.port());
-    check(&told, &["/terrain/layer1/", "/terrain/tiles/"]);
-    let blocks: BTreeSet<_> = { told.entities.iter() }
+    let reported = reported(viewer.port());
+    check(&reported, &["/terrain/layer1/", "/terrain/tiles/"]);
+    let blocks: BTreeSet<_> = { reported.entities.iter() }
         .filter(|(entity, _)| entity.starts_with("/terrain/layer0/"))
         .collect();
     // 160 cells in blocks of 32.
@@ -101,10 +101,10 @@ fn page_of_a_demo_is_told_the_coarse_whole_first() {
     demo.tells("device ");
     let (read, session) = (began.elapsed(), Instant::now());
     let port = demo.port();
-    let said = session.elapsed();
-    let after = check(&told(port), &[]);
+    let stated = session.elapsed();
+    let after = check(&reported(port), &[]);
     println!(
-        "terrain read after {read:?}; then the page's address after {said:?}, and the coarse whole {after:?} after it was asked for"
+        "terrain read after {read:?}; then the page's address after {stated:?}, and the coarse whole {after:?} after it was asked for"
     );
     assert!(demo.end());
     std::fs::remove_dir_all(folder).expect("it goes");

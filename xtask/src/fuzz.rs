@@ -10,7 +10,7 @@ use crate::run::{on_path, output, root, run, target_dir, timed};
 const TARGETS: [&str; 5] = ["terrain", "text", "tick", "tile", "wire"];
 
 /// Maximum bytes of an input: some hundred ticks or messages, a file with its headers.
-const LONGEST: u32 = 4096;
+const MAX: u32 = 4096;
 /// Seconds after which an input counts as hanging.
 const PATIENCE_S: u32 = 20;
 
@@ -35,7 +35,7 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
             nightly::cargo(&["fuzz", "run", "--fuzz-dir", ".", target, "--"])
                 .current_dir(root().join("fuzz"))
                 .arg(format!("-max_total_time={seconds}"))
-                .arg(format!("-max_len={LONGEST}"))
+                .arg(format!("-max_len={MAX}"))
                 .arg(format!("-timeout={PATIENCE_S}"))
                 .arg("-print_final_stats=1")
                 .env("CARGO_TARGET_DIR", target_dir()),

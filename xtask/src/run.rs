@@ -112,9 +112,9 @@ pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
         .output()
         .with_context(|| format!("cannot start `{line}`"))?;
     if !done.status.success() {
-        let said = [done.stdout, done.stderr].concat();
-        let said = String::from_utf8_lossy(&said);
-        bail!("`{line}` failed ({})\n{}", done.status, said.trim());
+        let stated = [done.stdout, done.stderr].concat();
+        let stated = String::from_utf8_lossy(&stated);
+        bail!("`{line}` failed ({})\n{}", done.status, stated.trim());
     }
     Ok(())
 }

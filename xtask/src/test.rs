@@ -173,11 +173,11 @@ fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Ve
     drop(command);
     let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
     let mut failed = vec![];
-    for said in BufReader::new(from).split(b'\n') {
-        let said = said?;
-        let said = String::from_utf8_lossy(&said);
-        show(&said);
-        failed.extend(listed_target(&said).map(str::to_owned));
+    for stated in BufReader::new(from).split(b'\n') {
+        let stated = stated?;
+        let stated = String::from_utf8_lossy(&stated);
+        show(&stated);
+        failed.extend(listed_target(&stated).map(str::to_owned));
     }
     let status = child.wait()?;
     if !status.success() && failed.is_empty() {
@@ -241,14 +241,14 @@ mod tests {
 
     #[test]
     fn failed_target_is_repeated_by_its_kind() {
-        let said = [
+        let stated = [
             "     Running tests/fallback.rs (target/debug/deps/fallback-1)",
             "error: test failed, to rerun pass `-p hapterra-tests --test fallback`",
             "error: 2 targets failed:",
             "    `-p hapterra-tests --test fallback`",
             "    `-p hapterra-core --doc`",
         ];
-        let failed = said.iter().filter_map(|line| listed_target(line));
+        let failed = stated.iter().filter_map(|line| listed_target(line));
         let commands: Vec<_> = failed.map(|target| repeat(target, false)).collect();
         let expected = [
             "cargo xtask test -- --test fallback    # hapterra-tests",

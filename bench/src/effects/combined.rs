@@ -43,13 +43,13 @@ fn off_degrees(rendered: &[EffectTick]) -> Vec<f64> {
 fn shares(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<f64> {
     let rendered = rendered.iter().filter(|record| record.whole);
     let share =
-        rendered.map(|record| length(record.force_n) / most_n(params, length(record.spring())));
+        rendered.map(|record| length(record.force_n) / max_n(params, length(record.spring())));
     share.map(|share| 100.0 * share).collect()
 }
 
 /// Returns the bound: shading keeps the size; texture adds its height along the force and at most
 /// λ/7.6 across it; damping and controller at most double the result.
-fn most_n(params: &SurfaceParams, depth_mm: f64) -> f64 {
+fn max_n(params: &SurfaceParams, depth_mm: f64) -> f64 {
     let [amplitude, wavelength] =
         [params.texture.amplitude_mm, params.texture.wavelength_mm].map(f64::from);
     let deep = depth_mm + amplitude.min(depth_mm);

@@ -144,7 +144,7 @@ pub fn streaming(row: &Row) -> String {
         shown(row.held_turning, 0),
         counts(row.missing()),
         counts(row.coarse()),
-        shown(row.holes_underlaid, 0),
+        shown(row.no_data_over_fallback, 0),
     ])
 }
 

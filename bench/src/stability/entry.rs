@@ -152,13 +152,13 @@ impl Judge {
         let depth_mm = (self.plane_mm - step.tip_mm[2]).max(0.0);
         let stretched_n = self.stiffness_n_per_mm * depth_mm;
         // The guard clamps after the clutch's share, but before the ramp's.
-        let most_n = match self.entry {
+        let max_n = match self.entry {
             Entry::Ramp => CLAMP_N,
             Entry::Clutch => {
                 f64::from(SurfaceParams::PREMIUM.max_force_n).min(CLAMP_N / self.share)
             }
         };
-        let spring_n = stretched_n.min(most_n);
+        let spring_n = stretched_n.min(max_n);
         // Beyond the clamp the force is constant.
         let stored_mj = spring_n * (stretched_n - 0.5 * spring_n) / self.stiffness_n_per_mm;
         // The additional energy of a stiffer spring at the same depth is intended.

@@ -246,14 +246,14 @@ impl Map {
         let mut lines = vec![format!(
             "stiffness in N/mm up to which a press of 1 N is still (no swing above one encoder count, {count_mm:.3} mm), up to which it is held at all, and up to which force comes in well in the ramp and while the clutch closes (0.3 mm, 0.05 mJ):"
         )];
-        let told = |limit: Option<f64>| {
+        let reported = |limit: Option<f64>| {
             limit.map_or_else(|| "none".to_owned(), |n_per_mm| n_per_mm.to_string())
         };
         for column @ (rate, damping, part) in self.columns() {
             let limits = Grasp::ALL.map(|grasp| {
-                let limit = |verdict| told(self.up_to(column, grasp, verdict));
+                let limit = |verdict| reported(self.up_to(column, grasp, verdict));
                 let (still, held) = (limit(Verdict::Still), limit(Verdict::LimitCycle));
-                let enters = told(self.enters_up_to(column, grasp));
+                let enters = reported(self.enters_up_to(column, grasp));
                 format!("{} {still} / {held} / {enters}", grasp.name())
             });
             lines.push(format!(

@@ -62,7 +62,7 @@ impl Setting {
             script = script.wait(REST_S);
         }
         let arm = self.arm(script)?;
-        let (mut given_mj, mut most_mj) = (0.0, f64::NEG_INFINITY);
+        let (mut given_mj, mut max_mj) = (0.0, f64::NEG_INFINITY);
         let mut touched_m_s = [f64::INFINITY, f64::NEG_INFINITY];
         let (mut is_apart, mut is_tripped) = (true, false);
         let tick_s = 1.0 / f64::from(self.rate.hz());
@@ -78,7 +78,7 @@ impl Setting {
             }
             // Commands in transit to the motors still belong to the tap.
             if !is_apart && up_mm > PLANE_MM + APART_MM {
-                most_mj = given_mj.max(most_mj);
+                max_mj = given_mj.max(max_mj);
                 given_mj = 0.0;
                 is_apart = true;
             }
@@ -87,7 +87,7 @@ impl Setting {
             !is_tripped
         });
         Ok((!is_tripped).then_some(Taps {
-            given_mj: most_mj.max(given_mj),
+            given_mj: max_mj.max(given_mj),
             touched_m_s,
         }))
     }

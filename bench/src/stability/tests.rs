@@ -369,8 +369,8 @@ fn force_comes_in_on_a_tenth_of_the_friction() {
         (10_000, 1.0, 0.5),
     ];
     enters_up_to(0.1, LONG_S, late);
-    for (table, said) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
-        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(said) {
+    for (table, stated) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
+        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(stated) {
             assert_eq!((hz, ramp.min(clutch)), (of_hz, f64::from(n_per_mm)));
         }
     }

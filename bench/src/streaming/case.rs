@@ -162,13 +162,13 @@ impl Bench<'_> {
         let HipPaths { straight, turning } = self.ways;
         row.straight_cells = Some(straight.cells() as u32);
         row.turning_cells = Some(turning.cells() as u32);
-        let top = self.motion(straight, run::SPEEDS[1], Late::Hole, false)?;
+        let top = self.motion(straight, run::SPEEDS[1], Late::NoData, false)?;
         let moved = top.moved;
         let inside = |tile: &&SentTile| (moved[0]..moved[1]).contains(&tile.tick);
         let tiles = top.tiles.iter().filter(inside).count() as f64;
         row.tiles_per_s = Some(round(1e3 * tiles / (moved[1] - moved[0]) as f64));
         let missing = |way, speed: u32| {
-            let motion = self.motion(way, speed.into(), Late::Hole, false)?;
+            let motion = self.motion(way, speed.into(), Late::NoData, false)?;
             Ok::<_, NotMeasured>(Some(motion.counts.missing))
         };
         row.missing_straight_500 = missing(straight, SPEEDS[0])?;
@@ -178,7 +178,8 @@ impl Bench<'_> {
         row.missing_turning_2000 = missing(turning, SPEEDS[1])?;
         row.missing_turning_5000 = missing(turning, SPEEDS[2])?;
         let held = |way| {
-            let holds = |speed| Ok(self.motion(way, speed, Late::Hole, true)?.counts.missing == 0);
+            let holds =
+                |speed| Ok(self.motion(way, speed, Late::NoData, true)?.counts.missing == 0);
             Ok::<_, NotMeasured>(Some(fastest(self.case.halvings, holds)?.round()))
         };
         row.held_straight = held(straight)?;
@@ -204,7 +205,7 @@ impl Bench<'_> {
         row.coarse_turning_500 = coarse(turning, SPEEDS[0])?;
         row.coarse_turning_2000 = coarse(turning, SPEEDS[1])?;
         row.coarse_turning_5000 = coarse(turning, SPEEDS[2])?;
-        row.holes_underlaid = Some(holes);
+        row.no_data_over_fallback = Some(holes);
         Ok(())
     }
 
@@ -219,7 +220,7 @@ impl Bench<'_> {
         way: &HipPath,
         speed: f64,
         late: Late,
-        to_a_hole: bool,
+        to_no_data: bool,
     ) -> Result<Motion, NotMeasured> {
         let raster = self.case.open()?;
         let terrain = terrain(&raster)?;
@@ -228,7 +229,7 @@ impl Bench<'_> {
         let pace = self.case.pace(Pace::Virtual);
         let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, way)?;
-        let (counts, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
+        let (counts, moved) = run::travel(&mut chain, self.hand, way, speed, to_no_data)?;
         Ok(Motion::of(chain, counts, moved))
     }
 }

@@ -120,8 +120,8 @@ impl<'t> Chain<'t> {
     }
 
     /// Returns the statistics of the link.
-    pub(super) const fn tally(&self) -> &LinkStats {
-        self.client.tally()
+    pub(super) const fn stats(&self) -> &LinkStats {
+        self.client.stats()
     }
 
     /// Runs a tick with these inputs, and calls `take` with the samples that arrive at the host.
@@ -137,7 +137,7 @@ impl<'t> Chain<'t> {
         let board = &mut self.board;
         self.line.carry(|bytes| board.receive(bytes));
         board.tick(sense);
-        let heard = self.hear();
+        let received = self.hear();
         let (now, mut out) = (TICK * self.now as u32, vec![]);
         let began = Instant::now();
         let mut on = |event: Event<'_>| {
@@ -145,7 +145,7 @@ impl<'t> Chain<'t> {
                 take(sample);
             }
         };
-        let answered = self.client.receive(now, &heard, &mut out, &mut on);
+        let answered = self.client.receive(now, &received, &mut out, &mut on);
         let spent = began.elapsed();
         answered
             .and_then(|()| self.client.due(now, &mut out, &mut on))
@@ -160,17 +160,17 @@ impl<'t> Chain<'t> {
 
     /// Returns the bytes from the device in a tick.
     fn hear(&mut self) -> Vec<u8> {
-        let mut heard = vec![0; self.line.bytes_a_tick()];
+        let mut received = vec![0; self.line.bytes_a_tick()];
         let mut length = 0;
-        while length < heard.len() {
-            let said = self.board.link.transmit(&mut heard[length..]);
-            if said == 0 {
+        while length < received.len() {
+            let stated = self.board.link.transmit(&mut received[length..]);
+            if stated == 0 {
                 break;
             }
-            length += said;
+            length += stated;
         }
-        heard.truncate(length);
-        heard
+        received.truncate(length);
+        received
     }
 
     /// Searches the host's bytes for tiles of the field. Returns their number.

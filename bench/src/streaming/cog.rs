@@ -74,7 +74,7 @@ pub(super) fn write(path: &Path, side: u32, relief: &mut Relief) -> io::Result<u
 }
 
 /// Returns an upper bound of a terrain's file size, for any compression of its blocks.
-pub(super) fn most_bytes(side: u32) -> u64 {
+pub(super) fn max_bytes(side: u32) -> u64 {
     let images = images(side);
     let blocks: Vec<&Place> = images.iter().flat_map(|image| &image.blocks).collect();
     let index = blocks.len() * 8 + images.len() * DIRECTORY as usize;
@@ -181,7 +181,7 @@ mod tests {
         let (mut relief, side) = (Relief::new(), 7200);
         let bytes = write(&path, side, &mut relief).expect("written");
         assert_eq!(std::fs::metadata(&path).expect("there").len(), bytes);
-        assert!(bytes <= most_bytes(side), "{bytes}");
+        assert!(bytes <= max_bytes(side), "{bytes}");
         let options = OpenOptions {
             most_in_memory_bytes: 0,
             ..OpenOptions::default()

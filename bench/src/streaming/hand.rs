@@ -20,7 +20,7 @@ const ABOVE: f64 = 30.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Late {
     /// None: it is no-data.
-    Hole,
+    NoData,
     /// The fallback of the whole reach of the arm.
     Fallback,
 }
@@ -59,7 +59,7 @@ impl Hand {
             ..terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
         };
         Ok(match late {
-            Late::Hole => scene,
+            Late::NoData => scene,
             Late::Fallback => {
                 let reach = Reach::of(&Calibration::PREMIUM_1_5);
                 terrain.underlaid(scene, reach.sides_mm())

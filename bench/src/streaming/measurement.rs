@@ -80,7 +80,7 @@ pub struct Row {
     pub coarse_turning_5000: Option<u32>,
     /// With a fallback: ticks without any terrain, in these six motions and one of 20,000 cells a
     /// second.
-    pub holes_underlaid: Option<u32>,
+    pub no_data_over_fallback: Option<u32>,
 }
 
 impl Row {

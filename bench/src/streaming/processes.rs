@@ -88,7 +88,7 @@ const SIDES_FROM: u32 = 6;
 /// Checks that the disk has room for a synthetic terrain. If the system does not report it, the
 /// write will show.
 fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
-    let needed = cog::most_bytes(side);
+    let needed = cog::max_bytes(side);
     let folder = path.parent().unwrap_or(path);
     match fs4::available_space(folder) {
         Ok(free) if free < needed => {

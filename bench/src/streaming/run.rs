@@ -9,7 +9,7 @@ use super::hip_path::HipPath;
 use super::tick_counts::{TickCounts, lacks_terrain};
 
 /// Ticks after which a wait fails: more than a server's 10 s time-out.
-const LONGEST: u64 = 30_000;
+const MAX: u64 = 30_000;
 /// Ticks of rest before the motion, so that all tiles within the margin arrive.
 const REST: u32 = 400;
 /// Ticks in which the hand accelerates evenly to its speed.
@@ -37,8 +37,8 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &HipPath) -> Result
         chain.tick(sense, &mut |sample| {
             is_touching |= sample.state == ContactState::Touching;
         })?;
-        if chain.now() > LONGEST {
-            let why = format!("no contact for {LONGEST} ticks");
+        if chain.now() > MAX {
+            let why = format!("no contact for {MAX} ticks");
             return Err(NotMeasured(why));
         }
     }
@@ -46,7 +46,7 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &HipPath) -> Result
 }
 
 /// Moves along a path at this many cells a second, after a touch and a rest, with a tenth of a
-/// second to reach the speed. With `to_a_hole`, the motion ends at the first tick without its
+/// second to reach the speed. With `to_no_data`, the motion ends at the first tick without its
 /// terrain. Returns the counts and the ticks in which the motion began and ended.
 ///
 /// # Errors
@@ -56,7 +56,7 @@ pub(super) fn travel(
     hand: &Hand,
     way: &HipPath,
     speed: f64,
-    to_a_hole: bool,
+    to_no_data: bool,
 ) -> Result<(TickCounts, [u64; 2]), NotMeasured> {
     let start = hand.below(way.at(0.0))?;
     let mut at_rest = None;
@@ -69,22 +69,22 @@ pub(super) fn travel(
     let mut ended = began + u64::from(ticks);
     for tick in 1..=ticks + AFTER {
         let sense = hand.below(way.at(covered(tick.into(), 1e-3 * speed)))?;
-        let mut is_hole = false;
+        let mut is_no_data = false;
         chain.tick(sense, &mut |sample| {
             moves |= Some(sample.hip) != at_rest;
             if moves && counts.ticks < ticks {
                 counts.add(sample);
-                is_hole |= lacks_terrain(sample);
+                is_no_data |= lacks_terrain(sample);
             }
         })?;
-        if counts.ticks == ticks || to_a_hole && is_hole {
+        if counts.ticks == ticks || to_no_data && is_no_data {
             ended = ended.min(chain.now());
             break;
         }
     }
-    let tally = chain.tally();
-    if tally.lost + tally.dropped > 0 {
-        let lost = tally.lost + tally.dropped;
+    let stats = chain.stats();
+    if stats.lost + stats.dropped > 0 {
+        let lost = stats.lost + stats.dropped;
         let why = format!("{lost} samples were lost, so gaps cannot be counted");
         return Err(NotMeasured(why));
     }

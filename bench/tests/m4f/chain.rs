@@ -141,7 +141,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     };
     let each = arm.classes(&[all.params, other(all.params), arm.scene().params]);
     let on = |scene: Scene, materials: &Materials| Scene {
-        materials: Some(materials.told().check_sum()),
+        materials: Some(materials.reported().check_sum()),
         ..scene
     };
     let on_two = (&sliding[..], on(arm.scene(), &two), Some(&two));

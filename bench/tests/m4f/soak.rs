@@ -25,7 +25,7 @@ const BATCH: usize = 20;
 const OF_EACH: usize = 30;
 /// Most instructions of a tick of the contact on any scene: with the chain around it, a tick at 10
 /// kHz then fits a processor of 168 MHz.
-const MOST: u32 = 12_000;
+const MAX: u32 = 12_000;
 
 /// The settings of a scene, and the costs of its ticks.
 struct CountedScene {
@@ -37,7 +37,7 @@ struct CountedScene {
 pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
     let counted = count(board, scenes, Surface::Smooth);
     let target = Target {
-        max: Some(MOST),
+        max: Some(MAX),
         ..Target::default()
     };
     let row = |name: &str, wanted: &dyn Fn(&CountedScene) -> bool| {
@@ -77,7 +77,7 @@ pub(crate) fn compared_rows(board: &CountingBoard) -> Vec<Row> {
 fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
     let counted = count(board, scenes, Surface::Rough);
     let target = Target {
-        max: Some(MOST),
+        max: Some(MAX),
         ..Target::default()
     };
     let ticks = counted.iter().flat_map(|scene| scene.ticks.iter().copied());

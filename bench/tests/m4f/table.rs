@@ -255,13 +255,13 @@ impl Table {
             let misses = kept <= target && count > target;
             misses || (count > kept * (1.0 + TOLERANCE) && count > kept + LEEWAY)
         };
-        let told = |i: usize| {
+        let reported = |i: usize| {
             let (name, count, kept) = (COUNTS[i], row.counts[i], kept[i]);
             format!(
                 "{}: {name} {count} instructions, {kept} in the table",
                 row.state
             )
         };
-        binding.filter(is_worse).map(told).collect()
+        binding.filter(is_worse).map(reported).collect()
     }
 }

@@ -21,9 +21,9 @@ std::thread_local! {
 
 /// Counts a searched patch.
 pub(super) fn searched(evaluations: u32) {
-    SEARCHED.with(|tally| {
-        let [patches, all] = tally.get();
-        tally.set([patches + 1, all + evaluations]);
+    SEARCHED.with(|stats| {
+        let [patches, all] = stats.get();
+        stats.set([patches + 1, all + evaluations]);
     });
 }
 

@@ -74,7 +74,7 @@ fn beside_patches<const D: usize>(
 ) -> Target {
     let mut is_patch = |cell| match window.ground(cell) {
         CellContent::Patch(_) => true,
-        CellContent::Hole => false,
+        CellContent::NoData => false,
         CellContent::Missing => {
             budget.lacks(cell);
             false

@@ -25,7 +25,7 @@ mod tolerance;
 mod crest_tests;
 #[cfg(test)]
 #[path = "cost_tests.rs"]
-mod tally;
+mod stats;
 #[cfg(test)]
 mod test_random;
 #[cfg(test)]

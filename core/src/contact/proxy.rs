@@ -2,8 +2,8 @@
 
 mod departures;
 mod in_air;
-mod landing;
 mod on_ground;
+mod onset;
 mod with_friction;
 
 use glam::Vec3;
@@ -19,7 +19,7 @@ use super::sweep::Path;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{TILE_CELLS, Window};
 use departures::Departures;
-use landing::Landing;
+use onset::Onset;
 use with_friction::Rough;
 
 /// Phase of the proxy, with the state of that phase.
@@ -135,7 +135,7 @@ pub struct Contact {
     touched: Option<(GridPoint, Vec3)>,
     /// Start of the proxy on the surface after a change of placement, until the terrain there
     /// arrives.
-    landing: Option<Landing>,
+    onset: Option<Onset>,
     /// State of friction, if the surface has any.
     rough: Option<Rough>,
 }
@@ -153,7 +153,7 @@ impl Contact {
                 ..settings
             },
             phase: Phase::Unseeded,
-            landing: None,
+            onset: None,
             rough,
             hip: GridPoint::default(),
             at_rest: false,

@@ -480,7 +480,7 @@ fn steep_ways_in_over_the_border_cross_nothing() {
 }
 
 /// A field of 16 × 16 cells with no-data in the middle, flat at height 1.
-fn with_a_hole(x: i32, y: i32) -> f32 {
+fn with_no_data(x: i32, y: i32) -> f32 {
     match (6..=10).contains(&x) && (6..=10).contains(&y) {
         true => f32::NAN,
         false => 1.0,
@@ -492,14 +492,14 @@ fn with_a_hole(x: i32, y: i32) -> f32 {
 #[test]
 fn straight_down_onto_any_sample_meets_the_surface() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(16, 16), with_a_hole);
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(16, 16), with_no_data);
     for (x, y) in (0..=16).flat_map(|y| (0..=16).map(move |x| (x, y))) {
         for fast in [0.1, 1.5, 500.0] {
             let at = |z: f32| GridPoint::new([x, y, 0], Vec3::Z * z);
             let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
             let above = contact.step(&field.window, &at(1.0 + fast)).state;
             let output = contact.step(&field.window, &at(0.75));
-            let expected = match with_a_hole(x, y).is_nan() {
+            let expected = match with_no_data(x, y).is_nan() {
                 true => (above, Vec3::ZERO),
                 false => (ContactState::Touching, Vec3::Z * 0.25),
             };
@@ -515,7 +515,7 @@ fn straight_down_onto_any_sample_meets_the_surface() {
 fn mirrored_path_along_grid_lines_has_mirrored_forces() {
     let mut tiles = [buffers::<2>(), buffers::<2>()];
     let [plain, mirrored] = &mut tiles;
-    let lopsided = |x: i32, y: i32| with_a_hole(x - 2, y + 1) + 0.125 * x as f32;
+    let lopsided = |x: i32, y: i32| with_no_data(x - 2, y + 1) + 0.125 * x as f32;
     let size = FieldSize::new(16, 16);
     let plain = Field::<2>::held(plain, size, lopsided);
     let mirrored = Field::<2>::held(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));

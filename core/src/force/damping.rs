@@ -158,8 +158,8 @@ impl Damper {
         }
         takes.along += 1e-3 * self.params.damping.ns_per_m;
         let along_n = spring_n * (1.0 - (takes.along * share).clamp(-1.0, 1.0));
-        let most_n = smaller(2.0 * spring_n.length(), self.params.max_force_n);
-        clamp_length(along_n - across_mm_s * takes.across, most_n)
+        let max_n = smaller(2.0 * spring_n.length(), self.params.max_force_n);
+        clamp_length(along_n - across_mm_s * takes.across, max_n)
     }
 }
 

@@ -88,7 +88,7 @@ fn created_by(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
             moved_mm: Vec3::Z * moved_mm,
             velocity_mm_s: Vec3::ZERO,
             asked_n: Vec3::Z * 2.0,
-            most_n: 8.5,
+            max_n: 8.5,
             shares: ramps(tick),
         });
         damper.created_mj()
@@ -140,7 +140,7 @@ fn damping_is_that_of_the_spring_which_is_let_through() {
                 moved_mm: Vec3::Z * 0.1,
                 velocity_mm_s,
                 asked_n: Vec3::Z * (deep_mm + 0.1) * inside * outside,
-                most_n: 8.5,
+                max_n: 8.5,
                 shares,
             });
         }
@@ -177,7 +177,7 @@ struct Taps {
     hz: u32,
     /// Time from the start of a tick until its force acts, s, and the damper's latency.
     late_s: f64,
-    told_s: f64,
+    reported_s: f64,
     /// Taps a second; at 9 the tip moves at up to 170 mm/s.
     tap_hz: f64,
 }
@@ -187,7 +187,7 @@ impl Taps {
         Self {
             hz,
             late_s,
-            told_s: late_s,
+            reported_s: late_s,
             tap_hz: 9.0,
         }
     }
@@ -196,7 +196,7 @@ impl Taps {
     /// The force obeys the guard's rate limit.
     fn given_mj(self, params: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
-        let mut damper = Damper::of(params, &context(self.hz, self.told_s as f32));
+        let mut damper = Damper::of(params, &context(self.hz, self.reported_s as f32));
         let tick_s = 1.0 / f64::from(self.hz);
         let slew_n = 1000.0 * tick_s as f32;
         let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * self.tap_hz * t_s);
@@ -217,7 +217,7 @@ impl Taps {
                     moved_mm,
                     velocity_mm_s,
                     asked_n,
-                    most_n: 8.5,
+                    max_n: 8.5,
                     shares: Shares::ALL,
                 });
                 force_n = damper.force_n(force_n, velocity_mm_s);
@@ -286,7 +286,7 @@ fn given_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
                 moved_mm,
                 velocity_mm_s,
                 asked_n,
-                most_n: 8.5,
+                max_n: 8.5,
                 shares: Shares::ALL,
             });
             force_n = damper.force_n(force_n, velocity_mm_s);
@@ -339,7 +339,7 @@ fn energy_of_unstated_latency_is_not_all_dissipated() {
     let on = params(1.0, 0.0, Controller::On);
     let known = Taps::new(1000, 1.1e-3);
     let unknown = Taps {
-        told_s: 0.1e-3,
+        reported_s: 0.1e-3,
         ..known
     };
     let without = known.given_mj(&params(1.0, 0.0, Controller::Off));
@@ -356,7 +356,7 @@ fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
     for hz in [1000, 2000, 4000] {
         for late_s in [0.63e-3, 0.88e-3] {
             let taps = Taps {
-                told_s: 1.13e-3,
+                reported_s: 1.13e-3,
                 ..Taps::new(hz, late_s)
             };
             let with = taps.given_mj(&params(1.0, 0.0, Controller::On));
@@ -410,7 +410,7 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
                 moved_mm: Vec3::ZERO,
                 velocity_mm_s: Vec3::Z * speed_mm_s,
                 asked_n: Vec3::ZERO,
-                most_n: 8.5,
+                max_n: 8.5,
                 shares: Shares::ALL,
             });
         }
@@ -444,7 +444,7 @@ fn what_was_created_is_forgotten_at_rest_and_never_more_than_a_little() {
             moved_mm: Vec3::ZERO,
             velocity_mm_s: Vec3::ZERO,
             asked_n: Vec3::Z * asked_n,
-            most_n: 8.5,
+            max_n: 8.5,
             shares: Shares::ALL,
         });
         damper.created_mj()

@@ -34,7 +34,7 @@ fn created(effects: &mut Effects, created_mj: f32) {
                 moved_mm,
                 velocity_mm_s: Vec3::ZERO,
                 asked_n: Vec3::Z * created_mj,
-                most_n: 8.5,
+                max_n: 8.5,
                 shares: Shares::ALL,
             });
         }
@@ -145,7 +145,7 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
                 moved_mm,
                 velocity_mm_s,
                 asked_n,
-                most_n: 8.5,
+                max_n: 8.5,
                 shares: Shares::ALL,
             });
             asked_n = damper.force_n(params.spring().force_n(context[0]), velocity_mm_s);

@@ -77,14 +77,14 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// Maximum number of materials, including the default.
-    pub const MOST: usize = MAX_MATERIALS;
+    pub const MAX: usize = MAX_MATERIALS;
     /// An empty table, which is not valid in a scene.
     pub const EMPTY: Self = Self {
         materials: Vec::new(),
     };
 
     /// Creates a table of these materials, the default first; returns `None` without materials, or
-    /// with more than [`Self::MOST`].
+    /// with more than [`Self::MAX`].
     #[must_use]
     pub fn new(materials: &[Material]) -> Option<Self> {
         let materials = Vec::from_slice(materials).ok()?;

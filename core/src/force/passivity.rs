@@ -99,7 +99,7 @@ pub(crate) struct Moment {
     /// The force that the guard let through in the last tick.
     pub(crate) asked_n: Vec3,
     /// The maximum force that the guard lets through.
-    pub(crate) most_n: f32,
+    pub(crate) max_n: f32,
     /// Shares of the spring's force in this tick.
     pub(crate) shares: Shares,
 }
@@ -171,7 +171,7 @@ impl Passivity {
             speed,
         } = now.shares;
         let stiffness_n_per_mm = clutch * params.stiffness_n_per_mm;
-        let max_force_n = smaller(clutch * params.max_force_n, now.most_n);
+        let max_force_n = smaller(clutch * params.max_force_n, now.max_n);
         let ramped = Spring {
             stiffness_n_per_mm: ramp * stiffness_n_per_mm,
             max_force_n: ramp * max_force_n,

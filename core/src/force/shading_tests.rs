@@ -80,7 +80,7 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
 }
 
 /// Maximum change of direction from one HIP to the next, degrees: without and with shading.
-fn largest_turns(rendered: &[ShadedTick]) -> (f32, f32) {
+fn max_turns(rendered: &[ShadedTick]) -> (f32, f32) {
     rendered
         .windows(2)
         .fold((0.0, 0.0), |(plain, shaded), pair| {
@@ -142,7 +142,7 @@ fn the_force_turns_evenly_over_valley_and_ridge() {
     for (from, to) in [(8.0, 16.0), (16.0, 24.0)] {
         let way = straight([from, 9.3], [to, 10.1]);
         let rendered = forces_along(&field, folds, Friction::NONE, way);
-        let (plain, shaded) = largest_turns(&rendered);
+        let (plain, shaded) = max_turns(&rendered);
         assert!(
             plain > 20.0 && shaded < 0.1 * plain,
             "{plain}° and {shaded}°"
@@ -193,7 +193,7 @@ fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
         let y = 2.0 + f64::from(i);
         let way = straight([2.1, y], [57.9, y + 13.0 * f64::from(i % 2)]);
         let rendered = forces_along(&field, rough, Friction::NONE, way);
-        let (a, b) = largest_turns(&rendered);
+        let (a, b) = max_turns(&rendered);
         (plain, shaded) = (plain.max(a), shaded.max(b));
     }
     assert!(
@@ -280,7 +280,7 @@ fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
             Friction::NONE,
             straight([11.1, y], [20.3, y]),
         );
-        let (plain, shaded) = largest_turns(&rendered);
+        let (plain, shaded) = max_turns(&rendered);
         assert!(
             plain > 10.0 && shaded < 0.1 * plain,
             "{plain}° and {shaded}°"
@@ -346,7 +346,7 @@ fn what_friction_holds_is_turned_with_the_rest() {
             Friction::coulomb(0.5),
             straight([from, 9.3], [to, 9.3]),
         );
-        let (plain, shaded) = largest_turns(&rendered);
+        let (plain, shaded) = max_turns(&rendered);
         assert!(
             plain > 50.0 && shaded < 1.0,
             "{from}: {plain}° and {shaded}°"

@@ -71,11 +71,11 @@ impl Texture {
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let (shortest, longest) = Self::WAVELENGTHS_MM;
-        let most_mm = self.wavelength_mm * Self::STEEPEST;
+        let max_mm = self.wavelength_mm * Self::STEEPEST;
         self.is_none()
             || (shortest..=longest).contains(&self.wavelength_mm)
                 && (0.0..=Self::MAX_AMPLITUDE_MM).contains(&self.amplitude_mm)
-                && self.amplitude_mm <= most_mm
+                && self.amplitude_mm <= max_mm
                 && (-360.0..=360.0).contains(&self.direction_deg)
     }
 

@@ -22,7 +22,7 @@ use crate::rate::TickRate;
 /// some 0.4 N at its tip.
 pub const JOG_SHARE: f32 = 0.25;
 /// Maximum time at full current, ms.
-pub const JOG_MOST_MS: u16 = 5_000;
+pub const JOG_MAX_MS: u16 = 5_000;
 /// Maximum speed of a joint during a jog, rad/s: 0.2 m/s at the tip of a Premium 1.5. Measured over
 /// one millisecond, to within a count.
 pub const FAST_RAD_S: f32 = 1.0;
@@ -40,7 +40,7 @@ pub struct Jog {
     /// The amplifier's current, A, independent of the motor's sign in the calibration. At most
     /// [`JOG_SHARE`] of the continuous current in either direction.
     pub current_a: f32,
-    /// Time at full current, ms; at most [`JOG_MOST_MS`].
+    /// Time at full current, ms; at most [`JOG_MAX_MS`].
     pub hold_ms: u16,
 }
 
@@ -50,7 +50,7 @@ impl Jog {
     pub fn is_valid(&self, record: &Calibration) -> bool {
         let most = JOG_SHARE * record.continuous_current_a;
         let most = most.to_array().get(usize::from(self.axis)).copied();
-        most.is_some_and(|most| self.current_a.abs() <= most) && self.hold_ms <= JOG_MOST_MS
+        most.is_some_and(|most| self.current_a.abs() <= most) && self.hold_ms <= JOG_MAX_MS
     }
 }
 
@@ -81,7 +81,7 @@ impl JogRun {
         Self {
             axis,
             full_a,
-            left: rate.ticks(u32::from(jog.hold_ms.min(JOG_MOST_MS))),
+            left: rate.ticks(u32::from(jog.hold_ms.min(JOG_MAX_MS))),
             from_rad: None,
             moved: false,
         }

@@ -237,7 +237,7 @@ fn no_host_gets_more_than_a_jog_may_be() {
             .map(|d| d.currents_a.abs().max_element());
         assert!(most.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
         let on = bench.drives.iter().filter(|drive| drive.enabled).count();
-        assert!(on <= 2_100 + usize::from(JOG_MOST_MS) + 10, "{on}");
+        assert!(on <= 2_100 + usize::from(JOG_MAX_MS) + 10, "{on}");
         let one = |drive: &GuardOutputs| drive.currents_a * Vec3::Y == drive.currents_a;
         assert!(bench.drives.iter().all(one), "{jog:?}");
     }

@@ -32,7 +32,7 @@ pub use fault::Fault;
 pub use feedback::{CURRENT_ROUGHNESS_A, CURRENT_TOLERANCE_A};
 pub use flags::{Blockers, Limits};
 pub use hold::HOLD_S;
-pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MOST_MS, JOG_SHARE, Jog};
+pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MAX_MS, JOG_SHARE, Jog};
 pub use mode::Mode;
 pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 

@@ -404,9 +404,9 @@ mod tests {
             l1_mm: 3.0,
             ..Calibration::PREMIUM_1_5
         };
-        let said = format!("{}", record.validate().expect_err("too short"));
+        let stated = format!("{}", record.validate().expect_err("too short"));
         assert_eq!(
-            said,
+            stated,
             "L1 is 3, expected 30 to 1000 mm: measure the upper link between its joint axes"
         );
     }

@@ -23,7 +23,7 @@ pub struct CoarseTile {
 impl CoarseTile {
     /// Minimum shift: with a finer tile, the check of an arriving tile would read more samples than
     /// a tick has time for.
-    pub const LEAST_SHIFT: u8 = 2;
+    pub const MIN_SHIFT: u8 = 2;
     /// Maximum shift: a tile as large as the range of positions.
     pub const MAX_SHIFT: u8 = 24;
 
@@ -31,7 +31,7 @@ impl CoarseTile {
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
         let Cell { x, y } = self.first;
-        (Self::LEAST_SHIFT..=Self::MAX_SHIFT).contains(&self.shift)
+        (Self::MIN_SHIFT..=Self::MAX_SHIFT).contains(&self.shift)
             && level.checked_add(self.shift).is_some()
             && x.unsigned_abs().max(y.unsigned_abs()) <= MAX_CELL.unsigned_abs()
     }
@@ -221,16 +221,16 @@ mod tests {
         assert_eq!((height(i32::MIN, 100), height(i32::MAX, 100)), (None, None));
         // On the border of the no-data cells, no-data has no weight.
         assert_eq!((height(1, 116), height(17, 116)), (Some(1.0), Some(1.0)));
-        let is_hole = |x, y| height(x, y).is_some_and(f32::is_nan);
-        assert!(is_hole(2, 116) && is_hole(9, 116));
+        let is_no_data = |x, y| height(x, y).is_some_and(f32::is_nan);
+        assert!(is_no_data(2, 116) && is_no_data(9, 116));
     }
 
     #[test]
     fn the_corners_of_a_cell_are_its_samples_to_the_bit_but_beside_holes() {
         let rough = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 997) as f32 / 7.0;
-        let is_hole = |col: usize, row: usize| (col, row) == (9, 4);
+        let is_no_data = |col: usize, row: usize| (col, row) == (9, 4);
         let coarse = tile(|col, row| {
-            if is_hole(col, row) {
+            if is_no_data(col, row) {
                 f32::NAN
             } else {
                 rough(col, row)

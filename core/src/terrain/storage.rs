@@ -258,8 +258,8 @@ mod tests {
                 "{x} {y}"
             );
         }
-        assert_eq!(window.ground(Cell::new(40, 0)), CellContent::Hole);
-        assert_eq!(window.ground(Cell::new(0, 33)), CellContent::Hole);
+        assert_eq!(window.ground(Cell::new(40, 0)), CellContent::NoData);
+        assert_eq!(window.ground(Cell::new(0, 33)), CellContent::NoData);
     }
 
     #[test]
@@ -286,7 +286,10 @@ mod tests {
             let size = FieldSize::new(columns, rows);
             let error = storage.fill(size, core::iter::repeat(0.0)).unwrap_err();
             assert_eq!(error, FieldError::Size { size, most: 32 });
-            assert_eq!(storage.window().ground(Cell::default()), CellContent::Hole);
+            assert_eq!(
+                storage.window().ground(Cell::default()),
+                CellContent::NoData
+            );
         }
         let size = FieldSize::new(2, 2);
         let few = TileArena::<1>::from_slice(size, &[0.0; 8]).unwrap_err();

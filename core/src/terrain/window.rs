@@ -16,7 +16,7 @@ pub enum CellContent {
     /// A patch.
     Patch(Corners),
     /// No surface: no-data, or outside the field.
-    Hole,
+    NoData,
     /// The tile has not arrived yet.
     Missing,
 }
@@ -193,7 +193,7 @@ impl<'t, const D: usize> Window<'t, D> {
     #[inline]
     pub fn ground(&self, cell: Cell) -> CellContent {
         if !self.has_cell(cell) {
-            return CellContent::Hole;
+            return CellContent::NoData;
         }
         let Some(tile) = self.held(TileIndex::holding(cell)) else {
             return self.unsettled_ground(cell);
@@ -201,7 +201,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let heights = tile.corners(cell);
         let [sw, se, nw, ne] = heights;
         if (sw + se + nw + ne).is_nan() {
-            return CellContent::Hole;
+            return CellContent::NoData;
         }
         CellContent::Patch(Corners {
             base: tile.base(),
@@ -219,7 +219,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let Some(tile) = self.held(TileIndex::holding(cell)) else {
             return match self.unsettled_ground(cell) {
                 CellContent::Patch(corners) => Some(corners),
-                CellContent::Hole => Some(Corners::NONE),
+                CellContent::NoData => Some(Corners::NONE),
                 CellContent::Missing => None,
             };
         };
@@ -368,8 +368,8 @@ mod tests {
                 CellContent::Patch(corners)
             );
         }
-        assert_eq!(field.window.ground(Cell::new(-1, 0)), CellContent::Hole);
-        assert_eq!(field.window.ground(Cell::new(640, 9)), CellContent::Hole);
+        assert_eq!(field.window.ground(Cell::new(-1, 0)), CellContent::NoData);
+        assert_eq!(field.window.ground(Cell::new(640, 9)), CellContent::NoData);
         assert_eq!(field.window.ground(Cell::new(600, 9)), CellContent::Missing);
     }
 

@@ -124,7 +124,7 @@ fn steps(from: f32, step: f32, count: u32) -> impl Iterator<Item = f32> {
     (0..count).map(move |i| from + step * i as f32)
 }
 
-fn largest_step(forces: &[Vec3]) -> f32 {
+fn max_step(forces: &[Vec3]) -> f32 {
     let steps = forces.windows(2).map(|pair| (pair[1] - pair[0]).length());
     steps.fold(0.0, f32::max)
 }
@@ -153,7 +153,7 @@ fn a_border_is_crossed_without_a_step_and_lies_half_way_between_the_samples() {
         assert!(forces[51].z > from * depth, "{step}: {}", forces[51]);
         assert_eq!(forces[51 + CHANGE as usize].z, to * depth, "{step}");
         let most = (to - from) * depth / CHANGE as f32;
-        let largest = largest_step(&forces);
+        let largest = max_step(&forces);
         assert!(
             largest < 1.001 * most,
             "{step}: {largest} N, {most} at most"
@@ -189,7 +189,7 @@ fn friction_changes_evenly_and_a_proxy_is_held_by_its_own_material() {
     assert!((held / pressed - 0.8).abs() < 1e-3, "{held} {pressed}");
     // The maximum is the change of friction in a tick plus a hand's motion of 0.02 in a tick.
     let most = 0.4 * (depth * 0.8 / CHANGE as f32 + 0.02);
-    let largest = largest_step(&forces[1..]);
+    let largest = max_step(&forces[1..]);
     assert!(largest < 1.01 * most, "{largest} N, {most} at most");
 
     // The proxy sticks east of the border while the HIP moves over it: the proxy's material counts.
@@ -253,7 +253,7 @@ fn a_texture_goes_out_before_another_one_comes_in() {
         }
         // No more than the wave itself: 2π A / λ times the stiffness and the path.
         let most = 0.4 * 0.02 * core::f32::consts::TAU * 0.1 * 2.0 + 0.04 / 25.0;
-        let largest = largest_step(&forces[100..]);
+        let largest = max_step(&forces[100..]);
         assert!(largest < most, "{table:?}: {largest} of {most}");
         assert!(forces.iter().all(|force| force.z >= 0.0), "it pulls");
     }

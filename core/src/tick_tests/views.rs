@@ -18,7 +18,7 @@ struct Watched<'t> {
     device: Device<'t, 4>,
     last: Outcome,
     counts: [i32; 3],
-    most_n: f32,
+    max_n: f32,
 }
 
 impl<'t> Watched<'t> {
@@ -33,7 +33,7 @@ impl<'t> Watched<'t> {
             device,
             last: last.expect("ticks"),
             counts: DEEP,
-            most_n: GENTLE_N,
+            max_n: GENTLE_N,
         }
     }
 
@@ -43,7 +43,7 @@ impl<'t> Watched<'t> {
         assert!(now.drive.enabled, "the arm stays armed");
         assert_eq!(now.sample.fault, None);
         let change = (now.sample.force_n - self.last.sample.force_n).length();
-        assert!(change <= self.most_n, "{change} N in a tick");
+        assert!(change <= self.max_n, "{change} N in a tick");
         self.last = now;
         now.sample
     }
@@ -133,7 +133,7 @@ fn held_clutch_has_no_force_and_carries_the_terrain() {
     assert!(moved.length() > 5.0 && moved.z < -5.0, "{moved}");
     // From here on the hand stands still again.
     arm.counts = [199, DEEP[1] + 398 + 60, -199];
-    arm.most_n = SLEW_N;
+    arm.max_n = SLEW_N;
     assert!(arm.tick().hip.to(&open.hip).z < -1.0);
 }
 

@@ -219,7 +219,7 @@ fn a_tile_with_materials_and_their_table() {
     let tile = TileMessage {
         epoch: 7,
         key: TileKey::new(1, -2, 100),
-        heights: Heights::Hole,
+        heights: Heights::NoData,
     };
     let plain = bytes(&ToDevice::Tile(tile)).split_off(1);
     for (materials, wanted) in [

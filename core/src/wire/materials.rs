@@ -227,7 +227,7 @@ mod tests {
     fn the_largest_table_fits_and_a_scene_has_its_own() {
         let mut material = Material::of(&SurfaceParams::PREMIUM);
         material.texture.seed = u32::MAX;
-        let table = MaterialTable::new(&[material; MaterialTable::MOST]).expect("fits");
+        let table = MaterialTable::new(&[material; MaterialTable::MAX]).expect("fits");
         let mut room = [0; MAX_TABLE_BYTES];
         let bytes = table_bytes(&table, &mut room).to_vec();
         assert!(bytes.len() > 600, "{}", bytes.len());

@@ -20,7 +20,7 @@ pub struct TileMessage<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Heights<'a> {
     /// No surface anywhere.
-    Hole,
+    NoData,
     /// All samples at `base + height` cells.
     Flat {
         /// Whole cells.

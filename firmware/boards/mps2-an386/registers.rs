@@ -44,7 +44,7 @@ impl Uart {
     pub(crate) const SENT: u32 = 1 << 0;
     pub(crate) const RECEIVED: u32 = 1 << 1;
     /// Max register reads for a byte; after that, no reader is assumed.
-    const PATIENCE: u32 = 1_000_000;
+    const TIMEOUT: u32 = 1_000_000;
 
     /// Enables the port; `control` selects its halves and interrupts.
     pub(crate) fn enable(&self, control: u32) {
@@ -55,7 +55,7 @@ impl Uart {
 
     /// Sends a byte without any interrupt, or drops it after a time-out.
     pub(crate) fn send(&self, byte: u8) {
-        for _ in 0..Self::PATIENCE {
+        for _ in 0..Self::TIMEOUT {
             if self.state.get() & Self::TX_FULL == 0 {
                 return self.data.set(u32::from(byte));
             }

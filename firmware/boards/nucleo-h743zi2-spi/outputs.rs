@@ -27,7 +27,7 @@ const SPI_HZ: u32 = 7_500_000;
 const FRAME: usize = 3;
 /// Max readings of the status until a frame is sent. Each takes at least four cycles of the bus'
 /// 114 MHz, so this is 35 µs, ten frames.
-const PATIENCE: u32 = 1_000;
+const TIMEOUT: u32 = 1_000;
 /// Core cycles in a microsecond.
 const CYCLES_PER_US: u32 = 456;
 /// Core cycles for which SYNC stays high at least: 250 ns, including the pin's rise time.
@@ -87,7 +87,7 @@ pub(crate) fn not_as_set() -> bool {
 ///
 /// embassy sets up the bus but does not send, because its waiting has no bound. Here a frame is
 /// sent by the procedure in the reference manual (RM0433, 50.4.9) for a known number of bytes, with
-/// at most [`PATIENCE`] readings of the status.
+/// at most [`TIMEOUT`] readings of the status.
 pub(crate) struct Bus {
     sync: Output<'static>,
     /// The cycle in which SYNC rose.
@@ -114,7 +114,7 @@ impl FrameBus for Bus {
         for byte in frame {
             REGISTERS.txdr8().write_value(byte);
         }
-        let sent = (0..PATIENCE).any(|_| REGISTERS.sr().read().eot());
+        let sent = (0..TIMEOUT).any(|_| REGISTERS.sr().read().eot());
         let back = frame.map(|_| REGISTERS.rxdr8().read());
         REGISTERS.ifcr().write(|w| {
             w.set_eotc(true);

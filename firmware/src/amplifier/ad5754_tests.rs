@@ -148,12 +148,12 @@ fn lost_range_or_overload_is_reported_within_seven_ticks() {
     ] {
         let (mut on, wires, pin) = on();
         lose(&mut wires.0.borrow_mut());
-        let told = (1..=7).find(|_| {
+        let reported = (1..=7).find(|_| {
             on.write([1.0, 2.0, 3.0]);
             !wires.0.borrow().as_set
         });
         let mut off = on.disable();
-        assert!(told.is_some());
+        assert!(reported.is_some());
         assert!(!pin.is_high());
         (0..20).for_each(|_| off.rest([0.0; 3]));
         assert!(wires.0.borrow().as_set, "set up anew");

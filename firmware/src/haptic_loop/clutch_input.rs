@@ -64,8 +64,9 @@ mod tests {
     fn counts(khz: u32, reads: impl Fn(u32) -> bool) -> std::vec::Vec<(u32, bool)> {
         let rate = TickRate::new(1_000 * khz).expect("a rate");
         let mut input = ClutchInput::new(rate);
-        let told = (1..=1_000).filter_map(|tick| input.tick(reads(tick)).map(|held| (tick, held)));
-        told.collect()
+        let reported =
+            (1..=1_000).filter_map(|tick| input.tick(reads(tick)).map(|held| (tick, held)));
+        reported.collect()
     }
 
     #[test]

@@ -96,7 +96,7 @@ mod tests {
     fn a_change_is_told_at_once_and_the_rest_now_and_then() {
         let mut reporter = Reporter::new(TickRate::DEFAULT);
         let mut report = Report::default();
-        let mut told = 0;
+        let mut reported = 0;
         for tick in 0..1000 {
             if tick == 250 {
                 report.mode = Mode::Requested;
@@ -104,9 +104,13 @@ mod tests {
             report.limits.toggle(Limits::FORCE_CLAMPED);
             if reporter.sends_report(&report, 0) {
                 reporter.sent_report(&report, 0);
-                told += 1;
+                reported += 1;
             }
         }
-        assert_eq!(told, 1 + 2 + 1 + 7, "at 0, 100, 200, 250, then 350 … 950");
+        assert_eq!(
+            reported,
+            1 + 2 + 1 + 7,
+            "at 0, 100, 200, 250, then 350 … 950"
+        );
     }
 }

@@ -50,7 +50,7 @@ pub(crate) struct DeviceState {
     /// The loop's latest report.
     pub(super) health: Health,
     /// The last report of the guard to the host.
-    told: Option<Report>,
+    reported: Option<Report>,
     /// True if the loop has received a command that may lead to driving, and has not reported since
     /// that it is disarmed.
     pub(super) may_drive: bool,
@@ -92,7 +92,7 @@ impl DeviceState {
             source: arm.source,
             full_scale_a: arm.full_scale_a,
             health: Health::default(),
-            told: None,
+            reported: None,
             may_drive: false,
             arming: None,
             mark: 0,
@@ -103,7 +103,7 @@ impl DeviceState {
 
     /// Begins a session: nothing is reported to its host yet.
     pub(super) fn session_opened(&mut self) {
-        self.told = None;
+        self.reported = None;
         self.arming = None;
         self.request = LatestRequest::default();
         self.forget_press();
@@ -290,7 +290,7 @@ impl DeviceState {
 
     fn guard_changed(&mut self) -> Option<Report> {
         let report = self.report();
-        (self.told.replace(report) != Some(report)).then_some(report)
+        (self.reported.replace(report) != Some(report)).then_some(report)
     }
 }
 

@@ -58,7 +58,7 @@ impl<const D: usize> Link<'_, D> {
             self.foreign_frames = self.foreign_frames.saturating_add(1);
             return;
         }
-        self.session.heard(self.ends.monitor.ticks());
+        self.session.received(self.ends.monitor.ticks());
         match (message, self.session.state()) {
             (ToDevice::Bye, state) => self.on_bye(state, room),
             (ToDevice::Detach, state) => self.on_detach(state, room),
@@ -111,7 +111,7 @@ impl<const D: usize> Link<'_, D> {
             Greeting::Again => {}
             Greeting::Opens => self.open(session, hello.number, room),
         }
-        self.session.heard(self.ends.monitor.ticks());
+        self.session.received(self.ends.monitor.ticks());
         let tick_hz = self.device.tick_hz();
         self.session.set_silence(hello.silence_s, tick_hz);
         let hello = self.device.hello(hello.number, self.scene, &self.session);

@@ -177,8 +177,9 @@ impl<'t, const D: usize> Link<'t, D> {
             };
             let (n, frame) = reader.push(rest);
             taken += n;
-            let heard = frame.map(|frame| frame.and_then(|content| self.on_content(content, room)));
-            if let Some(Err(bad)) = heard {
+            let received =
+                frame.map(|frame| frame.and_then(|content| self.on_content(content, room)));
+            if let Some(Err(bad)) = received {
                 self.on_bad_frame(bad);
             }
             self.reader = Some(reader);

@@ -91,8 +91,8 @@ impl<const D: usize> Link<'_, D> {
     /// Sends the close when nothing is driven and everything else was sent.
     fn say_goodbye(&mut self) {
         let leaves = self.session.is_leaving();
-        let said = self.samples.is_empty() && self.tx.wants_telemetry();
-        if leaves && said && !self.device.may_drive && self.tx.has_room() {
+        let stated = self.samples.is_empty() && self.tx.wants_telemetry();
+        if leaves && stated && !self.device.may_drive && self.tx.has_room() {
             self.say(&ToHost::Goodbye(self.sample_count()));
             self.session.answer_goodbye();
             log::ended();

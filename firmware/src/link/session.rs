@@ -67,9 +67,9 @@ pub(super) struct Session {
     /// Maximum silence of the host, ticks.
     silence_ticks: u32,
     /// The tick of the last frame of this session.
-    heard_at: u32,
+    received_at: u32,
     /// True if the host's silence was reported.
-    told_absent: bool,
+    reported_absent: bool,
     /// Samples put into telemetry.
     pub(super) packed: u32,
     /// The device's count of dropped samples when the session was opened.
@@ -93,8 +93,8 @@ impl Session {
             },
             over: HistoryBuf::new(),
             silence_ticks: 0,
-            heard_at: 0,
-            told_absent: false,
+            received_at: 0,
+            reported_absent: false,
             packed: 0,
             dropped_before: 0,
         }
@@ -198,9 +198,9 @@ impl Session {
     }
 
     /// Records a frame of this session in this tick.
-    pub(super) const fn heard(&mut self, tick: u32) {
-        self.heard_at = tick;
-        self.told_absent = false;
+    pub(super) const fn received(&mut self, tick: u32) {
+        self.received_at = tick;
+        self.reported_absent = false;
     }
 
     /// Sets the maximum silence of the host.
@@ -212,14 +212,14 @@ impl Session {
     /// Returns true if the host of the open session has been silent for [`ABSENT_MS`]; reported
     /// once until its next frame.
     pub(super) fn is_absent(&mut self, tick: u32, ticks_per_ms: u32) -> bool {
-        let silent = tick.wrapping_sub(self.heard_at);
+        let silent = tick.wrapping_sub(self.received_at);
         let is_absent = self.is_open() && silent >= ABSENT_MS.saturating_mul(ticks_per_ms);
-        is_absent && !core::mem::replace(&mut self.told_absent, true)
+        is_absent && !core::mem::replace(&mut self.reported_absent, true)
     }
 
     /// Returns true if the host of the session, open or detached, has been silent for too long.
     pub(super) fn is_forsaken(&self, tick: u32) -> bool {
         let has_begun = matches!(self.state, SessionState::Open | SessionState::Detached);
-        has_begun && tick.wrapping_sub(self.heard_at) >= self.silence_ticks
+        has_begun && tick.wrapping_sub(self.received_at) >= self.silence_ticks
     }
 }

@@ -95,7 +95,7 @@ pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), TileE
     let key = message.key;
     let mut flat = |base, height| tile.fill(key, base, |_, _| height);
     match message.heights {
-        Heights::Hole => flat(0, f32::NAN),
+        Heights::NoData => flat(0, f32::NAN),
         Heights::Flat { base, height } => flat(base, height),
         Heights::Samples { base, bytes } => tile.load(key, base, bytes),
         Heights::Packed { base, bytes } => tile.unpack(key, base, bytes),

@@ -66,23 +66,26 @@ fn notes_that_contradict_the_file_are_reported() {
     let placed = "<PAMDataset><GeoTransform>0, 2, 0, 9, 0, -2</GeoTransform></PAMDataset>";
     let raster = noted(placed, &OpenOptions::default());
     assert_eq!(raster.bounds().expect("placed").west, 0.0);
-    let said = raster.remarks().join(" ");
-    assert!(said.contains("x.asc.aux.xml beside it differ"), "{said}");
+    let stated = raster.remarks().join(" ");
+    assert!(
+        stated.contains("x.asc.aux.xml beside it differ"),
+        "{stated}"
+    );
     let raster = noted(
         &in_band("<NoDataValue>2</NoDataValue>"),
         &OpenOptions::default(),
     );
-    let said = raster.remarks().join(" ");
+    let stated = raster.remarks().join(" ");
     assert!(
-        said.contains("the file says -9999") && raster.summary().holes == 1,
-        "{said}"
+        stated.contains("the file says -9999") && raster.summary().holes == 1,
+        "{stated}"
     );
 }
 
 #[test]
 fn notes_that_cannot_be_read_are_named() {
     for notes in ["<PAMDataset>", "no XML", &"<a>".repeat(400_000)] {
-        let said = noted(notes, &OpenOptions::default()).remarks().join(" ");
-        assert!(said.contains("x.asc.aux.xml beside it"), "{said}");
+        let stated = noted(notes, &OpenOptions::default()).remarks().join(" ");
+        assert!(stated.contains("x.asc.aux.xml beside it"), "{stated}");
     }
 }

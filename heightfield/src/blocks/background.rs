@@ -8,7 +8,7 @@ use super::cache::Key;
 
 /// Max queued jobs: more than the blocks under a coarse tile (33 × 33). The oldest job is dropped,
 /// and is requested again if it is still needed.
-const MOST: usize = 2048;
+const MAX: usize = 2048;
 
 /// A job for a background thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -45,7 +45,7 @@ impl Queue {
     /// Adds a job at the front of the queue. Returns true if it is new.
     pub(super) fn want_first(&self, job: Job) -> bool {
         let mut state = self.state();
-        let is_new = !state.is_over && state.waiting.len() < MOST && state.known.insert(job);
+        let is_new = !state.is_over && state.waiting.len() < MAX && state.known.insert(job);
         if is_new {
             state.waiting.push_front(job);
             drop(state);
@@ -60,7 +60,7 @@ impl Queue {
         if state.is_over || !state.known.insert(job) {
             return false;
         }
-        if state.waiting.len() >= MOST
+        if state.waiting.len() >= MAX
             && let Some(left_out) = state.waiting.pop_front()
         {
             state.known.remove(&left_out);
@@ -139,7 +139,7 @@ mod tests {
         assert!(!queue.is_idle());
         queue.done(&first);
         assert!(queue.is_idle());
-        for number in 0..=MOST as u32 {
+        for number in 0..=MAX as u32 {
             queue.want(Job::Pass([number, 0]));
         }
         assert_eq!(queue.next(), Some(Job::Pass([1, 0])));

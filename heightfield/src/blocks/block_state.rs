@@ -26,9 +26,9 @@ pub(super) struct BlockState {
 
 impl BlockState {
     /// Returns an empty state with a max size of the cache, bytes.
-    pub(super) fn new(most_bytes: usize) -> Self {
+    pub(super) fn new(max_bytes: usize) -> Self {
         Self {
-            cache: Cache::new(most_bytes),
+            cache: Cache::new(max_bytes),
             unread: 0,
             awaited: HashMap::new(),
             outage: None,

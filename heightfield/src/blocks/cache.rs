@@ -25,16 +25,16 @@ pub(super) struct Cache {
     /// `None` if the file has no samples there.
     blocks: LruCache<Key, Option<Arc<Block>>>,
     bytes: usize,
-    most_bytes: usize,
+    max_bytes: usize,
 }
 
 impl Cache {
     /// Returns an empty cache with a max size, bytes.
-    pub(super) fn new(most_bytes: usize) -> Self {
+    pub(super) fn new(max_bytes: usize) -> Self {
         Self {
             blocks: LruCache::unbounded(),
             bytes: 0,
-            most_bytes,
+            max_bytes,
         }
     }
 
@@ -59,7 +59,7 @@ impl Cache {
         if let Some((_, replaced)) = self.blocks.push(key, block) {
             self.bytes -= bytes(replaced.as_deref());
         }
-        while self.bytes > self.most_bytes && self.blocks.len() > 1 {
+        while self.bytes > self.max_bytes && self.blocks.len() > 1 {
             let Some((_, gone)) = self.blocks.pop_lru() else {
                 return;
             };

@@ -223,8 +223,8 @@ impl Shared {
 
     /// Sets the max size of the cache, and the number of unreadable blocks that were reported
     /// before.
-    pub(super) fn set_share(&self, most_bytes: usize, unread: u32) {
-        *self.kept() = BlockState::new(most_bytes).after(unread);
+    pub(super) fn set_share(&self, max_bytes: usize, unread: u32) {
+        *self.kept() = BlockState::new(max_bytes).after(unread);
     }
 
     /// Returns the memory of the cached blocks, bytes, and the number of unreadable blocks.
@@ -271,7 +271,7 @@ impl Shared {
 
     /// Returns the max memory, bytes: the cached blocks, the one in use, the one read in the
     /// background, and the reader's own memory.
-    pub(super) fn most_bytes(&self) -> usize {
+    pub(super) fn max_bytes(&self) -> usize {
         let samples = |image: &BlockImage| image.block.map(u64::from).iter().product::<u64>();
         let largest = self.reader.images().iter().map(samples).max();
         let block = largest.unwrap_or(0) * self.sample_type().bytes();

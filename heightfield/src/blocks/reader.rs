@@ -1,7 +1,7 @@
 //! Interface of a format that can read a part of an image without the rest.
 
 use super::super::RasterError;
-use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
+use super::super::samples::{NoDataMask, SampleType, SampleValue, Samples, with_samples};
 use super::survey::Looks;
 
 /// Side of a usual block: smaller blocks of a file are read several at once.
@@ -96,7 +96,7 @@ pub(crate) struct Block {
     /// Row after row.
     pub(crate) samples: Samples,
     /// No-data that no value marks.
-    pub(crate) holes: Option<HoleMask>,
+    pub(crate) holes: Option<NoDataMask>,
     /// True if some samples are no-data only because a part of the file could not be read.
     pub(crate) is_lacking: bool,
 }

@@ -123,7 +123,7 @@ fn a_touched_place_reads_its_block_once_and_nothing_else() {
 fn missing_or_damaged_blocks_are_holes_and_the_rest_is_read() {
     let (field, _) = Field::new();
     let raster = raster(field, true, false);
-    for (column, row, is_hole) in [
+    for (column, row, is_no_data) in [
         (64, 0, true),
         (127, 47, true),
         (0, 48, true),
@@ -136,7 +136,7 @@ fn missing_or_damaged_blocks_are_holes_and_the_rest_is_read() {
     ] {
         assert_eq!(
             raster.height(column, row).is_nan(),
-            is_hole,
+            is_no_data,
             "{column} {row}"
         );
     }

@@ -50,7 +50,7 @@ pub struct DiskCache(Option<Arc<Folder>>);
 struct Folder {
     /// Folder of the records, inside the user's folder.
     path: PathBuf,
-    most_bytes: u64,
+    max_bytes: u64,
     /// Size reserved for unnamed files, bytes.
     unnamed: AtomicU64,
     /// Size of its content; `None` after a failed write.
@@ -69,18 +69,18 @@ impl DiskCache {
         Self(None)
     }
 
-    /// Returns a cache of at most `most_bytes` in a folder, which is created if needed; other
+    /// Returns a cache of at most `max_bytes` in a folder, which is created if needed; other
     /// contents of the folder are not touched. With zero bytes, nothing is stored.
     #[must_use]
-    pub fn at(folder: &Path, most_bytes: u64) -> Self {
-        if most_bytes == 0 {
+    pub fn at(folder: &Path, max_bytes: u64) -> Self {
+        if max_bytes == 0 {
             return Self::off();
         }
         let path = folder.join(FORM);
-        let room = Mutex::new(Some(SizeLimit::new(most_bytes)));
+        let room = Mutex::new(Some(SizeLimit::new(max_bytes)));
         Self(Some(Arc::new(Folder {
             path,
-            most_bytes,
+            max_bytes,
             unnamed: AtomicU64::new(0),
             room,
             warned: OnceLock::new(),

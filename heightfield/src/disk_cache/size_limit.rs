@@ -13,7 +13,7 @@ const LEFT_BEHIND: Duration = Duration::from_secs(3600);
 
 /// Tracks the size of a folder.
 pub(super) struct SizeLimit {
-    most_bytes: u64,
+    max_bytes: u64,
     /// Size of all records at the last scan plus the writes since; `None` before the first scan.
     used: Option<u64>,
     written: u64,
@@ -26,9 +26,9 @@ struct Record {
 }
 
 impl SizeLimit {
-    pub(super) const fn new(most_bytes: u64) -> Self {
+    pub(super) const fn new(max_bytes: u64) -> Self {
         Self {
-            most_bytes,
+            max_bytes,
             used: None,
             written: 0,
         }
@@ -48,7 +48,7 @@ impl SizeLimit {
         self.written += bytes;
         let used = self.used.get_or_insert(0);
         *used += bytes;
-        if *used > self.most_bytes || self.written > self.most_bytes / 8 {
+        if *used > self.max_bytes || self.written > self.max_bytes / 8 {
             self.make(folder);
         }
     }
@@ -58,10 +58,10 @@ impl SizeLimit {
     fn make(&mut self, folder: &Path) {
         let mut records = records(folder);
         let mut used: u64 = records.iter().map(|record| record.bytes).sum();
-        if used > self.most_bytes {
+        if used > self.max_bytes {
             records.sort_by_key(|record| record.used);
             for record in &records {
-                if used <= self.most_bytes - self.most_bytes / 8 {
+                if used <= self.max_bytes - self.max_bytes / 8 {
                     break;
                 }
                 // If this fails, another program has already deleted it.

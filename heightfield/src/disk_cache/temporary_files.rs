@@ -58,8 +58,8 @@ impl DiskCache {
     }
 
     /// Returns the max size of all records, bytes; zero if the cache is off.
-    pub(crate) fn most_bytes(&self) -> u64 {
-        self.0.as_ref().map_or(0, |folder| folder.most_bytes)
+    pub(crate) fn max_bytes(&self) -> u64 {
+        self.0.as_ref().map_or(0, |folder| folder.max_bytes)
     }
 }
 

@@ -17,9 +17,9 @@ fn bytes(number: usize) -> Vec<u8> {
         .collect()
 }
 
-fn cache(most_bytes: u64) -> (tempfile::TempDir, DiskCache) {
+fn cache(max_bytes: u64) -> (tempfile::TempDir, DiskCache) {
     let folder = tempfile::tempdir().expect("a folder");
-    let cache = DiskCache::at(folder.path(), most_bytes);
+    let cache = DiskCache::at(folder.path(), max_bytes);
     (folder, cache)
 }
 
@@ -86,8 +86,8 @@ fn a_record_that_is_not_whole_or_another_is_as_if_absent() {
 
 #[test]
 fn the_records_used_longest_ago_go_first_and_nothing_else() {
-    const MOST: u64 = 400 << 10;
-    let (folder, cache) = cache(MOST);
+    const MAX: u64 = 400 << 10;
+    let (folder, cache) = cache(MAX);
     let foreign = folder.path().join(FORM).join("ab").join("mine.txt");
     fs::create_dir_all(foreign.parent().expect("it has one")).expect("made");
     fs::write(&foreign, [1; 100]).expect("written");
@@ -100,7 +100,7 @@ fn the_records_used_longest_ago_go_first_and_nothing_else() {
         set_age(&path(&folder, number), age);
         // This record is used again and again.
         assert_eq!(cache.get(&name(0)), Some(bytes(0)), "{number}");
-        assert!(used(folder.path()) <= MOST + 200, "{}", used(folder.path()));
+        assert!(used(folder.path()) <= MAX + 200, "{}", used(folder.path()));
     }
     assert!(cache.get(&name(299)).is_some() && cache.get(&name(280)).is_some());
     assert!((1..200).all(|number| cache.get(&name(number)).is_none()));
@@ -109,13 +109,13 @@ fn the_records_used_longest_ago_go_first_and_nothing_else() {
 
 #[test]
 fn what_other_programs_write_counts_too() {
-    const MOST: u64 = 1 << 20;
-    let (folder, one) = cache(MOST);
-    let other = DiskCache::at(folder.path(), MOST);
+    const MAX: u64 = 1 << 20;
+    let (folder, one) = cache(MAX);
+    let other = DiskCache::at(folder.path(), MAX);
     for number in 0..600 {
         let cache = if number % 2 == 0 { &one } else { &other };
         cache.put(&name(number), &bytes(number));
-        assert!(used(folder.path()) <= MOST + MOST / 4, "{number}");
+        assert!(used(folder.path()) <= MAX + MAX / 4, "{number}");
     }
 }
 

@@ -8,7 +8,7 @@ use super::super::{Bounds, RasterError};
 /// Max offset of a file's samples from the first file's grid, cells.
 const TOLERANCE: f64 = 0.05;
 /// Max size of a grid, samples per direction.
-const LARGEST: f64 = 2_147_483_647.0;
+const MAX: f64 = 2_147_483_647.0;
 
 /// The grid of the first file.
 pub(super) struct Grid {
@@ -72,7 +72,7 @@ impl Grid {
             }
             let cells = (corner[axis] - self.corner[axis]) / self.step[axis];
             let beside = (cells - cells.round()).abs();
-            if cells.is_nan() || cells.abs() >= LARGEST {
+            if cells.is_nan() || cells.abs() >= MAX {
                 return Err(differs("it is too far away for one grid".into()));
             }
             if beside > TOLERANCE {
@@ -129,7 +129,7 @@ impl Grid {
         let is_angle = self.first.cell?.unit == CellUnit::Degree;
         let degrees = self.first.place?.degrees;
         let columns = 360.0 / degrees / self.step[0];
-        let whole = (columns - columns.round()).abs() <= TOLERANCE && columns < LARGEST;
+        let whole = (columns - columns.round()).abs() <= TOLERANCE && columns < MAX;
         (is_angle && whole).then_some(columns.round() as i64)
     }
 

@@ -49,7 +49,7 @@ impl Pool {
     }
 
     /// Returns the max memory of all open files, bytes, with a newly decoded one.
-    pub(super) const fn most_bytes() -> usize {
+    pub(super) const fn max_bytes() -> usize {
         MAX_BYTES + MAX_WHOLE_BYTES as usize
     }
 

@@ -268,7 +268,7 @@ impl BlockReader for Mosaic {
             true => RemoteFile::kept_bytes(),
             false => 0,
         };
-        pages + Pool::most_bytes() + names.sum::<usize>() + self.sources.len() * size_of::<Source>()
+        pages + Pool::max_bytes() + names.sum::<usize>() + self.sources.len() * size_of::<Source>()
     }
 }
 

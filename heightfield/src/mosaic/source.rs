@@ -135,8 +135,10 @@ impl Opened {
                 image => {
                     let place = [f64::from(column), f64::from(row)];
                     let known = |stored: Option<f64>| {
-                        let is_hole = |value: &f64| self.decoded.no_data == Some(*value);
-                        stored.filter(|value| !is_hole(value)).unwrap_or(f64::NAN)
+                        let is_no_data = |value: &f64| self.decoded.no_data == Some(*value);
+                        stored
+                            .filter(|value| !is_no_data(value))
+                            .unwrap_or(f64::NAN)
                     };
                     let (value, status) = blocks.between(image, place, |at| {
                         blocks.height(image, at, Wait::UntilRead, known)

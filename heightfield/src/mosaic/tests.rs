@@ -151,7 +151,7 @@ fn the_memory_of_many_files_is_bounded() {
     tiles(folder.path(), 3);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
     assert!(raster.samples().is_none());
-    assert!(raster.memory_bytes() > Pool::most_bytes());
+    assert!(raster.memory_bytes() > Pool::max_bytes());
     assert!(
         raster.memory_bytes() <= 256 << 20,
         "{}",
@@ -205,10 +205,10 @@ fn layers_beside_heights_are_left_out_and_named() {
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
     let summary = raster.summary();
     assert_eq!((summary.lowest, summary.highest), (500.0, 500.0));
-    let said = raster.remarks().join(" ");
+    let stated = raster.remarks().join(" ");
     assert!(
-        said.contains("n38_num.asc") && said.contains("n38_aux.asc"),
-        "{said}"
+        stated.contains("n38_num.asc") && stated.contains("n38_aux.asc"),
+        "{stated}"
     );
 }
 
@@ -236,10 +236,10 @@ fn tiles_that_differ_where_they_overlap_are_reported() {
     flat(folder.path(), "a.asc", 0, 500);
     flat(folder.path(), "b.asc", 3, 510);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
-    let said = raster.remarks().join(" ");
+    let stated = raster.remarks().join(" ");
     assert!(
-        said.contains("a.asc and b.asc overlap") && said.contains("up to 10"),
-        "{said}"
+        stated.contains("a.asc and b.asc overlap") && stated.contains("up to 10"),
+        "{stated}"
     );
     assert_eq!(raster.height(3, 0), 510.0);
 }

@@ -49,7 +49,7 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
     let wrong = |why: String| Error::new(ErrorKind::InvalidInput, why);
     let text = match error {
         StoreError::Generic { store, .. } if *store != "HTTP" => error.to_string(),
-        _ => return told(error),
+        _ => return reported(error),
     };
     if KEYS_OF_COMPUTERS.iter().any(|part| text.contains(part)) {
         return wrong("the environment holds no key, and this computer has none of its own".into());
@@ -69,11 +69,11 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
     if text.contains("incorrectly configured region") {
         return wrong("the bucket is in another region".into());
     }
-    told(error)
+    reported(error)
 }
 
 /// Returns the error for a server's response.
-pub(super) fn told(error: &StoreError) -> Error {
+pub(super) fn reported(error: &StoreError) -> Error {
     if let Some(why) = redirect_error(error) {
         return Error::new(ErrorKind::Unsupported, why.to_string());
     }
@@ -187,14 +187,14 @@ mod tests {
 
     #[test]
     fn what_a_server_says_is_short_on_one_line_and_holds_no_key() {
-        let said =
+        let stated =
             "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
-        let told = in_short(&said);
+        let reported = in_short(&stated);
         assert!(
-            told.starts_with("GET https://h/a.tif 500 \\u{1b}[2J x"),
-            "{told}"
+            reported.starts_with("GET https://h/a.tif 500 \\u{1b}[2J x"),
+            "{reported}"
         );
-        assert!(told.len() <= SHOWN);
+        assert!(reported.len() <= SHOWN);
         let page = "Server returned status code: 400 Bad Request: <html>?sig=secret";
         assert_eq!(
             in_short(page),
@@ -225,22 +225,22 @@ mod tests {
             assert_eq!(error.kind(), ErrorKind::InvalidInput);
             assert!(error.to_string().contains(why), "{error}");
             // For an open file, a retry may succeed.
-            assert_eq!(told(&generic(text)).kind(), OUTAGE);
+            assert_eq!(reported(&generic(text)).kind(), OUTAGE);
         }
     }
 
     #[test]
     fn the_word_of_a_server_is_told_where_it_is_one() {
-        let said = |body: &str| {
+        let stated = |body: &str| {
             let text = format!("Server returned non-2xx status code: 400 Bad Request: {body}");
-            told(&generic(&text)).to_string()
+            reported(&generic(&text)).to_string()
         };
-        let expired = said("<Error><Code>ExpiredToken</Code></Error>");
+        let expired = stated("<Error><Code>ExpiredToken</Code></Error>");
         assert!(
             expired.ends_with("the server says ExpiredToken"),
             "{expired}"
         );
-        let page = said("<Code>see https://h?sig=secret</Code>");
+        let page = stated("<Code>see https://h?sig=secret</Code>");
         assert!(page.ends_with("400 Bad Request"), "{page}");
     }
 }

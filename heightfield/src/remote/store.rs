@@ -8,7 +8,7 @@ use futures_util::StreamExt;
 use object_store::path::Path;
 use object_store::{GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore};
 
-use super::errors::{at_opening, is_without_ranges, told};
+use super::errors::{at_opening, is_without_ranges, reported};
 use super::servers::at;
 use super::{LOST, OUTAGE, pages};
 
@@ -61,11 +61,11 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
 
 /// Reads a whole file into memory, from a server without ranges.
 async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Opened> {
-    const LARGEST: u64 = 256 << 20;
+    const MAX: u64 = 256 << 20;
     let got = store.get_opts(&path, GetOptions::default()).await;
-    let got = got.map_err(|error| told(&error))?;
+    let got = got.map_err(|error| reported(&error))?;
     let was = got.meta.clone();
-    if was.size > LARGEST {
+    if was.size > MAX {
         let why = format!(
             "the server hands out no parts of files, and this one has {} MB",
             was.size >> 20
@@ -110,7 +110,7 @@ impl Object {
             ..GetOptions::default()
         };
         let got = self.store.get_opts(&self.path, options).await;
-        let got = got.map_err(|error| told(&error))?;
+        let got = got.map_err(|error| reported(&error))?;
         let is = &got.meta;
         let same = is.size == self.was.size
             && is.e_tag == self.was.e_tag
@@ -129,7 +129,7 @@ async fn body(got: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut parts = got.into_stream();
     while let Some(part) = parts.next().await {
-        bytes.extend_from_slice(&part.map_err(|error| told(&error))?);
+        bytes.extend_from_slice(&part.map_err(|error| reported(&error))?);
         if bytes.len() as u64 > wanted {
             let why = format!("more than {wanted} bytes came");
             return Err(Error::new(OUTAGE, why));

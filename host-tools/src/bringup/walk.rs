@@ -57,9 +57,9 @@ pub fn walk(
         attendant.hear(&format!("step {number} of {of}: {title}"));
         let result = steps::go(step, &mut board, attendant);
         match &result {
-            Ok(told) => {
-                attendant.hear(&format!("passed: {told}"));
-                log.take(step, true, told.clone());
+            Ok(reported) => {
+                attendant.hear(&format!("passed: {reported}"));
+                log.take(step, true, reported.clone());
             }
             Err(Halt::Found(finding)) => log.take(step, false, finding.to_string()),
             Err(_) => {}

@@ -177,17 +177,17 @@ impl<E: std::error::Error + 'static> Walk<'_, E> {
 
     /// Returns the counts once the arm is at rest.
     fn still_counts(&mut self) -> Result<[i32; 3], WalkError<E>> {
-        let mut told = false;
+        let mut reported = false;
         loop {
             let once = (self.counts)().map_err(WalkError::Counts)?;
             let again = (self.counts)().map_err(WalkError::Counts)?;
             if (0..3).all(|i| once[i].abs_diff(again[i]) <= STILL_COUNTS) {
                 return Ok(again);
             }
-            if !told {
+            if !reported {
                 self.attendant.hear("the arm moves: hold it still");
             }
-            told = true;
+            reported = true;
         }
     }
 }

@@ -19,7 +19,7 @@ use super::settings::SettingsOption;
 use super::terminal::waiting::shown_planning;
 use super::terminal::{interrupt, partial_files, progress, writer};
 use super::viewing::{Shown, ToBeShown, Viewing};
-use crate::events::{Event as Told, Watcher};
+use crate::events::{Event as Reported, Watcher};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Session, Timeouts, Transport, move_arm_while,
 };
@@ -186,7 +186,7 @@ fn show(
         "terrain        {name}: {}",
         session_summary::in_words(terrain)
     );
-    print!("{}", placing::told(view, terrain));
+    print!("{}", placing::reported(view, terrain));
     if let Some(line) = session_summary::materials(terrain) {
         println!("{line}");
     }
@@ -321,7 +321,7 @@ fn tour_emulated<'t>(
             Err(_) if interrupt::requested() => Err("interrupted").or_hint("nothing was written"),
             // If the link broke because the board ended, the board's failure is reported.
             Err(error) => match emulator.failure() {
-                Some(said) => Err(format!("the emulated board failed: {said}")).or_hint(report),
+                Some(stated) => Err(format!("the emulated board failed: {stated}")).or_hint(report),
                 None => Err(error.into()),
             },
         }
@@ -343,12 +343,12 @@ impl<'t> Tour<'_, 't> {
     fn go(
         self,
         transport: Box<dyn Transport + 't>,
-        patience: Timeouts,
+        timeouts: Timeouts,
     ) -> Result<(Toured<'t>, Option<Shown<'t>>), LinkError> {
         let (terrain, scene) = (self.placed.terrain(), self.placed.scene());
         let (control, mut events) = (self.control, self.events);
         let arming = Some(Arming::VIRTUAL);
-        let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
+        let (mut session, device) = Session::open(terrain, scene, arming, transport, timeouts)?;
         let line = format!("device         {}\n", session_summary::device(&device));
         writer::put(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
@@ -383,7 +383,7 @@ impl<'t> Tour<'_, 't> {
             let say = |line: String| progress.suspend(|| tell(line));
             let refuse = |text: String| {
                 if let Some(events) = &events {
-                    events.say(&Told::Refused { text: &text });
+                    events.say(&Reported::Refused { text: &text });
                 }
                 say(text);
             };
@@ -406,7 +406,7 @@ impl<'t> Tour<'_, 't> {
             }
             progress.set_position(log.ticks());
             if let Some(shown) = &mut shown {
-                shown.look(session.tally());
+                shown.look(session.stats());
             }
         }
         progress.finish_and_clear();
@@ -417,14 +417,14 @@ impl<'t> Tour<'_, 't> {
         let left = session.say_goodbye(&mut |_| {});
         if let Some(events) = &events {
             let disarmed = left.is_ok();
-            events.say(&Told::End { disarmed });
+            events.say(&Reported::End { disarmed });
         }
         toured.and(left)?;
         let summary = SessionSummary {
             ticks,
             device,
             figures,
-            tally: session.tally().clone(),
+            stats: session.stats().clone(),
         };
         let toured = Toured {
             rows,

@@ -2,7 +2,7 @@
 
 use hapterra_core::phantom::{Calibration, Model};
 
-use super::bringup::PATIENCE;
+use super::bringup::TIMEOUT;
 use super::failure::{Failure, OrHint};
 use crate::calibrate::file;
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
@@ -17,7 +17,7 @@ pub(super) fn calibration_of(
     tell: &dyn Fn(String),
 ) -> Result<Calibration, Failure> {
     let transport = address.connect(|| Native::new(HostClock::default(), None))?;
-    let mut control = ControlSession::look(transport, PATIENCE)?;
+    let mut control = ControlSession::look(transport, TIMEOUT)?;
     let calibration = match control.calibration()? {
         Some(calibration) => calibration,
         None => {

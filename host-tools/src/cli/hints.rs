@@ -88,7 +88,7 @@ impl Hint for PlaceError {
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
                 "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as no data: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
             }
-            Self::Outside { .. } | Self::Hole { .. } => {
+            Self::Outside { .. } | Self::NoData { .. } => {
                 "choose a place inside: longitude (or x) comes first"
             }
             Self::Unread { .. } => "try again when the file can be read",

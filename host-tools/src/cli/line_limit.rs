@@ -30,12 +30,12 @@ impl LineLimit {
         let open = self
             .window
             .filter(|(began, _)| now.saturating_duration_since(*began) < WINDOW);
-        let (began, said) = open.unwrap_or((now, 0));
-        if said >= self.most {
+        let (began, stated) = open.unwrap_or((now, 0));
+        if stated >= self.most {
             self.left_out += 1;
             return None;
         }
-        self.window = Some((began, said + 1));
+        self.window = Some((began, stated + 1));
         Some(std::mem::take(&mut self.left_out))
     }
 
@@ -63,7 +63,7 @@ mod tests {
         assert_eq!(one.admit(at(1001)), None);
         assert_eq!(one.admit(at(2500)), Some(1));
         let mut three = LineLimit::new(3);
-        let said = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
-        assert_eq!((said, three.left_out()), (3, 7));
+        let stated = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
+        assert_eq!((stated, three.left_out()), (3, 7));
     }
 }

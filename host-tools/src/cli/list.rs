@@ -20,7 +20,7 @@ pub struct Args {
 /// Default address of an emulated board's link.
 const USUAL_ADDRESS: &str = "localhost:4000";
 /// Time limit for a board's introduction.
-const PATIENCE: Duration = Duration::from_millis(1500);
+const TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// Lists the devices; if there are none, what was searched for and what to check.
 ///
@@ -54,7 +54,10 @@ fn list_usb() {
     for info in found {
         let place = printable(&Usb::place(&info));
         let known = Usb::open(&info).and_then(|link| who(Box::new(link)));
-        println!("  {place}: {}", known.unwrap_or_else(|error| told(&error)));
+        println!(
+            "  {place}: {}",
+            known.unwrap_or_else(|error| reported(&error))
+        );
     }
     for loader in plugged().iter().filter(|device| device.is_loader) {
         let serial = loader.serial.as_deref().unwrap_or("(no serial number)");
@@ -100,17 +103,17 @@ fn list_emulated(args: &Args) {
                     "  name another place with --tcp HOST:PORT; `hapterra demo` starts a board of its own"
                 );
             }
-            Err(error) => println!("  tcp:{address}: {}", told(&error)),
+            Err(error) => println!("  tcp:{address}: {}", reported(&error)),
         }
     }
 }
 
 /// Returns a description of the device behind a link.
 fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
-    let control = ControlSession::look(link, PATIENCE)?;
+    let control = ControlSession::look(link, TIMEOUT)?;
     Ok(session_summary::device(control.device()))
 }
 
-fn told(error: &LinkError) -> String {
+fn reported(error: &LinkError) -> String {
     format!("{error}; {}", error.hint())
 }

@@ -199,15 +199,15 @@ mod tests {
                 tracing::warn!(target: "hapterra::link::client", tile, "no such tile");
             }
         });
-        let said = text.lines().filter(|line| line.contains("no such tile"));
+        let stated = text.lines().filter(|line| line.contains("no such tile"));
         // One line for each second of the test, and the final number.
-        let (said, lines) = (said.count(), text.lines().count());
-        assert!((1..60).contains(&said) && lines == said + 1, "{text}");
+        let (stated, lines) = (stated.count(), text.lines().count());
+        assert!((1..60).contains(&stated) && lines == stated + 1, "{text}");
         let left_out = text.lines().filter_map(|line| {
             let (_, rest) = line.split_once('(')?;
             rest.split(' ').next()?.parse::<usize>().ok()
         });
-        assert_eq!(said + left_out.sum::<usize>(), 100_000, "{text}");
+        assert_eq!(stated + left_out.sum::<usize>(), 100_000, "{text}");
     }
 
     #[test]

@@ -21,13 +21,13 @@ pub(super) struct SessionSummary {
     pub(super) ticks: u64,
     pub(super) device: DeviceHello,
     pub(super) figures: Figures,
-    pub(super) tally: LinkStats,
+    pub(super) stats: LinkStats,
 }
 
 impl SessionSummary {
     /// Returns the table, one figure a line.
     pub(super) fn text(&self) -> String {
-        let (figures, tally, ticks) = (&self.figures, &self.tally, self.ticks);
+        let (figures, stats, ticks) = (&self.figures, &self.stats, self.ticks);
         let (force, depth, off) = (
             figures.force_n,
             figures.penetration_mm,
@@ -44,12 +44,12 @@ impl SessionSummary {
              proxy height   mean error {:.3e} mm, max {:.3e} mm against the bilinear surface in f64\n\
              tick cost      mean {mean_cost:.0}, worst {worst_cost:.0} {unit}\n",
             figures.late,
-            tally.tiles,
-            tally.tile_bytes,
-            tally.again,
-            tally.samples,
-            tally.lost,
-            tally.dropped,
+            stats.tiles,
+            stats.tile_bytes,
+            stats.again,
+            stats.samples,
+            stats.lost,
+            stats.dropped,
             force.count(),
             figures.samples,
             force.mean(),
@@ -59,20 +59,20 @@ impl SessionSummary {
             off.mean(),
             off.max(),
         );
-        let (bad, sessions) = (tally.bad_frames, tally.sessions);
+        let (bad, sessions) = (stats.bad_frames, stats.sessions);
         if bad > 0 || sessions > 1 {
             text += &format!("link           {bad} frames not understood, {sessions} sessions\n");
         }
-        let told = [
+        let reported = [
             (
-                tally.uncertain,
+                stats.uncertain,
                 "sessions whose end is not known: more may be lost",
             ),
-            (tally.foreign_frames, "frames of other sessions, not heeded"),
-            (tally.no_tiles, "requests for tiles that there are not"),
-            (tally.unanswered, "requests and questions without an answer"),
+            (stats.foreign_frames, "frames of other sessions, not heeded"),
+            (stats.no_tiles, "requests for tiles that there are not"),
+            (stats.unanswered, "requests and questions without an answer"),
         ];
-        for (count, what) in told.iter().filter(|(count, _)| *count > 0) {
+        for (count, what) in reported.iter().filter(|(count, _)| *count > 0) {
             text += &format!("link           {count} {what}\n");
         }
         text
@@ -99,7 +99,7 @@ impl SessionSummary {
         let facts = [
             ("mean force", format!("{force:.2} N")),
             ("ticks late", self.figures.late.to_string()),
-            ("tiles fetched", self.tally.tiles.to_string()),
+            ("tiles fetched", self.stats.tiles.to_string()),
             ("tick cost", format!("{mean_cost:.0} {unit}")),
         ];
         facts.map(|(name, value)| (name.to_owned(), value)).to_vec()
@@ -206,7 +206,7 @@ fn kind_of_device(hello: &DeviceHello) -> String {
 pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
     let grid = terrain.grid();
     let materials = grid.materials()?;
-    Some(format!("materials      {}", materials.told(grid)))
+    Some(format!("materials      {}", materials.reported(grid)))
 }
 
 #[cfg(test)]

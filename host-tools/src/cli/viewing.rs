@@ -148,8 +148,8 @@ impl<'t> Shown<'t> {
     }
 
     /// As [`ViewFeed::look`].
-    pub(in crate::cli) fn look(&mut self, tally: &LinkStats) {
-        self.feed.look(tally);
+    pub(in crate::cli) fn look(&mut self, stats: &LinkStats) {
+        self.feed.look(stats);
     }
 
     /// As [`end`].

@@ -122,16 +122,16 @@ struct Reader {
 impl Reader {
     /// Adds a line if there is room, after the number of lines dropped before it.
     fn take(&mut self, line: &[u8]) {
-        let said = match self.dropped {
+        let stated = match self.dropped {
             0 => String::new(),
             lines => of_reader(&Event::Dropped { lines }),
         };
-        if self.waiting.len() + said.len() + line.len() > FOR_A_READER {
+        if self.waiting.len() + stated.len() + line.len() > FOR_A_READER {
             self.dropped += 1;
             return;
         }
         self.dropped = 0;
-        self.waiting.extend(said.bytes());
+        self.waiting.extend(stated.bytes());
         self.waiting.extend(line);
     }
 
@@ -294,8 +294,8 @@ mod tests {
                 wait_until("the other reader", || seen.load(Ordering::Acquire) == n);
             }
         }
-        let said = Arc::new(AtomicU64::new(0));
-        let says = Arc::clone(&said);
+        let stated = Arc::new(AtomicU64::new(0));
+        let says = Arc::clone(&stated);
         read(stuck, move |line| {
             let rest = line.strip_prefix("{\"event\":\"dropped\",\"lines\":");
             let lines = rest.and_then(|rest| rest.strip_suffix('}')?.parse().ok());
@@ -303,10 +303,10 @@ mod tests {
         });
         wait_until("what it missed is said", || {
             sender.offer("{}\n".to_owned());
-            said.load(Ordering::Acquire) > 0
+            stated.load(Ordering::Acquire) > 0
         });
         drop(sender);
-        assert!(server.end() >= said.load(Ordering::Acquire));
+        assert!(server.end() >= stated.load(Ordering::Acquire));
     }
 
     #[test]

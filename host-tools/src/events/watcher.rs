@@ -20,7 +20,7 @@ const SPEED_WITHIN_S: f64 = 0.005;
 
 /// Last reported state.
 #[derive(Debug, Default)]
-struct Told {
+struct Reported {
     view: Option<usize>,
     contact: Option<bool>,
     limits: Option<(Limits, Mode, Option<Fault>)>,
@@ -37,7 +37,7 @@ pub struct Watcher {
     sender: Sender,
     device: usize,
     at: At,
-    told: Told,
+    reported: Reported,
     /// Number of readers connected before the last event.
     readers: u64,
     /// The previous sample's record, with its placement.
@@ -63,7 +63,7 @@ impl Watcher {
             sender,
             device,
             at,
-            told: Told::default(),
+            reported: Reported::default(),
             readers: 0,
             before: None,
             arming: (vec![], 0),
@@ -91,22 +91,22 @@ impl Watcher {
         };
         // A new reader receives the whole state.
         if readers != self.readers {
-            (self.readers, self.told) = (readers, Told::default());
+            (self.readers, self.reported) = (readers, Reported::default());
         }
         self.at = At {
             device: self.device,
             tick: sample.tick,
             t_s: record.t_s,
         };
-        if self.told.view.replace(view) != Some(view) {
+        if self.reported.view.replace(view) != Some(view) {
             self.tell(&view_of(view, terrain));
         }
         let limits = (sample.limits, sample.mode, sample.fault);
-        if self.told.limits.replace(limits) != Some(limits) {
+        if self.reported.limits.replace(limits) != Some(limits) {
             self.tell(&limits_of(limits));
         }
         let touching = record.contact;
-        let changes = self.told.contact.replace(touching) != Some(touching);
+        let changes = self.reported.contact.replace(touching) != Some(touching);
         if touching {
             // The material of a contact is reported before the contact.
             self.tell_material(record, terrain, changes);
@@ -199,13 +199,13 @@ impl Watcher {
     }
 
     fn told_place(&mut self, record: &Record) {
-        self.told.proxy_mm = Some(record.proxy_mm);
-        self.told.place_due_s = record.t_s + PLACE_EVERY_S;
+        self.reported.proxy_mm = Some(record.proxy_mm);
+        self.reported.place_due_s = record.t_s + PLACE_EVERY_S;
     }
 
     fn tell_place(&mut self, record: &Record, terrain: &Terrain<'_>) {
-        let moved = self.told.proxy_mm != Some(record.proxy_mm);
-        if moved && record.t_s >= self.told.place_due_s {
+        let moved = self.reported.proxy_mm != Some(record.proxy_mm);
+        if moved && record.t_s >= self.reported.place_due_s {
             self.told_place(record);
             self.tell(&Event::Place(place_of(record, terrain)));
         }
@@ -215,7 +215,7 @@ impl Watcher {
         let Some(materials) = terrain.grid().materials() else {
             return;
         };
-        if !at_once && record.t_s < self.told.material_due_s {
+        if !at_once && record.t_s < self.reported.material_due_s {
             return;
         }
         let ground = ground_of(record, terrain);
@@ -223,11 +223,11 @@ impl Watcher {
             // The material is reported once it is known.
             return;
         };
-        self.told.material_due_s = record.t_s + MATERIAL_EVERY_S;
+        self.reported.material_due_s = record.t_s + MATERIAL_EVERY_S;
         let class = usize::from(index).checked_sub(1);
         let class = class.and_then(|at| materials.looks().class.get(at));
         let number = class.map(|class| class.class);
-        if self.told.class.replace(number) != Some(number) {
+        if self.reported.class.replace(number) != Some(number) {
             self.tell(&Event::Material {
                 class: number,
                 name: class.and_then(|class| class.name.as_deref()),
@@ -336,12 +336,15 @@ mod tests {
         let server = Server::listen(0).expect("listens");
         let mut watcher = Watcher::new(server.sender(), 1);
         watcher.tell_material(&record, &terrain, true);
-        assert_eq!(watcher.told.class, None, "neither waited nor the default");
+        assert_eq!(
+            watcher.reported.class, None,
+            "neither waited nor the default"
+        );
         wait_until("the class", || {
             watcher.tell_material(&record, &terrain, true);
-            watcher.told.class.is_some()
+            watcher.reported.class.is_some()
         });
-        assert_eq!(watcher.told.class, Some(Some(7)));
+        assert_eq!(watcher.reported.class, Some(Some(7)));
     }
 
     #[test]

@@ -138,7 +138,7 @@ pub struct Client<'t> {
     zeroing: bool,
     /// The pending point of a replay, and the time at which it was sent.
     point: Option<(HipCommand, Duration)>,
-    tally: LinkStats,
+    stats: LinkStats,
     samples_since_sign: u32,
     logged: Option<Duration>,
 }
@@ -168,9 +168,9 @@ impl<'t> Client<'t> {
         terrain: &'t Terrain<'t>,
         scene: Scene,
         arming: Option<Arming>,
-        patience: Timeouts,
+        timeouts: Timeouts,
     ) -> Self {
-        Self::numbered(terrain, scene, arming, patience, fastrand::u64(..))
+        Self::numbered(terrain, scene, arming, timeouts, fastrand::u64(..))
     }
 
     /// As [`Client::new`], with session numbers drawn from a seed.
@@ -179,7 +179,7 @@ impl<'t> Client<'t> {
         terrain: &'t Terrain<'t>,
         scene: Scene,
         arming: Option<Arming>,
-        patience: Timeouts,
+        timeouts: Timeouts,
         seed: u64,
     ) -> Self {
         Self {
@@ -187,7 +187,7 @@ impl<'t> Client<'t> {
             next: None,
             scene,
             arming,
-            talk: HostProtocol::new(Some(scene), patience, fastrand::Rng::with_seed(seed))
+            talk: HostProtocol::new(Some(scene), timeouts, fastrand::Rng::with_seed(seed))
                 .with_materials(terrain.grid().materials().map(Materials::table)),
             reader: Box::default(),
             tile: TileBuffer::default(),
@@ -201,7 +201,7 @@ impl<'t> Client<'t> {
             prefetch: Prefetch::default(),
             zeroing: false,
             point: None,
-            tally: LinkStats::default(),
+            stats: LinkStats::default(),
             samples_since_sign: 0,
             logged: None,
         }
@@ -215,8 +215,8 @@ impl<'t> Client<'t> {
 
     /// Returns the statistics of the link.
     #[must_use]
-    pub const fn tally(&self) -> &LinkStats {
-        &self.tally
+    pub const fn stats(&self) -> &LinkStats {
+        &self.stats
     }
 
     /// Returns the state of the conversation.
@@ -233,8 +233,8 @@ impl<'t> Client<'t> {
 
     /// Returns the time-outs.
     #[must_use]
-    pub const fn patience(&self) -> &Timeouts {
-        self.talk.patience()
+    pub const fn timeouts(&self) -> &Timeouts {
+        self.talk.timeouts()
     }
 
     /// Begins a session, the first or another: appends the open message to `out`.
@@ -246,7 +246,7 @@ impl<'t> Client<'t> {
         self.prefetch.forget();
         self.zeroing = false;
         if self.talk.greet(now, out) {
-            self.tally.drawn();
+            self.stats.drawn();
         }
     }
 
@@ -321,7 +321,7 @@ impl<'t> Client<'t> {
         }
         self.repeat_point(now, out);
         for ask in self.talk.take_unanswered() {
-            self.tally.unanswered += 1;
+            self.stats.unanswered += 1;
             if matches!(ask, HostRequest::Request(Request::Zero { .. })) {
                 self.hand_over_withheld(out, on);
             }
@@ -331,13 +331,13 @@ impl<'t> Client<'t> {
     }
 
     fn repeat_point(&mut self, now: Duration, out: &mut Vec<u8>) {
-        let again = self.talk.patience().again;
+        let again = self.talk.timeouts().again;
         let is_open = self.state() == State::Open;
-        if let Some((point, said)) = &mut self.point
+        if let Some((point, stated)) = &mut self.point
             && is_open
-            && now.saturating_sub(*said) >= again
+            && now.saturating_sub(*stated) >= again
         {
-            *said = now;
+            *stated = now;
             self.talk.say(&ToDevice::Hip(*point), out);
         }
     }
@@ -361,14 +361,14 @@ impl<'t> Client<'t> {
                 Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
                 Ok(FromDevice::Message(message)) => {
                     if message.session != self.talk.session() {
-                        self.tally.foreign_frames += 1;
+                        self.stats.foreign_frames += 1;
                     }
                     if let Some(event) = self.talk.hear(now, message, out)? {
                         self.on_protocol_event(now, event, out, on);
                     }
                 }
                 Err(bad) => {
-                    self.tally.bad_frames += 1;
+                    self.stats.bad_frames += 1;
                     tracing::debug!(?bad, "a frame was not understood");
                 }
             }
@@ -401,7 +401,7 @@ impl<'t> Client<'t> {
             self.is_new = true;
             self.withheld.clear();
             self.zeroing = false;
-            self.tally.restarted();
+            self.stats.restarted();
         } else {
             // After a restart, only the session's last part is known.
             let LastSession {
@@ -412,7 +412,7 @@ impl<'t> Client<'t> {
             } = device.last;
             let ours = self.talk.previous();
             let whole = ours.is_some_and(|ours| (ours.0.get(), ours.1) == (session, opened_by));
-            self.tally.opened(whole.then_some(count));
+            self.stats.opened(whole.then_some(count));
         }
         self.device = Some(device);
     }
@@ -493,7 +493,7 @@ impl<'t> Client<'t> {
                 let samples = telemetry.samples.len() as u32;
                 self.samples_since_sign = self.samples_since_sign.saturating_add(samples);
                 // Until the scene is accepted, the samples belong to another scene or to none.
-                if self.tally.received(&telemetry) && !self.is_new {
+                if self.stats.received(&telemetry) && !self.is_new {
                     if let (Some(device), Some(last)) = (&self.device, telemetry.samples.last()) {
                         let tick_hz = f64::from(device.tick_hz);
                         self.prefetch
@@ -511,10 +511,10 @@ impl<'t> Client<'t> {
             }
             ToHost::Guard(report) => on(Event::Guard(&report)),
             ToHost::Heartbeat { count, report, .. } => {
-                self.tally.told(count);
+                self.stats.reported(count);
                 on(Event::Guard(&report));
             }
-            ToHost::Goodbye(count) => self.tally.told(count),
+            ToHost::Goodbye(count) => self.stats.reported(count),
             // A repeated message, or one about a scene that is not served any more.
             _ => {}
         }
@@ -560,9 +560,9 @@ impl<'t> Client<'t> {
         let bytes = out.len() - before;
         if key.level != self.scene.level {
             // Each placement has its own fallback, but all have the same key.
-            return self.tally.sent_fallback(bytes);
+            return self.stats.sent_fallback(bytes);
         }
-        self.tally.sent_tile(key, bytes);
+        self.stats.sent_tile(key, bytes);
         on(Event::TileSent(key));
     }
 
@@ -589,11 +589,11 @@ impl<'t> Client<'t> {
     /// Counts a request for a tile that does not exist; the log is limited, because a device may
     /// repeat such requests at any rate.
     fn on_no_tile(&mut self, now: Duration, key: TileKey) {
-        self.tally.no_tiles += 1;
+        self.stats.no_tiles += 1;
         let due = |at: Duration| now.saturating_sub(at) >= LOG_EVERY;
         if self.logged.is_none_or(due) {
             self.logged = Some(now);
-            let so_far = self.tally.no_tiles;
+            let so_far = self.stats.no_tiles;
             tracing::warn!(
                 ?key,
                 so_far,

@@ -36,7 +36,7 @@ struct Bench<'t> {
     opened: u32,
     unanswered: Vec<HostRequest>,
     /// Reported calibrations.
-    told: Vec<Option<Calibration>>,
+    reported: Vec<Option<Calibration>>,
     /// Scene changes, and whether they were accepted.
     viewed: Vec<(u8, bool)>,
 }
@@ -57,7 +57,7 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
         out: vec![],
         opened: 0,
         unanswered: vec![],
-        told: vec![],
+        reported: vec![],
         viewed: vec![],
     };
     bench.client.greet(bench.now, &mut bench.out);
@@ -68,10 +68,10 @@ impl Bench<'_> {
     fn hear_in(&mut self, session: SessionNumber, message: &ToHost) -> Result<(), LinkError> {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
-        let (opened, told, viewed) = (&mut self.opened, &mut self.told, &mut self.viewed);
+        let (opened, reported, viewed) = (&mut self.opened, &mut self.reported, &mut self.viewed);
         let mut on = |event: Event<'_>| match event {
             Event::Opened { .. } => *opened += 1,
-            Event::Calibration(calibration) => told.push(calibration.copied()),
+            Event::Calibration(calibration) => reported.push(calibration.copied()),
             Event::Viewed { view, taken } => viewed.push((view.number, taken)),
             _ => {}
         };
@@ -138,10 +138,10 @@ impl Bench<'_> {
     }
 
     /// Returns the lines since the last call.
-    fn said(&mut self) -> Vec<String> {
+    fn stated(&mut self) -> Vec<String> {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let out = std::mem::take(&mut self.out);
-        let (mut bytes, mut said) = (out.as_slice(), vec![]);
+        let (mut bytes, mut stated) = (out.as_slice(), vec![]);
         let read = |content: &[u8]| {
             if VersionCheck::is_in(content) {
                 return Ok("Version".to_owned());
@@ -159,14 +159,14 @@ impl Bench<'_> {
             })
         };
         while let Some(Ok(name)) = next_frame(&mut reader, &mut bytes, read) {
-            said.push(name);
+            stated.push(name);
         }
-        said
+        stated
     }
 }
 
-fn count_of(said: &[String], what: &str) -> usize {
-    said.iter().filter(|name| *name == what).count()
+fn count_of(stated: &[String], what: &str) -> usize {
+    stated.iter().filter(|name| *name == what).count()
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn what_is_said_twice_opens_once() {
         for message in [&taken, &hello, &hello, &taken, &taken, &hello] {
             bench.hear(message);
         }
-        assert_eq!((bench.opened, bench.client.tally().sessions), (1, 1));
+        assert_eq!((bench.opened, bench.client.stats().sessions), (1, 1));
         assert_eq!(bench.client.state(), State::Open);
     });
 }
@@ -200,9 +200,9 @@ fn hello_is_repeated_whatever_else_arrives_and_then_given_up() {
             assert!(noise < 200, "for ever");
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
-        let said = bench.said();
+        let stated = bench.stated();
         assert_eq!(
-            (count_of(&said, "Hello"), count_of(&said, "Version")),
+            (count_of(&stated, "Hello"), count_of(&stated, "Version")),
             (10, 10)
         );
     });
@@ -219,7 +219,7 @@ fn the_scene_is_repeated_whatever_else_arrives_and_then_given_up() {
             }
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
-        assert_eq!(count_of(&bench.said(), "Scene"), 10);
+        assert_eq!(count_of(&bench.stated(), "Scene"), 10);
     });
 }
 
@@ -227,7 +227,7 @@ fn the_scene_is_repeated_whatever_else_arrives_and_then_given_up() {
 fn telemetry_alone_is_no_answer() {
     on_bench(None, |bench| {
         bench.open();
-        bench.said();
+        bench.stated();
         let error = loop {
             bench.hear(&ToHost::Telemetry(Default::default()));
             if let Err(error) = bench.pass(ms(50)) {
@@ -235,9 +235,9 @@ fn telemetry_alone_is_no_answer() {
             }
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
-        let said = bench.said();
-        assert_eq!(count_of(&said, "Heartbeat"), 8);
-        assert_eq!(count_of(&said, "Hello"), 9, "from 0.75 s on");
+        let stated = bench.stated();
+        assert_eq!(count_of(&stated, "Heartbeat"), 8);
+        assert_eq!(count_of(&stated, "Hello"), 9, "from 0.75 s on");
     });
 }
 
@@ -249,11 +249,11 @@ fn an_arm_that_is_lost_is_repeated_and_then_told_and_taken_back() {
             bench.hear(&bench.alive());
             bench.pass(ms(50)).expect("alive");
         }
-        let said = bench.said();
-        assert_eq!(count_of(&said, "1 Arm"), 10);
+        let stated = bench.stated();
+        assert_eq!(count_of(&stated, "1 Arm"), 10);
         assert_eq!(bench.unanswered, [HostRequest::Request(Request::Arm)]);
-        assert_eq!(bench.client.tally().unanswered, 1);
-        assert_eq!(count_of(&said, "2 Disarm"), 1);
+        assert_eq!(bench.client.stats().unanswered, 1);
+        assert_eq!(count_of(&stated, "2 Disarm"), 1);
     });
 }
 
@@ -262,7 +262,7 @@ fn an_answer_ends_the_repeating_and_brings_the_next_request() {
     on_bench(Some(Arming::VIRTUAL), |bench| {
         bench.open();
         assert_eq!(
-            bench.said().last().map(|s| s.starts_with("1 Zero")),
+            bench.stated().last().map(|s| s.starts_with("1 Zero")),
             Some(true)
         );
         for number in [7, 1, 1] {
@@ -272,7 +272,7 @@ fn an_answer_ends_the_repeating_and_brings_the_next_request() {
                 result,
             }));
         }
-        assert_eq!(bench.said(), ["2 Arm"]);
+        assert_eq!(bench.stated(), ["2 Arm"]);
     });
 }
 
@@ -280,29 +280,29 @@ fn an_answer_ends_the_repeating_and_brings_the_next_request() {
 fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
     on_bench(None, |bench| {
         bench.open();
-        let told = |number, calibration| ToHost::Calibration {
+        let reported = |number, calibration| ToHost::Calibration {
             number,
             calibration,
         };
         let (old, new) = (Calibration::OMNI, Calibration::PREMIUM_3_0);
         for _ in 0..300 {
-            bench.said();
+            bench.stated();
             bench.client.ask(HostRequest::Calibration);
             bench.pass(ms(10)).expect("patient");
-            let said = bench.said();
-            let number = said
+            let stated = bench.stated();
+            let number = stated
                 .iter()
-                .find_map(|said| said.strip_suffix(" GetCalibration"));
+                .find_map(|stated| stated.strip_suffix(" GetCalibration"));
             let number: u8 = number.expect("asked").parse().expect("a number");
             // Repeated after 0.4 s: the second answer is still in transit.
-            bench.hear(&told(number, Some(old)));
+            bench.hear(&reported(number, Some(old)));
             bench.client.ask(HostRequest::Calibration);
             bench.pass(ms(10)).expect("patient");
-            bench.told.clear();
-            bench.hear(&told(number, Some(old)));
-            assert_eq!(bench.told, [], "question {number}");
-            bench.hear(&told(number.wrapping_add(1), Some(new)));
-            assert_eq!(bench.told, [Some(new)], "question {number}");
+            bench.reported.clear();
+            bench.hear(&reported(number, Some(old)));
+            assert_eq!(bench.reported, [], "question {number}");
+            bench.hear(&reported(number.wrapping_add(1), Some(new)));
+            assert_eq!(bench.reported, [Some(new)], "question {number}");
         }
     });
 }
@@ -311,21 +311,21 @@ fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
 fn repeated_query_keeps_its_number() {
     on_bench(None, |bench| {
         bench.open();
-        bench.said();
+        bench.stated();
         bench.client.ask(HostRequest::Status);
         bench.client.ask(HostRequest::Request(Request::Disarm));
         for _ in 0..40 {
             bench.hear(&bench.alive());
             bench.pass(ms(50)).expect("alive");
         }
-        let said = bench.said();
-        assert_eq!(count_of(&said, "1 Status"), 5);
+        let stated = bench.stated();
+        assert_eq!(count_of(&stated, "1 Status"), 5);
         bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
             number: 1,
             result: Ok(()),
         }));
         bench.pass(ms(300)).expect("alive");
-        assert_eq!(count_of(&bench.said(), "1 Status"), 1, "no answer to it");
+        assert_eq!(count_of(&bench.stated(), "1 Status"), 1, "no answer to it");
     });
 }
 
@@ -334,17 +334,17 @@ fn tiles_wait_until_the_device_knows_its_zero() {
     on_bench(Some(Arming::VIRTUAL), |bench| {
         bench.open();
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
-        bench.said();
+        bench.stated();
         for _ in 0..3 {
             bench.hear(&ToHost::TileRequest { epoch, key });
         }
-        assert_eq!(bench.said(), Vec::<String>::new());
+        assert_eq!(bench.stated(), Vec::<String>::new());
         let (number, result) = (1, Ok(()));
         bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
             number,
             result,
         }));
-        assert_eq!(bench.said(), ["2 Arm", "Tile"]);
+        assert_eq!(bench.stated(), ["2 Arm", "Tile"]);
     });
 }
 
@@ -377,7 +377,7 @@ fn a_device_that_was_restarted_gets_its_scene_again() {
         bench.open();
         bench.pass(ms(800)).expect("patient");
         assert_eq!(
-            count_of(&bench.said(), "Hello"),
+            count_of(&bench.stated(), "Hello"),
             2,
             "the first, and after silence"
         );
@@ -394,7 +394,7 @@ fn a_device_that_was_restarted_gets_its_scene_again() {
         bench.hear(&bench.taken());
         bench.hear(&ToHost::Hello(again));
         assert_eq!((bench.opened, bench.client.state()), (2, State::Open));
-        assert_eq!(bench.client.tally().uncertain, 1);
+        assert_eq!(bench.client.stats().uncertain, 1);
     });
 }
 
@@ -412,7 +412,7 @@ fn another_host_is_noticed() {
             }
         };
         assert!(matches!(error, LinkError::Taken), "{error}");
-        assert_eq!(bench.client.tally().samples, 0, "none of it is recorded");
+        assert_eq!(bench.client.stats().samples, 0, "none of it is recorded");
         // While the device answers this session, frames of other sessions are ignored.
     });
     on_bench(None, |bench| {
@@ -451,11 +451,11 @@ fn a_host_whose_session_is_over_is_told_why_at_once() {
                 }
                 if steps > 0 {
                     bench.pass(ms(800)).expect("patient");
-                    assert!(count_of(&bench.said(), "Hello") > 1);
+                    assert!(count_of(&bench.stated(), "Hello") > 1);
                 }
                 let number = if steps > 0 { 2 } else { 1 };
-                let told = bench.hear_in(session, &over(number, end));
-                let error = told.expect_err("over");
+                let reported = bench.hear_in(session, &over(number, end));
+                let error = reported.expect_err("over");
                 let is_taken = matches!(error, LinkError::Taken);
                 assert!(is_taken != is_passing, "{error}");
                 assert_eq!(error.is_passing(), is_passing, "{error}");
@@ -486,15 +486,15 @@ fn an_old_word_that_a_session_is_over_ends_no_other() {
         for end in ends {
             for (session, number) in [(first, 1), (first, 2), (other, 2), (second, 1), (second, 2)]
             {
-                let heard = bench.hear_in(session, &over(number, end));
-                heard.expect("passed over");
+                let received = bench.hear_in(session, &over(number, end));
+                received.expect("passed over");
             }
         }
         // The device has no other host, so it is silent.
         let error = loop {
             for session in [first, other] {
-                let heard = bench.hear_in(session, &over(2, SessionEnd::Replaced));
-                heard.expect("passed over");
+                let received = bench.hear_in(session, &over(2, SessionEnd::Replaced));
+                received.expect("passed over");
             }
             if let Err(error) = bench.pass(ms(50)) {
                 break error;
@@ -530,19 +530,19 @@ fn who_leaves_a_session_that_is_over_is_told_or_waits_for_goodbye() {
 fn goodbye_is_repeated_until_it_is_answered_or_told_that_it_is_not() {
     on_bench(None, |bench| {
         bench.open();
-        bench.said();
+        bench.stated();
         bench.client.leave(bench.now, &mut bench.out);
         bench.pass(ms(1_000)).expect("patient");
-        assert_eq!(count_of(&bench.said(), "Bye"), 3);
+        assert_eq!(count_of(&bench.stated(), "Bye"), 3);
         let count = SampleCount {
             sent: 9,
             dropped: 2,
         };
         bench.hear(&ToHost::Goodbye(count));
         assert_eq!(bench.client.state(), State::Closed);
-        assert_eq!(bench.said(), ["Close"]);
-        let tally = bench.client.tally();
-        assert_eq!((tally.lost, tally.dropped), (9, 2));
+        assert_eq!(bench.stated(), ["Close"]);
+        let stats = bench.client.stats();
+        assert_eq!((stats.lost, stats.dropped), (9, 2));
     });
     on_bench(None, |bench| {
         bench.open();
@@ -584,8 +584,8 @@ fn new_line_draws_a_new_session_number() {
             last,
             ..hello()
         }));
-        let tally = bench.client.tally();
-        assert_eq!((tally.lost, tally.dropped, tally.uncertain), (5, 1, 0));
+        let stats = bench.client.stats();
+        assert_eq!((stats.lost, stats.dropped, stats.uncertain), (5, 1, 0));
     });
 }
 
@@ -594,13 +594,13 @@ fn tiles_that_there_are_not_are_counted_and_seldom_told() {
     on_bench(None, |bench| {
         bench.open();
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 77, 0));
-        bench.said();
+        bench.stated();
         for _ in 0..1_000 {
             bench.hear(&ToHost::TileRequest { epoch, key });
         }
-        assert_eq!(bench.client.tally().no_tiles, 1_000);
+        assert_eq!(bench.client.stats().no_tiles, 1_000);
         assert_eq!(bench.client.logged, Some(bench.now));
-        assert_eq!(bench.said(), Vec::<String>::new());
+        assert_eq!(bench.stated(), Vec::<String>::new());
     });
 }
 
@@ -609,9 +609,9 @@ fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
     for (arming, again) in [(Arming::default(), 0), (Arming::VIRTUAL, 1)] {
         on_bench(Some(arming), |bench| {
             let arms = |bench: &mut Bench<'_>| {
-                let said = bench.said();
-                let arm = |said: &&String| said.contains("Zero") || said.ends_with("Arm");
-                usize::from(said.iter().any(|s| arm(&s)))
+                let stated = bench.stated();
+                let arm = |stated: &&String| stated.contains("Zero") || stated.ends_with("Arm");
+                usize::from(stated.iter().any(|s| arm(&s)))
             };
             bench.open();
             assert_eq!(arms(bench), 1);
@@ -636,7 +636,7 @@ fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
 fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
     on_bench(None, |bench| {
         bench.open();
-        bench.said();
+        bench.stated();
         let session = bench.client.session();
         let epoch = bench.client.scene().epoch;
         let mut bytes = vec![];
@@ -647,17 +647,17 @@ fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
             let framed = InSession { session, message };
             bytes.extend(encode(&framed, &mut frame).expect("fits"));
         }
-        let heard = bench
+        let received = bench
             .client
             .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
-        heard.expect("understood");
-        assert_eq!(count_of(&bench.said(), "Tile"), 1);
+        received.expect("understood");
+        assert_eq!(count_of(&bench.stated(), "Tile"), 1);
         // The next reception may request it again.
-        let heard = bench
+        let received = bench
             .client
             .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
-        heard.expect("understood");
-        assert_eq!(count_of(&bench.said(), "Tile"), 1);
+        received.expect("understood");
+        assert_eq!(count_of(&bench.stated(), "Tile"), 1);
     });
 }
 
@@ -674,11 +674,11 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
             report: Report::default(),
         });
         bench.pass(ms(500)).expect("in time");
-        let said = bench.said();
+        let stated = bench.stated();
         assert_eq!(
-            (count_of(&said, "SceneChange"), count_of(&said, "Scene")),
+            (count_of(&stated, "SceneChange"), count_of(&stated, "Scene")),
             (1, 0),
-            "{said:?}"
+            "{stated:?}"
         );
         assert_eq!(bench.client.scene().epoch, before);
         for _ in 0..2 {
@@ -692,11 +692,11 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         bench.out.clear();
         bench.hear(&bench.alive());
         bench.pass(ms(600)).expect("in time");
-        let said = bench.said();
+        let stated = bench.stated();
         assert_eq!(
-            (count_of(&said, "SceneChange"), count_of(&said, "Scene")),
+            (count_of(&stated, "SceneChange"), count_of(&stated, "Scene")),
             (0, 0),
-            "{said:?}"
+            "{stated:?}"
         );
     });
 }

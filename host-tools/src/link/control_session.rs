@@ -50,9 +50,9 @@ impl<'t> ControlSession<'t> {
     /// Opens a session.
     ///
     /// # Errors
-    /// [`LinkError`]: no answer within `patience`, or a different protocol.
-    pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
-        Self::with(transport, Timeouts::of_a_dialogue(patience))
+    /// [`LinkError`]: no answer within `timeout`, or a different protocol.
+    pub fn open(transport: Box<dyn Transport + 't>, timeout: Duration) -> Result<Self, LinkError> {
+        Self::with(transport, Timeouts::of_a_dialogue(timeout))
     }
 
     /// Opens a read-only session: the device answers status and calibration queries, ignores
@@ -60,16 +60,16 @@ impl<'t> ControlSession<'t> {
     ///
     /// # Errors
     /// As [`ControlSession::open`].
-    pub fn look(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
-        Self::with(transport, Timeouts::of_a_look(patience))
+    pub fn look(transport: Box<dyn Transport + 't>, timeout: Duration) -> Result<Self, LinkError> {
+        Self::with(transport, Timeouts::of_a_look(timeout))
     }
 
-    fn with(transport: Box<dyn Transport + 't>, patience: Timeouts) -> Result<Self, LinkError> {
+    fn with(transport: Box<dyn Transport + 't>, timeouts: Timeouts) -> Result<Self, LinkError> {
         // A read-only session is never opened, so it needs no end.
-        let is_over = patience.silence_s == ONLY_LOOKS;
+        let is_over = timeouts.silence_s == ONLY_LOOKS;
         let mut exchange = Exchange {
             line: Line::new(transport),
-            talk: HostProtocol::new(None, patience, fastrand::Rng::new()),
+            talk: HostProtocol::new(None, timeouts, fastrand::Rng::new()),
             reader: Box::default(),
             drives: false,
             is_over,
@@ -192,7 +192,7 @@ impl<'t> ControlSession<'t> {
         exchange.talk.listen_from(began);
         let first = exchange.status(on)?;
         let ticks = ms * (first.device.tick_hz / 1000).max(1);
-        let patience = exchange.talk.patience().give_up + Duration::from_millis(u64::from(ms));
+        let timeout = exchange.talk.timeouts().give_up + Duration::from_millis(u64::from(ms));
         loop {
             exchange.converse(&mut |_| {}, on)?;
             let status = exchange.status(on)?;
@@ -200,7 +200,7 @@ impl<'t> ControlSession<'t> {
                 return Ok(status);
             }
             let waited = exchange.line.now().saturating_sub(began);
-            if waited > patience {
+            if waited > timeout {
                 return Err(LinkError::Silent(waited));
             }
         }
@@ -311,7 +311,7 @@ impl Exchange<'_> {
         self.talk.due(line.now(), &mut line.out)?;
         if let Some(ask) = self.talk.take_unanswered().pop() {
             tracing::debug!(?ask, "given up");
-            return Err(LinkError::Silent(self.talk.patience().give_up));
+            return Err(LinkError::Silent(self.talk.timeouts().give_up));
         }
         line.flush()?;
         let (now, mut bytes, out) = line.receive(wait)?;
@@ -394,12 +394,12 @@ mod tests {
     use std::io;
     use std::rc::Rc;
 
-    const PATIENCE: Duration = timeouts::HANG;
+    const TIMEOUT: Duration = timeouts::HANG;
 
     #[test]
     fn a_device_says_who_and_how_it_is() {
         let device = Box::new(Native::for_replay().restless());
-        let mut control = ControlSession::open(device, PATIENCE).expect("it answers");
+        let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");
         assert_eq!(control.device().board.as_str(), "native");
         let status = control.fresh_status().expect("it answers");
         assert!(!status.health.report.blockers.is_empty());
@@ -410,13 +410,13 @@ mod tests {
     #[test]
     fn whoever_looks_takes_no_device_from_its_host() {
         let mut device = Native::for_replay().restless();
-        let mut looks = ControlSession::look(Box::new(&mut device), PATIENCE).expect("it answers");
+        let mut looks = ControlSession::look(Box::new(&mut device), TIMEOUT).expect("it answers");
         let known = looks.calibration().expect("it answers");
         assert_eq!(known, Some(Calibration::PREMIUM_1_5));
         let status = looks.fresh_status().expect("it answers");
         assert!(!status.health.report.blockers.is_empty());
         drop(looks);
-        let host = ControlSession::open(Box::new(&mut device), PATIENCE).expect("it answers");
+        let host = ControlSession::open(Box::new(&mut device), TIMEOUT).expect("it answers");
         let before = host.device().last.end;
         assert_eq!(before, SessionEnd::None, "nobody was its host before");
     }
@@ -425,7 +425,7 @@ mod tests {
     fn a_calibration_is_taken_stored_and_refused_with_a_reason() {
         let press: FaultInjector = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
         let device = Box::new(Native::for_replay().restless().meddled_with(press));
-        let mut control = ControlSession::open(device, PATIENCE).expect("it answers");
+        let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");
         let mut calibration = Calibration::OMNI;
         assert_eq!(control.store(calibration).expect("it answers"), Ok(()));
         assert_eq!(control.calibration().expect("answers"), Some(calibration));
@@ -461,7 +461,7 @@ mod tests {
     #[test]
     fn what_was_told_before_is_not_taken_for_what_is() {
         let device = Late(Native::for_replay().restless(), vec![]);
-        let mut control = ControlSession::open(Box::new(device), PATIENCE).expect("it answers");
+        let mut control = ControlSession::open(Box::new(device), TIMEOUT).expect("it answers");
         let look = |control: &mut ControlSession<'_>, expected: Calibration| {
             let known = control.calibration().expect("it answers");
             assert_eq!(known, Some(expected));
@@ -486,7 +486,7 @@ mod tests {
     }
 
     fn open<'t>(device: &'t mut Native<StoppedClock>) -> ControlSession<'t> {
-        ControlSession::open(Box::new(device), PATIENCE).expect("it answers")
+        ControlSession::open(Box::new(device), TIMEOUT).expect("it answers")
     }
 
     #[test]
@@ -552,15 +552,15 @@ mod tests {
 
     #[test]
     fn an_end_that_is_not_heard_is_told_within_its_time() {
-        let patience = Duration::from_millis(300);
+        let timeout = Duration::from_millis(300);
         let time = Rc::new(Cell::new(Duration::ZERO));
         let open = || {
             let deaf = Deaf(Native::for_replay().restless(), 3, Rc::clone(&time));
-            ControlSession::open(Box::new(deaf), patience).expect("it answers")
+            ControlSession::open(Box::new(deaf), timeout).expect("it answers")
         };
         let within = |began: Duration| {
             let took = time.get() - began;
-            assert!(took >= patience && took < 10 * patience, "{took:?}");
+            assert!(took >= timeout && took < 10 * timeout, "{took:?}");
         };
         let mut control = open();
         assert!(control.request(&Request::Arm).is_ok(), "the second send");
@@ -593,8 +593,8 @@ mod tests {
 
     #[test]
     fn one_that_says_nothing_or_nonsense_or_another_protocol_is_told_apart() {
-        let ask = |said: Vec<u8>| {
-            let opened = ControlSession::open(Box::new(Says(said)), Duration::from_millis(5));
+        let ask = |stated: Vec<u8>| {
+            let opened = ControlSession::open(Box::new(Says(stated)), Duration::from_millis(5));
             opened.map(|_| ())
         };
         assert!(matches!(ask(vec![]), Err(LinkError::Silent(_))));

@@ -26,7 +26,7 @@ const START: Duration = Duration::from_secs(60);
 const END: Duration = Duration::from_secs(60);
 
 /// Max bytes of a report.
-const SAID: u64 = 16 << 10;
+const STATED: u64 = 16 << 10;
 
 /// The name of the board whose clock counts instructions.
 pub const EMULATED: &str = "mps2-an386";
@@ -59,12 +59,12 @@ pub enum EmulatorError {
         source: io::Error,
     },
     /// QEMU ended, or did not connect.
-    #[error("{} did not bring the board up: {said}", path.display())]
+    #[error("{} did not bring the board up: {stated}", path.display())]
     NotUp {
         /// The program.
         path: PathBuf,
         /// Its output, or its exit status.
-        said: String,
+        stated: String,
     },
     /// A socket for the lines cannot be opened.
     #[error("cannot listen on the loopback address")]
@@ -136,7 +136,7 @@ impl Emulator {
         // The link breaks a moment before the process ends.
         std::thread::sleep(Duration::from_millis(200));
         let status = self.child.try_wait().ok().flatten()?;
-        Some(format!("{status}; {}", self.said()))
+        Some(format!("{status}; {}", self.stated()))
     }
 
     fn accept(&mut self, line: &TcpListener, deadline: Instant) -> Result<Tcp, EmulatorError> {
@@ -160,7 +160,7 @@ impl Emulator {
 
     /// Returns the reports of the board on its third line, which is QEMU's standard output, and
     /// QEMU's errors.
-    fn said(&mut self) -> String {
+    fn stated(&mut self) -> String {
         let report = self.report();
         let complaint = self.complaint();
         [report, complaint].join(" ").trim().to_owned()
@@ -177,12 +177,12 @@ impl Emulator {
     }
 
     fn not_up(&mut self, how: String) -> EmulatorError {
-        let said = match self.said() {
+        let stated = match self.stated() {
             nothing if nothing.is_empty() => how,
             words => words,
         };
         let path = self.path.clone();
-        EmulatorError::NotUp { path, said }
+        EmulatorError::NotUp { path, stated }
     }
 }
 
@@ -197,9 +197,9 @@ impl Drop for Emulator {
 /// Returns the printable text of a stream: the beginning of an endless one, and nothing if it
 /// cannot be read.
 fn text(from: impl Read) -> String {
-    let mut said = Vec::new();
-    let _ = from.take(SAID).read_to_end(&mut said);
-    printable_lines(String::from_utf8_lossy(&said).trim())
+    let mut stated = Vec::new();
+    let _ = from.take(STATED).read_to_end(&mut stated);
+    printable_lines(String::from_utf8_lossy(&stated).trim())
 }
 
 fn listen() -> Result<TcpListener, EmulatorError> {

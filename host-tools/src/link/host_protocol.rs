@@ -71,13 +71,13 @@ pub(super) struct HostProtocol {
     materials: Option<MaterialTable>,
     /// The unanswered scene change, and the times when it was first and last sent.
     view: Option<(SceneChange, Duration, Duration)>,
-    patience: Timeouts,
+    timeouts: Timeouts,
     state: State,
     /// The time when the state began, and when its message was last sent.
     since: Duration,
-    said: Duration,
+    stated: Duration,
     /// Time of the last answer.
-    heard: Duration,
+    received: Duration,
     alive_said: Duration,
     alive_is_due: bool,
     /// Time of the last frame of another session.
@@ -91,7 +91,7 @@ pub(super) struct HostProtocol {
 impl HostProtocol {
     pub(super) fn new(
         scene: Option<Scene>,
-        patience: Timeouts,
+        timeouts: Timeouts,
         mut numbers: fastrand::Rng,
     ) -> Self {
         let session = SessionNumber::new(numbers.u32(..));
@@ -104,11 +104,11 @@ impl HostProtocol {
             scene,
             materials: None,
             view: None,
-            patience,
+            timeouts,
             state: State::Closed,
             since: Duration::ZERO,
-            said: Duration::ZERO,
-            heard: Duration::ZERO,
+            stated: Duration::ZERO,
+            received: Duration::ZERO,
             alive_said: Duration::ZERO,
             alive_is_due: false,
             foreign: None,
@@ -140,8 +140,8 @@ impl HostProtocol {
         self.previous
     }
 
-    pub(super) const fn patience(&self) -> &Timeouts {
-        &self.patience
+    pub(super) const fn timeouts(&self) -> &Timeouts {
+        &self.timeouts
     }
 
     /// Begins a session, or begins again over a new line. Returns true if a new session number was
@@ -204,7 +204,7 @@ impl HostProtocol {
 
     /// Removes and returns the scene change if it is still unanswered after `give_up`.
     pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
-        let give_up = self.patience.give_up;
+        let give_up = self.timeouts.give_up;
         let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
         let lost = self.view.take_if(|(_, since, _)| is_lost(*since));
         lost.map(|(view, _, _)| view)
@@ -212,8 +212,8 @@ impl HostProtocol {
 
     /// Repeats the scene change if it is due.
     fn repeat_view(&mut self, now: Duration, out: &mut Vec<u8>) {
-        if let Some((view, since, said)) = self.view
-            && self.is_due(said, now)
+        if let Some((view, since, stated)) = self.view
+            && self.is_due(stated, now)
         {
             self.view = Some((view, since, now));
             self.say(&ToDevice::SceneChange(view), out);
@@ -246,7 +246,7 @@ impl HostProtocol {
 
     /// Restarts the silence time-out, after a time in which the line was not read.
     pub(super) fn listen_from(&mut self, now: Duration) {
-        self.heard = now;
+        self.received = now;
         self.alive_said = now;
     }
 
@@ -263,20 +263,20 @@ impl HostProtocol {
         let in_state = now.saturating_sub(self.since);
         match self.state {
             State::Closed => return Ok(()),
-            State::Greeting | State::SceneSent if in_state >= self.patience.give_up => {
+            State::Greeting | State::SceneSent if in_state >= self.timeouts.give_up => {
                 return Err(LinkError::Silent(in_state));
             }
-            State::Leaving if in_state >= self.patience.goodbye => {
+            State::Leaving if in_state >= self.timeouts.goodbye => {
                 return Err(LinkError::NotConfirmed);
             }
-            State::Detaching if in_state >= self.patience.goodbye => {
+            State::Detaching if in_state >= self.timeouts.goodbye => {
                 return Err(LinkError::Silent(in_state));
             }
             State::Open => self.check_silence(now)?,
             _ => {}
         }
-        let is_quiet = now.saturating_sub(self.heard) >= self.patience.greet_again;
-        if self.is_due(self.said, now) && (self.state != State::Open || is_quiet) {
+        let is_quiet = now.saturating_sub(self.received) >= self.timeouts.greet_again;
+        if self.is_due(self.stated, now) && (self.state != State::Open || is_quiet) {
             self.say_state(now, out);
         }
         if self.state == State::Open {
@@ -288,31 +288,31 @@ impl HostProtocol {
     }
 
     fn check_silence(&self, now: Duration) -> Result<(), LinkError> {
-        let quiet = now.saturating_sub(self.heard);
+        let quiet = now.saturating_sub(self.received);
         // A frame right after the last answer may have been in transit before it.
-        let late = self.heard + self.patience.greet_again;
+        let late = self.received + self.timeouts.greet_again;
         let others = self.foreign.is_some_and(|at| at > late);
-        if others && quiet >= 2 * self.patience.greet_again {
+        if others && quiet >= 2 * self.timeouts.greet_again {
             return Err(LinkError::Taken);
         }
-        match quiet >= self.patience.give_up {
+        match quiet >= self.timeouts.give_up {
             true => Err(LinkError::Silent(quiet)),
             false => Ok(()),
         }
     }
 
-    fn is_due(&self, said: Duration, now: Duration) -> bool {
-        now.saturating_sub(said) >= self.patience.again
+    fn is_due(&self, stated: Duration, now: Duration) -> bool {
+        now.saturating_sub(stated) >= self.timeouts.again
     }
 
     fn enter(&mut self, state: State, now: Duration) {
         self.state = state;
-        (self.since, self.said) = (now, now);
+        (self.since, self.stated) = (now, now);
     }
 
     /// Appends the messages that the state repeats.
     fn say_state(&mut self, now: Duration, out: &mut Vec<u8>) {
-        self.said = now;
+        self.stated = now;
         match self.state {
             State::Closed => {}
             State::Greeting => {
@@ -325,7 +325,7 @@ impl HostProtocol {
                 if let Some(scene) = self.scene {
                     self.say_scene(scene, out);
                 }
-                if now.saturating_sub(self.heard) >= self.patience.greet_again {
+                if now.saturating_sub(self.received) >= self.timeouts.greet_again {
                     self.say_hello(out);
                 }
             }
@@ -368,14 +368,14 @@ impl HostProtocol {
         let hello = HostHello {
             protocol: PROTOCOL,
             number: self.hello,
-            silence_s: self.patience.silence_s,
+            silence_s: self.timeouts.silence_s,
         };
         self.say(&ToDevice::Hello(hello), out);
     }
 
     /// Appends a sign of life if it is due.
     fn say_alive(&mut self, now: Duration, out: &mut Vec<u8>) {
-        if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.patience.alive {
+        if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.timeouts.alive {
             (self.alive_is_due, self.alive_said) = (false, now);
             self.say(&ToDevice::Heartbeat, out);
         }
@@ -391,7 +391,7 @@ impl HostProtocol {
         if self.state != State::Open {
             return;
         }
-        if let Some(message) = self.asking.due(now, &self.patience) {
+        if let Some(message) = self.asking.due(now, &self.timeouts) {
             self.say(&message, out);
         }
     }
@@ -451,7 +451,7 @@ impl HostProtocol {
                 Some(ProtocolEvent::Other(message))
             }
             message @ ToHost::PointAnswer { .. } => {
-                self.heard = now;
+                self.received = now;
                 Some(ProtocolEvent::Other(message))
             }
             message => Some(ProtocolEvent::Other(message)),
@@ -484,7 +484,7 @@ impl HostProtocol {
         if !self.answers_hello(number) {
             return Ok(None);
         }
-        self.heard = now;
+        self.received = now;
         match (self.state, end) {
             (State::Detaching, _) => self.enter(State::Closed, now),
             // The close message after the open message is answered with it.
@@ -504,7 +504,7 @@ impl HostProtocol {
         if !self.answers_hello(device.number) {
             return Ok(None);
         }
-        self.heard = now;
+        self.received = now;
         if device.protocol != PROTOCOL {
             return Err(LinkError::version(device.protocol));
         }
@@ -551,7 +551,7 @@ impl HostProtocol {
         if self.state == State::Open
             && let Some((view, _, _)) = self.view.take_if(is_views)
         {
-            self.heard = now;
+            self.received = now;
             if accepted {
                 self.scene = Some(view.scene);
             }
@@ -560,7 +560,7 @@ impl HostProtocol {
         if self.state != State::SceneSent || self.lacks_scene(Some(epoch)) {
             return Ok(None);
         }
-        self.heard = now;
+        self.received = now;
         if !accepted {
             return Err(LinkError::SceneRefused);
         }
@@ -570,7 +570,7 @@ impl HostProtocol {
 
     fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<ProtocolEvent> {
         let ask = self.asking.request_answered(number)?;
-        self.heard = now;
+        self.received = now;
         Some(ProtocolEvent::Answered(ask, message))
     }
 
@@ -581,12 +581,12 @@ impl HostProtocol {
         message: ToHost,
     ) -> Option<ProtocolEvent> {
         let ask = self.asking.question_answered(asked, number)?;
-        self.heard = now;
+        self.received = now;
         Some(ProtocolEvent::Answered(ask, message))
     }
 
     fn on_alive(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
-        self.heard = now;
+        self.received = now;
         if let ToHost::Heartbeat { epoch, .. } = message
             && self.state == State::Open
             && self.lacks_scene(*epoch)
@@ -601,7 +601,7 @@ impl HostProtocol {
 
     fn on_detached(&mut self, now: Duration) {
         if self.state == State::Detaching {
-            self.heard = now;
+            self.received = now;
             self.enter(State::Closed, now);
         }
     }
@@ -609,7 +609,7 @@ impl HostProtocol {
     fn on_goodbye(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
         let leaves = self.state == State::Leaving;
         if leaves {
-            self.heard = now;
+            self.received = now;
             self.enter(State::Closed, now);
             self.say(&ToDevice::Close, out);
         }

@@ -51,24 +51,24 @@ struct Numbering {
     /// Expected number of the next sample.
     expected: u32,
     /// Device's counts of sent and dropped samples.
-    told: SampleCount,
+    reported: SampleCount,
 }
 
 impl Numbering {
     /// Returns the number of sent samples that are missing after the last received one.
     fn tail(&self) -> u64 {
-        u64::from(ahead(self.expected, self.told.sent))
+        u64::from(ahead(self.expected, self.reported.sent))
     }
 
     /// Stores the device's count; returns the number of samples dropped since the last count. A
     /// late count changes nothing.
-    fn told(&mut self, count: SampleCount) -> u64 {
-        self.told.sent = self
-            .told
+    fn reported(&mut self, count: SampleCount) -> u64 {
+        self.reported.sent = self
+            .reported
             .sent
-            .wrapping_add(ahead(self.told.sent, count.sent));
-        let newly = ahead(self.told.dropped, count.dropped);
-        self.told.dropped = self.told.dropped.wrapping_add(newly);
+            .wrapping_add(ahead(self.reported.sent, count.sent));
+        let newly = ahead(self.reported.dropped, count.dropped);
+        self.reported.dropped = self.reported.dropped.wrapping_add(newly);
         u64::from(newly)
     }
 }
@@ -113,7 +113,7 @@ impl LinkStats {
             return;
         };
         match last {
-            Some(count) => self.dropped += before.told(count),
+            Some(count) => self.dropped += before.reported(count),
             None => self.uncertain += 1,
         }
         self.gaps += before.tail();
@@ -143,7 +143,7 @@ impl LinkStats {
         self.gaps += u64::from(gap);
         self.samples += u64::from(count);
         self.now.expected = telemetry.first.wrapping_add(count);
-        self.told(SampleCount {
+        self.reported(SampleCount {
             sent: self.now.expected,
             dropped: telemetry.dropped,
         });
@@ -151,8 +151,8 @@ impl LinkStats {
     }
 
     /// Stores the device's own count of this session.
-    pub(super) fn told(&mut self, count: SampleCount) {
-        self.dropped += self.now.told(count);
+    pub(super) fn reported(&mut self, count: SampleCount) {
+        self.dropped += self.now.reported(count);
         self.count_lost();
     }
 
@@ -175,8 +175,8 @@ mod tests {
         }
     }
 
-    fn counted(tally: &LinkStats) -> (u64, u64, u64) {
-        (tally.samples, tally.lost, tally.dropped)
+    fn counted(stats: &LinkStats) -> (u64, u64, u64) {
+        (stats.samples, stats.lost, stats.dropped)
     }
 
     const fn count(sent: u32, dropped: u32) -> SampleCount {
@@ -185,63 +185,63 @@ mod tests {
 
     #[test]
     fn gaps_are_loss_and_repeats_are_not_counted_twice() {
-        let mut tally = LinkStats::default();
-        tally.opened(None);
-        assert!(tally.received(&batch(0, 0)));
-        assert!(!tally.received(&batch(0, 0)));
-        assert!(tally.received(&batch(12, 3)));
-        assert_eq!(counted(&tally), (8, 8, 3));
+        let mut stats = LinkStats::default();
+        stats.opened(None);
+        assert!(stats.received(&batch(0, 0)));
+        assert!(!stats.received(&batch(0, 0)));
+        assert!(stats.received(&batch(12, 3)));
+        assert_eq!(counted(&stats), (8, 8, 3));
         // A sample that arrives after later ones stays counted as lost, once.
-        assert!(!tally.received(&batch(4, 1)));
-        assert_eq!(counted(&tally), (8, 8, 3));
+        assert!(!stats.received(&batch(4, 1)));
+        assert_eq!(counted(&stats), (8, 8, 3));
     }
 
     #[test]
     fn loss_at_the_start_and_at_the_end_is_counted() {
-        let mut tally = LinkStats::default();
-        tally.opened(None);
-        tally.told(count(16, 1));
-        assert_eq!(counted(&tally), (0, 16, 1));
-        assert!(tally.received(&batch(8, 1)));
-        assert_eq!(counted(&tally), (4, 12, 1));
-        tally.told(count(12, 1));
-        tally.told(count(36, 2));
-        tally.told(count(36, 2));
-        assert_eq!(counted(&tally), (4, 32, 2));
+        let mut stats = LinkStats::default();
+        stats.opened(None);
+        stats.reported(count(16, 1));
+        assert_eq!(counted(&stats), (0, 16, 1));
+        assert!(stats.received(&batch(8, 1)));
+        assert_eq!(counted(&stats), (4, 12, 1));
+        stats.reported(count(12, 1));
+        stats.reported(count(36, 2));
+        stats.reported(count(36, 2));
+        assert_eq!(counted(&stats), (4, 32, 2));
     }
 
     #[test]
     fn the_end_of_a_session_is_told_at_the_beginning_of_the_next() {
-        let mut tally = LinkStats::default();
-        tally.opened(None);
-        assert!(tally.received(&batch(0, 0)));
-        tally.drawn();
-        assert_eq!(counted(&tally), (4, 0, 0));
-        tally.opened(Some(count(20, 7)));
-        assert_eq!(counted(&tally), (4, 16, 7));
-        assert!(tally.received(&batch(0, 0)));
-        assert!(tally.received(&batch(4, 2)));
-        assert_eq!((counted(&tally), tally.uncertain), ((12, 16, 9), 0));
+        let mut stats = LinkStats::default();
+        stats.opened(None);
+        assert!(stats.received(&batch(0, 0)));
+        stats.drawn();
+        assert_eq!(counted(&stats), (4, 0, 0));
+        stats.opened(Some(count(20, 7)));
+        assert_eq!(counted(&stats), (4, 16, 7));
+        assert!(stats.received(&batch(0, 0)));
+        assert!(stats.received(&batch(4, 2)));
+        assert_eq!((counted(&stats), stats.uncertain), ((12, 16, 9), 0));
     }
 
     #[test]
     fn a_restart_leaves_a_doubt_that_is_told() {
-        let mut tally = LinkStats::default();
-        tally.opened(None);
-        assert!(tally.received(&batch(0, 0)));
-        tally.told(count(12, 1));
-        tally.restarted();
-        assert!(tally.received(&batch(0, 1)));
-        assert_eq!((counted(&tally), tally.uncertain), ((8, 8, 2), 1));
+        let mut stats = LinkStats::default();
+        stats.opened(None);
+        assert!(stats.received(&batch(0, 0)));
+        stats.reported(count(12, 1));
+        stats.restarted();
+        assert!(stats.received(&batch(0, 1)));
+        assert_eq!((counted(&stats), stats.uncertain), ((8, 8, 2), 1));
     }
 
     #[test]
     fn numbers_wrap_around() {
         let mut numbering = Numbering {
             expected: u32::MAX - 3,
-            told: count(u32::MAX - 3, 0),
+            reported: count(u32::MAX - 3, 0),
         };
-        assert_eq!(numbering.told(count(4, 0)), 0);
+        assert_eq!(numbering.reported(count(4, 0)), 0);
         assert_eq!(numbering.tail(), 8);
     }
 }

@@ -250,9 +250,9 @@ impl<C: TickClock> Native<C> {
     /// Runs the device until it can accept more bytes.
     fn make_room(&mut self) {
         let mut chunk = [0; 512];
-        let said = self.device.link.transmit(&mut chunk);
-        self.pending.extend(chunk.iter().take(said));
-        if said == 0 {
+        let stated = self.device.link.transmit(&mut chunk);
+        self.pending.extend(chunk.iter().take(stated));
+        if stated == 0 {
             self.tick();
         }
     }
@@ -275,9 +275,9 @@ impl<C: TickClock> Transport for Native<C> {
             return io::Read::read(&mut self.pending, into);
         }
         for _ in 0..self.ticks_a_call {
-            let said = self.device.link.transmit(into);
-            if said > 0 || (self.device.link.may_stand_still() && !self.restless) {
-                return Ok(said);
+            let stated = self.device.link.transmit(into);
+            if stated > 0 || (self.device.link.may_stand_still() && !self.restless) {
+                return Ok(stated);
             }
             self.tick();
         }

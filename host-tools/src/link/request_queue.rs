@@ -16,7 +16,7 @@ struct Pending {
     ask: HostRequest,
     number: u8,
     since: Duration,
-    said: Duration,
+    stated: Duration,
 }
 
 /// The pending request, the waiting ones, and the unanswered ones.
@@ -56,11 +56,11 @@ impl RequestQueue {
     }
 
     /// Returns the message to send now: the pending request if it is due again, or the next one.
-    pub(super) fn due(&mut self, now: Duration, patience: &Timeouts) -> Option<ToDevice<'static>> {
-        self.give_up_late(now, patience);
+    pub(super) fn due(&mut self, now: Duration, timeouts: &Timeouts) -> Option<ToDevice<'static>> {
+        self.give_up_late(now, timeouts);
         match &mut self.pending {
-            Some(pending) if now.saturating_sub(pending.said) < patience.again => return None,
-            Some(pending) => pending.said = now,
+            Some(pending) if now.saturating_sub(pending.stated) < timeouts.again => return None,
+            Some(pending) => pending.stated = now,
             None => {
                 let ask = self.waiting.pop_front()?;
                 self.pending = Some(self.begin(ask, now));
@@ -73,9 +73,9 @@ impl RequestQueue {
         })
     }
 
-    fn give_up_late(&mut self, now: Duration, patience: &Timeouts) {
+    fn give_up_late(&mut self, now: Duration, timeouts: &Timeouts) {
         let is_late = |pending: &mut Pending| {
-            now.saturating_sub(pending.since) >= patience.with(&pending.ask)
+            now.saturating_sub(pending.since) >= timeouts.with(&pending.ask)
         };
         if let Some(pending) = self.pending.take_if(is_late) {
             self.unanswered.push(pending.ask);
@@ -100,7 +100,7 @@ impl RequestQueue {
             ask,
             number: *number,
             since: now,
-            said: now,
+            stated: now,
         }
     }
 

@@ -34,10 +34,10 @@ impl<'t> Session<'t> {
         scene: Scene,
         arming: Option<Arming>,
         transport: Box<dyn Transport + 't>,
-        patience: Timeouts,
+        timeouts: Timeouts,
     ) -> Self {
         Self {
-            client: Client::new(terrain, scene, arming, patience),
+            client: Client::new(terrain, scene, arming, timeouts),
             line: Line::new(transport),
             goes_on: &|| true,
             leaves_by: None,
@@ -60,9 +60,9 @@ impl<'t> Session<'t> {
         scene: Scene,
         arming: Option<Arming>,
         transport: Box<dyn Transport + 't>,
-        patience: Timeouts,
+        timeouts: Timeouts,
     ) -> Result<(Self, DeviceHello), LinkError> {
-        let mut session = Self::new(terrain, scene, arming, transport, patience);
+        let mut session = Self::new(terrain, scene, arming, transport, timeouts);
         let device = session.begin(&mut |_| {})?;
         Ok((session, device))
     }
@@ -115,14 +115,14 @@ impl<'t> Session<'t> {
 
     /// Returns the statistics of the link.
     #[must_use]
-    pub const fn tally(&self) -> &LinkStats {
-        self.client.tally()
+    pub const fn stats(&self) -> &LinkStats {
+        self.client.stats()
     }
 
     /// Returns the time-outs.
     #[must_use]
-    pub const fn patience(&self) -> &Timeouts {
-        self.client.patience()
+    pub const fn timeouts(&self) -> &Timeouts {
+        self.client.timeouts()
     }
 
     /// Adds a request; an event reports its result. The request is sent in the next poll, or when
@@ -181,7 +181,7 @@ impl<'t> Session<'t> {
         self.client.leave(self.line.now(), &mut self.line.out);
         // The user has ended the session, but the device must still receive the close message.
         self.goes_on = &|| true;
-        self.leaves_by = Some(self.line.now() + self.client.patience().goodbye);
+        self.leaves_by = Some(self.line.now() + self.client.timeouts().goodbye);
         while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
                 tracing::debug!(%error, "while closing the session");

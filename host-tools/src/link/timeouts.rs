@@ -90,8 +90,8 @@ mod tests {
     #[test]
     fn no_real_arm_is_armed_for_long_after_its_host_is_gone() {
         let control = Timeouts::of_a_dialogue(Duration::from_secs(60));
-        for patience in [Timeouts::REAL_TIME, control] {
-            assert!((5..=30).contains(&patience.silence_s), "{patience:?}");
+        for timeout in [Timeouts::REAL_TIME, control] {
+            assert!((5..=30).contains(&timeout.silence_s), "{timeout:?}");
         }
     }
 }

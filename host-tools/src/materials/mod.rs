@@ -191,13 +191,13 @@ impl Materials {
     /// Describes the materials of a terrain in one line: those found at some hundred places, and
     /// the share of the default. Nothing is fetched if the file is at a URL.
     #[must_use]
-    pub fn told(&self, grid: &HapticGrid<'_>) -> String {
+    pub fn reported(&self, grid: &HapticGrid<'_>) -> String {
         let count = self.looks.class.len();
         let unread = format!("{count} classes in the table; the file is read where it is touched");
         if is_url(&self.file) {
             return unread;
         }
-        let mut found = [0_u32; MaterialTable::MOST];
+        let mut found = [0_u32; MaterialTable::MAX];
         let place =
             |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(LOOKED_AT) * f64::from(count - 1);
         for i in 0..LOOKED_AT * LOOKED_AT {

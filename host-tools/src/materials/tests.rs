@@ -105,10 +105,10 @@ fn classes_in_another_system_lie_where_they_are_on_the_globe() {
     assert_eq!([at(499_999.0), at(500_001.0)], [1, 2]);
     assert_eq!([at(499_900.0), at(500_100.0)], [1, 2]);
     let grid = HapticGrid::new(&terrain, HapticCells::Square).with_materials(Some(&materials));
-    let told = materials.told(&grid);
+    let reported = materials.reported(&grid);
     assert!(
-        told.contains("trees") && told.contains("class 20"),
-        "{told}"
+        reported.contains("trees") && reported.contains("class 20"),
+        "{reported}"
     );
 }
 
@@ -184,10 +184,10 @@ fn what_cannot_be_laid_over_a_terrain_is_told() {
     let bad = over(&unplaced, utm([0.0; 2]), looks(&[1])).expect_err("no system");
     assert!(matches!(bad, GroundError::NoSystem { unplaced, .. } if unplaced == "t.tif"));
     let elsewhere = over(&terrain, utm([510_000.0, 5_000_000.0]), looks(&[1]));
-    let told = elsewhere.expect_err("apart").to_string();
+    let reported = elsewhere.expect_err("apart").to_string();
     assert!(
-        told.contains("longitude 9.127") && told.contains("longitude 8.999"),
-        "{told}"
+        reported.contains("longitude 9.127") && reported.contains("longitude 8.999"),
+        "{reported}"
     );
     // A small raster between the places that are tested first.
     let large = raster((4_001, 3), [0.0; 2], 1.0, None, |_, _| 1.0);
@@ -252,7 +252,11 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
     assert_eq!(materials.file(), "https://host/c.tif");
     // Nothing is fetched to describe the materials.
     let grid = HapticGrid::new(&terrain, HapticCells::Stored);
-    assert!(materials.told(&grid).contains("read where it is touched"));
+    assert!(
+        materials
+            .reported(&grid)
+            .contains("read where it is touched")
+    );
     let apart = at(900_000.0).expect_err("elsewhere").to_string();
     assert!(apart.contains("https://host/c.tif lies"), "{apart}");
 }

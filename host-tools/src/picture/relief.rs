@@ -43,7 +43,7 @@ const TINTS: [RGBColor; 6] = [
     RGBColor(245, 241, 236),
 ];
 /// Colour of no-data, and of the stripes on it.
-pub(super) const HOLE: RGBColor = RGBColor(232, 234, 240);
+pub(super) const NO_DATA: RGBColor = RGBColor(232, 234, 240);
 const STRIPE: RGBColor = RGBColor(178, 184, 198);
 
 /// A finished relief.
@@ -74,7 +74,7 @@ pub(super) fn hole(x: i32, y: i32) -> RGBColor {
     if (x + y).rem_euclid(8) < 2 {
         STRIPE
     } else {
-        HOLE
+        NO_DATA
     }
 }
 

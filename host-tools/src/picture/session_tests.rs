@@ -85,17 +85,17 @@ fn a_session_shows_hip_and_proxy_on_map_and_profile() {
 #[test]
 fn a_map_of_a_part_shows_where_it_lies() {
     let samples = walk();
-    let said: Vec<_> = (0..9)
+    let stated: Vec<_> = (0..9)
         .map(|i| (format!("fact {i}"), "value".to_owned()))
         .collect();
     let facts = GroundFacts {
         metres_per_mm: Some(2.0),
         place_of: &|east, north| format!("{east}, {north}"),
-        lines: &said,
+        lines: &stated,
     };
     for size_mm in [[5000.0, 3000.0], [1000.0, 3000.0], [5000.0, 400.0]] {
         let picture = SessionPicture {
-            facts: &said,
+            facts: &stated,
             ground: Some(facts),
             ..session(&samples, size_mm)
         };

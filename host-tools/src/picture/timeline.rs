@@ -31,7 +31,7 @@ pub(super) fn heights(
         y: "height (mm)",
     };
     let mut plot = Plot::new(area, records, time, range, titles)?;
-    plot.bands(|r| below(r).is_none(), relief::HOLE.filled())?;
+    plot.bands(|r| below(r).is_none(), relief::NO_DATA.filled())?;
     plot.fill_below(below)?;
     plot.line(below, stroke(&SURFACE, 1.5))?;
     plot.line(|r| r.contact.then_some(r.proxy_mm[2]), stroke(&PROXY, 4.0))?;

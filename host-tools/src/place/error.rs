@@ -69,7 +69,7 @@ pub enum PlaceError {
     },
     /// A place without a height.
     #[error("there is no data at {place}; the terrain covers {bounds}")]
-    Hole {
+    NoData {
         /// The requested place.
         place: String,
         /// Bounds of the terrain.

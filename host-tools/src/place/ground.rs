@@ -209,7 +209,7 @@ pub(super) fn spot(
 ) -> Result<([f64; 2], f64), PlaceError> {
     let file = grid.raster().georeference();
     let ground = place(&file, asked, coordinates)?;
-    let told = || {
+    let reported = || {
         (
             asked_in_words(&file, asked, coordinates),
             bounds_in_words(&file),
@@ -222,7 +222,7 @@ pub(super) fn spot(
         if coordinates == Coordinates::LonLat && is_latitude_first(&file, asked) {
             return Err(PlaceError::LatitudeFirst(asked));
         }
-        let (place, bounds) = told();
+        let (place, bounds) = reported();
         return Err(PlaceError::Outside { place, bounds });
     }
     let haptic = grid.of_ground(ground);
@@ -230,10 +230,12 @@ pub(super) fn spot(
     let haptic = [0, 1].map(|axis| haptic[axis].clamp(0.0, most[axis]));
     match grid.read_surface(haptic) {
         (Some(height), _) => Ok((haptic, height)),
-        (None, ReadStatus::Pending) => Err(PlaceError::Unread { place: told().0 }),
+        (None, ReadStatus::Pending) => Err(PlaceError::Unread {
+            place: reported().0,
+        }),
         (None, ReadStatus::Complete) => {
-            let (place, bounds) = told();
-            Err(PlaceError::Hole { place, bounds })
+            let (place, bounds) = reported();
+            Err(PlaceError::NoData { place, bounds })
         }
     }
 }
@@ -246,7 +248,7 @@ pub(super) fn area(
     coordinates: Coordinates,
 ) -> Result<(Sides, [f64; 2]), PlaceError> {
     let file = grid.raster().georeference();
-    let told = || (box_in_words(asked), bounds_in_words(&file));
+    let reported = || (box_in_words(asked), bounds_in_words(&file));
     let points = outline(&file, asked, coordinates)?;
     let haptic: Vec<_> = points.iter().map(|point| grid.of_ground(*point)).collect();
     let [west, south, east, north] = around(haptic);
@@ -254,22 +256,22 @@ pub(super) fn area(
     let [west, south] = [west.max(0.0), south.max(0.0)];
     let [east, north] = [east.min(last[0]), north.min(last[1])];
     if west >= east || south >= north {
-        let (place, bounds) = told();
+        let (place, bounds) = reported();
         return Err(PlaceError::BoxOutside { place, bounds });
     }
     if east - west < 1.0 || north - south < 1.0 {
-        let (place, bounds) = told();
+        let (place, bounds) = reported();
         return Err(PlaceError::BoxTooSmall { place, bounds });
     }
     let cells = [west, south, east, north];
     match heights(grid, cells) {
         // The range of the available heights would be too small.
         (_, ReadStatus::Pending) => Err(PlaceError::Unread {
-            place: format!("the box {}", told().0),
+            place: format!("the box {}", reported().0),
         }),
         (Some(heights), ReadStatus::Complete) => Ok((cells, heights)),
         (None, ReadStatus::Complete) => {
-            let (place, bounds) = told();
+            let (place, bounds) = reported();
             Err(PlaceError::BoxOfHoles { place, bounds })
         }
     }

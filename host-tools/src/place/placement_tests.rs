@@ -418,9 +418,9 @@ fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
         let globe = globe(west);
         for coordinates in [OWN, LONLAT] {
             let error = seen(&globe, &boxed(sides, coordinates)).expect_err("two parts");
-            let said = error.to_string();
+            let stated = error.to_string();
             for part in parts {
-                assert!(said.contains(part), "{part} in: {said}");
+                assert!(stated.contains(part), "{part} in: {stated}");
             }
         }
         // Each part is accepted, and so are a box elsewhere and the whole globe.
@@ -457,7 +457,7 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
     };
     let utm_bounds =
         "x 386000 to 386400, y 3790000 to 3790300 (EPSG:26911), which is longitude -118.2";
-    for (said, parts) in [
+    for (stated, parts) in [
         (
             refused(utm, at([0.0, 0.0], OWN, Sizing::Fit)),
             ["x 0, y 0 (EPSG:26911) is outside", utm_bounds],
@@ -504,7 +504,7 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
         ),
     ] {
         for part in parts {
-            assert!(said.contains(part), "{part} in: {said}");
+            assert!(stated.contains(part), "{part} in: {stated}");
         }
     }
     let sized = |sizing| {

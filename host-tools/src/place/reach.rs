@@ -307,10 +307,17 @@ mod tests {
                     found[3].max(north),
                 ];
             }
-            for (side, (found, said)) in found.iter().zip(reach.sides_mm()).enumerate() {
-                let outwards = if side < 2 { found - said } else { said - found };
+            for (side, (found, stated)) in found.iter().zip(reach.sides_mm()).enumerate() {
+                let outwards = if side < 2 {
+                    found - stated
+                } else {
+                    stated - found
+                };
                 let room = -reach.step_mm..3.0 * reach.step_mm;
-                assert!(room.contains(&outwards), "side {side}: {found} and {said}");
+                assert!(
+                    room.contains(&outwards),
+                    "side {side}: {found} and {stated}"
+                );
             }
         }
     }
@@ -360,8 +367,8 @@ mod tests {
     #[test]
     fn the_encoders_tell_what_the_docs_say() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());
-        for (found, said) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
-            assert!((found / said - 1.0).abs() < 0.01, "{found} for {said}");
+        for (found, stated) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
+            assert!((found / stated - 1.0).abs() < 0.01, "{found} for {stated}");
         }
     }
 }

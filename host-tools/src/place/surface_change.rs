@@ -33,7 +33,7 @@ pub enum SurfaceError {
     /// Coefficients outside their range.
     #[error(
         "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {most}, and at rest not less than while the tip slides",
-        most = Friction::MOST
+        most = Friction::MAX
     )]
     Friction {
         /// While the tip slides.

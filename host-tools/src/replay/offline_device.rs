@@ -38,13 +38,13 @@ impl<'t> OfflineDevice<'t> {
         terrain: &'t Terrain<'t>,
         params: SurfaceParams,
         transport: Box<dyn Transport + 't>,
-        patience: Timeouts,
+        timeouts: Timeouts,
     ) -> Result<Self, LinkError> {
         let mut scene = terrain.scene(params, Source::Points, GridPoint::default());
         // A device that still has the scene of an earlier replay would continue from its end.
         let nonce = nonce();
         scene.epoch ^= nonce;
-        let (session, device) = Session::open(terrain, scene, None, transport, patience)?;
+        let (session, device) = Session::open(terrain, scene, None, transport, timeouts)?;
         Ok(Self {
             terrain: terrain.clone(),
             nonce,
@@ -97,7 +97,7 @@ impl<'t> OfflineDevice<'t> {
             self.published = Some(Published::new(terrain.clone(), params));
         }
         self.session.put_view(view, terrain)?;
-        let deadline = Instant::now() + 2 * self.session.patience().give_up;
+        let deadline = Instant::now() + 2 * self.session.timeouts().give_up;
         while Instant::now() < deadline {
             let (mut answer, wait) = (None, Duration::from_millis(100));
             self.session.poll(wait, &mut |event| {
@@ -133,8 +133,8 @@ impl<'t> OfflineDevice<'t> {
 
     /// Returns the link's statistics.
     #[must_use]
-    pub const fn tally(&self) -> &LinkStats {
-        self.session.tally()
+    pub const fn stats(&self) -> &LinkStats {
+        self.session.stats()
     }
 
     /// Steps the loop with the HIP at `hip` and returns its record.
@@ -154,7 +154,7 @@ impl<'t> OfflineDevice<'t> {
             });
         }
         self.session.step(HipCommand { seq, hip })?;
-        let deadline = Instant::now() + ANSWERS_A_POINT * self.session.patience().give_up;
+        let deadline = Instant::now() + ANSWERS_A_POINT * self.session.timeouts().give_up;
         while Instant::now() < deadline {
             if let Some(sample) = self.answer(seq)? {
                 return Ok(sample);

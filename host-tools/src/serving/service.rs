@@ -28,7 +28,7 @@ pub struct Service<'s, 't> {
     /// Arming.
     pub arming: Arming,
     /// Time-outs.
-    pub patience: Timeouts,
+    pub timeouts: Timeouts,
     /// Opens a line to the device. There is only one line at a time: the one before is closed when
     /// this is called.
     pub connect: Connect<'s, 't>,
@@ -65,7 +65,7 @@ pub struct End {
     /// disarm another host's arm: if [`End::why`] is [`LinkError::Taken`], this is no error.
     pub disarmed: Result<(), LinkError>,
     /// Statistics of the link.
-    pub tally: LinkStats,
+    pub stats: LinkStats,
 }
 
 impl<'s, 't> Service<'s, 't> {
@@ -82,7 +82,7 @@ impl<'s, 't> Service<'s, 't> {
         let mut line = (self.connect)()?;
         let checked = check(&mut *line);
         let (scene, arming) = (self.scene, Some(self.arming));
-        let session = Session::new(self.terrain, scene, arming, line, self.patience);
+        let session = Session::new(self.terrain, scene, arming, line, self.timeouts);
         let mut served = Served {
             session: session.heeding(self.goes_on),
             connect: self.connect,
@@ -114,11 +114,11 @@ impl<'t> Served<'_, 't> {
     pub fn serve(mut self, handler: &mut dyn SessionHandler<'t>) -> End {
         let why = self.until_over(handler);
         let disarmed = self.leave(why.as_ref().err(), &mut |event| handler.take(event));
-        let tally = self.session.tally().clone();
+        let stats = self.session.stats().clone();
         End {
             why,
             disarmed,
-            tally,
+            stats,
         }
     }
 
@@ -133,7 +133,7 @@ impl<'t> Served<'_, 't> {
                 .view()
                 .map(|(view, terrain)| self.session.put_view(view, terrain));
             let polled = polled.and(put.unwrap_or(Ok(())));
-            handler.show(self.session.tally());
+            handler.show(self.session.stats());
             match polled {
                 Err(error) if error.is_passing() => self.wait_for_device(handler, &error)?,
                 other => other?,

@@ -24,7 +24,7 @@ pub trait SessionHandler<'t> {
     }
 
     /// Shows the progress, if wanted; called after each poll of the line.
-    fn show(&mut self, tally: &LinkStats);
+    fn show(&mut self, stats: &LinkStats);
 
     /// Returns true if the service should end.
     fn is_over(&self) -> bool;

@@ -23,7 +23,7 @@ const fn ms(ms: u64) -> Duration {
 }
 
 /// Short, because the device answers at once.
-const PATIENCE: Timeouts = Timeouts {
+const TIMEOUTS: Timeouts = Timeouts {
     again: ms(10),
     alive: ms(20),
     greet_again: ms(40),
@@ -44,7 +44,7 @@ struct Bench {
     dead_up_to: Rc<Cell<u32>>,
     /// Number of lines opened so far.
     made: Rc<Cell<u32>>,
-    told: Rc<RefCell<Vec<String>>>,
+    reported: Rc<RefCell<Vec<String>>>,
     /// The host's time: a millisecond for each poll of a line.
     time: Rc<Cell<Duration>>,
 }
@@ -100,7 +100,7 @@ impl Bench {
             deaf: Rc::default(),
             dead_up_to: Rc::default(),
             made: Rc::default(),
-            told: Rc::default(),
+            reported: Rc::default(),
             time: Rc::default(),
         }
     }
@@ -126,13 +126,14 @@ impl Bench {
     fn last_end(&self) -> SessionEnd {
         self.deaf.set(false);
         let line = Box::new(self.line());
-        let control = ControlSession::open(line, PATIENCE.give_up).expect("it answers");
+        let control = ControlSession::open(line, TIMEOUTS.give_up).expect("it answers");
         control.device().last.end
     }
 
-    fn was_told(&self) -> bool {
-        let told = self.told.borrow();
-        told.iter()
+    fn was_reported(&self) -> bool {
+        let reported = self.reported.borrow();
+        reported
+            .iter()
             .any(|line| line.contains("switch the amplifiers off"))
     }
 }
@@ -148,7 +149,7 @@ fn absent() -> LinkError {
 struct Looks<'l> {
     left: u32,
     last: Box<dyn FnMut() + 'l>,
-    heard: Vec<String>,
+    received: Vec<String>,
 }
 
 impl<'l> Looks<'l> {
@@ -156,7 +157,7 @@ impl<'l> Looks<'l> {
         Self {
             left,
             last: Box::new(last),
-            heard: vec![],
+            received: vec![],
         }
     }
 }
@@ -165,7 +166,7 @@ impl SessionHandler<'_> for Looks<'_> {
     fn take(&mut self, _: Event<'_>) {}
 
     fn hear(&mut self, line: &str) {
-        self.heard.push(line.to_owned());
+        self.received.push(line.to_owned());
     }
 
     fn asks(&mut self) -> Vec<HostRequest> {
@@ -199,12 +200,12 @@ fn played<T>(
         terrain: &terrain,
         scene: terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home),
         arming: Arming::default(),
-        patience: PATIENCE,
+        timeouts: TIMEOUTS,
         connect: Box::new(|| connect().map(|line| line as Box<dyn Transport>)),
         device: "the bench".into(),
         retry: ms(1),
         goes_on,
-        tell: &|line| bench.told.borrow_mut().push(line.to_owned()),
+        tell: &|line| bench.reported.borrow_mut().push(line.to_owned()),
     })
 }
 
@@ -219,7 +220,7 @@ fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String
         let served = open(service).expect("it answers");
         served.serve(&mut handler)
     });
-    (end, handler.heard)
+    (end, handler.received)
 }
 
 #[test]
@@ -244,7 +245,7 @@ fn a_panic_says_goodbye_and_where_that_is_not_heard_the_user_is_told() {
         };
         let panicked = catch_unwind(AssertUnwindSafe(|| served(&bench, 5, &mut last)));
         assert!(panicked.is_err());
-        assert_eq!(bench.was_told(), deaf);
+        assert_eq!(bench.was_reported(), deaf);
         let end = [SessionEnd::Goodbye, SessionEnd::Replaced][usize::from(deaf)];
         assert_eq!(bench.last_end(), end);
     }
@@ -256,14 +257,14 @@ fn failed_start_closes_the_session_or_warns_the_user() {
         let bench = Bench::new();
         // The host before was killed.
         let line = Box::new(bench.line());
-        let killed = ControlSession::open(line, PATIENCE.give_up).expect("it answers");
+        let killed = ControlSession::open(line, TIMEOUTS.give_up).expect("it answers");
         bench.deaf.set(deaf);
         drop(killed);
         let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
             service.open(|_| Err(absent())).map(|_| ())
         });
         assert!(matches!(began, Err(LinkError::Absent { .. })), "{began:?}");
-        assert_eq!(bench.was_told(), deaf);
+        assert_eq!(bench.was_reported(), deaf);
         let end = [SessionEnd::Goodbye, SessionEnd::Replaced][usize::from(deaf)];
         assert_eq!(bench.last_end(), end);
     }
@@ -273,7 +274,7 @@ fn failed_start_closes_the_session_or_warns_the_user() {
         open(service).map(|_| ())
     });
     assert!(matches!(began, Err(LinkError::Silent(_))), "{began:?}");
-    assert!(bench.was_told());
+    assert!(bench.was_reported());
 }
 
 #[test]
@@ -302,8 +303,8 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
         served.serve(&mut handler)
     });
     assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
-    let heard = handler.heard.join("\n");
-    assert!(heard.contains("goes on where it was"), "{heard}");
+    let received = handler.received.join("\n");
+    assert!(received.contains("goes on where it was"), "{received}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
 }
 
@@ -346,7 +347,7 @@ fn losing_the_device_warns_of_an_armed_arm() {
     let end = played(&bench, &|| true, &mut || bench.only_line(), |service| {
         let served = open(service).expect("it answers");
         let line = Box::new(bench.line());
-        another = Some(ControlSession::open(line, PATIENCE.give_up).expect("it answers"));
+        another = Some(ControlSession::open(line, TIMEOUTS.give_up).expect("it answers"));
         served.serve(&mut handler)
     });
     let Err(taken @ LinkError::Taken) = end.why else {

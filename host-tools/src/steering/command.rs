@@ -325,9 +325,9 @@ mod tests {
             ("mark a\tb", "control character"),
             ("marks a", "no such word"),
         ] {
-            let told = parse(line).expect_err(line).to_string();
-            assert!(told.contains(why), "{told}");
-            assert!(!told.contains(char::is_control), "{told}");
+            let reported = parse(line).expect_err(line).to_string();
+            assert!(reported.contains(why), "{reported}");
+            assert!(!reported.contains(char::is_control), "{reported}");
         }
     }
 
@@ -360,9 +360,12 @@ mod tests {
             ("at soon reset", "a number"),
             ("at 1 at 2 reset", "no such word"),
         ] {
-            let told = parse(line).expect_err(line).to_string();
-            assert!(told.contains(why) && told.contains(line), "{told}");
-            assert!(told.contains("exaggerate TIMES"), "{told}");
+            let reported = parse(line).expect_err(line).to_string();
+            assert!(
+                reported.contains(why) && reported.contains(line),
+                "{reported}"
+            );
+            assert!(reported.contains("exaggerate TIMES"), "{reported}");
         }
         let long = parse(&"x".repeat(10_000)).expect_err("no command");
         assert!(long.to_string().len() < UNDERSTOOD.len() + 2 * SHOWN);

@@ -129,10 +129,10 @@ fn unopened_clutch_or_silent_device_is_given_up() {
                 let ask = HostRequest::Request(Request::Clutch { hold });
                 steering.on_event(&Event::Unanswered(&ask));
             }
-            let told = steering.lines();
+            let reported = steering.lines();
             assert!(
-                told.len() == 1 && told[0].contains("stays as it was"),
-                "{told:?}"
+                reported.len() == 1 && reported[0].contains("stays as it was"),
+                "{reported:?}"
             );
             assert_eq!(asked(steering), Some(ClutchHold::LetGo));
             samples(steering, Limits::empty(), 2);

@@ -65,7 +65,7 @@ impl Keys {
 
     /// Returns the release of the key that holds the clutch, once.
     pub fn released(&mut self, now: Duration) -> Option<Steer> {
-        let is_over = |heard: &mut Duration| now.saturating_sub(*heard) >= LET_GO;
+        let is_over = |received: &mut Duration| now.saturating_sub(*received) >= LET_GO;
         let over = self.held.take_if(is_over).is_some();
         (over && !self.toggled).then_some(Steer::Clutch(false))
     }

@@ -142,8 +142,8 @@ mod tests {
         for _ in 0..WAITING {
             assert_eq!(marks.mark("x".to_owned()), None);
         }
-        let told = marks.mark("y".to_owned()).expect("a line");
-        assert!(told.contains("`y` is left out"), "{told}");
+        let reported = marks.mark("y".to_owned()).expect("a line");
+        assert!(reported.contains("`y` is left out"), "{reported}");
         assert_eq!(marks.asks().len(), WAITING);
     }
 }

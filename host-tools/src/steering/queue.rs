@@ -20,7 +20,7 @@ const WAITING_EACH: usize = 1 << 16;
 
 /// Max bytes of a line with its end; commands have a few dozen. A longer line is cut here and ends
 /// the input.
-const LONGEST: u64 = 1 << 16;
+const MAX: u64 = 1 << 16;
 
 /// Source of commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -215,8 +215,8 @@ fn read_lines(
         let mut input = BufReader::new(input);
         for number in 1.. {
             let mut line = String::new();
-            let read = input.by_ref().take(LONGEST).read_line(&mut line);
-            let is_whole = line.ends_with('\n') || (line.len() as u64) < LONGEST;
+            let read = input.by_ref().take(MAX).read_line(&mut line);
+            let is_whole = line.ends_with('\n') || (line.len() as u64) < MAX;
             // After a cut line, the rest has no meaning.
             let goes_on = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
             if !goes_on || !is_whole {
@@ -246,7 +246,7 @@ mod tests {
         let take = move |line: &str, number| send.send((line.len(), number)).is_ok();
         let endless = Origin::File("/dev/zero".into());
         read_lines(&endless, take, || {}).expect("opened");
-        assert_eq!(next(&lines), Some((LONGEST as usize, 1)));
+        assert_eq!(next(&lines), Some((MAX as usize, 1)));
         assert_eq!(next(&lines), None);
     }
 
@@ -258,11 +258,11 @@ mod tests {
         std::fs::write(&path, text).expect("written");
         let origin: Origin = path.to_str().expect("text").parse().expect("a file");
         let mut queue = CommandQueue::of(&origin).expect("opened");
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         wait_until("the line that is no command", || {
-            let due = queue.due(0.9, true, &mut |line| told.push(line));
+            let due = queue.due(0.9, true, &mut |line| reported.push(line));
             assert_eq!(due, None);
-            !told.is_empty()
+            !reported.is_empty()
         });
         let mut due = |t_s, is_free| queue.due(t_s, is_free, &mut |_| {});
         let zoom = |times| change(PlacementChange::Zoom(times));
@@ -277,8 +277,8 @@ mod tests {
         assert_eq!(sixth, Wanted::Mark("done".to_owned()));
         assert_eq!(due(9.0, true), None);
         assert!(
-            told[0].starts_with("line 3 of the commands: `nonsense`"),
-            "{told:?}"
+            reported[0].starts_with("line 3 of the commands: `nonsense`"),
+            "{reported:?}"
         );
         assert!(CommandQueue::of(&Origin::File(folder.path().join("none"))).is_err());
         assert_eq!("-".parse(), Ok(Origin::StandardInput));
@@ -286,14 +286,14 @@ mod tests {
 
     /// Takes all due commands of some queues until each has its count.
     fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Wanted>>, Vec<String>) {
-        let (mut due, mut told) = (vec![vec![]; queues.len()], vec![]);
+        let (mut due, mut reported) = (vec![vec![]; queues.len()], vec![]);
         wait_until("all commands", || {
             for (queue, due) in queues.iter_mut().zip(&mut due) {
-                due.extend(queue.due(0.0, true, &mut |line| told.push(line)));
+                due.extend(queue.due(0.0, true, &mut |line| reported.push(line)));
             }
             due.iter().map(Vec::len).eq(counts.iter().copied())
         });
-        (due, told)
+        (due, reported)
     }
 
     #[test]
@@ -303,7 +303,7 @@ mod tests {
         let text = "zoom 2\non 2 zoom 3\non 3 zoom 9\non x reset\non 1 at 0 zoom 4\non 2 nonsense\nenter 7\non 2 enter 7\nzoom 5";
         std::fs::write(&path, text).expect("written");
         let mut queues = CommandQueue::of_several(&Origin::File(path), 2, || {}).expect("opened");
-        let (due, told) = all_due(&mut queues, &[3, 4]);
+        let (due, reported) = all_due(&mut queues, &[3, 4]);
         let zoom = |times| change(PlacementChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
         // An answer does not wait for earlier commands.
@@ -312,8 +312,8 @@ mod tests {
         assert_eq!(others, [2.0, 3.0, 5.0].map(zoom).each_ref());
         assert_eq!(answers, [&Wanted::Enter(7)]);
         // An error is reported only once, not by each device.
-        let [third, fourth, sixth, seventh] = &told[..] else {
-            panic!("{told:?}");
+        let [third, fourth, sixth, seventh] = &reported[..] else {
+            panic!("{reported:?}");
         };
         assert!(third.starts_with("line 3 of the commands: `on` is followed"));
         assert!(third.contains("1 to 2"), "{third}");
@@ -354,19 +354,25 @@ mod tests {
         drop(queues.pop());
         let (due, _) = all_due(&mut queues, &[1]);
         assert_eq!(due[0], [change(PlacementChange::Reset)]);
-        let mut told = vec![];
+        let mut reported = vec![];
         let (mut taken, t_s) = (0, 0.0);
         // A bounded queue keeps the commands that are not due yet.
         for _ in 0..3 {
-            assert_eq!(second.due(t_s, false, &mut |line| told.push(line)), None);
+            assert_eq!(
+                second.due(t_s, false, &mut |line| reported.push(line)),
+                None
+            );
             assert_eq!(second.waiting.len(), WAITING);
         }
-        while second.due(t_s, true, &mut |line| told.push(line)).is_some() {
+        while second
+            .due(t_s, true, &mut |line| reported.push(line))
+            .is_some()
+        {
             taken += 1;
         }
         assert_eq!(taken, WAITING_EACH);
         assert_eq!(
-            told,
+            reported,
             [format!(
                 "{} commands were left out: this device was too far behind",
                 count - WAITING_EACH

@@ -62,7 +62,7 @@ impl Terrain<'_> {
         let (east, north) = (along(0)?, along(1)?);
         let cells = (east[1] - east[0]).max(north[1] - north[0]);
         let spans = |shift: &u8| (TILE_CELLS as f64) * f64::from(*shift).exp2() >= cells;
-        let shift = (CoarseTile::LEAST_SHIFT..=CoarseTile::MAX_SHIFT).find(spans)?;
+        let shift = (CoarseTile::MIN_SHIFT..=CoarseTile::MAX_SHIFT).find(spans)?;
         Some(CoarseTile {
             // Whole numbers of cells inside the field.
             first: Cell::new(east[0] as i32, north[0] as i32),
@@ -176,7 +176,7 @@ impl Terrain<'_> {
 fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
     let shift = wide.shift.saturating_sub(NEAR_IS_FINER);
     let near = CoarseTile {
-        shift: shift.max(CoarseTile::LEAST_SHIFT),
+        shift: shift.max(CoarseTile::MIN_SHIFT),
         ..*wide
     };
     let side = |tile: &CoarseTile| (TILE_CELLS as i32) << tile.shift;
@@ -195,7 +195,7 @@ fn coarse_tile(buffer: &mut TileBuffer, sample: impl Fn(usize, usize) -> f64) ->
         *height = sample(index % TILE_SAMPLES, index / TILE_SAMPLES);
     }
     match range(buffer.heights.as_slice()) {
-        None => Heights::Hole,
+        None => Heights::NoData,
         // The samples have no known unit.
         Some((low, high, _)) => buffer.above(low, high, &[]),
     }

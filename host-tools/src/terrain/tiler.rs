@@ -459,10 +459,10 @@ impl<'r> Terrain<'r> {
         let unit = self.read(key, &mut buffer.heights, reads);
         if let Some(step) = steep_step(&buffer.heights) {
             self.warn_of_step(key, step);
-            return Some(Heights::Hole);
+            return Some(Heights::NoData);
         }
         let Some((low, high, known)) = range(buffer.heights.as_slice()) else {
-            return Some(Heights::Hole);
+            return Some(Heights::NoData);
         };
         if low == high && known == self.samples_in(key) {
             let base = tile_heights::base(low, high);

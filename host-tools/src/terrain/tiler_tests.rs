@@ -113,7 +113,7 @@ fn holes_stay_holes_and_an_empty_tile_says_so() {
     assert_eq!(tile[4 * TILE_SAMPLES + 4], 5.0);
     let mut buffer = TileBuffer::default();
     let (heights, _) = terrain.tile(key(0, 2, 0), &mut buffer).expect("a tile");
-    assert_eq!(heights, Heights::Hole);
+    assert_eq!(heights, Heights::NoData);
     assert_eq!(terrain.height_mm(3.5, 4.5), None);
     assert_eq!(terrain.height_mm(10.5, 4.5), Some(5.0));
     assert_eq!(terrain.height_mm(10.5, 32.1), None);
@@ -175,14 +175,14 @@ fn tile_with_too_steep_step_is_a_hole() {
         let raster = Raster::from_fn(64, 9, move |x, _| if x > 40 { height } else { 0.0 });
         raster.expect("raster")
     };
-    for (height, is_hole) in [(9_999.0, false), (10_001.0, true)] {
+    for (height, is_no_data) in [(9_999.0, false), (10_001.0, true)] {
         let raster = wall(height);
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let mut buffer = TileBuffer::default();
         let (steep, _) = terrain.tile(key(0, 1, 0), &mut buffer).expect("a tile");
-        assert_eq!(steep == Heights::Hole, is_hole, "{height}");
+        assert_eq!(steep == Heights::NoData, is_no_data, "{height}");
         let (flat, _) = terrain.tile(key(0, 0, 0), &mut buffer).expect("a tile");
-        assert_ne!(flat, Heights::Hole);
+        assert_ne!(flat, Heights::NoData);
     }
 }

@@ -212,11 +212,11 @@ impl<'t> ViewFeed<'t> {
         let Some(scene) = self.scene_due.take() else {
             return true;
         };
-        let is_told = self.queue.offer(Message::Scene(scene.clone()));
-        if !is_told {
+        let is_reported = self.queue.offer(Message::Scene(scene.clone()));
+        if !is_reported {
             self.scene_due = Some(scene);
         }
-        is_told
+        is_reported
     }
 
     /// Keeps the tile under a row's HIP in full detail: for rows that are not rendered by a device
@@ -230,7 +230,7 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Sends the due messages on tiles and link; call it after each poll of the line.
-    pub fn look(&mut self, tally: &LinkStats) {
+    pub fn look(&mut self, stats: &LinkStats) {
         if !self.tell_scene() {
             return;
         }
@@ -242,10 +242,10 @@ impl<'t> ViewFeed<'t> {
             self.link_due_s = latest.t_s + LINK_EVERY_S;
             let link = Link {
                 t_s: latest.t_s,
-                tiles: tally.tiles,
-                tile_bytes: tally.tile_bytes,
-                samples: tally.samples,
-                lost: tally.lost + tally.dropped,
+                tiles: stats.tiles,
+                tile_bytes: stats.tile_bytes,
+                samples: stats.samples,
+                lost: stats.lost + stats.dropped,
                 late: self.late,
                 dropped: self.dropped.messages,
             };
@@ -274,7 +274,7 @@ impl<'t> ViewFeed<'t> {
         }
         let batch = std::mem::replace(&mut self.batch, Vec::with_capacity(self.at_a_time));
         let samples = batch.len() as u64;
-        let is_told = match self.tell_scene() {
+        let is_reported = match self.tell_scene() {
             true => self.offer(Message::Samples(batch)),
             // The viewer would draw them in the placement before.
             false => {
@@ -282,7 +282,7 @@ impl<'t> ViewFeed<'t> {
                 false
             }
         };
-        if !is_told {
+        if !is_reported {
             self.dropped.samples += samples;
         }
     }
@@ -378,7 +378,7 @@ mod tests {
         rows += 4 * LIVE_BATCH as u64;
         let (dropped, _) = feed.finish();
         let bytes = reader.join().expect("it reads");
-        let (mut rest, mut views, mut told) = (bytes.as_slice(), 0, 0);
+        let (mut rest, mut views, mut reported) = (bytes.as_slice(), 0, 0);
         while let Some(message) = stream::read(&mut rest).expect("whole") {
             match message {
                 Message::Scene(scene) => {
@@ -387,14 +387,14 @@ mod tests {
                     assert!(!scene.keeps_tiles || views == 2);
                 }
                 Message::Samples(samples) => {
-                    told += samples.len() as u64;
+                    reported += samples.len() as u64;
                     let of_view = |sample: &stream::Sample| sample.t_s == f64::from(views - 1);
                     assert!(samples.iter().all(of_view), "in view {views}");
                 }
                 _ => {}
             }
         }
-        assert_eq!((views, told + dropped.samples), (2, rows));
+        assert_eq!((views, reported + dropped.samples), (2, rows));
         assert!(dropped.samples >= 2 * LIVE_BATCH as u64);
         // Each dropped sample was in a batch, and nothing else was dropped.
         let batches = dropped.samples / LIVE_BATCH as u64;

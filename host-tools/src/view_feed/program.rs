@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn what_is_no_program_is_named() {
         let missing = Program::at("/no/such/program".into());
-        let said = missing.start().expect_err("there is none").to_string();
-        assert!(said.contains("/no/such/program"), "{said}");
+        let stated = missing.start().expect_err("there is none").to_string();
+        assert!(stated.contains("/no/such/program"), "{stated}");
     }
 }

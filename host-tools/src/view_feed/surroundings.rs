@@ -99,7 +99,7 @@ mod tests {
 
     /// Returns the layers sent while home moves along these positions, with a number of calls at
     /// each.
-    fn told(homes: &[([f64; 2], usize)]) -> Vec<Layer> {
+    fn reported(homes: &[([f64; 2], usize)]) -> Vec<Layer> {
         let raster = Raster::from_fn(20_001, 65, height).expect("raster");
         let terrain = Terrain::new(&raster, Scale::new(0.5, 0.1).expect("scale"), 0);
         let terrain = terrain.expect("terrain");
@@ -125,8 +125,8 @@ mod tests {
 
     #[test]
     fn finer_layers_go_along_with_a_far_pan_and_stay_with_a_near_one() {
-        assert_eq!(told(&[([2000.0, 30.0], 9), ([1000.0, 10.0], 9)]), []);
-        let layers = told(&[([15_000.0, 30.0], 9), ([15_100.0, 30.0], 9)]);
+        assert_eq!(reported(&[([2000.0, 30.0], 9), ([1000.0, 10.0], 9)]), []);
+        let layers = reported(&[([15_000.0, 30.0], 9), ([15_100.0, 30.0], 9)]);
         let [layer] = layers.as_slice() else {
             panic!("{} layers", layers.len());
         };
@@ -137,15 +137,15 @@ mod tests {
             "{west}"
         );
         assert_eq!(layer.heights.len(), (layer.columns * layer.rows) as usize);
-        for (i, told) in layer.heights.iter().enumerate() {
+        for (i, reported) in layer.heights.iter().enumerate() {
             let (column, row) = (i as u32 % layer.columns, i as u32 / layer.columns);
-            assert_eq!(*told, height(west as u32 + 8 * column, 8 * row), "{i}");
+            assert_eq!(*reported, height(west as u32 + 8 * column, 8 * row), "{i}");
         }
     }
 
     #[test]
     fn a_pan_meanwhile_leaves_what_was_being_read() {
-        let layers = told(&[([9000.0, 30.0], 1), ([15_000.0, 30.0], 9)]);
+        let layers = reported(&[([9000.0, 30.0], 1), ([15_000.0, 30.0], 9)]);
         let wests: Vec<_> = layers.iter().map(|layer| layer.first[0]).collect();
         assert!(matches!(wests[..], [west] if west > 9000), "{wests:?}");
     }

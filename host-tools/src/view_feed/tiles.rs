@@ -26,7 +26,7 @@ pub(super) struct Tiles {
     /// Tiles that keep their detail.
     detailed: HashSet<TileKey>,
     /// Pending tiles for the viewer, by slot.
-    untold: Vec<(u32, TileKey)>,
+    unreported: Vec<(u32, TileKey)>,
 }
 
 impl Tiles {
@@ -37,7 +37,7 @@ impl Tiles {
             held: HeldTiles::new(side, parts),
             coming: None,
             detailed: HashSet::new(),
-            untold: vec![],
+            unreported: vec![],
         }
     }
 
@@ -73,13 +73,13 @@ impl Tiles {
     /// Empties the window.
     fn forget(&mut self) {
         self.held.clear();
-        self.untold.clear();
+        self.unreported.clear();
     }
 
     fn sent(&mut self, key: TileKey) {
         let (slot, key) = self.held.sent(key);
-        self.untold.retain(|(other, _)| *other != slot);
-        self.untold.push((slot, key));
+        self.unreported.retain(|(other, _)| *other != slot);
+        self.unreported.push((slot, key));
     }
 
     /// Keeps the tile at a position (cells) in full detail: for rows that are not rendered by a
@@ -92,20 +92,20 @@ impl Tiles {
         let is_there = terrain.has(TileKey::new(key.level, haptic(col), haptic(row)));
         let has_room = self.detailed.len() < MAX_DETAILED;
         if has_room && is_there && self.detailed.insert(key) {
-            self.untold.push((self.detailed.len() as u32, key));
+            self.unreported.push((self.detailed.len() as u32, key));
         }
     }
 
     /// Sends some of the pending tiles.
     pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
-        let mut told = 0;
-        for (slot, key) in std::mem::take(&mut self.untold) {
+        let mut reported = 0;
+        for (slot, key) in std::mem::take(&mut self.unreported) {
             // A tile that does not fit in the queue is tried again in the next call.
-            let is_told = told < AT_A_TIME
+            let is_reported = reported < AT_A_TIME
                 && queue.offer(Message::Tile(layers::tile(terrain, key.index, slot)));
-            match is_told {
-                true => told += 1,
-                false => self.untold.push((slot, key)),
+            match is_reported {
+                true => reported += 1,
+                false => self.unreported.push((slot, key)),
             }
         }
     }

@@ -49,12 +49,12 @@ fn run_until_reset(device: &Device<'_>, by: Stop, break_it: impl FnOnce(&mut Mac
 
 #[test]
 fn a_panic_is_told_after_the_reset_with_its_place() {
-    let told = after_reset(Reset::Software, |device| {
+    let reported = after_reset(Reset::Software, |device| {
         run_until_reset(device, Stop::Software, |machine, at| {
             machine.call_instead(at, machine.image.panicking());
         });
     });
-    for (machine, status) in told {
+    for (machine, status) in reported {
         let board = machine.chip.board;
         assert_eq!(status.boot.cause, ResetCause::Software, "{board}");
         let crash = status.boot.crash.expect("a crash");
@@ -67,12 +67,12 @@ fn a_panic_is_told_after_the_reset_with_its_place() {
 
 #[test]
 fn a_hard_fault_is_told_after_the_reset_with_its_address() {
-    let told = after_reset(Reset::Software, |device| {
+    let reported = after_reset(Reset::Software, |device| {
         run_until_reset(device, Stop::Software, |machine, at| {
             machine.patch(at.address, &[0x00, 0xDE]);
         });
     });
-    for (machine, status) in told {
+    for (machine, status) in reported {
         let board = machine.chip.board;
         let crash = status.boot.crash.expect("a crash");
         assert_eq!(crash.kind, CrashKind::HardFault, "{board}");
@@ -90,7 +90,7 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 
 #[test]
 fn a_panic_is_told_even_where_its_record_cannot_be_made() {
-    let told = after_reset(Reset::Software, |device| {
+    let reported = after_reset(Reset::Software, |device| {
         let record = {
             let mut machine = device.machine.borrow_mut();
             let record = machine.image.function_like(&["CrashRecord", "new"]);
@@ -104,7 +104,7 @@ fn a_panic_is_told_even_where_its_record_cannot_be_made() {
         assert_eq!(machine.hard_faults, 1, "making the record failed");
         machine.restore(record);
     });
-    for (machine, status) in told {
+    for (machine, status) in reported {
         let board = machine.chip.board;
         let crash = status.boot.crash.expect("a crash");
         assert_eq!((crash.kind, crash.tick), (CrashKind::Panic, 0), "{board}");
@@ -114,12 +114,12 @@ fn a_panic_is_told_even_where_its_record_cannot_be_made() {
 
 #[test]
 fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
-    let told = after_reset(Reset::Watchdog, |device| {
+    let reported = after_reset(Reset::Watchdog, |device| {
         run_until_reset(device, Stop::Watchdog, |machine, at| {
             machine.patch(at.address, &[0xFE, 0xE7]);
         });
     });
-    for (machine, status) in told {
+    for (machine, status) in reported {
         let board = machine.chip.board;
         assert_eq!(status.boot.cause, ResetCause::Watchdog, "{board}");
         assert_eq!(status.boot.crash, None, "{board}");
@@ -130,13 +130,13 @@ fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
 
 #[test]
 fn a_stored_calibration_is_there_after_the_reset() {
-    let told = after_reset(Reset::Watchdog, |device| {
+    let reported = after_reset(Reset::Watchdog, |device| {
         let before = device.ask_status();
         assert_eq!(before.boot.cause, ResetCause::PowerOn);
         assert_eq!(before.calibration, CalibrationSource::None);
         assert_eq!(store(device), Ok(()));
     });
-    for (machine, status) in told {
+    for (machine, status) in reported {
         let board = machine.chip.board;
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
         assert_eq!(
@@ -219,8 +219,8 @@ fn what_was_being_written_when_the_power_went_leaves_the_record_before() {
         assert_eq!(status.boot.crash, None, "{board}");
         let met = |vector| again.machine.borrow().taken.contains(&vector);
         assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
-        let told = again.machine.borrow().bus().reports_unreadable();
-        assert!(!told, "{board}: left for the next write to fail by");
+        let reported = again.machine.borrow().bus().reports_unreadable();
+        assert!(!reported, "{board}: left for the next write to fail by");
         assert_eq!(store(&mut again), Ok(()), "{board}: no room beside it");
         assert_eq!(again.machine.borrow().hard_faults, 0, "{board}");
     });

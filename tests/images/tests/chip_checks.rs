@@ -83,8 +83,8 @@ fn a_probe_that_stops_reading_the_log_stops_no_task() {
         let hello = VersionCheck::Asked { protocol: 3 };
         device.send(encode(&hello, &mut [0; 32]).expect("it fits"));
         device.run_ms(100);
-        let told = device.latest.and_then(|sample| sample.fault);
-        assert_eq!(told, None, "{board}");
+        let reported = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(reported, None, "{board}");
         assert!(device.machine.borrow().is_enabled(), "{board}: still armed");
     });
 }

@@ -121,8 +121,8 @@ fn the_boards_pages_say_what_the_tiles_take() {
             .symbol_like(&["TILES"])
             .expect("the tiles")
             .size;
-        let said = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
-        assert!(page.contains(&said), "{board}: {said}");
+        let stated = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
+        assert!(page.contains(&stated), "{board}: {stated}");
     }
 }
 

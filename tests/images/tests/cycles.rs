@@ -58,12 +58,12 @@ fn worse(rows: &[Row], columns: &[usize]) -> Vec<String> {
         };
         let number = |text: &str| text.parse::<f64>().expect("a number");
         let is_worse = |i: &usize| number(&record[*i]) > TOLERANCE * number(&kept[*i]);
-        let told = |i: usize| {
+        let reported = |i: usize| {
             let (title, now, kept) = (TITLES[i], &record[i], &kept[i]);
             format!("{}: {title} {now}, {kept} in the table", row.state)
         };
         let worse = columns.iter().copied().filter(is_worse);
-        worse.map(told).collect()
+        worse.map(reported).collect()
     };
     rows.iter().flat_map(worse_row).collect()
 }

@@ -62,8 +62,8 @@ fn assert_off_came_first(machine: &mut Machine) {
 /// Checks that this fault is reported to the host.
 fn assert_told(device: &mut Device<'_>, fault: Fault) {
     device.run_ms(40);
-    let told = device.latest.and_then(|sample| sample.fault);
-    assert_eq!(told, Some(fault));
+    let reported = device.latest.and_then(|sample| sample.fault);
+    assert_eq!(reported, Some(fault));
 }
 
 /// Checks that a fault switches the amplifiers off in one tick, that they stay off after `undo`,

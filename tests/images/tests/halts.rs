@@ -50,8 +50,8 @@ fn the_first_tick_after_a_halt_has_no_force() {
             assert_eq!(on, None, "{board}, {ms} ms: nothing is driven after it");
             drop(machine);
             device.run_ms(40);
-            let told = device.latest.and_then(|sample| sample.fault);
-            assert_eq!(told, Some(Fault::TickGap), "{board}, {ms} ms");
+            let reported = device.latest.and_then(|sample| sample.fault);
+            assert_eq!(reported, Some(Fault::TickGap), "{board}, {ms} ms");
         });
     }
 }
@@ -77,7 +77,7 @@ fn a_halt_is_noticed_although_the_debugger_stops_the_clock() {
         assert!(!machine.is_enabled(), "{board}");
         drop(machine);
         device.run_ms(40);
-        let told = device.latest.and_then(|sample| sample.fault);
-        assert_eq!(told, Some(Fault::TickGap), "{board}");
+        let reported = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(reported, Some(Fault::TickGap), "{board}");
     });
 }

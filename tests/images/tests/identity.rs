@@ -38,7 +38,7 @@ fn the_serial_number_on_usb_and_on_the_link_is_the_chips_identifier() {
         let endpoints = BulkEndpoints::find(&configuration.expect("well formed"));
         let pipes = ScriptedPipes::new(Rc::new(RefCell::new(machine)), endpoints.expect("two"));
         let opened = ControlSession::open(Box::new(Bulk(pipes)), HANG);
-        let told = opened.expect("it answers").device().serial.to_string();
-        assert_eq!(told, expected, "{board}");
+        let reported = opened.expect("it answers").device().serial.to_string();
+        assert_eq!(reported, expected, "{board}");
     }
 }

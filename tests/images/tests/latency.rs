@@ -71,15 +71,19 @@ fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
             device.move_to(plane.counts_at([118.0, 91.0], 1.5));
             device.run_ms(5);
             let found = stopwatch.take();
-            let said = Row::read(chip.board);
+            let stated = Row::read(chip.board);
             for (i, each) in [&found.to_output, &found.whole].into_iter().enumerate() {
                 assert!(each.len() > 30, "{}", each.len());
-                let (most, said) = (most(chip, each), said.cycles[i]);
+                let (most, stated) = (most(chip, each), stated.cycles[i]);
                 let instructions = each.iter().map(|cycles| cycles.instructions).max();
                 let instructions = instructions.expect("some ticks");
                 println!("{}: {most} cycles, {instructions} instructions", chip.board);
-                assert!(most <= said, "{}: {most}, not {said}", chip.board);
-                assert!(most > said * 3 / 4, "{}: {most}, not {said}", chip.board);
+                assert!(most <= stated, "{}: {most}, not {stated}", chip.board);
+                assert!(
+                    most > stated * 3 / 4,
+                    "{}: {most}, not {stated}",
+                    chip.board
+                );
             }
             let (board, latency_us) = (chip.board, device.latency_us);
             let behind_us = match board {
@@ -87,7 +91,7 @@ fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
                 "nucleo-h743zi2" => (2_000_000 / DUTY_HZ) as u16,
                 _ => 15 + 10,
             };
-            let states_us = said.us[0] as u16 + behind_us + CURRENT_LOOP_US;
+            let states_us = stated.us[0] as u16 + behind_us + CURRENT_LOOP_US;
             assert_eq!(latency_us, states_us, "{board}");
             let tried_us = match board {
                 "nucleo-h743zi2" => stability::LONG_US,
@@ -101,22 +105,22 @@ fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
 #[test]
 fn the_fastest_tick_that_the_build_takes_ends_in_time() {
     for (board, fastest_hz) in tick_rate::FASTEST_HZ {
-        let said = Row::read(board);
+        let stated = Row::read(board);
         let (core_hz, timer_hz) = match board {
             "nucleo-g474re" => (168_000_000, 42_000_000),
             _ => (456_000_000, 57_000_000),
         };
-        let us = said
+        let us = stated
             .cycles
             .map(|cycles| cycles.div_ceil(core_hz / 1_000_000));
-        assert_eq!(said.us, us, "{board}");
+        assert_eq!(stated.us, us, "{board}");
         // The converter on SPI adds its frames' time to the core's.
         let frames_us = if board == "nucleo-h743zi2-spi" { 15 } else { 0 };
         let in_time = |hz: u32| (us[1] + frames_us) * hz <= 1_000_000;
         let rates = (1..=10).map(|khz| 1_000 * khz);
         let rates = rates.filter(|hz| timer_hz % hz == 0 && in_time(*hz));
         assert_eq!(rates.max(), Some(fastest_hz), "{board}");
-        assert_eq!(said.fastest_hz, fastest_hz, "{board}");
+        assert_eq!(stated.fastest_hz, fastest_hz, "{board}");
     }
 }
 

@@ -46,9 +46,9 @@ fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
     });
     drop(machine);
     device.run_ms(40);
-    let told = device.latest.and_then(|sample| sample.fault);
-    let took = took.unwrap_or_else(|| panic!("{board}: on after {at_most} ticks, {told:?}"));
-    (took, told)
+    let reported = device.latest.and_then(|sample| sample.fault);
+    let took = took.unwrap_or_else(|| panic!("{board}: on after {at_most} ticks, {reported:?}"));
+    (took, reported)
 }
 
 #[test]
@@ -117,9 +117,9 @@ fn a_converter_that_forgets_takes_eight_ticks() {
                 return;
             }
             device.machine.borrow().bus().converter.forget();
-            let (took, told) = ends(device, 9);
+            let (took, reported) = ends(device, 9);
             assert!(took <= 8, "{took}");
-            assert_eq!(told, Some(Fault::OutputsNotAsSet));
+            assert_eq!(reported, Some(Fault::OutputsNotAsSet));
         },
     );
 }
@@ -166,9 +166,9 @@ fn a_current_that_was_not_commanded_is_found_where_there_are_monitors() {
         };
         on_each_armed(fit, |device| {
             device.machine.borrow().bus().set_monitors(wrong);
-            let (took, told) = ends(device, 40);
+            let (took, reported) = ends(device, 40);
             assert!((4..=15).contains(&took), "{took}");
-            assert_eq!(told, Some(Fault::CurrentMismatch));
+            assert_eq!(reported, Some(Fault::CurrentMismatch));
         });
     }
 }

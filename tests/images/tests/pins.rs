@@ -32,7 +32,7 @@ fn table(page: &str, heading: &str) -> Pins {
 }
 
 /// Returns the pins of a board on its page.
-fn said(board: &str) -> Pins {
+fn stated(board: &str) -> Pins {
     let page = |name: &str| {
         let path = repository().join(format!("docs/reference/boards/{name}.md"));
         std::fs::read_to_string(path).expect("the page")
@@ -86,11 +86,11 @@ fn every_pin_is_set_up_as_its_boards_page_says() {
     for mut machine in machines() {
         let board = machine.chip.board;
         let mut expected = modes(&machine);
-        let said = said(board);
-        assert!(said.len() >= 15, "{board}: {said:?}");
+        let stated = stated(board);
+        assert!(stated.len() >= 15, "{board}: {stated:?}");
         assert_eq!(machine.run_ms(10), Stop::Time, "{board}");
         // Pins that are not on the page keep their reset state.
-        expected.extend(said);
+        expected.extend(stated);
         let is = modes(&machine);
         let other = expected
             .iter()

@@ -7,7 +7,7 @@ use hapterra_image_tests::device::{Device, machines, on_each_board, rough_ground
 use hapterra_image_tests::machine::{Machine, Stop};
 
 /// The highest priority that critical sections mask.
-const CEILING: u8 = 0x20;
+const ABSOLUTE_LIMIT: u8 = 0x20;
 /// Priority of the haptic interrupt.
 const HAPTIC: u8 = 0x10;
 /// Priority of the supply's interrupt, whose handler does not return.
@@ -72,7 +72,7 @@ fn the_haptic_interrupt_is_above_the_ceiling_and_the_page_says_so() {
             } else if interrupt == chip.comparator.interrupt {
                 assert_eq!(priority, SUPPLY, "{}", chip.board);
             } else {
-                assert!(priority >= CEILING, "{}: {interrupt}", chip.board);
+                assert!(priority >= ABSOLUTE_LIMIT, "{}: {interrupt}", chip.board);
             }
         }
         let rows = rows(&machine);

@@ -33,9 +33,9 @@ fn a_command_pin_that_reads_otherwise_is_a_fault() {
             assert!(machine.is_enabled(), "axis {axis}: within its error");
             machine.bus().command_held_at = Some((axis, commanded + 200));
             drop(machine);
-            let (took, told) = ends(device, 6);
+            let (took, reported) = ends(device, 6);
             assert_eq!(took, Some(3), "axis {axis}");
-            assert_eq!(told, Some(Fault::OutputsNotAsSet), "axis {axis}");
+            assert_eq!(reported, Some(Fault::OutputsNotAsSet), "axis {axis}");
         });
     }
 }
@@ -45,9 +45,9 @@ fn an_enable_pin_held_low_from_outside_is_a_fault() {
     Bench::new().on_each(|device| {
         let board = device.machine.borrow().chip.board;
         device.machine.borrow().bus().enable_held_at = Some(false);
-        let (took, told) = ends(device, 3);
+        let (took, reported) = ends(device, 3);
         assert_eq!(took, Some(1), "{board}");
-        assert_eq!(told, Some(Fault::OutputsNotAsSet), "{board}");
+        assert_eq!(reported, Some(Fault::OutputsNotAsSet), "{board}");
     });
 }
 

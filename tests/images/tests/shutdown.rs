@@ -285,8 +285,8 @@ fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
         assert_eq!(driven, Some(true), "ready for the next time");
         drop(machine);
         device.run_ms(40);
-        let told = device.latest.and_then(|sample| sample.fault);
-        assert_eq!(told, Some(Fault::EmergencyStop));
+        let reported = device.latest.and_then(|sample| sample.fault);
+        assert_eq!(reported, Some(Fault::EmergencyStop));
     });
 }
 

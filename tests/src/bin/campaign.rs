@@ -109,49 +109,49 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
 fn run(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(campaign::SEED);
     if let Some(number) = request.segment {
-        let mut tally = campaign::LinkStats::default();
-        campaign::segment::run(seed, number, request.ground, &mut tally)?;
-        print!("{}", tally.table());
-        println!("{:#?}", tally.extremes);
+        let mut stats = campaign::LinkStats::default();
+        campaign::segment::run(seed, number, request.ground, &mut stats)?;
+        print!("{}", stats.table());
+        println!("{:#?}", stats.extremes);
         return Ok(None);
     }
     let seconds = request.seconds.unwrap_or(10_000);
-    let tally = campaign::run(seed, seconds, &mut |segment, tally| {
+    let stats = campaign::run(seed, seconds, &mut |segment, stats| {
         eprintln!(
             "segment {segment}: {} mishaps, amplifiers on for {} s of {} s",
-            tally.injected(),
-            tally.armed / 1_000,
-            tally.ticks / 1_000
+            stats.injected(),
+            stats.armed / 1_000,
+            stats.ticks / 1_000
         );
     })?;
-    print!("{}", tally.table());
-    println!("{:#?}", tally.extremes);
+    print!("{}", stats.table());
+    println!("{:#?}", stats.extremes);
     let commit = request.commit.as_deref();
-    Ok(Some(campaign::report::page(commit, seed, seconds, &tally)))
+    Ok(Some(campaign::report::page(commit, seed, seconds, &stats)))
 }
 
 /// Runs the campaign of link faults. Returns the report, or `None` for a single segment.
 fn run_link(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(link_campaign::SEED);
     if let Some(number) = request.segment {
-        let mut tally = link_campaign::LinkStats::default();
-        link_campaign::segment(seed, number, &mut tally)?;
-        print!("{}", tally.table());
+        let mut stats = link_campaign::LinkStats::default();
+        link_campaign::segment(seed, number, &mut stats)?;
+        print!("{}", stats.table());
         return Ok(None);
     }
     let seconds = request.seconds.unwrap_or(3_600);
-    let tally = link_campaign::run(seed, seconds, &mut |segment, tally| {
+    let stats = link_campaign::run(seed, seconds, &mut |segment, stats| {
         eprintln!(
             "segment {segment}: {} runs, amplifiers on for {} s of {} s",
-            tally.runs(),
-            tally.ticks[1] / 1_000,
-            tally.ticks[0] / 1_000
+            stats.runs(),
+            stats.ticks[1] / 1_000,
+            stats.ticks[0] / 1_000
         );
     })?;
-    print!("{}", tally.table());
+    print!("{}", stats.table());
     let commit = request.commit.as_deref();
     Ok(Some(link_campaign::report::page(
-        commit, seed, seconds, &tally,
+        commit, seed, seconds, &stats,
     )))
 }
 

@@ -81,17 +81,17 @@ fn all(wanted: &Wanted) -> ExitCode {
     let time = Duration::from_secs_f64(wanted.minutes * 60.0);
     let began = Instant::now();
     let mut last = None;
-    let tally = soak(
+    let stats = soak(
         wanted.seed,
         wanted.surface,
         0,
         Until::Time(time),
         threads,
-        |tally| {
+        |stats| {
             let second = began.elapsed().as_secs();
             if last != Some(second) {
                 last = Some(second);
-                live(tally, began.elapsed(), time);
+                live(stats, began.elapsed(), time);
             }
         },
     );
@@ -99,14 +99,14 @@ fn all(wanted: &Wanted) -> ExitCode {
         eprintln!();
     }
     println!(
-        "seed {}, {:.1} minutes on {threads} threads\n{tally}",
+        "seed {}, {:.1} minutes on {threads} threads\n{stats}",
         wanted.seed,
         began.elapsed().as_secs_f64() / 60.0
     );
     // Prints a few of each kind.
-    let mut told: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
-    for broken in &tally.broken {
-        let times = told.entry(&broken.invariant).or_default();
+    let mut reported: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
+    for broken in &stats.broken {
+        let times = reported.entry(&broken.invariant).or_default();
         *times += 1;
         if *times > SHOWN {
             continue;
@@ -120,7 +120,7 @@ fn all(wanted: &Wanted) -> ExitCode {
             wanted.surface.option()
         );
     }
-    if tally.broken.is_empty() {
+    if stats.broken.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
@@ -128,7 +128,7 @@ fn all(wanted: &Wanted) -> ExitCode {
 }
 
 /// Prints progress: one line, overwritten on a terminal, and once a minute elsewhere.
-fn live(tally: &LinkStats, elapsed: Duration, time: Duration) {
+fn live(stats: &LinkStats, elapsed: Duration, time: Duration) {
     let terminal = stderr().is_terminal();
     if !terminal && !elapsed.as_secs().is_multiple_of(60) {
         return;
@@ -138,9 +138,9 @@ fn live(tally: &LinkStats, elapsed: Duration, time: Duration) {
         "{start}{:4} of {} s: {} scenes, {:.1} million ticks, {} wrong answers{end}",
         elapsed.as_secs(),
         time.as_secs(),
-        tally.scenes,
-        tally.ticks() as f64 / 1e6,
-        tally.broken.len()
+        stats.scenes,
+        stats.ticks() as f64 / 1e6,
+        stats.broken.len()
     );
     let _ = stderr().flush();
 }

@@ -44,7 +44,7 @@ pub struct ForceWatch {
     /// The contact in progress, if all of it is known.
     contact: Option<Touched>,
     /// The most energy that a contact has given to the tip with the controller on, mJ.
-    pub most_given_mj: f32,
+    pub max_given_mj: f32,
     /// Ticks of these contacts.
     pub watched_ticks: u64,
     /// Those of `watched_ticks` during the ramp.
@@ -56,7 +56,7 @@ pub struct ForceWatch {
     let_through: Option<Shares>,
     swing: Swing,
     /// The most reversals of the tip in a quarter of a second.
-    pub most_turns: usize,
+    pub max_turns: usize,
 }
 
 /// Record of a contact.
@@ -77,14 +77,14 @@ impl ForceWatch {
             last: None,
             before_n: Vec3::ZERO,
             contact: None,
-            most_given_mj: 0.0,
+            max_given_mj: 0.0,
             watched_ticks: 0,
             ramp_ticks: 0,
             clutch_ticks: 0,
             share: Share::UNKNOWN,
             let_through: None,
             swing: Swing::default(),
-            most_turns: 0,
+            max_turns: 0,
         }
     }
 
@@ -123,12 +123,12 @@ impl ForceWatch {
         let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
         let spring_n = share * self.surfaces.stiffest_n_per_mm() * stretch_mm;
         let is_damped = self.surfaces.is_damped() || self.surfaces.is_controlled();
-        let most_n = if is_damped { 2.0 * spring_n } else { spring_n };
+        let max_n = if is_damped { 2.0 * spring_n } else { spring_n };
         let force_n = sample.force_n.length();
-        match force_n <= most_n * (1.0 + ROUNDING) + ROUNDING {
+        match force_n <= max_n * (1.0 + ROUNDING) + ROUNDING {
             true => Ok(()),
             false => Err(format!(
-                "{force_n} N at {depth_mm} mm, at most {most_n}: {sample:?}"
+                "{force_n} N at {depth_mm} mm, at most {max_n}: {sample:?}"
             )),
         }
     }
@@ -154,13 +154,13 @@ impl ForceWatch {
         if shares.clutch == 0.0 {
             return 0.0;
         }
-        let most_n = CLAMP_N / shares.clutch;
-        shares.product() * self.surfaces.stored_mj(depth_mm, most_n)
+        let max_n = CLAMP_N / shares.clutch;
+        shares.product() * self.surfaces.stored_mj(depth_mm, max_n)
     }
 
     fn shading_mj(&self, deepest_mm: f32) -> f32 {
         let way_mm = self.cell_mm + deepest_mm;
-        let gives_mj = SHADED_MJ + SHADED_PART * self.surfaces.most_n(deepest_mm) * way_mm;
+        let gives_mj = SHADED_MJ + SHADED_PART * self.surfaces.max_n(deepest_mm) * way_mm;
         gives_mj.min(SHADED_MOST_MJ)
     }
 
@@ -177,8 +177,8 @@ impl ForceWatch {
         let before_n =
             std::mem::replace(&mut self.before_n, last.map_or(Vec3::ZERO, |s| s.force_n));
         let is_spring = |sample: &TickRecord| !sample.limits.intersects(NO_SPRING);
-        let is_told = self.surfaces.is_spring() && self.surfaces.is_controlled() && is_calm;
-        let last = last.filter(|last| is_told && is_spring(last) && is_spring(sample));
+        let is_reported = self.surfaces.is_spring() && self.surfaces.is_controlled() && is_calm;
+        let last = last.filter(|last| is_reported && is_spring(last) && is_spring(sample));
         let Some((last, (before, now))) = last.zip(shares) else {
             (self.contact, self.swing) = (None, Swing::default());
             return Ok(());
@@ -206,7 +206,7 @@ impl ForceWatch {
         });
         let along = sample.force_n.normalize_or_zero();
         let turns = self.swing.turns(sample.tick, moved_mm, along);
-        self.most_turns = self.most_turns.max(turns);
+        self.max_turns = self.max_turns.max(turns);
         if turns > MAX_TURNS {
             return Err(format!(
                 "the tip swings, {turns} turns in 0.25 s: {sample:?}"
@@ -218,7 +218,7 @@ impl ForceWatch {
         self.watched_ticks += 1;
         self.ramp_ticks += u64::from(sample.limits.contains(Limits::RAMPING) && is_rendered);
         self.clutch_ticks += u64::from(sample.limits.contains(Limits::CLUTCH_MOVES) && is_rendered);
-        self.most_given_mj = self.most_given_mj.max(contact.given_mj);
+        self.max_given_mj = self.max_given_mj.max(contact.given_mj);
         let [high_mm, _] = self.surfaces.relief();
         let textures = 2.0 * self.surfaces.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
         let shading = match self.surfaces.is_shaded() {

@@ -65,7 +65,7 @@ impl Effects {
         };
         let classes = match random.below(2) {
             0 => 0,
-            _ => 1 + random.below(MaterialTable::MOST - 1),
+            _ => 1 + random.below(MaterialTable::MAX - 1),
         };
         // With one stiffness everywhere, the ground is a spring in the energy checks.
         let is_even = random.below(2) == 0;
@@ -202,7 +202,7 @@ impl SceneSurfaces {
 
     /// Returns the largest force of a spring at this depth, N.
     #[must_use]
-    pub fn most_n(&self, depth_mm: f32) -> f32 {
+    pub fn max_n(&self, depth_mm: f32) -> f32 {
         let spring_n = self.stiffest_n_per_mm() * depth_mm;
         spring_n.min(self.hardest.max_force_n)
     }
@@ -213,11 +213,11 @@ impl SceneSurfaces {
         self.hardest.is_controlled()
     }
 
-    /// Returns the energy of the stiffest spring at a depth, mJ, with a force of `most_n` at most.
+    /// Returns the energy of the stiffest spring at a depth, mJ, with a force of `max_n` at most.
     #[must_use]
-    pub fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
+    pub fn stored_mj(&self, depth_mm: f32, max_n: f32) -> f32 {
         let stiffness = self.stiffest_n_per_mm();
-        let force_n = self.most_n(depth_mm).min(most_n);
+        let force_n = self.max_n(depth_mm).min(max_n);
         match stiffness > 0.0 {
             true => force_n * (depth_mm - 0.5 * force_n / stiffness),
             false => 0.0,

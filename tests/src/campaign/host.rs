@@ -69,8 +69,8 @@ impl<'t> Host<'t> {
     /// Clears all state and restarts with another scene.
     pub fn restart(&mut self, scene: Scene, now: u64, random: &mut Random) {
         let seed = random.bits();
-        let patience = Timeouts::REAL_TIME;
-        self.client = Client::numbered(self.terrain, scene, None, patience, seed);
+        let timeout = Timeouts::REAL_TIME;
+        self.client = Client::numbered(self.terrain, scene, None, timeout, seed);
         *self.reader = FrameReader::new();
         self.greet(now, random);
     }
@@ -125,13 +125,13 @@ impl<'t> Host<'t> {
     /// Queues the device's bytes of this tick, and answers those that arrive.
     pub fn hear(
         &mut self,
-        said: &[u8],
+        stated: &[u8],
         now: u64,
         unkind: &Unkind,
         tiles: Tiles,
         random: &mut Random,
     ) {
-        self.to_host.send(said, now, unkind, random);
+        self.to_host.send(stated, now, unkind, random);
         let mut out = Vec::new();
         while let Some(piece) = self.to_host.receive(now) {
             match tiles {
@@ -164,7 +164,7 @@ impl<'t> Host<'t> {
         } = self;
         let mut on = |event: Event<'_>| match event {
             Event::Sample(sample) => samples.push(*sample),
-            Event::Status(told) => *status = Some(told.clone()),
+            Event::Status(reported) => *status = Some(reported.clone()),
             Event::Guard(report) => *fault = report.fault,
             _ => {}
         };
@@ -234,7 +234,7 @@ fn of_poisoned_materials(
         _ => TileMaterials::One(0),
     };
     let heights = match random.below(2) {
-        0 => Heights::Hole,
+        0 => Heights::NoData,
         _ => Heights::Flat {
             base: random.below(40) as i32 - 10,
             height: 0.5,

@@ -47,14 +47,14 @@ pub fn run(
     seconds: u64,
     done: &mut dyn FnMut(u64, &LinkStats),
 ) -> Result<LinkStats, Violation> {
-    let mut tally = LinkStats::default();
+    let mut stats = LinkStats::default();
     let mut number = 0;
-    while tally.armed < seconds * 1_000 {
+    while stats.armed < seconds * 1_000 {
         for ground in [Ground::Ice, Ground::Drawn] {
-            segment::run(seed, number, ground, &mut tally)?;
+            segment::run(seed, number, ground, &mut stats)?;
         }
-        done(number, &tally);
+        done(number, &stats);
         number += 1;
     }
-    Ok(tally)
+    Ok(stats)
 }

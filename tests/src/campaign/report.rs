@@ -8,8 +8,8 @@ use crate::campaign_table;
 
 /// Returns the page of a campaign that ran with the source at `commit`.
 #[must_use]
-pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &LinkStats) -> String {
-    let at = &tally.extremes;
+pub fn page(commit: Option<&str>, seed: u64, seconds: u64, stats: &LinkStats) -> String {
+    let at = &stats.extremes;
     let commit = commit.map_or(String::new(), |commit| format!(" at commit {commit}"));
     format!(
         "# The closed-loop campaign
@@ -78,9 +78,9 @@ column is the maximum number of ticks from the first tick of the fault until the
 detected within {STALL_TICKS} ticks, before the watchdog resets the board. The arm was near a singular pose for {:.1} s.
 
 {}",
-        tally.armed / 1_000,
-        tally.ticks / 1_000,
-        tally.injected(),
+        stats.armed / 1_000,
+        stats.ticks / 1_000,
+        stats.injected(),
         1e-3 * at.watched_ticks as f64,
         1e-3 * at.ramp_ticks as f64,
         1e-3 * at.clutch_ticks as f64,
@@ -97,7 +97,7 @@ detected within {STALL_TICKS} ticks, before the watchdog resets the board. The a
         at.misled.force_n,
         at.misled.off_counts,
         1e-3 * at.singular_ticks as f64,
-        tally.table(),
+        stats.table(),
     )
 }
 

@@ -60,7 +60,7 @@ pub struct Violation {
     pub what: String,
 }
 
-/// Runs a segment of a campaign and adds it to `tally`.
+/// Runs a segment of a campaign and adds it to `stats`.
 ///
 /// # Errors
 /// The first [`Violation`].
@@ -68,7 +68,7 @@ pub fn run(
     seed: u64,
     segment: u64,
     ground: Ground,
-    tally: &mut LinkStats,
+    stats: &mut LinkStats,
 ) -> Result<(), Violation> {
     let mut random = Random::new(seed ^ segment.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let raster = terrain(&mut random);
@@ -81,14 +81,14 @@ pub fn run(
     let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(materials.as_ref());
     let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
     let mut running = Segment::new(&terrain, effects, random);
-    let played = running.play(tally);
+    let played = running.play(stats);
     let forces = &running.forces;
-    running.watch.extremes.given_mj = forces.most_given_mj;
+    running.watch.extremes.given_mj = forces.max_given_mj;
     running.watch.extremes.watched_ticks = forces.watched_ticks;
     running.watch.extremes.ramp_ticks = forces.ramp_ticks;
     running.watch.extremes.clutch_ticks = forces.clutch_ticks;
-    running.watch.extremes.turns = forces.most_turns;
-    tally.add(running.now, running.armed, &running.watch.extremes);
+    running.watch.extremes.turns = forces.max_turns;
+    stats.add(running.now, running.armed, &running.watch.extremes);
     played.map_err(|what| Violation {
         segment,
         ground,
@@ -174,7 +174,7 @@ impl<'t> Segment<'t> {
         }
     }
 
-    fn play(&mut self, tally: &mut LinkStats) -> Result<(), String> {
+    fn play(&mut self, stats: &mut LinkStats) -> Result<(), String> {
         let mut deck = Kind::ALL;
         for left in (1..deck.len()).rev() {
             deck.swap(left, self.random.below(left + 1));
@@ -194,7 +194,7 @@ impl<'t> Segment<'t> {
                 ));
             }
             let (outcome, reaction) = self.mishap(kind)?;
-            tally.count(kind, outcome, reaction)?;
+            stats.count(kind, outcome, reaction)?;
         }
         Ok(())
     }
@@ -424,11 +424,11 @@ impl<'t> Segment<'t> {
             }
         }
         self.clock.set(reading);
-        let mut said = [0; 1024];
-        let length = self.run_core(core, sense, stalls, &mut said);
-        let said = &said[..length];
+        let mut stated = [0; 1024];
+        let length = self.run_core(core, sense, stalls, &mut stated);
+        let stated = &stated[..length];
         self.host
-            .hear(said, self.now, &unkind, tiles, &mut self.random);
+            .hear(stated, self.now, &unkind, tiles, &mut self.random);
         self.look(core, &sense)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
         self.arm.step(currents, mood);
@@ -438,7 +438,13 @@ impl<'t> Segment<'t> {
     }
 
     /// Runs the core for a tick. Returns the number of bytes it sent.
-    fn run_core(&mut self, core: Core, sense: GuardInputs, stalls: bool, said: &mut [u8]) -> usize {
+    fn run_core(
+        &mut self,
+        core: Core,
+        sense: GuardInputs,
+        stalls: bool,
+        stated: &mut [u8],
+    ) -> usize {
         match core {
             Core::Runs if stalls => self.drive = self.device.tick_alone(sense),
             Core::Runs => {
@@ -446,7 +452,7 @@ impl<'t> Segment<'t> {
                 self.host
                     .deliver(self.now, &mut |bytes| device.receive(bytes));
                 self.drive = device.tick(sense);
-                return device.link.transmit(said);
+                return device.link.transmit(stated);
             }
             // The last command stays on.
             Core::Halted => {}

@@ -82,11 +82,11 @@ impl Watch {
             return Err(format!("amplifiers on with {sense:?}"));
         }
         if drive.enabled {
-            let told = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
+            let reported = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
             let currents = drive.currents_a.to_array().map(f64::from);
             let torque = torques_nm(&self.model, currents);
-            self.force_as_read(torque, told)?;
-            self.force_at_the_tip(torque, told, truth)?;
+            self.force_as_read(torque, reported)?;
+            self.force_at_the_tip(torque, reported, truth)?;
         }
         Ok(())
     }
@@ -153,8 +153,8 @@ impl Watch {
     }
 
     /// Checks the force with the levers that the device computes.
-    fn force_as_read(&mut self, torque_nm: [f64; 3], told: [i32; 3]) -> Result<(), String> {
-        let angle = |i: usize| Encoder::new(&self.model.drive[i]).angle_rad(told[i]);
+    fn force_as_read(&mut self, torque_nm: [f64; 3], reported: [i32; 3]) -> Result<(), String> {
+        let angle = |i: usize| Encoder::new(&self.model.drive[i]).angle_rad(reported[i]);
         let q = std::array::from_fn(angle);
         let Some(levers) = Levers::at(&self.model, &self.record, q) else {
             return Ok(());
@@ -172,10 +172,10 @@ impl Watch {
     fn force_at_the_tip(
         &mut self,
         torque_nm: [f64; 3],
-        told: [i32; 3],
+        reported: [i32; 3],
         truth: &Truth,
     ) -> Result<(), String> {
-        let off = (0..3).map(|i| told[i].abs_diff(truth.counts[i]));
+        let off = (0..3).map(|i| reported[i].abs_diff(truth.counts[i]));
         let off_counts = off.fold(0, u32::max);
         let is_misled = off_counts > OFF_COUNTS;
         self.extremes.misled_ticks += u64::from(is_misled);

@@ -9,7 +9,7 @@ use super::tick::texture;
 
 /// Returns a table that is valid for a scene, or one of arbitrary numbers.
 pub(super) fn table(bytes: &mut Bytes<'_>) -> MaterialTable {
-    let count = 1 + usize::from(bytes.byte()) % MaterialTable::MOST;
+    let count = 1 + usize::from(bytes.byte()) % MaterialTable::MAX;
     let all: Vec<Material> = (0..count).map(|_| material(bytes)).collect();
     MaterialTable::new(&all).unwrap_or(MaterialTable::EMPTY)
 }
@@ -42,7 +42,7 @@ fn material(bytes: &mut Bytes<'_>) -> Material {
 pub(super) fn lay(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>) {
     let kind = bytes.byte();
     let count = match kind & 3 {
-        0 => MaterialTable::MOST,
+        0 => MaterialTable::MAX,
         _ => table.materials().len(),
     };
     let samples = TILE_SAMPLES * TILE_SAMPLES - usize::from(kind & 12 == 12);

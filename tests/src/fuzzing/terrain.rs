@@ -74,8 +74,8 @@ fn open(path: &Path, how: u8) -> bool {
     let raster = match Raster::open(path, &options) {
         Ok(raster) => raster,
         Err(error) => {
-            let told = error.to_string();
-            assert!(!told.contains(char::is_control), "{told:?}");
+            let reported = error.to_string();
+            assert!(!reported.contains(char::is_control), "{reported:?}");
             // Third-party decoders may panic; the project's may not.
             assert!(
                 !matches!(error.fault(), RasterError::DecoderFailed(name) if !is_anothers(name))

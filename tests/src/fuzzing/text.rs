@@ -37,8 +37,8 @@ pub fn run(data: &[u8]) {
 
 /// Formats a result and its error.
 fn check<T: std::fmt::Debug, E: std::error::Error>(read: Result<T, E>) {
-    let told = read.map_or_else(|error| error.to_string(), |read| format!("{read:?}"));
-    assert!(!told.is_empty());
+    let reported = read.map_or_else(|error| error.to_string(), |read| format!("{read:?}"));
+    assert!(!reported.is_empty());
 }
 
 fn read_command(line: &str) {

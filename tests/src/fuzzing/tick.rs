@@ -61,11 +61,11 @@ pub fn run(data: &[u8]) {
             }
             // A table, and a scene that belongs to it or to another.
             _ if kind == 247 || kind == 246 => {
-                let (told, mut scene) = (materials::table(&mut bytes), scene(&mut bytes));
+                let (reported, mut scene) = (materials::table(&mut bytes), scene(&mut bytes));
                 // As on the link, which refuses a scene that cannot be rendered.
-                if told.is_valid() && scene.is_valid() {
-                    haptics.take_materials(&told);
-                    table = told;
+                if reported.is_valid() && scene.is_valid() {
+                    haptics.take_materials(&reported);
+                    table = reported;
                 }
                 scene.materials = Some(match kind {
                     247 => table.check_sum(),

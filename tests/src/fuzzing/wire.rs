@@ -93,8 +93,8 @@ impl Wire {
         for session in (1..=OTHERS).map(SessionNumber::new) {
             self.hear(&message_in(session, &ToDevice::Hello(hello)));
         }
-        for said in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
-            self.hear(&message(&said));
+        for stated in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
+            self.hear(&message(&stated));
         }
         // Clears any latched fault. The last of these requests has the number 1.
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
@@ -129,10 +129,10 @@ impl Wire {
             if n == 0 {
                 return;
             }
-            let mut said = &chunk[..n];
-            while !said.is_empty() {
-                let (taken, frame) = self.host.push(said);
-                said = &said[taken..];
+            let mut stated = &chunk[..n];
+            while !stated.is_empty() {
+                let (taken, frame) = self.host.push(stated);
+                stated = &stated[taken..];
                 if let Some(frame) = frame {
                     let frame = frame.expect("the device sends whole frames");
                     if VersionCheck::is_in(frame) {

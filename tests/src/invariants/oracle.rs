@@ -8,7 +8,7 @@ use hapterra_core::force::Texture;
 
 use super::material::Judged;
 use super::observed_tick::ObservedTick;
-use super::texture::TextureJudge;
+use super::texture::TextureOracle;
 use super::{Invariant, Violation};
 use crate::scene::run::Scene;
 use crate::scene::terrain::Terrain;
@@ -74,7 +74,7 @@ impl Measured {
 pub struct TickOracle<'g> {
     pub(super) terrain: &'g Terrain,
     pub(super) friction: Friction,
-    texture: Option<TextureJudge>,
+    texture: Option<TextureOracle>,
     /// Work units that a tick may spend.
     pub(super) work: u32,
     /// Ticks in a row in which the proxy has not moved.
@@ -134,7 +134,7 @@ impl<'g> TickOracle<'g> {
     /// Returns the oracle for a surface with a texture, or with none.
     #[must_use]
     pub fn with_texture(self, texture: Texture) -> Self {
-        let texture = (!texture.is_none()).then(|| TextureJudge::new(texture));
+        let texture = (!texture.is_none()).then(|| TextureOracle::new(texture));
         Self { texture, ..self }
     }
 
@@ -225,54 +225,54 @@ impl<'g> TickOracle<'g> {
         self.measured.states[output.state as usize] += 1;
         self.measured.unconverged += u64::from(!output.converged);
         self.measured.work = self.measured.work.max(output.work);
-        let mut told = Vec::new();
-        told.extend(self.is_finite(seen).err());
-        if told.is_empty() {
-            self.finite(seen, &mut told);
+        let mut reported = Vec::new();
+        reported.extend(self.is_finite(seen).err());
+        if reported.is_empty() {
+            self.finite(seen, &mut reported);
         }
         self.remembers(seen);
-        told
+        reported
     }
 
-    fn finite(&mut self, seen: &ObservedTick, told: &mut Vec<Violation>) {
-        told.extend(self.is_within_work(seen).err());
-        told.extend(self.is_clamped(seen).err());
-        told.extend(self.is_consistent(seen).err());
-        told.extend(self.is_shaded(seen).err());
-        told.extend(self.is_textured(seen).err());
+    fn finite(&mut self, seen: &ObservedTick, reported: &mut Vec<Violation>) {
+        reported.extend(self.is_within_work(seen).err());
+        reported.extend(self.is_clamped(seen).err());
+        reported.extend(self.is_consistent(seen).err());
+        reported.extend(self.is_shaded(seen).err());
+        reported.extend(self.is_textured(seen).err());
         if seen.is_touching() {
-            told.extend(self.is_on_surface(seen).err());
+            reported.extend(self.is_on_surface(seen).err());
         }
         if seen.is_touching() && seen.output.converged {
             if self.friction.is_none() {
-                told.extend(self.is_local_minimum(seen).err());
+                reported.extend(self.is_local_minimum(seen).err());
             } else {
-                told.extend(self.is_in_cone(seen).err());
-                told.extend(self.is_held_back(seen).err());
+                reported.extend(self.is_in_cone(seen).err());
+                reported.extend(self.is_held_back(seen).err());
             }
-            told.extend(self.is_hip_below(seen).err());
+            reported.extend(self.is_hip_below(seen).err());
         }
         if seen.is_free() {
-            told.extend(self.is_above(seen, self.before.as_ref()).err());
+            reported.extend(self.is_above(seen, self.before.as_ref()).err());
         }
         if let Some(before) = self.before {
-            self.since(&before, seen, told);
+            self.since(&before, seen, reported);
         }
     }
 
-    fn since(&mut self, before: &ObservedTick, seen: &ObservedTick, told: &mut Vec<Violation>) {
-        told.extend(self.was_seen_above(before, seen).err());
-        told.extend(self.fades(before, seen).err());
-        told.extend(self.lets_go_gently(before, seen).err());
-        told.extend(self.descends(before, seen).err());
-        told.extend(self.stays_in_basin(before, seen).err());
-        told.extend(self.advances(before, seen).err());
+    fn since(&mut self, before: &ObservedTick, seen: &ObservedTick, reported: &mut Vec<Violation>) {
+        reported.extend(self.was_seen_above(before, seen).err());
+        reported.extend(self.fades(before, seen).err());
+        reported.extend(self.lets_go_gently(before, seen).err());
+        reported.extend(self.descends(before, seen).err());
+        reported.extend(self.stays_in_basin(before, seen).err());
+        reported.extend(self.advances(before, seen).err());
         if before.is_free() {
-            told.extend(self.first_crossing(before, seen).err());
+            reported.extend(self.first_crossing(before, seen).err());
         }
-        told.extend(self.passes_no_wall(before, seen).err());
+        reported.extend(self.passes_no_wall(before, seen).err());
         if !self.friction.is_none() {
-            told.extend(self.sticks(before, seen).err());
+            reported.extend(self.sticks(before, seen).err());
         }
     }
 

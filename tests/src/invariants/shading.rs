@@ -40,9 +40,9 @@ impl TickOracle<'_> {
         }
         let [x, y, _] = seen.proxy;
         let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
-        let is_told =
+        let is_reported =
             is_whole && seen.is_touching() && seen.output.converged && plain.length() > SHORT;
-        if !is_told || !inside(x) || !inside(y) || !self.friction.is_none() {
+        if !is_reported || !inside(x) || !inside(y) || !self.friction.is_none() {
             return Ok(());
         }
         let Some(smoothed) = smoothed_normal(self.terrain, [x, y]) else {

@@ -25,7 +25,7 @@ const DEEP: f64 = 1e18;
 
 /// Checks the texture of one scene with cells of a millimetre, tick by tick.
 #[derive(Clone, Debug)]
-pub struct TextureJudge {
+pub struct TextureOracle {
     texture: Texture,
     before: Option<GridPoint>,
     /// Wavelengths a tick, decaying.
@@ -55,7 +55,7 @@ pub(super) struct TextureBounds {
 /// Verdict on a textured force.
 type Verdict = Result<(), String>;
 
-impl TextureJudge {
+impl TextureOracle {
     /// Creates the oracle before the first tick.
     #[must_use]
     pub const fn new(texture: Texture) -> Self {
@@ -88,14 +88,14 @@ impl TextureJudge {
         })?;
         let Added { wanted, allowed } = self.adds(plain, &seen.output.proxy, share);
         let off = (textured - plain - wanted * share).length();
-        let told = || {
+        let reported = || {
             format!(
                 "{textured} is {off:e} off {plain} and {share} of {wanted}, {allowed:e} may be: {seen:?}"
             )
         };
         // Exact, if the proxy is too fast for any texture.
         let is_gone = (2.0 - 8.0 * self.speed) < -1e-5;
-        held(off <= allowed && (!is_gone || textured == plain), told)
+        held(off <= allowed && (!is_gone || textured == plain), reported)
     }
 
     /// Returns the contribution of the whole texture to a displacement at a point, cells; `share`
@@ -169,8 +169,8 @@ impl TextureJudge {
     }
 }
 
-fn held(holds: bool, told: impl Fn() -> String) -> Verdict {
-    holds.then_some(()).ok_or_else(told)
+fn held(holds: bool, reported: impl Fn() -> String) -> Verdict {
+    holds.then_some(()).ok_or_else(reported)
 }
 
 /// Returns the height of a texture of amplitude 1 at a point, and the slopes of `texture`.

@@ -78,8 +78,8 @@ impl<'t> Board<'t> {
     /// Returns the bytes that the device sends, up to `room`.
     pub fn say<'b>(&mut self, into: &'b mut [u8; A_TICK], room: usize) -> &'b [u8] {
         let room = room.min(A_TICK);
-        let said = self.device.link.transmit(&mut into[..room]);
-        &into[..said]
+        let stated = self.device.link.transmit(&mut into[..room]);
+        &into[..stated]
     }
 
     /// Runs one tick of device and arm.

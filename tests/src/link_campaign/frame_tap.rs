@@ -84,9 +84,9 @@ impl Tap {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
             // A frame cut short by an open is dropped.
-            let said = frame.and_then(|frame| frames::said_by_device(frame.ok()?));
-            if let Some(said) = said.filter(|said| Some(said.session) == self.session) {
-                self.on_message(&said.message, when);
+            let stated = frame.and_then(|frame| frames::said_by_device(frame.ok()?));
+            if let Some(stated) = stated.filter(|stated| Some(stated.session) == self.session) {
+                self.on_message(&stated.message, when);
             }
         }
     }

@@ -37,7 +37,7 @@ pub fn said_by_device(frame: &[u8]) -> Option<InSession<ToHost>> {
 
 /// Returns a host's message in a frame, and its session.
 #[must_use]
-pub fn said_by_host(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
+pub fn stated_by_host(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
     decode(frame).ok()
 }
 

@@ -16,7 +16,7 @@ use crate::random::Random;
 
 /// Seconds of a silent host after which the device disarms: the smallest value allowed.
 pub const SILENCE_S: u16 = 5;
-const PATIENCE: Timeouts = Timeouts {
+const TIMEOUTS: Timeouts = Timeouts {
     silence_s: SILENCE_S,
     ..Timeouts::REAL_TIME
 };
@@ -27,12 +27,12 @@ pub enum End {
     /// It closed the session, and reports success.
     Agreed,
     /// It reported a fault to its user.
-    Told(LinkError),
+    Reported(LinkError),
 }
 
 /// Report on arming to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum Reported {
     /// Nothing yet.
     Nothing,
     /// The device will arm when the switch is pressed.
@@ -51,7 +51,7 @@ pub struct Host<'t> {
     /// True if it has requested arming.
     pub asked: bool,
     /// The report to its user on that request.
-    pub told: Told,
+    pub reported: Reported,
     /// State of the device's guard, as shown to its user.
     pub view: Option<Report>,
     /// Samples received since the last read.
@@ -70,14 +70,14 @@ impl<'t> Host<'t> {
         random: &mut Random,
         out: &mut Vec<u8>,
     ) -> Self {
-        let mut client = Client::numbered(terrain, scene, None, PATIENCE, random.bits());
+        let mut client = Client::numbered(terrain, scene, None, TIMEOUTS, random.bits());
         client.greet(Duration::from_millis(now), out);
         Self {
             client,
             last_end: None,
             opened: false,
             asked: false,
-            told: Told::Nothing,
+            reported: Reported::Nothing,
             view: None,
             samples: Vec::new(),
             end: None,
@@ -86,8 +86,8 @@ impl<'t> Host<'t> {
 
     /// Returns the counts that its user sees.
     #[must_use]
-    pub fn tally(&self) -> &LinkStats {
-        self.client.tally()
+    pub fn stats(&self) -> &LinkStats {
+        self.client.stats()
     }
 
     /// Returns its session.
@@ -120,7 +120,7 @@ impl<'t> Host<'t> {
         let was_leaving = self.client.state() == State::Leaving;
         let gone_on = self.go_on(Duration::from_millis(now), bytes, out);
         self.end = match gone_on {
-            Err(error) => Some(End::Told(error)),
+            Err(error) => Some(End::Reported(error)),
             Ok(()) if was_leaving && self.client.state() == State::Closed => Some(End::Agreed),
             Ok(()) => None,
         };
@@ -131,7 +131,7 @@ impl<'t> Host<'t> {
             client,
             last_end,
             opened,
-            told,
+            reported,
             view,
             samples,
             ..
@@ -144,12 +144,12 @@ impl<'t> Host<'t> {
             Event::Sample(sample) => samples.push(*sample),
             Event::Guard(report) => *view = Some(*report),
             Event::Answered { request, result } if *request == Request::Arm => {
-                *told = match result {
-                    Ok(()) => Told::Accepted,
-                    Err(_) => Told::No,
+                *reported = match result {
+                    Ok(()) => Reported::Accepted,
+                    Err(_) => Reported::No,
                 };
             }
-            Event::Unanswered(HostRequest::Request(Request::Arm)) => *told = Told::No,
+            Event::Unanswered(HostRequest::Request(Request::Arm)) => *reported = Reported::No,
             _ => {}
         };
         client.receive(now, bytes, out, &mut on)?;

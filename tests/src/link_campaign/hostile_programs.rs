@@ -38,12 +38,12 @@ pub fn host(random: &mut Random) -> Vec<u8> {
             part.to_vec()
         }
         _ => {
-            let mut said = Vec::new();
+            let mut stated = Vec::new();
             for _ in 0..1 + random.below(8) {
-                said.extend(host_frame(random));
+                stated.extend(host_frame(random));
             }
-            said.truncate(A_MILLISECOND);
-            said
+            stated.truncate(A_MILLISECOND);
+            stated
         }
     }
 }
@@ -86,7 +86,7 @@ fn host_message<'b>(random: &mut Random) -> ToDevice<'b> {
             tile: TileMessage {
                 epoch,
                 key: TileKey::new(random.bits() as u8, word(random), word(random)),
-                heights: Heights::Hole,
+                heights: Heights::NoData,
             },
             materials: TileMaterials::Runs(&[200, 255, 0, 0][..random.below(5)]),
         }),
@@ -225,8 +225,8 @@ impl Behaviour {
         random: &mut Random,
     ) -> Vec<u8> {
         let often = now.is_multiple_of(10);
-        let mut said = Vec::new();
-        let mut tell = |message: ToHost| said.extend(frames::from_device(session, &message));
+        let mut stated = Vec::new();
+        let mut tell = |message: ToHost| stated.extend(frames::from_device(session, &message));
         let greets = !matches!(self, Self::Mute | Self::Noise | Self::Drips);
         if greets && often {
             tell(ToHost::Hello(hello(number)));
@@ -248,7 +248,7 @@ impl Behaviour {
             }
             Self::RefusesLate if now.is_multiple_of(100) => {
                 let protocol = [PROTOCOL, PROTOCOL + 1][random.below(2)];
-                said.extend(frames::version_check(VersionCheck::Refused { protocol }));
+                stated.extend(frames::version_check(VersionCheck::Refused { protocol }));
             }
             Self::CountsWildly => {
                 tell(ToHost::Telemetry(Telemetry {
@@ -264,7 +264,7 @@ impl Behaviour {
             }
             _ => {}
         }
-        said
+        stated
     }
 }
 

@@ -58,22 +58,22 @@ pub fn run(
     seconds: u64,
     done: &mut dyn FnMut(u64, &LinkStats),
 ) -> Result<LinkStats, Violation> {
-    let mut tally = LinkStats::default();
+    let mut stats = LinkStats::default();
     let mut number = 0;
-    while tally.ticks[0] < seconds * 1_000 {
-        segment(seed, number, &mut tally)?;
-        done(number, &tally);
+    while stats.ticks[0] < seconds * 1_000 {
+        segment(seed, number, &mut stats)?;
+        done(number, &stats);
         number += 1;
     }
-    Ok(tally)
+    Ok(stats)
 }
 
 /// Runs a segment of a campaign, with each kind of fault once in random order, and adds it to
-/// `tally`.
+/// `stats`.
 ///
 /// # Errors
 /// The first [`Violation`].
-pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Violation> {
+pub fn segment(seed: u64, number: u64, stats: &mut LinkStats) -> Result<(), Violation> {
     let mut random = Random::new(seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let raster = terrain(&mut random);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
@@ -85,9 +85,9 @@ pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Viol
     }
     let played = deck
         .into_iter()
-        .try_for_each(|kind| runs::run(&mut segment, kind, tally).map_err(|what| (kind, what)));
+        .try_for_each(|kind| runs::run(&mut segment, kind, stats).map_err(|what| (kind, what)));
     let (board, off) = (&segment.board, segment.off_surface);
-    tally.add(board.ticks, segment.touching, off, &board.watch.extremes);
+    stats.add(board.ticks, segment.touching, off, &board.watch.extremes);
     played.map_err(|(kind, what)| Violation {
         ground: crate::campaign::Ground::Ice,
         segment: number,

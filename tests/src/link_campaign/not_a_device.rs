@@ -35,28 +35,28 @@ fn talk(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcome, Stri
     let mut out = Vec::new();
     let mut host = Host::start(segment.terrain, segment.scene, began, chance, &mut out);
     let mut hellos = Hellos::default();
-    let mut said = 0;
+    let mut stated = 0;
     for now in began..=began + MEETS + LEAVES {
         if now == began + MEETS {
             host.leave(now, &mut out);
         }
-        said += out.len();
+        stated += out.len();
         hellos.hear(&out);
         out.clear();
-        let told = (host.session(), hellos.last);
-        let heard = behaviour.say(now, &segment.scene, told, chance);
-        host.step(now, &heard, &mut out);
+        let reported = (host.session(), hellos.last);
+        let received = behaviour.say(now, &segment.scene, reported, chance);
+        host.step(now, &received, &mut out);
         host.samples.clear();
         let seconds = 1 + ((now - began) / 1_000) as usize;
-        if said > seconds * A_SECOND {
-            return Err(format!("the host said {said} bytes in {seconds} s"));
+        if stated > seconds * A_SECOND {
+            return Err(format!("the host said {stated} bytes in {seconds} s"));
         }
         match &host.end {
             Some(End::Agreed) => return Err("the end was agreed on with no device".into()),
-            Some(End::Told(LinkError::Version { ours, theirs })) if ours == theirs => {
+            Some(End::Reported(LinkError::Version { ours, theirs })) if ours == theirs => {
                 return Err(format!("both speak protocol {ours}"));
             }
-            Some(End::Told(error)) => return Ok(Outcome::Told(error.to_string())),
+            Some(End::Reported(error)) => return Ok(Outcome::Reported(error.to_string())),
             None if !host.opened && now > began + OPENS => return Err("opening hangs".into()),
             None => {}
         }
@@ -76,8 +76,8 @@ impl Hellos {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
-            let said = frame.and_then(|frame| frames::said_by_host(frame.ok()?));
-            if let Some(ToDevice::Hello(hello)) = said.map(|said| said.message) {
+            let stated = frame.and_then(|frame| frames::stated_by_host(frame.ok()?));
+            if let Some(ToDevice::Hello(hello)) = stated.map(|stated| stated.message) {
                 self.last = hello.number;
             }
         }

@@ -7,10 +7,10 @@ use crate::campaign_table;
 
 /// Returns the page of a campaign that ran with the source at `commit`.
 #[must_use]
-pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &LinkStats) -> String {
-    let at = &tally.extremes;
+pub fn page(commit: Option<&str>, seed: u64, seconds: u64, stats: &LinkStats) -> String {
+    let at = &stats.extremes;
     let commit = commit.map_or(String::new(), |commit| format!(" at commit {commit}"));
-    let [ticks, armed] = tally.ticks.map(|ticks| ticks / 1_000);
+    let [ticks, armed] = stats.ticks.map(|ticks| ticks / 1_000);
     format!(
         "# The campaign of link faults
 
@@ -53,14 +53,14 @@ contact, or while the host closes. In one segment of four the device's clock sto
 ## Faults
 
 {}",
-        tally.runs(),
-        tally.agreed(),
+        stats.runs(),
+        stats.agreed(),
         at.force_n,
         at.slew_n,
         at.current_a,
-        tally.touching,
-        tally.off_surface,
-        tally.table(),
+        stats.touching,
+        stats.off_surface,
+        stats.table(),
     )
 }
 

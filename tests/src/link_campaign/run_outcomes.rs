@@ -12,7 +12,7 @@ pub enum Outcome {
     /// Host and device agreed on the end.
     Agreed,
     /// The fault was reported to the user.
-    Told(String),
+    Reported(String),
     /// The host was killed, and no other connected in this run.
     Killed,
 }
@@ -24,7 +24,7 @@ struct Row {
     agreed: u32,
     killed: u32,
     /// By the error's text, without numbers.
-    told: BTreeMap<String, u32>,
+    reported: BTreeMap<String, u32>,
 }
 
 /// All outcomes of a campaign.
@@ -49,10 +49,10 @@ impl LinkStats {
         match outcome {
             Outcome::Agreed => row.agreed += 1,
             Outcome::Killed => row.killed += 1,
-            Outcome::Told(error) => {
+            Outcome::Reported(error) => {
                 let words = error.split([':', '0', '1', '2', '3', '4', '5', '6', '7', '8', '9']);
                 let begin = words.into_iter().next().unwrap_or_default();
-                *row.told.entry(begin.trim().to_owned()).or_default() += 1;
+                *row.reported.entry(begin.trim().to_owned()).or_default() += 1;
             }
         }
     }
@@ -94,8 +94,13 @@ impl LinkStats {
         let mut reports =
             "\n| fault | runs | reported to the user |\n| --- | ---: | --- |\n".to_owned();
         for kind in Kind::ALL {
-            let told = self.rows.get(kind).into_iter().flat_map(|row| &row.told);
-            reports.extend(told.map(|(words, runs)| format!("| {kind:?} | {runs} | {words} |\n")));
+            let reported = self
+                .rows
+                .get(kind)
+                .into_iter()
+                .flat_map(|row| &row.reported);
+            reports
+                .extend(reported.map(|(words, runs)| format!("| {kind:?} | {runs} | {words} |\n")));
         }
         runs + &reports
     }

@@ -2,7 +2,7 @@
 //! fault begins in one of the steps.
 
 use super::fault::{Fault, Kind};
-use super::host::{End, SILENCE_S, Told};
+use super::host::{End, Reported, SILENCE_S};
 use super::not_a_device;
 use super::run_outcomes::{LinkStats, Outcome};
 use super::segment::Segment;
@@ -51,17 +51,17 @@ struct Plan {
 ///
 /// # Errors
 /// The broken invariant.
-pub fn run(segment: &mut Segment<'_>, kind: Kind, tally: &mut LinkStats) -> Result<(), String> {
+pub fn run(segment: &mut Segment<'_>, kind: Kind, stats: &mut LinkStats) -> Result<(), String> {
     if kind == Kind::HostileDevice {
         let outcome = not_a_device::meet(segment)?;
-        tally.count(kind, outcome);
+        stats.count(kind, outcome);
         return Ok(());
     }
     // A run that ended before its fault is not counted, for example because its host left a
     // disarmed device.
     loop {
         if let Some(outcome) = try_run(segment, kind)? {
-            tally.count(kind, outcome);
+            stats.count(kind, outcome);
             return Ok(());
         }
     }
@@ -180,10 +180,10 @@ impl Run<'_, '_> {
         if settled {
             self.segment.board.mood = Mood::Wanders;
         }
-        match host.told {
-            Told::Nothing => false,
-            Told::No => true,
-            Told::Accepted => settled || (pressed.is_some() && host.sees(&[Mode::Disarmed])),
+        match host.reported {
+            Reported::Nothing => false,
+            Reported::No => true,
+            Reported::Accepted => settled || (pressed.is_some() && host.sees(&[Mode::Disarmed])),
         }
     }
 
@@ -260,8 +260,9 @@ impl Run<'_, '_> {
     /// Checks the report of a host that ended against the truth.
     fn ended(&mut self) -> Result<Outcome, String> {
         let segment = &mut *self.segment;
-        if let Some(End::Told(error)) = segment.host.as_ref().and_then(|host| host.end.as_ref()) {
-            return Ok(Outcome::Told(error.to_string()));
+        if let Some(End::Reported(error)) = segment.host.as_ref().and_then(|host| host.end.as_ref())
+        {
+            return Ok(Outcome::Reported(error.to_string()));
         }
         if segment.board.drive.enabled {
             return Err("an end was agreed on, and the amplifiers are on".into());
@@ -274,17 +275,17 @@ impl Run<'_, '_> {
         let Some(host) = &self.segment.host else {
             return Ok(());
         };
-        let (tally, tap) = (host.tally(), &self.segment.tap);
-        let (told, made) = (tally.samples + tally.lost + tally.dropped, tap.made());
+        let (stats, tap) = (host.stats(), &self.segment.tap);
+        let (reported, made) = (stats.samples + stats.lost + stats.dropped, tap.made());
         // The tap does not see samples that are dropped at the end of a scene or of the session.
-        let unseen = match tally.dropped {
+        let unseen = match stats.dropped {
             0 => 0,
             _ => tap.unseen(self.segment.board.ticks[0]),
         };
-        if self.is_whole && !(made..=made + unseen).contains(&told) {
+        if self.is_whole && !(made..=made + unseen).contains(&reported) {
             return Err(format!(
-                "{made} samples were made, {} received, {} lost and {} dropped: {told}",
-                tally.samples, tally.lost, tally.dropped
+                "{made} samples were made, {} received, {} lost and {} dropped: {reported}",
+                stats.samples, stats.lost, stats.dropped
             ));
         }
         match tap.early <= IN_FLIGHT {

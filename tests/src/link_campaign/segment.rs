@@ -167,7 +167,7 @@ impl<'t> Segment<'t> {
         self.deliver();
         self.board.tick()?;
         let mut buffer = [0; A_TICK];
-        let said = self.board.say(&mut buffer, self.to_host.room());
+        let stated = self.board.say(&mut buffer, self.to_host.room());
         if self.to_host.room() < A_TICK {
             self.full = self.now;
         }
@@ -176,13 +176,13 @@ impl<'t> Segment<'t> {
             ticks: self.board.ticks[0],
             flows: self.now > self.full + DRAINS,
         };
-        self.tap.hear(said, &when);
-        self.to_host.send(said, self.now, &mut self.random);
-        let mut heard = Vec::new();
+        self.tap.hear(stated, &when);
+        self.to_host.send(stated, self.now, &mut self.random);
+        let mut received = Vec::new();
         while let Some(transfer) = self.to_host.receive(self.now) {
-            heard.extend(transfer);
+            received.extend(transfer);
         }
-        self.with_host(|host, now, out| host.step(now, &heard, out));
+        self.with_host(|host, now, out| host.step(now, &received, out));
         self.judge()?;
         self.now += 1;
         Ok(())
@@ -206,8 +206,8 @@ impl<'t> Segment<'t> {
             .fault
             .is_some_and(|fault| fault.kind == Kind::HostileHost);
         if hostile && self.to_device.room() > 0 {
-            let said = hostile_programs::host(&mut self.random);
-            self.send(&said);
+            let stated = hostile_programs::host(&mut self.random);
+            self.send(&stated);
         }
     }
 

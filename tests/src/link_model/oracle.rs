@@ -14,7 +14,7 @@ const SILENCE: u64 = SILENCE_S as u64 * 1_000 + FADE;
 /// Violation of the protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wrong {
-    /// The run did not end within `LONGEST` ticks.
+    /// The run did not end within `MAX` ticks.
     Hangs,
     /// The amplifiers were on at this tick without a host that requested force.
     Driven(u64),
@@ -48,7 +48,7 @@ pub(super) struct RunOracle {
     /// The device's session, and true if the amplifiers were on at its start and ever since.
     inherited: (u32, bool),
     /// The tick of the last frame to the device.
-    heard_at: u64,
+    received_at: u64,
 }
 
 impl RunOracle {
@@ -62,7 +62,7 @@ impl RunOracle {
 
     /// Records a frame that arrived at the device.
     pub(super) const fn frame_came(&mut self, now: u64) {
-        self.heard_at = now;
+        self.received_at = now;
     }
 
     /// Records that another host replaced a killed one.
@@ -94,7 +94,7 @@ impl RunOracle {
         if enabled && unasked {
             return Err(Wrong::Unasked(now));
         }
-        if enabled && now > self.heard_at + SILENCE {
+        if enabled && now > self.received_at + SILENCE {
             return Err(Wrong::Forsaken(now));
         }
         Ok(())
@@ -102,14 +102,14 @@ impl RunOracle {
 
     /// Checks the host's view: its session is open with this device, and these were its samples, by
     /// their ticks.
-    pub(super) fn told(
+    pub(super) fn reported(
         &self,
         session: u32,
         opened: Option<&DeviceHello>,
         samples: &[u32],
     ) -> Result<(), Wrong> {
         let mut greetings = self.account.greetings(session);
-        if let Some(device) = opened.filter(|device| !greetings.any(|said| said == *device)) {
+        if let Some(device) = opened.filter(|device| !greetings.any(|stated| stated == *device)) {
             return Err(Wrong::Misled(format!("{device:?}")));
         }
         let has_told = |tick: &&u32| self.account.has_told(session, **tick);
@@ -129,10 +129,10 @@ impl RunOracle {
     }
 
     /// Compares the host's counts of its sessions with the device's.
-    pub(super) fn count(&self, tally: &LinkStats, sessions: &[u32]) -> Result<(), Wrong> {
-        let counted = (tally.samples + tally.lost, tally.dropped);
+    pub(super) fn count(&self, stats: &LinkStats, sessions: &[u32]) -> Result<(), Wrong> {
+        let counted = (stats.samples + stats.lost, stats.dropped);
         let made = self.account.of(sessions);
-        match counted == made || tally.uncertain > 0 {
+        match counted == made || stats.uncertain > 0 {
             true => Ok(()),
             false => Err(Wrong::Miscounted(counted, made)),
         }

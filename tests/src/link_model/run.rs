@@ -24,7 +24,7 @@ use super::requests::{RequestSequence, RequestStep};
 use super::status_queries::StatusQueries;
 
 /// Ticks after which a run counts as hanging: each step has its deadline, and no plan needs more.
-const LONGEST: u64 = 60_000;
+const MAX: u64 = 60_000;
 /// Ticks after the end in which delayed frames still arrive.
 const AFTER: u64 = 6_500;
 /// Samples with the amplifiers on after which the host continues.
@@ -38,7 +38,7 @@ pub enum End {
     /// The host has a confirmation that the device is disarmed.
     Agreed,
     /// The host reported to its user that the state is unknown, and why.
-    Told,
+    Reported,
 }
 
 /// Report of a run.
@@ -193,15 +193,15 @@ impl<'t> World<'t> {
             }
             // Without a user to report to, only the state of the device counts.
             if self.host_gone && !self.enabled {
-                break End::Told;
+                break End::Reported;
             }
-            if self.now > LONGEST {
+            if self.now > MAX {
                 return Err(Wrong::Hangs);
             }
         };
         let ticks = self.now;
         if end == End::Agreed {
-            self.judge.count(self.client.tally(), &self.sessions)?;
+            self.judge.count(self.client.stats(), &self.sessions)?;
             self.judge.agreed(self.now, self.enabled)?;
         }
         for _ in 0..AFTER {
@@ -212,7 +212,7 @@ impl<'t> World<'t> {
             ticks,
             frames: [self.lines[0].count(), self.lines[1].count()],
             driven: self.driven,
-            uncertain: self.client.tally().uncertain,
+            uncertain: self.client.stats().uncertain,
             resumptions: self.resumptions,
             answers: self.questions.answers,
             came_of: self.errands.map_or([0; 3], |[armed, disarmed]| {
@@ -316,12 +316,12 @@ impl<'t> World<'t> {
     fn listen(&mut self) {
         let mut chunk = [0; 2048];
         loop {
-            let said = self.device.link.transmit(&mut chunk);
-            if said == 0 {
+            let stated = self.device.link.transmit(&mut chunk);
+            if stated == 0 {
                 return;
             }
-            self.judge.device_says(&chunk[..said]);
-            self.lines[1].send(&chunk[..said], self.now);
+            self.judge.device_says(&chunk[..stated]);
+            self.lines[1].send(&chunk[..stated], self.now);
         }
     }
 
@@ -353,19 +353,19 @@ impl<'t> World<'t> {
                 event => questions.take(&event),
             }
         };
-        let mut heard = Ok(());
+        let mut received = Ok(());
         for mut frame in self.lines[1].arrived(self.now) {
             if self.other_device {
                 frame = forged_frames::of_another_version(frame);
             }
-            heard = heard.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
+            received = received.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
         }
-        let heard = heard.and_then(|()| self.client.due(now, &mut out, &mut on));
+        let received = received.and_then(|()| self.client.due(now, &mut out, &mut on));
         self.say(&out);
         let session = self.client.session().get();
-        self.judge.told(session, opened.as_ref(), &samples)?;
+        self.judge.reported(session, opened.as_ref(), &samples)?;
         self.questions.judge()?;
-        match heard {
+        match received {
             Ok(()) => self.go_on(),
             Err(error) => return self.on_error(error),
         }
@@ -476,9 +476,11 @@ impl<'t> World<'t> {
         match (error, self.step) {
             (_, Step::Over(_)) => {}
             // To the device, late frames of an earlier host look like another host's.
-            (LinkError::NotConfirmed | LinkError::Taken, _) => self.step = Step::Over(End::Told),
+            (LinkError::NotConfirmed | LinkError::Taken, _) => {
+                self.step = Step::Over(End::Reported)
+            }
             (LinkError::Version { .. }, _) if self.other_device => {
-                self.step = Step::Over(End::Told);
+                self.step = Step::Over(End::Reported);
             }
             (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < RESUMPTIONS => {
                 self.resumptions += 1;
@@ -496,12 +498,12 @@ impl<'t> World<'t> {
 }
 
 fn host<'t>(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Client<'t> {
-    let patience = Timeouts {
+    let timeout = Timeouts {
         silence_s: SILENCE_S,
         ..Timeouts::REAL_TIME
     };
     let arming = Some(Arming::VIRTUAL);
-    Client::numbered(terrain, scene, arming, patience, seed)
+    Client::numbered(terrain, scene, arming, timeout, seed)
 }
 
 /// A tick is a millisecond; the clock starts before the program.

@@ -41,9 +41,9 @@ impl StatusQueries {
         match event {
             Event::Status(status) => {
                 self.answers += 1;
-                let told = status.ticks.run;
-                let asked = self.asked.take().filter(|asked| told < *asked);
-                self.outdated = self.outdated.or(asked.map(|asked| (told, asked)));
+                let reported = status.ticks.run;
+                let asked = self.asked.take().filter(|asked| reported < *asked);
+                self.outdated = self.outdated.or(asked.map(|asked| (reported, asked)));
             }
             Event::Unanswered(HostRequest::Status) => self.asked = None,
             _ => {}
@@ -53,7 +53,7 @@ impl StatusQueries {
     pub(super) fn judge(&self) -> Result<(), Wrong> {
         match self.outdated {
             None => Ok(()),
-            Some((told, asked)) => Err(Wrong::Outdated(told, asked)),
+            Some((reported, asked)) => Err(Wrong::Outdated(reported, asked)),
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::invariants::observed_tick::unshifted;
 use crate::invariants::{Invariant, Violation};
 
 /// Ticks that one point may be repeated for.
-const PATIENCE: usize = 20_000;
+const TIMEOUT: usize = 20_000;
 
 /// Answer to a point.
 #[derive(Clone, Copy, Debug)]
@@ -126,7 +126,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
         let mut haptics = Haptics::new(slots, TickRate::DEFAULT, None);
         let message = message(scene, materials, replay.shift);
-        haptics.take_materials(&materials.told());
+        haptics.take_materials(&materials.reported());
         assert!(matches!(haptics.accept(Command::Scene(message)), Ok(None)));
         let mut requester = TileRequester::new();
         requester.reset(0, message.size);
@@ -193,7 +193,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         self.seq += 1;
         let _ = self.haptics.accept(Command::Hip(HipCommand { seq, hip }));
         let mut work = 0;
-        for _ in 0..PATIENCE {
+        for _ in 0..TIMEOUT {
             let outcome = self.haptics.tick(&GuardInputs::default(), true);
             self.note(hip, &outcome);
             work = outcome.sample.work.max(work);
@@ -273,6 +273,6 @@ fn message(scene: &Scene, materials: &Materials, shift: [i32; 3]) -> SceneMessag
         },
         source: Source::Points,
         hold_clock: false,
-        materials: Some(materials.told().check_sum()),
+        materials: Some(materials.reported().check_sum()),
     }
 }

@@ -8,7 +8,7 @@ use super::run::{Scene, is_alike};
 use super::symmetry;
 use super::terrain::Kind;
 use super::tile_supply::{Buffers, SIDE, Supply};
-use crate::invariants::material::MaterialJudge;
+use crate::invariants::material::MaterialOracle;
 use crate::invariants::oracle::Measured;
 use crate::invariants::{Invariant, Violation};
 use crate::random::Random;
@@ -32,7 +32,7 @@ pub fn run(
         Supply::Held => SIDE,
         Supply::Pulled { .. } => [2, 3, 4, SIDE][random.below(4)],
     };
-    let mut judge = MaterialJudge::new(scene, materials, [0; 3]);
+    let mut judge = MaterialOracle::new(scene, materials, [0; 3]);
     let usual = Replay {
         shift: [0; 3],
         supply: scene.supply,
@@ -127,7 +127,7 @@ fn shifted(
     let scene = &scene.with(scene.terrain.clone(), path);
     let mut at = |shift| {
         let supply = Supply::Pulled { latency: 0 };
-        let mut judge = MaterialJudge::new(scene, materials, shift);
+        let mut judge = MaterialOracle::new(scene, materials, shift);
         let how = Replay { shift, supply };
         replay_in(4, scene, materials, buffers, how, |replied| {
             judge.look(replied)
@@ -156,7 +156,7 @@ fn turned(
     let path = path.map(|p| symmetry.point(&scene.terrain, *p)).collect();
     let twin = scene.with(symmetry.terrain(&scene.terrain), path);
     let materials = &materials.seen_by(symmetry);
-    let mut judge = MaterialJudge::new(&twin, materials, [0; 3]);
+    let mut judge = MaterialOracle::new(&twin, materials, [0; 3]);
     let how = Replay {
         shift: [0; 3],
         supply: Supply::Pulled { latency: 0 },

@@ -68,8 +68,8 @@ impl Materials {
         let count = match random.below(8) {
             0 => 1,
             1 | 2 => 2,
-            3 | 4 => MaterialTable::MOST,
-            _ => 1 + random.below(MaterialTable::MOST),
+            3 | 4 => MaterialTable::MAX,
+            _ => 1 + random.below(MaterialTable::MAX),
         };
         let mut table: Vec<Material> = Vec::new();
         for index in 0..count {
@@ -158,7 +158,7 @@ impl Materials {
     /// # Panics
     /// If it is empty or too long.
     #[must_use]
-    pub fn told(&self) -> MaterialTable {
+    pub fn reported(&self) -> MaterialTable {
         MaterialTable::new(&self.table).expect("as many as fit")
     }
 

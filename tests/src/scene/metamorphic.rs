@@ -165,7 +165,7 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     // On a border of the data a HIP belongs to the patch in the north-east, mirrored or not; and
     // the work left of a tick may differ.
     let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
-    let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
+    let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::NoData;
     if !settles || !plain {
         return Ok(false);
     }
@@ -258,8 +258,8 @@ fn is_shaded_likewise(
     };
     // At this distance all points near the proxy are equally near, and each has its own normal.
     let length = a.output.displacement.length();
-    let is_told = (0.1..FAR).contains(&length);
-    if !is_told || !scene.friction.is_none() || a.output.state != b.output.state {
+    let is_reported = (0.1..FAR).contains(&length);
+    if !is_reported || !scene.friction.is_none() || a.output.state != b.output.state {
         return true;
     }
     let tip = one.displacement.as_dvec3().to_array();

@@ -25,7 +25,7 @@ pub(super) const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
 };
 
 /// Ticks that one HIP may be repeated for in lock-step.
-const PATIENCE: usize = 20_000;
+const TIMEOUT: usize = 20_000;
 /// One scene in this many has a HIP that stays deep.
 const DEEP_EVERY: u64 = 8;
 
@@ -120,10 +120,10 @@ pub(super) fn texture(mixed: u64) -> Texture {
         return Texture::NONE;
     }
     let wavelength_mm = [0.25, 0.5, 1.0, 1.7, 8.0, 32.0, 100.0][random.below(7)];
-    let most_mm = (wavelength_mm * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
+    let max_mm = (wavelength_mm * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
     Texture {
         pattern,
-        amplitude_mm: most_mm * [0.02, 0.4, 1.0][random.below(3)],
+        amplitude_mm: max_mm * [0.02, 0.4, 1.0][random.below(3)],
         wavelength_mm,
         direction_deg: [0.0, 0.0, 33.0, -120.0][random.below(4)],
         seed: [0, 1, random.bits() as u32][random.below(3)],
@@ -348,7 +348,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         let in_real_time = self.execution == Execution::RealTime;
         let before = (self.contact.clone(), self.shader);
         let installed = self.supplied.installed.len();
-        for _ in 0..PATIENCE {
+        for _ in 0..TIMEOUT {
             self.contact.step(&self.supplied.window, &hip);
             let output = *self.contact.output();
             work = work.max(output.work);

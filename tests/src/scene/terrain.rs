@@ -27,7 +27,7 @@ pub enum Kind {
     /// Subnormal numbers of both signs.
     Denormals,
     /// Rough, with samples that are NaN, infinite, or out of range.
-    Holes,
+    NoData,
     /// Straight ridges of tents.
     Ridges,
     /// Cliffs between plateaus.
@@ -50,7 +50,7 @@ pub const KINDS: [Kind; 14] = [
     Kind::Checkerboard,
     Kind::Spikes,
     Kind::Denormals,
-    Kind::Holes,
+    Kind::NoData,
     Kind::Ridges,
     Kind::Steps,
     Kind::Twisted,
@@ -202,7 +202,7 @@ impl Shape {
                 let tiny = f32::from_bits((random * 1000.0) as u32);
                 return if self.random(y, x) > 0.5 { tiny } else { -tiny };
             }
-            Kind::Holes => return hole_or(random, 2.0 * self.random(y, x)),
+            Kind::NoData => return hole_or(random, 2.0 * self.random(y, x)),
             Kind::Ridges => 4.0 * ((0.25 * (tx * fx + ty * fy)).rem_euclid(2.0) - 1.0).abs(),
             Kind::Steps => 5.0 * (waves * 1.5).round() + f64::from(x / 11 % 3),
             Kind::Twisted => {

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use soak_counts::{Broken, Found, LinkStats, MostWork};
+pub use soak_counts::{Broken, Found, LinkStats, MaxWork};
 
 use crate::scene::run::{Scene, Surface};
 use crate::scene::tile_supply::Buffers;
@@ -39,7 +39,7 @@ pub fn soak(
 ) -> LinkStats {
     let began = Instant::now();
     let next = AtomicU64::new(first);
-    let tally = Mutex::new(LinkStats::default());
+    let stats = Mutex::new(LinkStats::default());
     let is_over = |number: u64| match until {
         Until::Time(time) => began.elapsed() >= time,
         Until::Scenes(scenes) => number >= first + scenes,
@@ -52,17 +52,17 @@ pub fn soak(
                 return;
             }
             let found = run(seed, number, surface, &mut buffers);
-            tally.lock().expect("no panic inside").add(number, found);
+            stats.lock().expect("no panic inside").add(number, found);
         }
     };
     thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
         while !workers.iter().all(thread::ScopedJoinHandle::is_finished) {
             thread::sleep(Duration::from_millis(50));
-            live(&tally.lock().expect("no panic inside"));
+            live(&stats.lock().expect("no panic inside"));
         }
     });
-    tally.into_inner().expect("no panic inside")
+    stats.into_inner().expect("no panic inside")
 }
 
 /// Runs one scene; a panic counts as a violation.
@@ -81,9 +81,9 @@ pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> F
         Err(panic) => {
             // A tile may be partly filled.
             *buffers = Buffers::default();
-            let said = panic.downcast_ref::<String>().cloned();
-            let said = said.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
-            Found::Broke(kind, "Panic".to_owned(), said.unwrap_or_default())
+            let stated = panic.downcast_ref::<String>().cloned();
+            let stated = stated.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+            Found::Broke(kind, "Panic".to_owned(), stated.unwrap_or_default())
         }
     }
 }

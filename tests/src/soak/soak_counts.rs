@@ -33,7 +33,7 @@ pub struct Broken {
 
 /// The largest work of a tick, and its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MostWork {
+pub struct MaxWork {
     /// Work units.
     pub units: u32,
     /// The number of the tick's scene.
@@ -48,7 +48,7 @@ pub struct LinkStats {
     /// Violations.
     pub broken: Vec<Broken>,
     /// The tick with the most work, among the scenes without violations.
-    pub most_work: Option<MostWork>,
+    pub max_work: Option<MaxWork>,
     by_kind: BTreeMap<usize, Measured>,
     by_invariant: BTreeMap<String, u64>,
 }
@@ -71,9 +71,9 @@ impl LinkStats {
             Found::Held(kind, measured) => {
                 let row = KINDS.iter().position(|k| *k == kind).unwrap_or(0);
                 self.by_kind.entry(row).or_default().add(&measured);
-                if self.most_work.is_none_or(|most| measured.work > most.units) {
+                if self.max_work.is_none_or(|most| measured.work > most.units) {
                     let units = measured.work;
-                    self.most_work = Some(MostWork { units, number });
+                    self.max_work = Some(MaxWork { units, number });
                 }
             }
         }
@@ -113,7 +113,7 @@ impl fmt::Display for LinkStats {
             self.ticks(),
             self.broken.len()
         )?;
-        if let Some(MostWork { units, number }) = self.most_work {
+        if let Some(MaxWork { units, number }) = self.max_work {
             writeln!(
                 f,
                 "largest work of a tick: {units} of {WORK_PER_TICK} units, in scene {number}"

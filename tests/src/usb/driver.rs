@@ -205,15 +205,15 @@ impl End {
 
     async fn listen(&self) -> Result<Vec<u8>, EndpointError> {
         self.wire.borrow_mut().control_listens = true;
-        let heard = self.until(|wire| {
+        let received = self.until(|wire| {
             if wire.setup.is_some() {
                 return Some(Err(EndpointError::Disabled));
             }
             wire.into_device[0].packet.take().map(Ok)
         });
-        let heard = heard.await;
+        let received = received.await;
         self.wire.borrow_mut().control_listens = false;
-        heard
+        received
     }
 }
 

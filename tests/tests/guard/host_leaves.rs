@@ -9,7 +9,7 @@ use heightfield::Raster;
 use crate::rig::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
 
 /// Returns the largest change of the currents from one tick to the next, A.
-fn largest_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
+fn max_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
     let steps = log.windows(2).map(|pair| {
         let change = pair[1].1.currents_a - pair[0].1.currents_a;
         change.abs().max_element()
@@ -44,7 +44,7 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
                 .all(|(_, d)| d.enabled || d == &alone[alone.len() - 1].1)
         );
         let weight = alone[alone.len() - 2].1.currents_a;
-        let step = largest_step(&alone[..alone.len() - 1]);
+        let step = max_step(&alone[..alone.len() - 1]);
         eprintln!("largest step {step:.3} A, at the end {weight} A");
         assert!(step < 0.06, "{step} A");
         // Only the arm's weight remains: −0.062 A on axis 2, and the same on 3.
@@ -55,7 +55,7 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
     let before = bed.log.borrow().len() - 1;
     bed = bed.run(PRESSED + u64::from(passed) + 600);
     let log = bed.log.borrow();
-    let step = largest_step(&log[before..log.len() - 1]);
+    let step = max_step(&log[before..log.len() - 1]);
     eprintln!("largest step after the return {step:.3} A");
     assert!(step < 0.06, "{step} A");
     let last = bed.samples.last().expect("samples");
@@ -85,7 +85,7 @@ fn goodbye_lets_the_force_out_gently_and_switches_off() {
     assert!((90..130).contains(&(off - PRESSED as usize)), "{off}");
     let going = &log[PRESSED as usize - 10..off];
     let before = going[0].1.currents_a.abs().max_element();
-    let step = largest_step(going);
+    let step = max_step(going);
     assert!(before > 1.0 && step < 0.02 * before, "{before} A, {step} A");
     assert!(log[off..].iter().all(|(_, drive)| !drive.enabled));
 }

@@ -47,9 +47,9 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
         });
         polled.expect("goes on");
     }
-    let tally = session.tally();
+    let stats = session.stats();
     assert_eq!(
-        (tally.lost, tally.dropped),
+        (stats.lost, stats.dropped),
         (0, 0),
         "a thousand samples a second"
     );

@@ -86,8 +86,8 @@ impl<'t> Bed<'t> {
 
     pub(crate) fn open(&mut self, arming: Option<Arming>) {
         let link = Box::new(Shared(Rc::clone(&self.device)));
-        let (terrain, scene, patience) = (self.terrain, self.scene, Timeouts::EMULATED);
-        let opened = Session::open(terrain, scene, arming, link, patience);
+        let (terrain, scene, timeout) = (self.terrain, self.scene, Timeouts::EMULATED);
+        let opened = Session::open(terrain, scene, arming, link, timeout);
         self.session = Some(opened.expect("opened").0);
     }
 

@@ -54,10 +54,10 @@ fn a_recording_is_replayed_with_its_own_settings() {
             .any(|(a, b)| a["force_z_n"] != b["force_z_n"])
     );
     // An option on the command line has priority, with a note.
-    let told = folder.replays("felt.csv", "stiff.csv", &["--stiffness=0.6"]);
+    let reported = folder.replays("felt.csv", "stiff.csv", &["--stiffness=0.6"]);
     assert!(
-        told.contains("--stiffness 0.6N/mm, where the recording has 0.3N/mm"),
-        "{told}"
+        reported.contains("--stiffness 0.6N/mm, where the recording has 0.3N/mm"),
+        "{reported}"
     );
     assert!(
         folder
@@ -74,14 +74,14 @@ fn a_recording_of_another_terrain_is_refused() {
     let other = folder.text("other.tif");
     terrain_file(other.as_ref(), Kind::Fractal, 256, 7);
     let (replayed, out) = (folder.text("felt.csv"), folder.text("out.csv"));
-    let told = folder.fails(&["replay", &other, &replayed, "-o", &out]);
+    let reported = folder.fails(&["replay", &other, &replayed, "-o", &out]);
     for part in [
         "other.tif",
         "hills.tif",
         "its heights are others",
         "--ignore-settings",
     ] {
-        assert!(told.contains(part), "{part} in {told}");
+        assert!(reported.contains(part), "{part} in {reported}");
     }
     assert!(!folder.path("out.csv").exists());
     folder.runs(&["replay", &other, &replayed, "-o", &out, "--ignore-settings"]);
@@ -92,10 +92,10 @@ fn a_recording_of_another_terrain_is_refused() {
         .read("felt.csv")
         .replacen("recording = 1", "recording = 2", 1);
     std::fs::write(folder.path("later.csv"), later).expect("written");
-    let told = folder.fails(&["replay", &other, &folder.text("later.csv"), "-o", &out]);
+    let reported = folder.fails(&["replay", &other, &folder.text("later.csv"), "-o", &out]);
     assert!(
-        told.contains("format 2") && told.contains("hint: "),
-        "{told}"
+        reported.contains("format 2") && reported.contains("hint: "),
+        "{reported}"
     );
 }
 
@@ -188,7 +188,7 @@ fn demo_recording_replays_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, out) = (folder.text("hills.tif"), folder.text("demo"));
     // Without an image or a device it runs in the program itself, and prints this.
-    let told = folder.runs(&[
+    let reported = folder.runs(&[
         "demo",
         &terrain,
         "--out",
@@ -198,7 +198,7 @@ fn demo_recording_replays_bit_by_bit() {
         "--surface",
         UNCONTROLLED,
     ]);
-    assert!(told.contains("--device native"), "{told}");
+    assert!(reported.contains("--device native"), "{reported}");
     is_reproduced(&folder, "hills.tif", "demo/hills.csv");
 }
 
@@ -243,8 +243,8 @@ fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
         folder.run(&["replay", &words[0], &words[1], "-o", &words[2]])
     };
     assert!(with(1e-7).status.success(), "{}", output_text(&with(1e-7)));
-    let told = output_text(&with(1e-5));
-    assert!(told.contains("cells of another size"), "{told}");
+    let reported = output_text(&with(1e-5));
+    assert!(reported.contains("cells of another size"), "{reported}");
 }
 
 /// Returns a Python that reads Parquet, and its code for that.
@@ -331,10 +331,10 @@ fn no_command_writes_over_its_own_input() {
         outputs.push(folder.text("soft.csv"));
     }
     for output in &outputs {
-        let told = folder.fails(&["replay", &hills, &input, "-o", output]);
+        let reported = folder.fails(&["replay", &hills, &input, "-o", output]);
         assert!(
-            told.contains("it is the input") && told.contains("hint: "),
-            "{told}"
+            reported.contains("it is the input") && reported.contains("hint: "),
+            "{reported}"
         );
         folder.fails(&[
             "run",
@@ -352,8 +352,8 @@ fn no_command_writes_over_its_own_input() {
     let (png, here) = (folder.text("dem.png"), folder.text("."));
     terrain_file(png.as_ref(), Kind::Fractal, 64, 1);
     let picture = std::fs::read(&png).expect("there");
-    let told = folder.fails(&["demo", &png, "--device", "native", "--out", &here]);
-    assert!(told.contains("--out"), "{told}");
+    let reported = folder.fails(&["demo", &png, "--device", "native", "--out", &here]);
+    assert!(reported.contains("--out"), "{reported}");
     let arm = folder.text("arm.toml");
     let native = [
         "calibrate",
@@ -371,8 +371,8 @@ fn no_command_writes_over_its_own_input() {
     let steer = folder.text("steer.txt");
     let native = ["--device", "native", "--duration", "1s"];
     let by_file = ["--commands", &steer, "--out", &steer];
-    let told = folder.fails(&[&["run", &hills], &native[..], &by_file].concat());
-    assert!(told.contains("it is the input"), "{told}");
+    let reported = folder.fails(&[&["run", &hills], &native[..], &by_file].concat());
+    assert!(reported.contains("it is the input"), "{reported}");
     exists_as_before(&folder.path("steer.txt"), b"at 1 zoom 2\n");
     exists_as_before(&folder.path("hills.tif"), &terrain);
     exists_as_before(&folder.path("in.csv"), &trajectory);
@@ -403,8 +403,8 @@ fn no_command_writes_over_a_file_beside_its_input() {
             &[&["run", &terrain, "--out", &output], &native[..]].concat(),
             &["view", &input, &terrain, "--rrd", &output],
         ] {
-            let told = folder.fails(words);
-            assert!(told.contains("it is the input"), "{beside}: {told}");
+            let reported = folder.fails(words);
+            assert!(reported.contains("it is the input"), "{beside}: {reported}");
         }
         exists_as_before(Path::new(&output), text.as_bytes());
     }
@@ -412,8 +412,8 @@ fn no_command_writes_over_a_file_beside_its_input() {
     std::fs::rename(folder.path("float.hdr"), folder.path("float.csv")).expect("renamed");
     std::fs::hard_link(folder.path("float.csv"), folder.path("float.hdr")).expect("linked");
     let (terrain, here) = (folder.text("float.flt"), folder.text("."));
-    let told = folder.fails(&["demo", &terrain, "--device", "native", "--out", &here]);
-    assert!(told.contains("it is the input"), "{told}");
+    let reported = folder.fails(&["demo", &terrain, "--device", "native", "--out", &here]);
+    assert!(reported.contains("it is the input"), "{reported}");
     exists_as_before(&folder.path("float.hdr"), header.as_bytes());
 }
 
@@ -442,10 +442,10 @@ fn a_calibration_file_is_text_and_show_prints_it() {
         "{held}"
     );
     std::fs::write(&arm, text.replace("l1_mm", "l1_inch")).expect("written");
-    let told = folder.fails(&["calibrate", "--show", &arm]);
+    let reported = folder.fails(&["calibrate", "--show", &arm]);
     assert!(
-        told.contains("arm.toml") && told.contains("l1_inch"),
-        "{told}"
+        reported.contains("arm.toml") && reported.contains("l1_inch"),
+        "{reported}"
     );
 }
 
@@ -494,12 +494,15 @@ fn a_reader_who_goes_away_is_no_crash() {
             }
             let run = command.stdout(writer).spawn().expect("started");
             let run = run.wait_with_output().expect("it ends");
-            let told = output_text(&run);
-            assert!(!told.contains("panicked"), "{words:?}, {closed}: {told}");
+            let reported = output_text(&run);
+            assert!(
+                !reported.contains("panicked"),
+                "{words:?}, {closed}: {reported}"
+            );
             // A crash is 101; a list without hardware is 1.
             assert!(
                 matches!(run.status.code(), Some(0 | 1)),
-                "{words:?}, {closed}: {told}"
+                "{words:?}, {closed}: {reported}"
             );
         }
     }
@@ -533,17 +536,17 @@ fn an_output_that_cannot_be_written_is_no_crash() {
     };
     for words in of_files(&out).iter().chain(&of_files(&file)) {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        let told = folder.fails(&words);
+        let reported = folder.fails(&words);
         assert!(
-            told.contains("cannot write") && told.contains("hint: "),
-            "{told}"
+            reported.contains("cannot write") && reported.contains("hint: "),
+            "{reported}"
         );
-        assert!(!told.contains("panicked"), "{told}");
+        assert!(!reported.contains("panicked"), "{reported}");
     }
-    let told = folder.fails(&[&["demo", &hills, "--out", &file][..], &native].concat());
+    let reported = folder.fails(&[&["demo", &hills, "--out", &file][..], &native].concat());
     assert!(
-        told.contains("cannot write") && !told.contains("panicked"),
-        "{told}"
+        reported.contains("cannot write") && !reported.contains("panicked"),
+        "{reported}"
     );
     let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else {
         eprintln!("skipped: there is no /dev/full here");
@@ -574,16 +577,16 @@ fn an_output_that_cannot_be_written_is_no_crash() {
             .stdout(full.try_clone().expect("cloned"))
             .output()
             .expect("it runs");
-        let told = output_text(&run);
-        assert!(!told.contains("panicked"), "{words:?}: {told}");
+        let reported = output_text(&run);
+        assert!(!reported.contains("panicked"), "{words:?}: {reported}");
         assert!(
             matches!(run.status.code(), Some(0 | 1)),
-            "{words:?}: {told}"
+            "{words:?}: {reported}"
         );
         // A lost report is not a success.
         if ["info", "status", "calibrate"].contains(&words[0]) {
             assert_eq!(run.status.code(), Some(1), "{words:?}");
-            assert!(told.contains("cannot write the report"), "{told}");
+            assert!(reported.contains("cannot write the report"), "{reported}");
         }
     }
 }
@@ -601,10 +604,10 @@ fn odd_outputs_and_options_are_told() {
         String::from_utf8_lossy(&run.stdout),
         folder.read("replayed.csv")
     );
-    let told = folder.fails(&["run", &hills, "--device", "native", "--out", "-"]);
-    assert!(told.contains("standard output"), "{told}");
-    let told = folder.replays("in.csv", "stiff.csv", &["--stiffness=1e9"]);
-    assert!(told.contains("1000000000 N/mm"), "{told}");
+    let reported = folder.fails(&["run", &hills, "--device", "native", "--out", "-"]);
+    assert!(reported.contains("standard output"), "{reported}");
+    let reported = folder.replays("in.csv", "stiff.csv", &["--stiffness=1e9"]);
+    assert!(reported.contains("1000000000 N/mm"), "{reported}");
     // Commands that display a record write none.
     let run = folder.run(&[
         "calibrate",
@@ -622,10 +625,10 @@ fn odd_outputs_and_options_are_told() {
     // A failed demo leaves no files.
     let demo = folder.text("demo");
     let words = ["demo", &hills, "--device", "emulated:none.elf"];
-    let told = folder.fails(&[&words[..], &["--out", &demo]].concat());
+    let reported = folder.fails(&[&words[..], &["--out", &demo]].concat());
     assert!(
-        told.contains("none.elf") && !folder.path("demo").exists(),
-        "{told}"
+        reported.contains("none.elf") && !folder.path("demo").exists(),
+        "{reported}"
     );
     // A path that begins below ground causes a note on the missing force.
     std::fs::write(
@@ -633,8 +636,8 @@ fn odd_outputs_and_options_are_told() {
         "t_s,x_mm,y_mm,z_mm\n0,60,60,-900\n0.001,60,60,-901\n",
     )
     .expect("written");
-    let told = folder.replays("in.csv", "replayed.csv", &[]);
-    assert!(told.contains("2 rows are below ground"), "{told}");
+    let reported = folder.replays("in.csv", "replayed.csv", &[]);
+    assert!(reported.contains("2 rows are below ground"), "{reported}");
     // The recording distinguishes it from a free HIP.
     let text = std::fs::read_to_string(folder.path("replayed.csv")).expect("written");
     assert_eq!(text.matches(",unseeded").count(), 2, "{text}");
@@ -665,10 +668,10 @@ fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
         ];
         for words in commands {
             let run = folder.run(&[words, more].concat());
-            let told = String::from_utf8_lossy(&run.stdout).into_owned();
+            let reported = String::from_utf8_lossy(&run.stdout).into_owned();
             assert!(
-                run.status.success() && told.contains(expected),
-                "{told}{}",
+                run.status.success() && reported.contains(expected),
+                "{reported}{}",
                 output_text(&run)
             );
         }

@@ -48,10 +48,10 @@ fn demo(folder: &Folder) -> String {
 #[test]
 fn recording_has_each_change_of_placement_and_is_replayed() {
     let folder = Folder::of(SIZE);
-    let told = demo(&folder);
+    let reported = demo(&folder);
     assert!(
-        told.contains("line 4 of the commands: `spin 3` is no command"),
-        "{told}"
+        reported.contains("line 4 of the commands: `spin 3` is no command"),
+        "{reported}"
     );
     let text = folder.read("demo/hills.csv");
     let settings = Settings::from_toml(&comments(&text))
@@ -150,24 +150,24 @@ fn what_cannot_be_replayed_is_refused_and_named() {
         assert!(!folder.path("again.csv").exists());
         output_text(&run)
     };
-    let told = refused("demo/hills.csv", &["--scale", "3mm/cell"]);
+    let reported = refused("demo/hills.csv", &["--scale", "3mm/cell"]);
     assert!(
-        told.contains("6 placements") && told.contains("--ignore-settings"),
-        "{told}"
+        reported.contains("6 placements") && reported.contains("--ignore-settings"),
+        "{reported}"
     );
     // One of the placements is not described.
     let text = folder.read("demo/hills.csv");
     folder.write("less.csv", &text.replace("# number = 2", "# number = 7"));
-    let told = refused("less.csv", &[]);
-    assert!(told.contains("does not describe view 2"), "{told}");
-    assert!(told.contains("line "), "{told}");
+    let reported = refused("less.csv", &[]);
+    assert!(reported.contains("does not describe view 2"), "{reported}");
+    assert!(reported.contains("line "), "{reported}");
     let row = text.lines().last().expect("rows");
     let wrong = format!("{row}x");
     folder.write("wrong.csv", &text.replace(row, &wrong));
-    let told = refused("wrong.csv", &[]);
+    let reported = refused("wrong.csv", &[]);
     assert!(
-        told.contains("column view") && told.contains("5x"),
-        "{told}"
+        reported.contains("column view") && reported.contains("5x"),
+        "{reported}"
     );
     // Only the path is used.
     let run = folder.replay("demo/hills.csv", "again.csv", &["--ignore-settings"]);

@@ -16,7 +16,7 @@ use tokio::runtime::Runtime;
 use tower_http::services::ServeDir;
 
 /// Upper bound of the size of any file here, bytes.
-const LARGEST: usize = 1 << 30;
+const MAX: usize = 1 << 30;
 
 /// The public bucket.
 pub const PUBLIC: &str = "open";
@@ -122,7 +122,7 @@ async fn answered<S: Service>(
 ) -> Response {
     let asked = format!("{} {}", request.method(), request.uri().path());
     let (parts, body) = request.into_parts();
-    let body = to_bytes(body, LARGEST).await.unwrap_or_default();
+    let body = to_bytes(body, MAX).await.unwrap_or_default();
     let answer = shared
         .service
         .answer(&parts, &String::from_utf8_lossy(&body));
@@ -153,7 +153,7 @@ async fn served(
     head.headers.extend(service.head());
     let tag = HeaderValue::from_static("\"0x8DC0FFEE0000001\"");
     head.headers.insert(ETAG, tag);
-    let bytes = to_bytes(body, LARGEST).await.unwrap_or_default();
+    let bytes = to_bytes(body, MAX).await.unwrap_or_default();
     let count = bytes.len();
     (Response::from_parts(head, Body::from(bytes)), count)
 }

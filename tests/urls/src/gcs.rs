@@ -24,7 +24,7 @@ const SCOPES: [&str; 3] = [
     "https://www.googleapis.com/auth/devstorage.full_control",
 ];
 /// Longest validity of a token, seconds.
-const LONGEST: u64 = 3600;
+const MAX: u64 = 3600;
 
 /// A token of an account that may read everything, as `gcloud auth print-access-token` prints it.
 pub const TOKEN: &str = "ya29.a0-of-the-surveyor";
@@ -101,15 +101,15 @@ impl Service for Google {
             return is_asked.then(|| token(TOKEN)).ok_or_else(|| denied("This"));
         }
         let file = Answer::File(path.to_owned());
-        let Some(said) = request.headers.get(AUTHORIZATION) else {
+        let Some(stated) = request.headers.get(AUTHORIZATION) else {
             return match bucket(path) {
                 PUBLIC => Ok(file),
                 _ => Err(denied("Anonymous caller")),
             };
         };
         // A token is checked even if none is needed.
-        let said = said.to_str().ok();
-        match said.and_then(|said| holder(said.strip_prefix("Bearer ")?)) {
+        let stated = stated.to_str().ok();
+        match stated.and_then(|stated| holder(stated.strip_prefix("Bearer ")?)) {
             Some(mail) if mail == SURVEYOR.mail => Ok(file),
             Some(mail) => Err(denied(mail)),
             None => Err(refusal(
@@ -164,7 +164,7 @@ fn holder(token: &str) -> Option<&'static str> {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?.as_secs();
     let [made, ends] = ["iat", "exp"].map(|name| claims[name].as_u64());
     let (made, ends) = (made?, ends?);
-    let holds = made <= now && now < ends && ends <= made + LONGEST;
+    let holds = made <= now && now < ends && ends <= made + MAX;
     let scopes = claims["scope"].as_str()?;
     let may_read = scopes.split(' ').any(|scope| SCOPES.contains(&scope));
     let is_signed = head["alg"] == "RS256" && account.has_signed(signed, &signature);

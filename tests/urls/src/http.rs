@@ -17,7 +17,7 @@ use tokio::sync::watch;
 use tower_http::services::ServeDir;
 
 /// Upper bound of the size of any file here, bytes.
-const LARGEST: usize = 1 << 30;
+const MAX: usize = 1 << 30;
 
 /// A server on this machine.
 pub struct Server {
@@ -238,7 +238,7 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
         Fault::None | Fault::Cut | Fault::Short | Fault::Endless => {}
     }
     let (mut head, body) = next.run(request).await.into_parts();
-    let bytes = to_bytes(body, LARGEST).await.unwrap_or_default();
+    let bytes = to_bytes(body, MAX).await.unwrap_or_default();
     shared.state().bytes += bytes.len();
     if head.status.is_success() {
         head.headers

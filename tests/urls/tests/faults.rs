@@ -49,15 +49,15 @@ fn what_the_server_cannot_answer_once_is_asked_for_again() {
 #[test]
 fn what_it_never_answers_is_told_with_the_file_and_why() {
     let (_folder, server) = hills();
-    let told = open(&server, "valleys.tif").expect_err("none");
-    assert!(told.contains("there is no such file"), "{told}");
-    assert!(told.contains("valleys.tif"), "{told}");
+    let reported = open(&server, "valleys.tif").expect_err("none");
+    assert!(reported.contains("there is no such file"), "{reported}");
+    assert!(reported.contains("valleys.tif"), "{reported}");
     server.fail(Fault::Forbidden, 1);
-    let told = open(&server, "hills.tif").expect_err("forbidden");
-    assert!(told.contains("without a key"), "{told}");
+    let reported = open(&server, "hills.tif").expect_err("forbidden");
+    assert!(reported.contains("without a key"), "{reported}");
     server.fail(Fault::Error500, usize::MAX);
-    let told = open(&server, "hills.tif").expect_err("broken");
-    assert!(told.contains("500"), "{told}");
+    let reported = open(&server, "hills.tif").expect_err("broken");
+    assert!(reported.contains("500"), "{reported}");
     drop(server);
     let nobody = "http://127.0.0.1:1/hills.tif";
     let error = Raster::open(nobody, &OpenOptions::default()).expect_err("nobody");
@@ -76,8 +76,8 @@ fn what_it_never_answers_is_told_with_the_file_and_why() {
 fn long_page_of_an_error_is_not_read_to_its_end() {
     let (_folder, server) = hills();
     server.fail(Fault::LongError, usize::MAX);
-    let told = open(&server, "hills.tif").expect_err("none");
-    assert!(told.contains("there is no such file"), "{told}");
+    let reported = open(&server, "hills.tif").expect_err("none");
+    assert!(reported.contains("there is no such file"), "{reported}");
     let (requests, bytes) = server.seen();
     // Besides the data in the system's buffers.
     assert!(bytes <= requests.len() * (16 << 20), "{bytes} bytes came");
@@ -88,13 +88,13 @@ fn bytes_that_were_not_asked_for_are_not_taken() {
     for fault in [Fault::OtherRange, Fault::Short, Fault::Endless] {
         let (_folder, server) = hills();
         server.fail(fault, usize::MAX);
-        let told = open(&server, "hills.tif").expect_err("from the beginning");
+        let reported = open(&server, "hills.tif").expect_err("from the beginning");
         let why = match fault {
             Fault::Short => "bytes of",
             Fault::Endless => "more than",
             _ => "Requested",
         };
-        assert!(told.contains(why), "{told}");
+        assert!(reported.contains(why), "{reported}");
         server.fail(Fault::None, 0);
         let raster = open(&server, "hills.tif").expect("a right answer");
         server.fail(fault, usize::MAX);
@@ -118,8 +118,8 @@ fn comes(raster: &Raster, column: u32, row: u32) -> f64 {
 fn a_mask_that_cannot_be_asked_for_is_not_taken_for_none() {
     let (_folder, server) = hills();
     server.fail_at(".msk", Fault::Error500, usize::MAX);
-    let told = open(&server, "hills.tif").expect_err("who knows what is masked");
-    assert!(told.contains("500"), "{told}");
+    let reported = open(&server, "hills.tif").expect_err("who knows what is masked");
+    assert!(reported.contains("500"), "{reported}");
     // A server answers "forbidden" about a missing file to a user without list permission.
     server.fail_at(".msk", Fault::Forbidden, usize::MAX);
     open(&server, "hills.tif").expect("no mask");
@@ -152,8 +152,8 @@ fn notes_beside_a_url_are_read_as_beside_a_file() {
     let asked = requests.iter().filter(|line| line.ends_with(".aux.xml"));
     assert_eq!(asked.count(), 1, "{requests:?}");
     server.fail_at(".aux.xml", Fault::Error500, usize::MAX);
-    let told = open(&server, "hills.tif").expect_err("who knows what is no data");
-    assert!(told.contains("500"), "{told}");
+    let reported = open(&server, "hills.tif").expect_err("who knows what is no data");
+    assert!(reported.contains("500"), "{reported}");
 }
 
 /// The error is the server's, and not a lack of data.
@@ -177,8 +177,11 @@ fn place_on_a_terrain_whose_server_is_down_is_no_hole() {
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         let fault = Placement::new(&grid, &reach, &options).expect_err("not read");
         assert!(matches!(fault, PlaceError::Unread { .. }), "{fault}");
-        let told = raster.check_complete().expect_err("it did not come");
-        assert!(matches!(told.fault(), RasterError::Remote(_)), "{told}");
+        let reported = raster.check_complete().expect_err("it did not come");
+        assert!(
+            matches!(reported.fault(), RasterError::Remote(_)),
+            "{reported}"
+        );
     }
 }
 
@@ -210,8 +213,11 @@ fn what_did_not_come_is_told_before_anything_is_armed() {
         asked < 40,
         "{asked} requests to a server that does not answer"
     );
-    let told = raster.check_complete().expect_err("it did not come");
-    assert!(matches!(told.fault(), RasterError::Remote(_)), "{told}");
+    let reported = raster.check_complete().expect_err("it did not come");
+    assert!(
+        matches!(reported.fault(), RasterError::Remote(_)),
+        "{reported}"
+    );
     assert!(raster.check_complete().is_ok(), "and nothing since");
 }
 
@@ -258,8 +264,8 @@ fn missing_source_of_a_vrt_is_a_hole_and_the_others_are_read() {
 fn what_was_not_looked_at_for_want_of_an_answer_is_no_hole() {
     let (_folder, server) = hills();
     server.fail_beyond(Fault::Error500);
-    let told = open(&server, "hills.tif").expect_err("its overview is beyond");
-    assert!(told.contains("500"), "{told}");
+    let reported = open(&server, "hills.tif").expect_err("its overview is beyond");
+    assert!(reported.contains("500"), "{reported}");
 }
 
 #[test]

@@ -281,12 +281,12 @@ fn files_at_a_url_lead_to_no_file_of_this_computer() {
         ("vrt.tar", tar("in.vrt", vrt.as_bytes())),
     ] {
         let (_folder, _, server) = served(name, &bytes);
-        let told = Raster::open(server.url(name), &OpenOptions::default());
-        let told = told.expect_err(name).to_string();
+        let reported = Raster::open(server.url(name), &OpenOptions::default());
+        let reported = reported.expect_err(name).to_string();
         let words = "on this computer";
         assert!(
-            told.contains(words) || told.contains("beside it"),
-            "{name}: {told}"
+            reported.contains(words) || reported.contains("beside it"),
+            "{name}: {reported}"
         );
     }
 }

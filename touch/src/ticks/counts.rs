@@ -35,13 +35,13 @@ pub struct Counts {
     /// Moves on straight lines that took longer than [`ODD_MOVE_S`].
     pub odd_moves: u64,
     /// The longest move, s.
-    pub longest_move_s: f64,
+    pub max_move_s: f64,
 }
 
 impl Counts {
     /// Counts a move between two rows, s.
     pub(super) fn moves(&mut self, step_s: f64) {
         self.odd_moves += u64::from(step_s > ODD_MOVE_S);
-        self.longest_move_s = self.longest_move_s.max(step_s);
+        self.max_move_s = self.max_move_s.max(step_s);
     }
 }

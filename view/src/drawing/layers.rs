@@ -23,7 +23,7 @@ const BLOCK_CELLS: usize = 32;
 #[derive(Default)]
 pub(super) struct Layers {
     /// The layers as received, to draw them for a placement with other heights.
-    told: Vec<Layer>,
+    reported: Vec<Layer>,
     layers: Vec<Shown>,
     /// Colours, from the coarsest layer, which covers the whole terrain.
     shade: Option<Shade>,
@@ -60,12 +60,12 @@ impl Layers {
     /// below is drawn completely until then, so that there is no gap.
     pub(super) fn put(&mut self, log: &Log, ground: &Ground, layer: Layer) -> Result<Vec<Entry>> {
         let number = layer.number as usize;
-        if number > self.told.len() {
+        if number > self.reported.len() {
             // A finer layer without a coarser one.
             return Ok(Vec::new());
         }
         let gone = self.layers.split_off(number);
-        self.told.truncate(number);
+        self.reported.truncate(number);
         let mut entries = Vec::new();
         if !gone.is_empty() {
             entries.extend(self.triangles(log, number.checked_sub(1))?);
@@ -74,7 +74,7 @@ impl Layers {
             entries.push(block.nothing(log)?);
         }
         entries.extend(self.draw(log, ground, &layer)?);
-        self.told.push(layer);
+        self.reported.push(layer);
         for block in gone.iter().flat_map(|layer| &layer.blocks) {
             if !self.has(&block.entity) {
                 entries.push(block.forgotten(log)?);
@@ -92,13 +92,13 @@ impl Layers {
 
     /// Shows all layers again, with the heights of another placement.
     pub(super) fn redraw(&mut self, log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
-        let told = std::mem::take(&mut self.told);
+        let reported = std::mem::take(&mut self.reported);
         (self.shade, self.layers) = (None, Vec::new());
         let mut entries = Vec::new();
-        for layer in &told {
+        for layer in &reported {
             entries.extend(self.draw(log, ground, layer)?);
         }
-        self.told = told;
+        self.reported = reported;
         for number in 0..self.layers.len() {
             entries.extend(self.triangles(log, Some(number))?);
         }
@@ -156,7 +156,7 @@ impl Layers {
     /// Returns the part of a layer that a finer one shows, in cells of level 0: west, south, east,
     /// north.
     fn inner(&self, number: usize) -> Option<[i32; 4]> {
-        let finer = self.told.get(number + 1)?;
+        let finer = self.reported.get(number + 1)?;
         Some(extent(finer))
     }
 
@@ -167,19 +167,19 @@ impl Layers {
             let every = mesh_step(layer.columns.max(layer.rows) as usize);
             layer.step.saturating_mul(every as i32)
         };
-        self.told.last().map_or(1, of).max(1)
+        self.reported.last().map_or(1, of).max(1)
     }
 
     /// Returns west, south, east and north of the terrain, in cells of level 0; `None` before the
     /// first layer.
     pub(super) fn extent(&self) -> Option<[i32; 4]> {
-        self.told.first().map(extent)
+        self.reported.first().map(extent)
     }
 
     /// Returns the surface at a position (cells of level 0) in the picture's units, from the finest
     /// layer there; `None` for no-data and outside.
     pub(super) fn up_at(&self, ground: &Ground, place: [f64; 2]) -> Option<f32> {
-        let unit = { self.told.iter().rev() }.find_map(|layer| height_at(layer, place))?;
+        let unit = { self.reported.iter().rev() }.find_map(|layer| height_at(layer, place))?;
         ground.heights_of(&[unit]).first().copied()
     }
 
@@ -511,14 +511,14 @@ mod tests {
     fn a_place_has_the_height_of_the_finest_layer_there() {
         let ground = Ground::new(&super::super::ground::tests::scene());
         // Heights that encode their position and layer.
-        let told = |number: u32, first: i32, step: i32, posts: i32| Layer {
+        let reported = |number: u32, first: i32, step: i32, posts: i32| Layer {
             heights: (0..posts * posts)
                 .map(|i| (first + step * (i % posts)) as f32 + 1000.0 * number as f32)
                 .collect(),
             ..layer(number, first, step, posts as u32)
         };
         let mut layers = Layers {
-            told: vec![told(0, 0, 16, 5), told(1, 16, 2, 9)],
+            reported: vec![reported(0, 0, 16, 5), reported(1, 16, 2, 9)],
             ..Layers::default()
         };
         let unit = ground.heights_of(&[1.0])[0];
@@ -539,8 +539,8 @@ mod tests {
             assert_eq!(up(&layers, outside[0], outside[1]), None);
         }
         // No-data, and the cells beside it.
-        layers.told.truncate(1);
-        layers.told[0].heights[0] = f32::NAN;
+        layers.reported.truncate(1);
+        layers.reported[0].heights[0] = f32::NAN;
         assert_eq!(up(&layers, 3.0, 3.0), None);
         is(up(&layers, 20.0, 20.0), 20.0);
     }

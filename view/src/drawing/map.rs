@@ -15,7 +15,7 @@ use super::log::{Entry, Log};
 use super::shade::{Heights, Rgb, Shade};
 
 /// Max pixels along the longer side of the relief.
-const LARGEST: usize = 512;
+const MAX: usize = 512;
 /// Updates of the hand in a second.
 const RATE_HZ: f64 = 20.0;
 const HELD: Rgb = [64, 224, 208];
@@ -158,7 +158,7 @@ impl Map {
             return Ok(Vec::new());
         }
         let (columns, rows) = (layer.columns as usize, layer.rows as usize);
-        let every = columns.max(rows).div_ceil(LARGEST).max(1);
+        let every = columns.max(rows).div_ceil(MAX).max(1);
         let taken = |count: usize| (0..count).step_by(every);
         let up: Vec<f32> = taken(rows)
             .flat_map(|row| taken(columns).map(move |column| row * columns + column))

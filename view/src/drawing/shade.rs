@@ -26,7 +26,7 @@ const LIGHT: [f32; 3] = [255.0, 252.0, 244.0];
 const BELOW_45_SHARE: f64 = 0.88;
 const EXAGGERATION: (f64, f64) = (0.3, 30.0);
 /// Colour of no-data.
-pub(super) const HOLE: Rgb = [60, 64, 72];
+pub(super) const NO_DATA: Rgb = [60, 64, 72];
 
 /// Colours of heights: the same for all layers of a terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,7 +110,7 @@ impl Shade {
     /// Returns the colour of a sample.
     pub(super) fn colour(&self, heights: &Heights<'_>, column: usize, row: usize) -> Rgb {
         let Some(height) = heights.at(column, row) else {
-            return HOLE;
+            return NO_DATA;
         };
         let slope = heights.slope(column, row).map(|s| s * self.exaggeration);
         let tint = tint((height - self.low) / self.span);
@@ -196,7 +196,7 @@ mod tests {
             let heights = of(&mm);
             let shade = Shade::of(&heights);
             let colour = shade.colour(&heights, 0, 0);
-            assert_eq!(colour == HOLE, !value.is_finite(), "{value}");
+            assert_eq!(colour == NO_DATA, !value.is_finite(), "{value}");
         }
     }
 }

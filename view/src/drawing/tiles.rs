@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
-use hapterra_view_stream::{TILE_CELLS, TILE_POSTS, Tile, Tiles as Told};
+use hapterra_view_stream::{TILE_CELLS, TILE_POSTS, Tile, Tiles as Reported};
 use re_sdk_types::archetypes::{LineStrips3D, Mesh3D};
 use re_sdk_types::components::{Color, Radius};
 
 use super::ground::Ground;
 use super::layers::Layers;
 use super::log::{Entry, Log};
-use super::shade::{HOLE, Heights, Rgb};
+use super::shade::{NO_DATA, Heights, Rgb};
 
 /// Samples along the side of a tile.
 const SIDE: usize = TILE_CELLS as usize + 1;
@@ -89,7 +89,7 @@ impl Tiles {
         self.outlined.remove(&tile.slot);
         let colour = |column: usize, row: usize| {
             let shade = layers.shade();
-            shade.map_or(HOLE, |shade| shade.colour(&heights, column + 1, row + 1))
+            shade.map_or(NO_DATA, |shade| shade.colour(&heights, column + 1, row + 1))
         };
         let mesh = posts.mesh(&colour);
         let around = ring().iter().map(|(x, y)| colour(*x, *y)).collect();
@@ -163,10 +163,10 @@ impl Tiles {
         &mut self,
         log: &Log,
         ground: &Ground,
-        told: &Told,
+        reported: &Reported,
     ) -> Result<Vec<Entry>> {
         let mut entries = Vec::new();
-        let held: BTreeSet<_> = told.held.iter().copied().collect();
+        let held: BTreeSet<_> = reported.held.iter().copied().collect();
         for (slot, index) in &self.slots {
             let lines = self.outlines.get(index).filter(|_| held.contains(index));
             let before = self.outlined.get(slot);
@@ -188,7 +188,7 @@ impl Tiles {
             .filter(|index| !self.outlines.contains_key(*index));
         let squares = unknown.map(|index| flat(ground, *index)).collect();
         entries.push(drawn(log, "terrain/held", squares, HELD)?);
-        let awaited = told.awaited.iter();
+        let awaited = reported.awaited.iter();
         let awaited = awaited.flat_map(|index| match self.outlines.get(index) {
             Some(lines) => lines.clone(),
             None => vec![flat(ground, *index)],
@@ -451,8 +451,8 @@ mod tests {
             };
             tiles.add(&log, &ground, &layers, &tile).expect("drawn");
         };
-        let told = |tiles: &mut Tiles, held: &[[i32; 2]]| -> Vec<String> {
-            let held = Told {
+        let reported = |tiles: &mut Tiles, held: &[[i32; 2]]| -> Vec<String> {
+            let held = Reported {
                 held: held.to_vec(),
                 awaited: vec![],
             };
@@ -464,12 +464,12 @@ mod tests {
         came(&mut tiles, 3, [1, 2]);
         came(&mut tiles, 4, [2, 2]);
         let [third, fourth] = ["terrain/held/3 ", "terrain/held/4 "];
-        assert_eq!(told(&mut tiles, &[[1, 2], [2, 2]]), [third, fourth]);
-        assert!(told(&mut tiles, &[[1, 2], [2, 2]]).is_empty());
+        assert_eq!(reported(&mut tiles, &[[1, 2], [2, 2]]), [third, fourth]);
+        assert!(reported(&mut tiles, &[[1, 2], [2, 2]]).is_empty());
         // Another in the same slot, and one that is no longer stored.
         came(&mut tiles, 3, [9, 2]);
-        assert_eq!(told(&mut tiles, &[[9, 2], [2, 2]]), [third]);
-        assert_eq!(told(&mut tiles, &[[9, 2]]), [fourth]);
-        assert!(told(&mut tiles, &[[9, 2]]).is_empty());
+        assert_eq!(reported(&mut tiles, &[[9, 2], [2, 2]]), [third]);
+        assert_eq!(reported(&mut tiles, &[[9, 2]]), [fourth]);
+        assert!(reported(&mut tiles, &[[9, 2]]).is_empty());
     }
 }

@@ -13,7 +13,7 @@ use super::{Blob, encoded};
 use crate::drawing::TIMELINE;
 
 /// Max entries that are joined: the device's time may stand still.
-const MOST: usize = 1000;
+const MAX: usize = 1000;
 
 /// A piece of the events.
 pub(super) struct Piece {
@@ -83,7 +83,7 @@ impl Gather {
         let is_long = self
             .span
             .is_some_and(|span| span.abs_length() >= self.least_ns);
-        match is_long || self.count >= MOST {
+        match is_long || self.count >= MAX {
             true => self.rest(),
             false => Ok(None),
         }

@@ -66,7 +66,7 @@ struct State {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// `hapterra` ended the stream.
-    Told,
+    Reported,
     /// `hapterra` ended without ending the stream: it was killed, or crashed.
     Lost,
 }
@@ -265,7 +265,7 @@ mod tests {
 
     const NOW: Duration = Duration::ZERO;
 
-    fn told(page: &Page) -> usize {
+    fn reported(page: &Page) -> usize {
         std::iter::from_fn(|| match page.next(NOW) {
             Next::Blob(_) => Some(()),
             _ => None,
@@ -296,7 +296,7 @@ mod tests {
         assert!(kept.happened <= 20_000 && kept.happened + 2_000 > happened);
         // Three entries, and the rest of the limit.
         let page = history.come(Pieces::Fine);
-        assert!(told(&page) < 100);
+        assert!(reported(&page) < 100);
     }
 
     #[test]
@@ -306,7 +306,7 @@ mod tests {
         for _ in 0..50 {
             history.put(vec![entry(None)]).expect("encodes");
         }
-        assert_eq!(told(&history.come(Pieces::Fine)), 50);
+        assert_eq!(reported(&history.come(Pieces::Fine)), 50);
     }
 
     #[test]
@@ -318,12 +318,12 @@ mod tests {
             page.offer(None, &Arc::new(vec![0; QUEUE_BYTES / 2 + 1]));
         };
         big(&slow);
-        assert_eq!(told(&slow) + told(&quick), 1);
+        assert_eq!(reported(&slow) + reported(&quick), 1);
         big(&slow);
         big(&slow);
         history.put(vec![entry(None)]).expect("encodes");
         assert_eq!(slow.next(NOW), Next::Cut);
-        assert_eq!(told(&quick), 1);
+        assert_eq!(reported(&quick), 1);
         let kept = history.kept();
         assert_eq!((kept.pages, kept.came, kept.cut), (1, 2, 1));
     }
@@ -360,9 +360,9 @@ mod tests {
         for _ in 0..2500 {
             history.put(vec![at(1.0)]).expect("encodes");
         }
-        assert_eq!((told(&gathered), told(&fine)), (2, 2500));
-        history.end(End::Told).expect("encodes");
-        assert_eq!(told(&gathered), 1);
+        assert_eq!((reported(&gathered), reported(&fine)), (2, 2500));
+        history.end(End::Reported).expect("encodes");
+        assert_eq!(reported(&gathered), 1);
     }
 
     #[test]
@@ -375,13 +375,13 @@ mod tests {
         assert_eq!(page.next(NOW), Next::Cut);
         let page = history.come(Pieces::Fine);
         history.put(vec![entry(None)]).expect("encodes");
-        for how in [End::Told, End::Lost] {
+        for how in [End::Reported, End::Lost] {
             history.end(how).expect("encodes");
             let late = history.come(Pieces::Fine);
-            assert_eq!(told(&late), 1);
+            assert_eq!(reported(&late), 1);
             assert_eq!(late.next(NOW), Next::Over(how));
         }
-        assert_eq!(told(&page), 1);
+        assert_eq!(reported(&page), 1);
         assert_eq!(page.next(NOW), Next::Over(End::Lost));
     }
 }

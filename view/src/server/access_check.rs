@@ -52,8 +52,8 @@ impl Asked<'_> {
 
 /// Returns true if `Host` is an address or `localhost`, with the server's port.
 fn is_own(host: &str, port: u16) -> bool {
-    let (name, said) = match host.rsplit_once(':') {
-        Some((name, said)) if !said.ends_with(']') => (name, said.parse().ok()),
+    let (name, stated) = match host.rsplit_once(':') {
+        Some((name, stated)) if !stated.ends_with(']') => (name, stated.parse().ok()),
         _ => (host, Some(80)),
     };
     let inner = name
@@ -63,7 +63,7 @@ fn is_own(host: &str, port: u16) -> bool {
         Some(inner) => inner.parse::<std::net::Ipv6Addr>().is_ok(),
         None => matches!(name.parse(), Ok(IpAddr::V4(_))),
     };
-    said == Some(port) && (is_address || name.eq_ignore_ascii_case("localhost"))
+    stated == Some(port) && (is_address || name.eq_ignore_ascii_case("localhost"))
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use access_check::Asked;
 use files::Files;
 
 /// Max number of pages and files in transfer at the same time.
-const MOST: usize = 24;
+const MAX: usize = 24;
 
 /// A server that runs until the program ends.
 pub struct Server {
@@ -87,7 +87,7 @@ impl Server {
 
 fn serve(server: &tiny_http::Server, shared: &Arc<Shared>) {
     for request in server.incoming_requests() {
-        if shared.under_way.fetch_add(1, Ordering::AcqRel) >= MOST {
+        if shared.under_way.fetch_add(1, Ordering::AcqRel) >= MAX {
             shared.under_way.fetch_sub(1, Ordering::AcqRel);
             refuse(request, 503);
             continue;

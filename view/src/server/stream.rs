@@ -42,11 +42,11 @@ pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
             }
             Next::Nothing => to.write_all(&SIGN.to_le_bytes())?,
             Next::Over(how) => {
-                let said = match how {
-                    End::Told => 0,
+                let stated = match how {
+                    End::Reported => 0,
                     End::Lost => LOST,
                 };
-                to.write_all(&said.to_le_bytes())?;
+                to.write_all(&stated.to_le_bytes())?;
                 return to.flush();
             }
             Next::Cut => return to.flush(),

@@ -46,7 +46,7 @@ pub fn program() -> Option<PathBuf> {
 pub struct Browser {
     child: Child,
     to: File,
-    heard: Receiver<Value>,
+    received: Receiver<Value>,
     count: u64,
     /// Requests of pages, by their addresses.
     pub requests: Vec<String>,
@@ -110,7 +110,7 @@ impl Browser {
             .open(&pipes[0])
             .expect("a pipe");
         let from = BufReader::new(File::open(&pipes[1]).expect("a pipe"));
-        let (say, heard) = channel();
+        let (say, received) = channel();
         std::thread::spawn(move || {
             let texts = from.split(0).map_while(Result::ok);
             let values = texts.filter_map(|text| serde_json::from_slice(&text).ok());
@@ -121,7 +121,7 @@ impl Browser {
         Self {
             child,
             to,
-            heard,
+            received,
             count: 0,
             requests: vec![],
         }
@@ -155,14 +155,14 @@ impl Browser {
         let until = Instant::now() + HANG;
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            let heard = self.heard.recv_timeout(left);
-            let heard = heard.unwrap_or_else(|_| panic!("no answer to {method}"));
-            if heard["method"] == "Network.requestWillBeSent" {
-                let address = heard["params"]["request"]["url"].as_str();
+            let received = self.received.recv_timeout(left);
+            let received = received.unwrap_or_else(|_| panic!("no answer to {method}"));
+            if received["method"] == "Network.requestWillBeSent" {
+                let address = received["params"]["request"]["url"].as_str();
                 self.requests.push(address.unwrap_or_default().to_owned());
             }
-            if heard["id"] == number {
-                return heard;
+            if received["id"] == number {
+                return received;
             }
         }
     }
@@ -216,11 +216,11 @@ impl Browser {
     /// visible, whichever is in front.
     pub fn set_seen(&mut self, page: &Page, is_seen: bool) {
         let state = if is_seen { "visible" } else { "hidden" };
-        let told = format!(
+        let reported = format!(
             "Object.defineProperty(document, \"visibilityState\", {{ value: \"{state}\", configurable: true }});
             document.dispatchEvent(new Event(\"visibilitychange\"))"
         );
-        self.value(page, &told);
+        self.value(page, &reported);
     }
 
     /// Returns the value of an expression in a page.

@@ -98,9 +98,9 @@ pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
         assert_eq!((labels.len(), labels[2].as_str()), (3, "N"));
         for (at, label) in at.iter().zip(&labels).take(2) {
             for axis in 0..2 {
-                let said = place(label)[axis] - base[axis];
-                let off = f64::from(at.0.0[axis]) + origin[axis] - said;
-                assert!(off.abs() < ROUNDED + MAP_METRE * said, "{label}: {off}");
+                let stated = place(label)[axis] - base[axis];
+                let off = f64::from(at.0.0[axis]) + origin[axis] - stated;
+                assert!(off.abs() < ROUNDED + MAP_METRE * stated, "{label}: {off}");
             }
         }
     }

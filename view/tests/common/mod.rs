@@ -25,8 +25,8 @@ const UNSEEN: &str = "--no-browser --port 0";
 /// A program under observation by a test. It is killed if it has not ended by itself.
 pub struct Running {
     child: Child,
-    told: Receiver<String>,
-    said: Receiver<String>,
+    reported: Receiver<String>,
+    stated: Receiver<String>,
 }
 
 impl Running {
@@ -39,8 +39,8 @@ impl Running {
             .spawn()
             .expect("the program starts");
         Self {
-            told: lines_of(child.stdout.take().expect("a pipe")),
-            said: lines_of(child.stderr.take().expect("a pipe")),
+            reported: lines_of(child.stdout.take().expect("a pipe")),
+            stated: lines_of(child.stderr.take().expect("a pipe")),
             child,
         }
     }
@@ -65,12 +65,12 @@ impl Running {
 
     /// Returns the next line on standard error.
     pub fn line(&self) -> String {
-        self.said.recv_timeout(HANG).expect("it says a line")
+        self.stated.recv_timeout(HANG).expect("it says a line")
     }
 
     /// Waits for a line on standard output with this beginning.
     pub fn tells(&self, beginning: &str) {
-        while !{ self.told.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {}
+        while !{ self.reported.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {}
     }
 
     /// Returns the port of its viewer's page, from one of the lines.
@@ -118,9 +118,9 @@ impl Running {
 
     /// Returns its unread output, and waits until it and its viewer have ended.
     pub fn words(&self) -> String {
-        self.told
+        self.reported
             .iter()
-            .chain(&self.said)
+            .chain(&self.stated)
             .collect::<Vec<_>>()
             .join("\n")
     }
@@ -217,12 +217,12 @@ pub fn started_by(process: u32, program: &str) -> Option<u32> {
 
 /// Returns the lines of a stream, as they arrive.
 fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
-    let (say, said) = channel();
+    let (say, stated) = channel();
     std::thread::spawn(move || {
         let lines = BufReader::new(from).lines().map_while(Result::ok);
         lines.into_iter().try_for_each(|line| say.send(line))
     });
-    said
+    stated
 }
 
 /// Sends a complete request and returns the whole answer.

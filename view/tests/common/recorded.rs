@@ -80,14 +80,14 @@ impl Csv {
         Self {
             names: lines.next().expect("a header"),
             rows: lines.collect(),
-            units: [said(&text, "cell_m"), said(&text, "cell_mm")]
+            units: [stated(&text, "cell_m"), stated(&text, "cell_mm")]
                 .concat()
                 .first()
                 .copied()
                 .expect("settings"),
-            scales: said(&text, "cell_mm")
+            scales: stated(&text, "cell_mm")
                 .into_iter()
-                .zip(said(&text, "height_mm_per_unit"))
+                .zip(stated(&text, "height_mm_per_unit"))
                 .map(|(cell, height)| [cell, height])
                 .collect(),
         }
@@ -112,7 +112,7 @@ impl Csv {
 }
 
 /// Returns the numbers with this name in the remarks of a recording, in their order.
-pub fn said(text: &str, name: &str) -> Vec<f64> {
+pub fn stated(text: &str, name: &str) -> Vec<f64> {
     let lines = text.lines().filter_map(|line| line.strip_prefix("# "));
     let pairs = lines.filter_map(|line| line.split_once(" = "));
     pairs

@@ -14,7 +14,7 @@ use std::time::Duration;
 const PORT: u16 = 8766;
 /// Maximum bytes of a request's head.
 const MAX_HEAD: u64 = 16 << 10;
-const PATIENCE: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(10);
 
 /// A server that is bound to its port.
 pub(crate) struct Server {
@@ -59,8 +59,8 @@ impl Server {
     }
 
     fn answer(&self, mut stream: &TcpStream) -> io::Result<()> {
-        stream.set_read_timeout(Some(PATIENCE))?;
-        stream.set_write_timeout(Some(PATIENCE))?;
+        stream.set_read_timeout(Some(TIMEOUT))?;
+        stream.set_write_timeout(Some(TIMEOUT))?;
         let head: Vec<String> = BufReader::new(stream.take(MAX_HEAD))
             .lines()
             .map_while(Result::ok)

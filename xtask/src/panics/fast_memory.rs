@@ -109,8 +109,8 @@ mod tests {
 
     #[test]
     fn what_is_reached_lies_in_one_of_the_areas() {
-        let told = judged([0x20, 0x40, 0x0800_0000, 0x80]).expect("all are placed");
-        assert!(told.starts_with("2 of the 3 functions"), "{told}");
+        let reported = judged([0x20, 0x40, 0x0800_0000, 0x80]).expect("all are placed");
+        assert!(reported.starts_with("2 of the 3 functions"), "{reported}");
         // A bridge may be anywhere.
         assert!(judged([0x20, 0x0800_2000, 0x0800_0000, 0x80]).is_ok());
     }

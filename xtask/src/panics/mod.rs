@@ -30,9 +30,9 @@ pub(crate) fn check(board: &Board, path: &Path) -> Result<()> {
     say(format!("{name}: no panic can be reached from {list}"));
     if let Some(interrupt) = board.fast_interrupt {
         let areas = fast_memory::areas(&elf)?;
-        let told = fast_memory::judge(&calls, board, interrupt, &areas);
-        let told = told.with_context(|| format!("image {name}"))?;
-        say(format!("{name}: {told}"));
+        let reported = fast_memory::judge(&calls, board, interrupt, &areas);
+        let reported = reported.with_context(|| format!("image {name}"))?;
+        say(format!("{name}: {reported}"));
     }
     Ok(())
 }

@@ -89,7 +89,7 @@ fn gamepad_moves_turns_and_presses() {
 }
 
 /// Returns the sound of a force and its change: Hz, and its volume.
-fn heard(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
+fn received(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
     let value = site.value(&format!(
         "import('./js/sound.js').then(async ({{ Sound }}) => {{
             const offline = new OfflineAudioContext(1, 44100, 44100);
@@ -109,10 +109,10 @@ fn heard(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
 fn sound_follows_the_force_and_its_changes() {
     let _one = one();
     let Some(mut site) = on_a_ramp() else { return };
-    let [_, silence] = heard(&mut site, 0.0, 0.0);
-    let [one_hz, one_newton] = heard(&mut site, 1.0, 0.0);
-    let [two_hz, two_newtons] = heard(&mut site, 2.0, 0.0);
-    let [_, rustle] = heard(&mut site, 0.0, 0.04);
+    let [_, silence] = received(&mut site, 0.0, 0.0);
+    let [one_hz, one_newton] = received(&mut site, 1.0, 0.0);
+    let [two_hz, two_newtons] = received(&mut site, 2.0, 0.0);
+    let [_, rustle] = received(&mut site, 0.0, 0.04);
     let found = (silence, one_hz, one_newton, two_hz, two_newtons, rustle);
     assert!(silence < 1e-3, "{found:?}");
     assert!(

@@ -209,7 +209,7 @@ impl Asking {
             budget.spend(SLOPE);
             let entry = start.at.across(side);
             let patch = match window.ground(entry.cell) {
-                CellContent::Hole => continue,
+                CellContent::NoData => continue,
                 // This might be the steepest neighbour: the proxy waits for its tile.
                 CellContent::Missing => {
                     budget.lacks(entry.cell);
@@ -359,7 +359,7 @@ pub(super) fn to_steepest_patch<const D: usize>(
         }
         let point = before.0.across(side);
         let its_patch = match window.ground(point.cell) {
-            CellContent::Hole => continue,
+            CellContent::NoData => continue,
             CellContent::Missing => {
                 budget.lacks(point.cell);
                 (*at, *patch) = before;

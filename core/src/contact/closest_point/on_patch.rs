@@ -83,7 +83,7 @@ pub(super) fn search(
         None => by_rulings(patch, hip, start, budget)?,
     };
     #[cfg(test)]
-    crate::contact::tally::searched(found.evaluations);
+    crate::contact::stats::searched(found.evaluations);
     Some(found)
 }
 

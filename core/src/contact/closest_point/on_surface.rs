@@ -111,7 +111,7 @@ impl Descent {
         budget: &mut Budget,
     ) {
         #[cfg(test)]
-        crate::contact::tally::searched(1);
+        crate::contact::stats::searched(1);
         budget.spend(ARRIVAL + CONVEX);
         self.restart(at);
         self.here = Nearest::from_convex(closest);
@@ -166,7 +166,7 @@ impl Descent {
         let cell = self.at.cell;
         let mut patch = match window.ground(cell) {
             CellContent::Patch(corners) => view.patch(&corners),
-            CellContent::Hole => return Ended::Lost,
+            CellContent::NoData => return Ended::Lost,
             CellContent::Missing => {
                 budget.lacks(cell);
                 return Ended::Lost;
@@ -310,7 +310,7 @@ fn patch_at<const D: usize>(
 ) -> Option<Patch> {
     match window.ground(point.cell) {
         CellContent::Patch(corners) => Some(view.patch(&corners)),
-        CellContent::Hole | CellContent::Missing => None,
+        CellContent::NoData | CellContent::Missing => None,
     }
 }
 
@@ -351,7 +351,7 @@ fn leads_off_beyond<const D: usize>(
     match window.ground(entered.cell) {
         CellContent::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
         // At the border of the data the proxy does not leave; see `edge_fade`.
-        CellContent::Hole | CellContent::Missing => false,
+        CellContent::NoData | CellContent::Missing => false,
     }
 }
 

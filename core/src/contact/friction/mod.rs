@@ -30,7 +30,7 @@ pub struct Friction {
 
 impl Friction {
     /// Maximum coefficient: tan 84°.
-    pub const MOST: f32 = 10.0;
+    pub const MAX: f32 = 10.0;
     /// Maximum of [`Self::viscous_s`].
     pub const MAX_VISCOUS_S: f32 = 1.0;
     /// A frictionless surface: the proxy is the surface's closest point.
@@ -61,8 +61,8 @@ impl Friction {
     pub fn is_valid(&self) -> bool {
         let ordered = self.dynamic_mu <= self.static_mu;
         ordered
-            && (0.0..=Self::MOST).contains(&self.dynamic_mu)
-            && (0.0..=Self::MOST).contains(&self.static_mu)
+            && (0.0..=Self::MAX).contains(&self.dynamic_mu)
+            && (0.0..=Self::MAX).contains(&self.static_mu)
             && (0.0..=Self::MAX_VISCOUS_S).contains(&self.viscous_s)
     }
 }

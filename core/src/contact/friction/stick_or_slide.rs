@@ -304,7 +304,7 @@ impl Asked {
         self.is_open = false;
         self.patch = match window.ground(self.at.cell) {
             CellContent::Patch(corners) => view.patch(&corners),
-            CellContent::Hole => return Some(Walked::Off),
+            CellContent::NoData => return Some(Walked::Off),
             CellContent::Missing => {
                 budget.lacks(self.at.cell);
                 return Some(Walked::Off);
@@ -338,7 +338,7 @@ impl Asked {
         let point = self.at;
         let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
         let mut leads_off = self.pull.is_above && into == Side::NONE;
-        let (mut all_above, mut has_hole) = (self.pull.is_above, false);
+        let (mut all_above, mut has_no_data) = (self.pull.is_above, false);
         for place in 0..3 {
             let side = border.neighbour(place);
             if side == Side::NONE {
@@ -360,13 +360,13 @@ impl Asked {
                     budget.lacks(at.cell);
                     self.is_open = true;
                 }
-                CellContent::Hole => has_hole = true,
+                CellContent::NoData => has_no_data = true,
             }
         }
-        has_hole |= self.is_open;
+        has_no_data |= self.is_open;
         if leads_off && let Some(walked) = off(leave, &point) {
             return Some(walked);
         }
-        (has_hole && all_above).then_some(Walked::Off)
+        (has_no_data && all_above).then_some(Walked::Off)
     }
 }

@@ -18,8 +18,8 @@ impl Contact {
         hip: GridPoint,
         budget: &mut Budget,
     ) -> Turn {
-        if let Some(landing) = &self.landing {
-            let waits = landing.waits(budget);
+        if let Some(onset) = &self.onset {
+            let waits = onset.waits(budget);
             return self.answers(waits);
         }
         let view = HipView::new(hip);

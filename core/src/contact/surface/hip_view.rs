@@ -56,11 +56,11 @@ impl HipView {
             };
             let cell = column.offset(side.east, side.north);
             let ground = window.ground(cell);
-            if ground != CellContent::Hole {
+            if ground != CellContent::NoData {
                 return (cell, ground);
             }
         }
-        (column, CellContent::Hole)
+        (column, CellContent::NoData)
     }
 
     /// Returns true if the HIP is above the patch of these corners, in the cell under it.

@@ -90,11 +90,11 @@ pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Ste
         }
         let other = step.on_border_of(side);
         let ground = window.ground(other.cell);
-        if ground != CellContent::Hole {
+        if ground != CellContent::NoData {
             return (other, ground);
         }
     }
-    (step, CellContent::Hole)
+    (step, CellContent::NoData)
 }
 
 /// The cells under a straight path, in order; each begins exactly where the one before ended, so

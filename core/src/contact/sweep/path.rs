@@ -51,7 +51,7 @@ pub(in crate::contact) struct Path {
     /// True if the path starts on the surface and leaves it.
     on_surface: bool,
     /// True if the last cell passed holds no patch: no-data, or beyond the data.
-    over_hole: bool,
+    over_no_data: bool,
     /// True if the sweep waits for a tile, and not for budget.
     is_missing: bool,
 }
@@ -75,7 +75,7 @@ impl Path {
             at: from,
             ends,
             on_surface,
-            over_hole: false,
+            over_no_data: false,
             is_missing: false,
         }
     }
@@ -121,7 +121,7 @@ impl Path {
             let low = lower(&self.at, &end);
             if window.is_clear(span, low) || window.is_clear_nearby(around, low) {
                 // The path is above everything around, so only the field's border matters.
-                self.over_hole = !window.has_cell(end.column());
+                self.over_no_data = !window.has_cell(end.column());
                 self.on_surface = false;
             } else if !self.is_walked(&end) {
                 // If this is full, the piece is intersected instead.
@@ -152,7 +152,7 @@ impl Path {
         budget: &mut Budget,
     ) -> Option<Swept> {
         let view = HipView::new(self.at);
-        let mut over_hole = self.over_hole;
+        let mut over_no_data = self.over_no_data;
         let mut on_surface = self.on_surface;
         let mut steps = Steps::between(&self.at, &end);
         while let Some(mut step) = steps.next() {
@@ -166,9 +166,9 @@ impl Path {
                 continue;
             }
             let mut ground = window.ground(step.cell);
-            if ground == CellContent::Hole {
+            if ground == CellContent::NoData {
                 (step, ground) = beside(window, step);
-                over_hole |= step.is_point();
+                over_no_data |= step.is_point();
             }
             let patch = match ground {
                 CellContent::Patch(corners) => view.patch(&corners),
@@ -177,14 +177,14 @@ impl Path {
                     budget.lacks(step.cell);
                     return Some(Swept::Missing);
                 }
-                CellContent::Hole => {
-                    over_hole = true;
+                CellContent::NoData => {
+                    over_no_data = true;
                     on_surface = false;
                     continue;
                 }
             };
             let [start, middle, after] = step.gap(&patch);
-            if over_hole && start >= 0.0 {
+            if over_no_data && start >= 0.0 {
                 return Some(Swept::Under);
             }
             let crossing = if on_surface && middle < 0.0 {
@@ -195,9 +195,9 @@ impl Path {
             if let Some(s) = crossing {
                 return Some(Swept::Hit(step.point(s)));
             }
-            (over_hole, on_surface) = (false, false);
+            (over_no_data, on_surface) = (false, false);
         }
-        (self.over_hole, self.on_surface) = (over_hole, false);
+        (self.over_no_data, self.on_surface) = (over_no_data, false);
         None
     }
 }

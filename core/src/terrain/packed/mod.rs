@@ -81,6 +81,6 @@ const HEAD: usize = 5;
 /// Bytes of a line.
 const LINE: usize = 17;
 /// Bit in the first byte: there is no-data.
-const HOLES: u8 = 4;
+const NO_DATA: u8 = 4;
 /// Position of the Rice parameter in the first byte.
 const PARAMETER_SHIFT: u32 = 3;

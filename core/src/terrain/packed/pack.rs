@@ -4,7 +4,7 @@ use super::bits::BitWriter;
 use super::line::{Line, of_rank, rank};
 use super::prediction::Prediction;
 use super::rice::{MAX_PARAMETER, Rice, write_run};
-use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
+use super::{HEAD, LINE, NO_DATA, PARAMETER_SHIFT};
 use crate::grid::MAX_CELL;
 use crate::terrain::TILE_SAMPLES;
 
@@ -44,9 +44,9 @@ pub fn pack<'b>(
     steps: &[Step],
     buffer: &'b mut [u8],
 ) -> Option<&'b [u8]> {
-    let first = heights.iter().position(|height| !is_hole(*height))?;
+    let first = heights.iter().position(|height| !is_no_data(*height))?;
     let mut numbers = [0; SAMPLES];
-    let known = || heights.iter().filter(|height| !is_hole(**height));
+    let known = || heights.iter().filter(|height| !is_no_data(**height));
     let nearest = known().fold(f32::INFINITY, |nearest, height| {
         if height.abs() < nearest.abs() {
             *height
@@ -73,7 +73,7 @@ pub fn pack<'b>(
     )
 }
 
-fn is_hole(height: f32) -> bool {
+fn is_no_data(height: f32) -> bool {
     height.is_nan() || height.abs() > MAX_CELL as f32
 }
 
@@ -90,7 +90,7 @@ struct Lines {
 impl Lines {
     /// Creates the lines of a step; `height` is the one nearest to the base.
     fn of(step: &Step, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
-        let known = || heights.iter().filter(|height| !is_hole(**height));
+        let known = || heights.iter().filter(|height| !is_no_data(**height));
         let above = |height: f32| f64::from(height) + base;
         let span = known().fold(0.0, |span: f64, other| {
             span.max((f64::from(*other) - f64::from(height)).abs())
@@ -152,7 +152,7 @@ impl Lines {
             let exact = (f64::from(*height) + self.up) * self.per_cell - self.from;
             // Saturates.
             *number = libm::rint(exact) as i32;
-            is_hole(*height) || height_of(self.written(), *number).to_bits() == height.to_bits()
+            is_no_data(*height) || height_of(self.written(), *number).to_bits() == height.to_bits()
         })
     }
 }
@@ -172,11 +172,11 @@ fn write<'b>(
     lines: &[Line],
     buffer: &'b mut [u8],
 ) -> Option<&'b [u8]> {
-    let holes = heights.iter().any(|height| is_hole(*height));
+    let holes = heights.iter().any(|height| is_no_data(*height));
     let parameter = parameter(heights, numbers, predicted);
     let (head, _) = buffer.split_first_chunk_mut::<HEAD>()?;
     head[0] =
-        lines.len() as u8 | if holes { HOLES } else { 0 } | (parameter as u8) << PARAMETER_SHIFT;
+        lines.len() as u8 | if holes { NO_DATA } else { 0 } | (parameter as u8) << PARAMETER_SHIFT;
     head[1..].copy_from_slice(&predicted.to_le_bytes());
     let mut front = HEAD;
     for line in lines {
@@ -189,15 +189,17 @@ fn write<'b>(
     let mut prediction = Prediction::new(predicted);
     let mut rice = Rice::new(parameter);
     if holes {
-        bits.number(u32::from(is_hole(heights[0])), 1)?;
+        bits.number(u32::from(is_no_data(heights[0])), 1)?;
     }
     let mut run = None;
     for (i, height) in heights.iter().enumerate() {
-        let hole = is_hole(*height);
+        let hole = is_no_data(*height);
         if holes && run != Some(hole) {
             run = Some(hole);
             let rest = heights[i..].iter();
-            let length = rest.take_while(|height| is_hole(**height) == hole).count();
+            let length = rest
+                .take_while(|height| is_no_data(**height) == hole)
+                .count();
             write_run(length as u32, &mut bits)?;
         }
         let mut difference = None;
@@ -219,7 +221,7 @@ fn write<'b>(
 /// Returns the Rice parameter that suits the first samples with a height.
 fn parameter(heights: &[f32; SAMPLES], numbers: &[i32; SAMPLES], predicted: i32) -> u32 {
     let known = heights.iter().zip(numbers);
-    let known = known.filter(|(height, _)| !is_hole(**height));
+    let known = known.filter(|(height, _)| !is_no_data(**height));
     let (mut sum, mut count, mut last) = (0_u64, 0_u64, predicted);
     for (_, number) in known.take(TILE_SAMPLES) {
         sum += 2 * u64::from(number.wrapping_sub(last).unsigned_abs());

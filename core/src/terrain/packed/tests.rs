@@ -149,13 +149,13 @@ fn holes_stay_where_they_are() {
         &mut |_, row| row < 9,
         &mut |_, _| random.below(3) == 0,
     ];
-    for is_hole in holes {
-        let heights = by_sample(|col, row| match is_hole(col, row) {
+    for is_no_data in holes {
+        let heights = by_sample(|col, row| match is_no_data(col, row) {
             true => f32::NAN,
             false => hills[row * TILE_SAMPLES + col],
         });
         let bytes = packed(&heights, base, &steps).unwrap();
-        assert_eq!(bytes[0] & HOLES, HOLES);
+        assert_eq!(bytes[0] & NO_DATA, NO_DATA);
         assert!(bytes.len() < 1200, "{}", bytes.len());
     }
     let mut buffer = [0; MAX_PACKED];

@@ -4,7 +4,7 @@ use super::bits::BitReader;
 use super::line::{Line, of_rank};
 use super::prediction::Prediction;
 use super::rice::{MAX_PARAMETER, Rice, read_run};
-use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
+use super::{HEAD, LINE, NO_DATA, PARAMETER_SHIFT};
 
 /// State of the decoding of a tile's heights.
 pub(in crate::terrain) struct Unpacker<'b> {
@@ -29,7 +29,7 @@ impl<'b> Unpacker<'b> {
         let (second, bytes) = line(lines > 1, bytes)?;
         let mut bits = BitReader::new(bytes);
         Some(Self {
-            runs: (kind & HOLES != 0).then(|| Runs::new(&mut bits)),
+            runs: (kind & NO_DATA != 0).then(|| Runs::new(&mut bits)),
             bits,
             prediction: Prediction::new(i32::from_le_bytes(*predicted)),
             rice: Rice::new(parameter),
@@ -43,7 +43,7 @@ impl<'b> Unpacker<'b> {
     #[inline]
     pub(in crate::terrain) fn next(&mut self, col: usize) -> f32 {
         let (rice, bits) = (&mut self.rice, &mut self.bits);
-        if self.runs.as_mut().is_some_and(|runs| runs.is_hole(bits)) {
+        if self.runs.as_mut().is_some_and(|runs| runs.is_no_data(bits)) {
             self.prediction.next(col, |_, west| west);
             return f32::NAN;
         }
@@ -91,7 +91,7 @@ impl Runs {
 
     /// Returns true if the next sample is no-data.
     #[inline]
-    fn is_hole(&mut self, bits: &mut BitReader<'_>) -> bool {
+    fn is_no_data(&mut self, bits: &mut BitReader<'_>) -> bool {
         if self.left == 0 {
             self.holes = !self.holes;
             self.left = read_run(bits);

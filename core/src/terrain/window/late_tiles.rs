@@ -164,7 +164,7 @@ impl<'t, const D: usize> Window<'t, D> {
         let [sw, se, nw, ne] = heights;
         match (sw + se + nw + ne).is_nan() {
             false => CellContent::Patch(Corners { base, heights }),
-            true if are_of_tiles => CellContent::Hole,
+            true if are_of_tiles => CellContent::NoData,
             // If the fallback has no height here, the tile may have one.
             true => CellContent::Missing,
         }

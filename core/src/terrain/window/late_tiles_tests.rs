@@ -187,7 +187,7 @@ impl<'t> Bed<'t> {
                         patches += 1;
                     }
                     CellContent::Missing => assert!(model.contains(&None), "{x} {y}"),
-                    CellContent::Hole => panic!("{x} {y}: there is none"),
+                    CellContent::NoData => panic!("{x} {y}: there is none"),
                 }
             }
         }
@@ -348,7 +348,7 @@ fn no_data_of_a_tile_acts_at_once() {
     tile.fill_from(key, 0, SIZE, height).expect("in range");
     let _ = bed.window.take(tile, [HERE; 2]);
     bed.window.settle(0.25);
-    assert_eq!(ground(&bed, 130, 140), CellContent::Hole);
+    assert_eq!(ground(&bed, 130, 140), CellContent::NoData);
     let patch = |height| {
         CellContent::Patch(Corners {
             base: 0,

@@ -35,7 +35,7 @@ fn armed_step_by_step_and_told_of_each() {
         ToHost::Guard(report) => Some(report.mode),
         _ => None,
     };
-    let mut modes: std::vec::Vec<Mode> = rig.heard.iter().filter_map(guard).collect();
+    let mut modes: std::vec::Vec<Mode> = rig.received.iter().filter_map(guard).collect();
     modes.dedup();
     let way = [
         Mode::Disarmed,
@@ -146,7 +146,7 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
             number,
             calibration: Some(Calibration::PREMIUM_3_0),
         };
-        assert!(rig.heard.contains(&got), "{:?}", rig.heard.last());
+        assert!(rig.received.contains(&got), "{:?}", rig.received.last());
     }
 }
 
@@ -310,7 +310,7 @@ fn what_was_found_at_boot_is_told_and_blocks() {
 fn goodbye_is_answered_when_the_force_is_out_and_the_scene_dropped() {
     let mut rig = Rig::armed();
     rig.say(&ToDevice::Bye);
-    let answered = |rig: &Rig| rig.heard.iter().any(|m| matches!(m, ToHost::Goodbye(_)));
+    let answered = |rig: &Rig| rig.received.iter().any(|m| matches!(m, ToHost::Goodbye(_)));
     let (mut ticks, mut on) = (0, 0);
     while !answered(&rig) {
         rig.run(1);
@@ -325,11 +325,11 @@ fn goodbye_is_answered_when_the_force_is_out_and_the_scene_dropped() {
     rig.say(&ToDevice::Close);
     rig.run(1);
     assert!(rig.device.link.has_ended());
-    rig.heard.clear();
+    rig.received.clear();
     rig.greet_anew();
     rig.run(2);
-    let ToHost::Hello(hello) = &rig.heard[0] else {
-        panic!("{:?}", rig.heard[0]);
+    let ToHost::Hello(hello) = &rig.received[0] else {
+        panic!("{:?}", rig.received[0]);
     };
     assert_eq!(hello.epoch, None, "it holds nothing any more");
     assert_eq!(hello.last.end, SessionEnd::Goodbye);

@@ -31,7 +31,7 @@ fn another_protocol_is_refused_in_words_that_every_version_knows() {
     rig.send(&asked(3));
     rig.send(&[1, 7, 0, 0]);
     rig.run(3);
-    assert_eq!(rig.heard, []);
+    assert_eq!(rig.received, []);
     let refused = VersionCheck::Refused { protocol: PROTOCOL };
     assert_eq!(rig.refused, [refused]);
     // A later host also sends the query, whatever its open message is.
@@ -41,11 +41,11 @@ fn another_protocol_is_refused_in_words_that_every_version_knows() {
         ..HELLO
     }));
     rig.run(1);
-    assert_eq!((rig.refused.len(), rig.heard.len()), (3, 0));
+    assert_eq!((rig.refused.len(), rig.received.len()), (3, 0));
     rig.send(&asked(PROTOCOL));
     rig.say(&ToDevice::Hello(HELLO));
     rig.run(1);
-    assert!(matches!(rig.heard[0], ToHost::Hello(_)));
+    assert!(matches!(rig.received[0], ToHost::Hello(_)));
     assert_eq!(rig.refused.len(), 3, "the hello is the answer");
 }
 
@@ -110,7 +110,7 @@ fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
     let first = rig.session;
     rig.greet_anew();
     rig.run(20);
-    let heard = rig.heard.len();
+    let received = rig.received.len();
     for number in [7, 7, 8] {
         rig.send(&framed(
             first,
@@ -129,9 +129,9 @@ fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
     rig.run(300);
     let end = SessionEnd::Replaced;
     let over = [7, 7, 8].map(|number| (first, ToHost::SessionClosed { number, end }));
-    assert_eq!(rig.heard_before, over);
+    assert_eq!(rig.received_before, over);
     let telemetry = |m: &&ToHost| matches!(m, ToHost::Telemetry(_) | ToHost::TileRequest { .. });
-    let of_the_present = &rig.heard[heard..];
+    let of_the_present = &rig.received[received..];
     assert!(of_the_present.iter().all(|m| telemetry(&m)));
     assert_eq!(rig.status().foreign_frames, 15);
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
@@ -147,19 +147,19 @@ fn a_host_that_was_let_go_is_told_so_and_one_that_has_left_is_not() {
     rig.say(&ToDevice::Hello(hello));
     rig.run(5_200);
     let over = |rig: &mut Rig, number| {
-        rig.heard_before.clear();
+        rig.received_before.clear();
         rig.say(&ToDevice::Hello(HostHello { number, ..HELLO }));
         rig.run(1);
-        rig.heard_before.clone()
+        rig.received_before.clone()
     };
     let end = SessionEnd::HostSilent;
-    let told = (rig.session, ToHost::SessionClosed { number: 3, end });
-    assert_eq!(over(&mut rig, 3), [told]);
+    let reported = (rig.session, ToHost::SessionClosed { number: 3, end });
+    assert_eq!(over(&mut rig, 3), [reported]);
     // A leaving host needs only the answer to its close.
     rig.say(&ToDevice::Bye);
     assert_eq!(over(&mut rig, 4), []);
     rig.run(250);
-    assert!(matches!(rig.heard.last(), Some(ToHost::Goodbye(_))));
+    assert!(matches!(rig.received.last(), Some(ToHost::Goodbye(_))));
     assert_eq!(over(&mut rig, 5), []);
     rig.say(&ToDevice::Close);
     assert_eq!(over(&mut rig, 6), []);
@@ -200,7 +200,7 @@ fn numbers_of_requests_wrap_around() {
         rig.run(1);
     }
     let answers = |m: &&ToHost| matches!(m, ToHost::Answer(_));
-    assert_eq!(rig.heard.iter().filter(answers).count(), 600);
+    assert_eq!(rig.received.iter().filter(answers).count(), 600);
 }
 
 #[test]
@@ -224,11 +224,11 @@ fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
         (7_000..7_110).contains(&on),
         "{on}: seven seconds, and to fade out"
     );
-    rig.heard.clear();
+    rig.received.clear();
     rig.greet_anew();
     rig.run(5);
-    let ToHost::Hello(device) = &rig.heard[0] else {
-        panic!("{:?}", rig.heard[0]);
+    let ToHost::Hello(device) = &rig.received[0] else {
+        panic!("{:?}", rig.received[0]);
     };
     assert_eq!(device.last.end, SessionEnd::HostSilent);
     assert_eq!(device.epoch, Some(7), "and it holds the scene");
@@ -271,11 +271,11 @@ fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
     assert_eq!(answers.collect::<std::string::String>(), "hsc".repeat(6));
     // It requests nothing, and the session before is the one that was left.
     rig.send(&framed(looker, &ToDevice::Bye));
-    rig.heard.clear();
+    rig.received.clear();
     rig.greet_anew();
     rig.run(5);
-    let ToHost::Hello(device) = &rig.heard[0] else {
-        panic!("{:?}", rig.heard[0]);
+    let ToHost::Hello(device) = &rig.received[0] else {
+        panic!("{:?}", rig.received[0]);
     };
     assert_eq!(device.last.session, FIRST.get());
     assert_eq!(device.last.end, SessionEnd::HostSilent);
@@ -312,10 +312,10 @@ fn a_host_that_speaks_is_not_let_go() {
 
 /// Returns the answer that a new host receives to its open message.
 fn greeted(rig: &mut Rig) -> DeviceHello {
-    rig.heard.clear();
+    rig.received.clear();
     rig.greet_anew();
     rig.run(5);
-    match &rig.heard[0] {
+    match &rig.received[0] {
         ToHost::Hello(device) => device.clone(),
         other => panic!("{other:?}"),
     }
@@ -327,10 +327,14 @@ fn look(rig: &mut Rig, silence_s: u16) {
     rig.say(&ToDevice::Hello(HostHello { silence_s, ..HELLO }));
     rig.run(1);
     for _ in 0..2 {
-        rig.heard.clear();
+        rig.received.clear();
         rig.say(&ToDevice::Detach);
         rig.run(1);
-        assert!(rig.heard.contains(&ToHost::Detached), "{:?}", rig.heard);
+        assert!(
+            rig.received.contains(&ToHost::Detached),
+            "{:?}",
+            rig.received
+        );
     }
 }
 
@@ -345,15 +349,15 @@ fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
     assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
     // Its own late open message does not open it again, and neither does that of the previous
     // session, which is answered.
-    rig.heard.clear();
+    rig.received.clear();
     for session in [second, rig.session] {
         rig.send(&framed(session, &ToDevice::Hello(HELLO)));
     }
     rig.run(5);
-    assert_eq!(rig.heard, []);
+    assert_eq!(rig.received, []);
     let (number, end) = (HELLO.number, SessionEnd::Replaced);
     assert_eq!(
-        rig.heard_before,
+        rig.received_before,
         [(second, ToHost::SessionClosed { number, end })]
     );
     let device = greeted(&mut rig);
@@ -392,7 +396,7 @@ fn detached_host_arms_nothing_and_later_close_disarms() {
     rig.run(10);
     rig.say(&ToDevice::Bye);
     rig.run(250);
-    assert!(matches!(rig.heard.last(), Some(ToHost::Goodbye(_))));
+    assert!(matches!(rig.received.last(), Some(ToHost::Goodbye(_))));
     assert!(!rig.device.tick(rig.sense).enabled);
     assert_eq!(greeted(&mut rig).last.end, SessionEnd::Goodbye);
 }
@@ -422,7 +426,7 @@ fn what_is_alive_is_answered_with_what_was_sent_before() {
     }
     rig.run(20);
     let (mut sent, mut answers) = (0, 0);
-    for message in &rig.heard {
+    for message in &rig.received {
         match message {
             ToHost::Telemetry(telemetry) => sent += telemetry.samples.len() as u32,
             ToHost::Heartbeat { count, report, .. } => {
@@ -444,7 +448,7 @@ fn goodbye_is_said_again_to_a_host_that_missed_it() {
         rig.run(250);
     }
     let goodbyes: Vec<_> = rig
-        .heard
+        .received
         .iter()
         .filter(|m| matches!(m, ToHost::Goodbye(_)))
         .collect();
@@ -476,7 +480,7 @@ fn nothing_is_heeded_before_hello() {
     rig.send(&frame(&ToDevice::Scene(scene(Source::Points))));
     rig.send(&point(0, 0.0, 0.0));
     rig.run(3);
-    assert_eq!(rig.heard, []);
+    assert_eq!(rig.received, []);
 }
 
 #[test]
@@ -588,7 +592,7 @@ fn joined_in_the_middle_of_a_frame() {
         rig.send(&tile(7, key)[cut..]);
         rig.say(&ToDevice::Hello(HELLO));
         rig.run(1);
-        assert!(matches!(rig.heard[0], ToHost::Hello(_)), "cut {cut}");
+        assert!(matches!(rig.received[0], ToHost::Hello(_)), "cut {cut}");
     }
 }
 
@@ -596,12 +600,12 @@ fn joined_in_the_middle_of_a_frame() {
 fn a_zero_before_hello_ends_what_the_last_host_left_unfinished() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     rig.run(3);
-    rig.heard.clear();
+    rig.received.clear();
     rig.send(&point(0, 0.0, 2.0)[..4]);
     rig.send(&[0]);
     rig.greet_anew();
     rig.run(1);
-    assert!(matches!(rig.heard[0], ToHost::Hello(_)));
+    assert!(matches!(rig.received[0], ToHost::Hello(_)));
 }
 
 #[test]
@@ -632,12 +636,12 @@ fn force_stays_when_the_host_dies_and_the_session_resumes() {
     }
     rig.device.link.interrupted();
     rig.writer = usize::MAX;
-    rig.heard.clear();
+    rig.received.clear();
     rig.greet_anew();
     rig.say(&ToDevice::Scene(scene(Source::Encoders)));
     rig.run(300);
-    let ToHost::Hello(device) = &rig.heard[0] else {
-        panic!("{:?}", rig.heard[0]);
+    let ToHost::Hello(device) = &rig.received[0] else {
+        panic!("{:?}", rig.received[0]);
     };
     assert_eq!(device.epoch, Some(7), "it says what it still holds");
     assert!(
@@ -653,7 +657,7 @@ fn force_stays_when_the_host_dies_and_the_session_resumes() {
 fn a_host_that_returns_with_another_scene_starts_afresh() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     rig.descend(5);
-    rig.heard.clear();
+    rig.received.clear();
     rig.greet_anew();
     let other = Scene {
         epoch: 8,
@@ -757,7 +761,7 @@ fn a_host_that_floods_is_held_back_not_obeyed() {
     rig.run(600);
     assert!(rig.on_the_way.is_empty());
     let taken = |m: &&ToHost| matches!(m, ToHost::SceneAck { accepted: true, .. });
-    assert_eq!(rig.heard.iter().filter(taken).count(), 501);
+    assert_eq!(rig.received.iter().filter(taken).count(), 501);
 }
 
 #[test]
@@ -805,8 +809,8 @@ fn no_hello_of_the_last_sessions_opens_one_again() {
         rig.run(1);
     }
     assert_eq!(rig.status().foreign_frames, foreign + 8);
-    let told: Vec<_> = rig.heard_before.iter().map(|(of, _)| *of).collect();
-    assert_eq!(told, sessions);
+    let reported: Vec<_> = rig.received_before.iter().map(|(of, _)| *of).collect();
+    assert_eq!(reported, sessions);
 }
 
 #[test]
@@ -827,7 +831,7 @@ fn nothing_is_armed_while_a_record_is_being_stored() {
         .receive(&frame(&ToDevice::Request { number, request }));
     rig.device.link.stored(Ok(()));
     rig.run(10);
-    let last = rig.heard.iter().rev().find_map(|message| match message {
+    let last = rig.received.iter().rev().find_map(|message| match message {
         ToHost::Answer(answer) if answer.number == number => Some(answer.result),
         _ => None,
     });

@@ -13,12 +13,14 @@ fn marked(rig: &Rig) -> Vec<(u8, u32)> {
         ToHost::Marked { number, tick } => Some((*number, *tick)),
         _ => None,
     };
-    rig.heard.iter().filter_map(answer).collect()
+    rig.received.iter().filter_map(answer).collect()
 }
 
 fn latest_tick(rig: &Rig) -> u32 {
-    let told = rig.telemetry();
-    let last = told.last().and_then(|telemetry| telemetry.samples.last());
+    let reported = rig.telemetry();
+    let last = reported
+        .last()
+        .and_then(|telemetry| telemetry.samples.last());
     last.expect("samples").tick
 }
 

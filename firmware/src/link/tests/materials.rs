@@ -47,7 +47,7 @@ fn is_taken(rig: &Rig, epoch: u32) -> bool {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
         _ => None,
     };
-    let answers: Vec<_> = rig.heard.iter().filter_map(answer).collect();
+    let answers: Vec<_> = rig.received.iter().filter_map(answer).collect();
     assert_eq!(answers.last().map(|answer| answer.0), Some(epoch));
     answers.last().is_some_and(|answer| answer.1)
 }
@@ -105,7 +105,7 @@ fn tile_is_rendered_with_its_own_material() {
     let force = rendered(&mut rig);
     assert!((force - 0.5 * 0.8 * 0.5 / 0.4).abs() < 1e-6, "{force}");
     // Repeated, because the answer was lost: the stored table stays.
-    rig.heard.clear();
+    rig.received.clear();
     assert!(sends(&mut rig, scene_of(&table, 9), &table));
     rig.run(300);
     assert_eq!(rig.needs(), []);
@@ -133,7 +133,7 @@ fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
     assert_eq!(rendered(&mut rig), 0.5);
     // Without materials in the scene, a tile has none.
     let plain = scene(Source::Points);
-    rig.heard.clear();
+    rig.received.clear();
     rig.say(&ToDevice::Scene(plain));
     rig.run(4);
     assert!(is_taken(&rig, plain.epoch));

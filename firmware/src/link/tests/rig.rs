@@ -117,12 +117,12 @@ pub(super) struct Rig {
     pub(super) on_the_way: VecDeque<u8>,
     /// Bytes that the writer takes in a step; `usize::MAX` for a fast one.
     pub(super) writer: usize,
-    pub(super) heard: Vec<ToHost>,
+    pub(super) received: Vec<ToHost>,
     /// The session of a host that only reads, if there is one.
     pub(super) looker: Option<SessionNumber>,
     pub(super) looked_at: Vec<ToHost>,
     /// Messages to the hosts of earlier sessions.
-    pub(super) heard_before: Vec<(SessionNumber, ToHost)>,
+    pub(super) received_before: Vec<(SessionNumber, ToHost)>,
     /// The current session, and the number of its last request.
     pub(super) session: SessionNumber,
     pub(super) number: u8,
@@ -151,10 +151,10 @@ impl Rig {
             reader: Box::new(FrameReader::new()),
             on_the_way: VecDeque::new(),
             writer: usize::MAX,
-            heard: Vec::new(),
+            received: Vec::new(),
             looker: None,
             looked_at: Vec::new(),
-            heard_before: Vec::new(),
+            received_before: Vec::new(),
             session: FIRST,
             number: 0,
             asked: Vec::new(),
@@ -182,7 +182,11 @@ impl Rig {
         rig.say(&ToDevice::Hello(HELLO));
         rig.say(&ToDevice::Scene(scene));
         rig.run(1);
-        assert!(matches!(rig.heard[0], ToHost::Hello(_)), "{:?}", rig.heard);
+        assert!(
+            matches!(rig.received[0], ToHost::Hello(_)),
+            "{:?}",
+            rig.received
+        );
         rig
     }
 
@@ -296,7 +300,7 @@ impl Rig {
                 continue;
             }
             if let ToHost::SessionClosed { .. } = framed.message {
-                self.heard_before.push((framed.session, framed.message));
+                self.received_before.push((framed.session, framed.message));
                 continue;
             }
             assert_eq!(framed.session, self.session, "{:?}", framed.message);
@@ -306,7 +310,7 @@ impl Rig {
                 (self.damage)(&mut answer);
                 self.on_the_way.extend(answer);
             }
-            self.heard.push(message);
+            self.received.push(message);
         }
     }
 
@@ -315,7 +319,7 @@ impl Rig {
             ToHost::TileRequest { key, .. } => Some(*key),
             _ => None,
         };
-        self.heard.iter().filter_map(need).collect()
+        self.received.iter().filter_map(need).collect()
     }
 
     pub(super) fn rendered(&self) -> Vec<(u32, TickRecord)> {
@@ -323,7 +327,7 @@ impl Rig {
             ToHost::PointAnswer { seq, sample } => Some((*seq, *sample)),
             _ => None,
         };
-        self.heard.iter().filter_map(rendered).collect()
+        self.received.iter().filter_map(rendered).collect()
     }
 
     pub(super) fn telemetry(&self) -> Vec<Telemetry> {
@@ -331,7 +335,7 @@ impl Rig {
             ToHost::Telemetry(telemetry) => Some(telemetry.clone()),
             _ => None,
         };
-        self.heard.iter().filter_map(telemetry).collect()
+        self.received.iter().filter_map(telemetry).collect()
     }
 
     /// Returns the last report of the guard.
@@ -340,7 +344,7 @@ impl Rig {
             ToHost::Guard(report) => Some(*report),
             _ => None,
         };
-        self.heard.iter().rev().find_map(guard)
+        self.received.iter().rev().find_map(guard)
     }
 
     /// Returns all answers to a kind of request.
@@ -352,7 +356,7 @@ impl Rig {
             }
             _ => None,
         };
-        self.heard.iter().filter_map(answer).collect()
+        self.received.iter().filter_map(answer).collect()
     }
 
     /// Requests the status.
@@ -363,7 +367,11 @@ impl Rig {
             ToHost::Status { status, .. } => Some(status.clone()),
             _ => None,
         };
-        self.heard.iter().rev().find_map(status).expect("answered")
+        self.received
+            .iter()
+            .rev()
+            .find_map(status)
+            .expect("answered")
     }
 
     /// Sends points from above down into the plane, one by one, each after the answer to the one

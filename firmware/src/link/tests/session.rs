@@ -16,8 +16,8 @@ fn introduces_itself() {
     let mut rig = Rig::new();
     rig.say(&ToDevice::Hello(HELLO));
     rig.run(1);
-    let [ToHost::Hello(device), ToHost::Guard(_)] = &rig.heard[..] else {
-        panic!("{:?}", rig.heard);
+    let [ToHost::Hello(device), ToHost::Guard(_)] = &rig.received[..] else {
+        panic!("{:?}", rig.received);
     };
     assert_eq!((device.board.as_str(), device.epoch), ("native", None));
     assert_eq!((usize::from(device.window), device.tick_hz), (D, 1000));
@@ -63,7 +63,7 @@ fn an_invalid_scene_is_refused_and_the_one_before_stays() {
         epoch: 8,
         accepted: false,
     };
-    assert_eq!(rig.heard.last(), Some(&answer));
+    assert_eq!(rig.received.last(), Some(&answer));
     assert_eq!(rig.descend(3).len(), 3);
 }
 
@@ -113,8 +113,8 @@ fn goodbye_comes_after_everything_was_said() {
     rig.writer = 0;
     rig.run(20);
     rig.say_goodbye();
-    let Some(ToHost::Goodbye(count)) = rig.heard.last() else {
-        panic!("{:?}", rig.heard.last());
+    let Some(ToHost::Goodbye(count)) = rig.received.last() else {
+        panic!("{:?}", rig.received.last());
     };
     let count = *count;
     let samples: usize = rig.telemetry().iter().map(|t| t.samples.len()).sum();

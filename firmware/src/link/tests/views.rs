@@ -28,8 +28,10 @@ fn view(number: u8, hip: GridPoint) -> SceneChange {
 
 /// Returns the latest reported sample.
 fn latest(rig: &Rig) -> TickRecord {
-    let told = rig.telemetry();
-    let last = told.last().and_then(|telemetry| telemetry.samples.last());
+    let reported = rig.telemetry();
+    let last = reported
+        .last()
+        .and_then(|telemetry| telemetry.samples.last());
     *last.expect("samples")
 }
 
@@ -39,7 +41,7 @@ fn taken(rig: &Rig) -> Vec<(u32, bool)> {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
         _ => None,
     };
-    rig.heard.iter().filter_map(answer).skip(1).collect()
+    rig.received.iter().filter_map(answer).skip(1).collect()
 }
 
 fn with_an_open_clutch() -> Rig {
@@ -57,7 +59,7 @@ fn with_an_open_clutch() -> Rig {
 fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     let mut rig = with_an_open_clutch();
     let wanted = view(1, latest(&rig).hip);
-    rig.heard
+    rig.received
         .retain(|message| !matches!(message, ToHost::TileRequest { .. }));
     rig.say(&ToDevice::SceneChange(wanted));
     rig.run(40);

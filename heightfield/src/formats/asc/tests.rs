@@ -79,21 +79,21 @@ fn degrees_are_told_from_metres_by_place_and_size() {
 
 #[test]
 fn what_is_wrong_is_named() {
-    let told = |text: &str| open(text).expect_err("refused").to_string();
+    let reported = |text: &str| open(text).expect_err("refused").to_string();
     let square = "ncols 2\nnrows 2\ncellsize 1\n";
-    assert!(told(&format!("{square}1 2 3")).contains("3 follow"));
-    assert!(told(&format!("{square}1 2 3 4 5")).contains("more numbers"));
-    assert!(told(&format!("{square}1 2 3 x4")).contains("row 1, column 1: 'x4'"));
-    assert!(told("nrows 2\ncellsize 1\n1 2 3 4").contains("no ncols"));
-    assert!(told("ncols 2.5\nnrows 2\ncellsize 1\n1 2").contains("ncols is 2.5"));
-    assert!(told("ncols 2\nnrows 2\ncellsize\n").contains("ends after"));
-    assert!(told("ncols 2\nnrows 2\ncolour 3\ncellsize 1\n1 2 3 4").contains("'colour'"));
+    assert!(reported(&format!("{square}1 2 3")).contains("3 follow"));
+    assert!(reported(&format!("{square}1 2 3 4 5")).contains("more numbers"));
+    assert!(reported(&format!("{square}1 2 3 x4")).contains("row 1, column 1: 'x4'"));
+    assert!(reported("nrows 2\ncellsize 1\n1 2 3 4").contains("no ncols"));
+    assert!(reported("ncols 2.5\nnrows 2\ncellsize 1\n1 2").contains("ncols is 2.5"));
+    assert!(reported("ncols 2\nnrows 2\ncellsize\n").contains("ends after"));
+    assert!(reported("ncols 2\nnrows 2\ncolour 3\ncellsize 1\n1 2 3 4").contains("'colour'"));
     let huge = "ncols 2000000000\nnrows 2000000000\ncellsize 1\n1 2 3";
     assert!(
-        told(huge).contains("truncated"),
+        reported(huge).contains("truncated"),
         "and no room was made for them"
     );
-    assert!(told(&format!("{square}{}", "7".repeat(4000))).contains("more than 128 bytes"));
+    assert!(reported(&format!("{square}{}", "7".repeat(4000))).contains("more than 128 bytes"));
 }
 
 #[test]
@@ -109,9 +109,9 @@ fn samples_that_are_no_heights_are_holes() {
         let raster = open(&format!("{square}{header}{samples}")).expect("a grid");
         assert_eq!(raster.summary().holes, holes, "{header}{samples}");
         assert_eq!(raster.summary().lowest, 1.0, "{header}{samples}");
-        let said = raster.remarks().join(" ");
-        assert!(said.contains(remark), "{said}");
-        assert_eq!(said.is_empty(), remark.is_empty(), "{said}");
+        let stated = raster.remarks().join(" ");
+        assert!(stated.contains(remark), "{stated}");
+        assert_eq!(stated.is_empty(), remark.is_empty(), "{stated}");
     }
     let fortran = open(&format!("{square}1.0D+02 2 3 4 5 6")).expect("a grid");
     assert_eq!(fortran.height(0, 1), 100.0);

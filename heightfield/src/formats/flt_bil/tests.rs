@@ -173,7 +173,7 @@ fn rows_may_be_padded() {
     assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
 }
 
-fn told(data: &'static str, bytes: &[u8], header: &str) -> (String, Error) {
+fn reported(data: &'static str, bytes: &[u8], header: &str) -> (String, Error) {
     let error = Pair::new(data, bytes, "a.hdr", header)
         .open(None)
         .expect_err("refused");
@@ -183,7 +183,7 @@ fn told(data: &'static str, bytes: &[u8], header: &str) -> (String, Error) {
 #[test]
 fn what_is_wrong_is_named_and_no_room_is_made_for_it() {
     let whole = floats([1.0; 6], false);
-    let (text, _) = told("a.flt", &whole[..23], FLT);
+    let (text, _) = reported("a.flt", &whole[..23], FLT);
     assert!(
         text.contains("truncated") && text.contains("a.hdr"),
         "{text}"
@@ -194,7 +194,7 @@ fn what_is_wrong_is_named_and_no_room_is_made_for_it() {
         "ncols 3\nnrows 2\nskipbytes 8e15\n",
         "ncols 3\nnrows 4000000000\ntotalrowbytes 0\n",
     ] {
-        let (text, _) = told("a.flt", &whole, absurd);
+        let (text, _) = reported("a.flt", &whole, absurd);
         assert!(
             text.contains("truncated")
                 || text.contains("absurd")
@@ -213,7 +213,7 @@ fn what_is_wrong_is_named_and_no_room_is_made_for_it() {
             "no size",
         ),
     ] {
-        let (text, _) = told("a.flt", &whole, header);
+        let (text, _) = reported("a.flt", &whole, header);
         assert!(text.contains(word), "{header}: {text}");
     }
 }
@@ -263,11 +263,11 @@ fn number_type_and_unit_are_read() {
             (-5.0, 960.0, 1)
         );
         assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));
-        let said = raster.remarks().join(" ");
+        let stated = raster.remarks().join(" ");
         assert_eq!(
-            said.contains("states no type"),
+            stated.contains("states no type"),
             number_type.is_empty(),
-            "{said}"
+            "{stated}"
         );
     }
 }
@@ -275,18 +275,18 @@ fn number_type_and_unit_are_read() {
 #[test]
 fn length_that_contradicts_the_header_is_refused() {
     let header = "NCOLS 3\nNROWS 2\nBYTEORDER LSBFIRST\n";
-    let told = |kind: &str, bytes: usize| {
+    let reported = |kind: &str, bytes: usize| {
         let header = format!("{header}{kind}");
         let opened = Pair::new("x.bil", &vec![1; bytes], "x.hdr", &header).open(None);
         opened.map_or_else(|fault| fault.to_string(), |_| String::new())
     };
-    let said = told("NBITS 16\n", 24);
+    let stated = reported("NBITS 16\n", 24);
     assert!(
-        said.contains("byte 12") && said.contains("has 24"),
-        "{said}"
+        stated.contains("byte 12") && stated.contains("has 24"),
+        "{stated}"
     );
-    assert!(told("NBITS 8\nNUMBERTYPE 2_BYTE_INTEGER\n", 12).contains("nbits is 8"));
-    assert!(told("NUMBERTYPE 3_BYTE_COLOUR\n", 12).contains("3_byte_colour"));
+    assert!(reported("NBITS 8\nNUMBERTYPE 2_BYTE_INTEGER\n", 12).contains("nbits is 8"));
+    assert!(reported("NUMBERTYPE 3_BYTE_COLOUR\n", 12).contains("3_byte_colour"));
     // Some programs append less than a row after the samples.
-    assert_eq!(told("NBITS 16\n", 14), "");
+    assert_eq!(reported("NBITS 16\n", 14), "");
 }

@@ -11,7 +11,7 @@ use super::{NAME, at_url, fault};
 use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, usual_block};
 use crate::encoding::codes;
 use crate::raw_samples::{transposed, turned};
-use crate::samples::{HoleMask, SampleType, with_samples};
+use crate::samples::{NoDataMask, SampleType, with_samples};
 use crate::{RasterError, subsampled};
 
 /// Parts per direction that are read at opening, if a file stays on disk.
@@ -233,9 +233,9 @@ fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, RasterError> 
 }
 
 /// Returns the samples that a mask or an alpha band marks as no-data.
-fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, RasterError> {
+fn holes(mask: &Band<'_>, part: &Part) -> Result<NoDataMask, RasterError> {
     let valid = read::<u8>(mask, part)?;
-    let mut holes = HoleMask::with_capacity(valid.len());
+    let mut holes = NoDataMask::with_capacity(valid.len());
     for (at, valid) in valid.iter().enumerate() {
         holes.set(at, *valid == 0);
     }

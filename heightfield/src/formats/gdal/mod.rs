@@ -359,7 +359,7 @@ fn read(
     }
     let all = blocks.read(0, &Part::whole(full.columns, full.rows))?;
     let mut decoded = Decoded::new(format, size, all.samples);
-    decoded.storage.set_holes(all.holes);
+    decoded.storage.set_no_data(all.holes);
     Ok(decoded)
 }
 

@@ -6,7 +6,7 @@ use super::{fault, reader};
 use crate::decoded::Decoded;
 use crate::encoding::code;
 use crate::input::FileBytes;
-use crate::samples::HoleMask;
+use crate::samples::NoDataMask;
 use crate::{Encoding, RasterError, Samples};
 
 /// Reads a picture whose colours encode heights. An alpha of 0 is no-data.
@@ -14,7 +14,7 @@ pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, R
     let codes = Codes::read(input)?;
     let mut decoded = Decoded::new("PNG".into(), codes.size, Samples::from(codes.codes));
     decoded.take_codes(encoding);
-    decoded.storage.set_holes(Some(codes.transparent));
+    decoded.storage.set_no_data(Some(codes.transparent));
     Ok(decoded)
 }
 
@@ -38,7 +38,7 @@ struct Codes {
     size: (u32, u32),
     codes: Vec<i32>,
     /// Pixels whose alpha is 0.
-    transparent: HoleMask,
+    transparent: NoDataMask,
 }
 
 impl Codes {
@@ -57,7 +57,7 @@ impl Codes {
         reader.next_frame(&mut frame).map_err(fault)?;
         let count = size.0 as usize * size.1 as usize;
         let mut codes = Vec::with_capacity(count);
-        let mut transparent = HoleMask::with_capacity(count);
+        let mut transparent = NoDataMask::with_capacity(count);
         for (index, bytes) in frame.chunks_exact(pixel).take(count).enumerate() {
             codes.push(code([bytes[0], bytes[1], bytes[2]]));
             transparent.set(index, bytes.get(3) == Some(&0));

@@ -10,7 +10,7 @@ use crate::beside::lay_out_by_world_file;
 use crate::decoded::Decoded;
 use crate::format::{Claim, Format, Parts};
 use crate::input::{FileBytes, ReadSeek};
-use crate::samples::{HoleMask, SampleValue, with_samples};
+use crate::samples::{NoDataMask, SampleValue, with_samples};
 use crate::{Endian, PngChannel, RasterError, Samples};
 
 /// Pictures whose pixels are heights.
@@ -75,7 +75,9 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
             1 => Samples::U8(Vec::with_capacity(count)),
             _ => Samples::U16(Vec::with_capacity(count)),
         },
-        mask: chosen.hole_index.map(|_| HoleMask::with_capacity(count)),
+        mask: chosen
+            .no_data_index
+            .map(|_| NoDataMask::with_capacity(count)),
     };
     pixels.read(&mut reader)?;
     if channel.is_none() && chosen.height == PngChannel::Alpha {
@@ -84,7 +86,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
     let what = chosen.described(color);
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);
     let mut decoded = Decoded::new(format, size, pixels.samples);
-    decoded.storage.set_holes(pixels.mask);
+    decoded.storage.set_no_data(pixels.mask);
     decoded.no_data = transparent;
     Ok(decoded)
 }
@@ -112,7 +114,7 @@ fn transparent_grey(info: &::png::Info<'_>) -> Option<f64> {
 struct Choice {
     height: PngChannel,
     height_index: usize,
-    hole_index: Option<usize>,
+    no_data_index: Option<usize>,
 }
 
 impl Choice {
@@ -138,7 +140,7 @@ impl Choice {
             height,
             height_index: find(height)
                 .ok_or_else(|| ambiguous(format!("the picture has no {height:?} channel")))?,
-            hole_index: find(Alpha).filter(|_| height == Grey),
+            no_data_index: find(Alpha).filter(|_| height == Grey),
         })
     }
 
@@ -158,7 +160,7 @@ struct Pixels {
     sample_bytes: usize,
     pixel_bytes: usize,
     samples: Samples,
-    mask: Option<HoleMask>,
+    mask: Option<NoDataMask>,
 }
 
 impl Pixels {
@@ -192,7 +194,7 @@ impl Pixels {
             }
             _ => unreachable!("a PNG has 8 or 16 bits a sample"),
         }
-        if let Some((mask, alpha)) = self.mask.as_mut().zip(self.chosen.hole_index) {
+        if let Some((mask, alpha)) = self.mask.as_mut().zip(self.chosen.no_data_index) {
             let transparent = channel(alpha).map(|bytes| bytes.iter().all(|&byte| byte == 0));
             let holes = (first..).zip(transparent).filter(|&(_, hole)| hole);
             holes.for_each(|(index, _)| mask.insert(index));

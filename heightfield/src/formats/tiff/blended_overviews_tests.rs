@@ -44,10 +44,10 @@ fn overviews_mixed_with_no_data_are_not_used() {
         let summary = raster.summary();
         assert_eq!((summary.lowest, summary.highest), (1000.0, 1000.0));
         assert_eq!(raster.surface(1, [33.0, 10.0]), 1000.0);
-        let said = raster.remarks().join(" ");
+        let stated = raster.remarks().join(" ");
         assert!(
-            said.contains(&rim.to_string()) && said.contains("gdaladdo"),
-            "{said}"
+            stated.contains(&rim.to_string()) && stated.contains("gdaladdo"),
+            "{stated}"
         );
     }
 }

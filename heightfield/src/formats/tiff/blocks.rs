@@ -19,7 +19,7 @@ use crate::decoder_panic::guarded;
 use crate::disk_cache::{DiskCache, FileStamp};
 use crate::input::FileBytes;
 use crate::remote::RemoteFile;
-use crate::samples::{HoleMask, SampleValue, with_samples};
+use crate::samples::{NoDataMask, SampleValue, with_samples};
 use crate::unreadable_parts::UnreadableParts;
 use crate::{RasterError, SampleType};
 
@@ -172,7 +172,7 @@ impl Image {
     pub(super) fn unpacked_bytes(&self) -> u64 {
         let own = self.layout.unpacked.as_ref();
         let masks = self.masks.iter().map(Mask::unpacked_bytes);
-        own.map_or(0, |unpacked| unpacked.most_bytes()) + masks.sum::<u64>()
+        own.map_or(0, |unpacked| unpacked.max_bytes()) + masks.sum::<u64>()
     }
 }
 
@@ -327,7 +327,7 @@ impl TiffBlocks {
         let count = part.columns as usize * part.rows as usize;
         let mut samples = self.images[MAIN].layout.held().none();
         with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
-        let mut holes = HoleMask::with_capacity(count);
+        let mut holes = NoDataMask::with_capacity(count);
         holes.insert_range(..);
         Block {
             samples,

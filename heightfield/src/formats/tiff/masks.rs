@@ -66,7 +66,7 @@ impl Mask {
     /// Returns the max disk space for its decompressed chunks, bytes.
     pub(super) fn unpacked_bytes(&self) -> u64 {
         let unpacked = self.layout.as_ref().and_then(|mask| mask.unpacked.as_ref());
-        unpacked.map_or(0, |unpacked| unpacked.most_bytes())
+        unpacked.map_or(0, |unpacked| unpacked.max_bytes())
     }
 
     /// Calls `set` with the index, in the part, of each no-data sample.

@@ -106,12 +106,12 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     let held = layout.held().none();
     let no_data = options.no_data.or(metadata.no_data);
     let no_data = no_data.and_then(|value| held.comparable_no_data(value));
-    let (storage, told) = stored(&files, options, &file, image, &known, no_data)?;
+    let (storage, reported) = stored(&files, options, &file, image, &known, no_data)?;
     let mut decoded = Decoded::new(format, size, storage);
-    for told in told {
-        match told {
-            Told::Remark(remark) => decoded.remarks.push(remark),
-            Told::Whole(why) => decoded.why_whole = Some(why),
+    for reported in reported {
+        match reported {
+            Reported::Remark(remark) => decoded.remarks.push(remark),
+            Reported::Whole(why) => decoded.why_whole = Some(why),
         }
     }
     if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
@@ -125,7 +125,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
 }
 
 /// Remark on the storage of the samples.
-enum Told {
+enum Reported {
     /// A remark on how they are read.
     Remark(String),
     /// Reason why all are in memory.
@@ -142,14 +142,14 @@ fn stored(
     mut image: Image,
     known: &Known<'_>,
     no_data: Option<f64>,
-) -> Result<(Storage, Vec<Told>), RasterError> {
+) -> Result<(Storage, Vec<Reported>), RasterError> {
     let input = files[0];
     let most = match input.remote() {
         // Parts that are not accessed are not downloaded.
         Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
         None => options.most_in_memory_bytes,
     };
-    let mut told = None;
+    let mut reported = None;
     if image.layout.bytes() > most {
         if let Err(fault) = budget::check(&image.layout, input.len(), true) {
             if !image.has_parts() {
@@ -162,17 +162,17 @@ fn stored(
                 if !input.is_outline() {
                     unpack::check_first(&image.layout)?;
                 }
-                told = unpacked_told(&image);
+                reported = unpacked_told(&image);
                 let overviews = match find_appended(input, "ovr")? {
                     Some(beside) => Some((Arc::new(open(&beside)?), beside.remote())),
                     None => None,
                 };
                 let file = (file.clone(), input.remote());
                 let mut blocks = TiffBlocks::new(file, image, overviews, known, files)?;
-                let mut remarks: Vec<_> = told.into_iter().collect();
+                let mut remarks: Vec<_> = reported.into_iter().collect();
                 if options.encoding.is_some() && blocks.has_overviews() {
                     blocks.leave_overviews_out();
-                    remarks.push(Told::Remark(
+                    remarks.push(Reported::Remark(
                         "its overviews are not used: the mean of encoded colours is no height"
                             .into(),
                     ));
@@ -180,26 +180,26 @@ fn stored(
                     && let Some(remark) = blended(&blocks, no_data)?
                 {
                     blocks.leave_overviews_out();
-                    remarks.push(Told::Remark(remark));
+                    remarks.push(Reported::Remark(remark));
                 }
                 return Ok((blocks.into(), remarks));
             }
-            Err(why) => told = Some(Told::Whole(why + at_once(&image.layout))),
+            Err(why) => reported = Some(Reported::Whole(why + at_once(&image.layout))),
         }
     }
     let layout = &image.layout;
     budget::check_memory(layout)?;
     budget::check(layout, input.len(), false)?;
     if input.is_outline() {
-        return Ok((layout.held().none().into(), told.into_iter().collect()));
+        return Ok((layout.held().none().into(), reported.into_iter().collect()));
     }
     let all = Part::whole(layout.columns, layout.rows);
     if let Some(remote) = input.remote() {
         remote.want(once(0..input.len()));
     }
     let mut storage = Storage::from(samples::heights(layout, &all)?);
-    storage.set_holes(samples::holes(layout, &image.masks, &all)?);
-    Ok((storage, told.into_iter().collect()))
+    storage.set_no_data(samples::holes(layout, &image.masks, &all)?);
+    Ok((storage, reported.into_iter().collect()))
 }
 
 /// Returns a remark on the peak memory, if reading needs more than the samples themselves.
@@ -212,14 +212,14 @@ fn at_once(layout: &Layout) -> &'static str {
 }
 
 /// Returns a remark on strips or tiles that are decompressed to disk, if there are any.
-fn unpacked_told(image: &Image) -> Option<Told> {
+fn unpacked_told(image: &Image) -> Option<Reported> {
     let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
     let whose = match &image.layout.unpacked {
         Some(_) => format!("its {}", image.layout.chunks_name()),
         None => "the strips or tiles of its mask".into(),
     };
     (megabytes > 0).then(|| {
-        Told::Remark(format!(
+        Reported::Remark(format!(
             "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache), up to {megabytes} MB, until the program ends"
         ))
     })

@@ -38,17 +38,17 @@ fn tie_points_without_a_grid_and_orientation_get_a_remark() {
     let ties = |count: usize| vec![(33922, Values::Doubles(vec![1.0; 6 * count]))];
     for count in [1, 4] {
         let raster = with_tags(ties(count)).expect("a terrain");
-        let said = raster.remarks().join(" ");
+        let stated = raster.remarks().join(" ");
         assert!(
-            said.contains(&format!("places of {count} samples")),
-            "{said}"
+            stated.contains(&format!("places of {count} samples")),
+            "{stated}"
         );
     }
     let whole = with_tags(placed([0.0, 0.0], 30.0, 32632)).expect("a terrain");
     assert_eq!(whole.remarks(), [""; 0]);
     let turned = vec![(274, Values::Shorts(vec![4]))];
-    let said = with_tags(turned).expect("a terrain").remarks().join(" ");
-    assert!(said.contains("the first row at the bottom"), "{said}");
+    let stated = with_tags(turned).expect("a terrain").remarks().join(" ");
+    assert!(stated.contains("the first row at the bottom"), "{stated}");
 }
 
 #[test]

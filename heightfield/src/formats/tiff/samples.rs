@@ -9,7 +9,7 @@ use super::masks::Mask;
 use super::{uncompressed, unpack};
 use crate::blocks::Part;
 use crate::encoding::codes;
-use crate::samples::{HoleMask, SampleValue, with_samples};
+use crate::samples::{NoDataMask, SampleValue, with_samples};
 use crate::{RasterError, Samples};
 
 /// Reads a part of the heights' band, or of encoded heights.
@@ -55,12 +55,12 @@ pub(super) fn holes(
     layout: &Layout,
     masks: &[Mask],
     part: &Part,
-) -> Result<Option<HoleMask>, RasterError> {
+) -> Result<Option<NoDataMask>, RasterError> {
     let columns = part.columns as usize;
     let mut holes = None;
     let mut set = |index| {
         let size = columns * part.rows as usize;
-        let holes = holes.get_or_insert_with(|| HoleMask::with_capacity(size));
+        let holes = holes.get_or_insert_with(|| NoDataMask::with_capacity(size));
         holes.insert(index);
     };
     let (first, last) = (part.row, part.row + part.rows);

@@ -489,9 +489,9 @@ fn a_world_file_places_what_has_no_place_of_its_own() {
         Some(32611)
     );
     std::fs::write(folder.path().join("plain.TFW"), "30\n0\n0\n").expect("written");
-    let told = open().expect_err("a damaged neighbour").to_string();
+    let reported = open().expect_err("a damaged neighbour").to_string();
     assert!(
-        told.contains("plain.TFW") && told.contains("six numbers"),
-        "{told}"
+        reported.contains("plain.TFW") && reported.contains("six numbers"),
+        "{reported}"
     );
 }

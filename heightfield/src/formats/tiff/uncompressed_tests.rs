@@ -111,8 +111,8 @@ fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
             ..ONE_STRIP
         };
         let fault = open(&made, 0).expect_err(why);
-        let is_told = matches!(&fault, RasterError::Unsupported { .. });
-        assert!(is_told && fault.to_string().contains(why), "{fault}");
+        let is_reported = matches!(&fault, RasterError::Unsupported { .. });
+        assert!(is_reported && fault.to_string().contains(why), "{fault}");
     }
 }
 

@@ -61,7 +61,7 @@ impl Unpacked {
         counts: RangeInclusive<u64>,
         disk: &DiskCache,
     ) -> io::Result<Self> {
-        let count = (disk.most_bytes() / each.max(1)).clamp(*counts.start(), *counts.end());
+        let count = (disk.max_bytes() / each.max(1)).clamp(*counts.start(), *counts.end());
         let unnamed = disk.file_without_name(each.saturating_mul(count))?;
         let slots = (0..count).map(|_| None).collect();
         Ok(Self {
@@ -74,7 +74,7 @@ impl Unpacked {
     }
 
     /// Returns its max size on disk, bytes.
-    pub(super) const fn most_bytes(&self) -> u64 {
+    pub(super) const fn max_bytes(&self) -> u64 {
         self.each.saturating_mul(self.count)
     }
 

@@ -49,9 +49,9 @@ const fn packing(code: u16, pack: fn(&[u8]) -> Vec<u8>, predictor: u16) -> Packi
 }
 
 /// Returns a layout whose strips or tiles are decompressed into a folder with a max size.
-fn layout(made: &Made, bytes: Vec<u8>, most_bytes: u64) -> (tempfile::TempDir, Layout) {
+fn layout(made: &Made, bytes: Vec<u8>, max_bytes: u64) -> (tempfile::TempDir, Layout) {
     let folder = tempfile::tempdir().expect("a folder");
-    let disk = DiskCache::at(folder.path(), most_bytes);
+    let disk = DiskCache::at(folder.path(), max_bytes);
     let input = FileBytes::unpacked("test.tif", bytes);
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
@@ -150,7 +150,7 @@ fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
         check_parts(&TILES, &layout);
         check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
-        assert_eq!(unpacked.most_bytes(), kept * tile);
+        assert_eq!(unpacked.max_bytes(), kept * tile);
         let file = unpacked.unnamed.file.metadata().expect("told");
         assert!(file.len() <= kept * tile, "{} {most}", file.len());
     }
@@ -256,8 +256,8 @@ fn cut_strip_keeps_its_rows_and_reports_the_missing_ones() {
     let read = |at| uncompressed::read(&layout, 0, &row(at));
     assert!(read(500).is_ok());
     let fault = read(600).expect_err("cut").to_string();
-    let is_told = fault.contains("packbits") && fault.contains("from row 551 on");
-    assert!(is_told && fault.contains("ends too early"), "{fault}");
+    let is_reported = fault.contains("packbits") && fault.contains("from row 551 on");
+    assert!(is_reported && fault.contains("ends too early"), "{fault}");
     let fault = open(&made, 1 << 30).expect_err("all of it is read");
     assert!(matches!(fault, RasterError::Damaged(_)), "{fault}");
 }

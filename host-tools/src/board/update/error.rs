@@ -30,12 +30,12 @@ pub enum UpdateError {
     #[error("the loader describes its flash in a way that is not understood: {0:?}")]
     Layout(String),
     /// The loader's flash differs from the board's chip.
-    #[error("the loader is not that of {board}: it reports the flash {said:?}")]
+    #[error("the loader is not that of {board}: it reports the flash {stated:?}")]
     OtherChip {
         /// The board that the image is for.
         board: &'static str,
         /// The loader's description.
-        said: String,
+        stated: String,
     },
     /// The loader cannot write or cannot read back.
     #[error("the loader cannot {0}")]

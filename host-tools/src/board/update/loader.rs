@@ -49,7 +49,7 @@ const FUNCTIONAL: u8 = 0x21;
 const MAX_TRANSFERRED: u16 = 4096;
 
 /// Time limit of one operation; an H743's sector takes at most 4 s (its data sheet).
-const PATIENCE: Duration = Duration::from_secs(30);
+const TIMEOUT: Duration = Duration::from_secs(30);
 /// Attempts to make a loader idle.
 const TRIES: usize = 8;
 
@@ -213,13 +213,13 @@ impl<P: ControlPipe> Loader<P> {
         let given = self.pipe.write(request::DNLOAD, block, bytes);
         given.map_err(|source| self.failed(doing, source))?;
         let mut waited = Duration::ZERO;
-        while waited < PATIENCE {
+        while waited < TIMEOUT {
             let status = self.status(doing)?;
             match status.state {
                 DNLOAD_IDLE if status.status == 0 => return Ok(()),
                 DNBUSY | DNLOAD_SYNC if status.status == 0 => {
                     // A loader must not block the host for ever or make it spin.
-                    let wait = status.wait.clamp(Duration::from_millis(1), PATIENCE);
+                    let wait = status.wait.clamp(Duration::from_millis(1), TIMEOUT);
                     self.pipe.wait(wait);
                     waited += wait;
                 }
@@ -245,7 +245,7 @@ impl<P: ControlPipe> Loader<P> {
                 IDLE => return Ok(()),
                 ERROR => request::CLRSTATUS,
                 DNBUSY => {
-                    self.pipe.wait(status.wait.min(PATIENCE));
+                    self.pipe.wait(status.wait.min(TIMEOUT));
                     continue;
                 }
                 _ => request::ABORT,

@@ -39,15 +39,15 @@ impl Plan {
     pub fn new(board: &Board, image: &Image, layout: &Layout) -> Result<Self, UpdateError> {
         let memories = image.memories;
         let expected = (memories.flash, memories.page_bytes, memories.flash_bytes);
-        let said = (
+        let stated = (
             layout.start,
             layout.page_bytes,
             layout.page_bytes * layout.pages,
         );
-        if said != expected {
+        if stated != expected {
             return Err(UpdateError::OtherChip {
                 board: board.name,
-                said: layout.said.clone(),
+                stated: layout.stated.clone(),
             });
         }
         let mut pages = pages(image, &memories)?;

@@ -240,27 +240,27 @@ fn what_the_loader_refuses_is_told_in_words_and_ends() {
         let (_, done) = try_update(Scripted::new(&G474, faults), &image(&G474));
         done.expect_err("refused").error.to_string()
     };
-    let said = refused(Faults {
+    let stated = refused(Faults {
         stuck_page: Some(FLASH + 4096),
         ..Faults::default()
     });
     assert!(
-        said.contains("erase a page") && said.contains("cannot be erased"),
-        "{said}"
+        stated.contains("erase a page") && stated.contains("cannot be erased"),
+        "{stated}"
     );
-    let said = refused(Faults {
+    let stated = refused(Faults {
         protected: true,
         ..Faults::default()
     });
     assert!(
-        said.contains("read back") && said.contains("protected"),
-        "{said}"
+        stated.contains("read back") && stated.contains("protected"),
+        "{stated}"
     );
-    let said = refused(Faults {
+    let stated = refused(Faults {
         never_done: true,
         ..Faults::default()
     });
-    assert!(said.contains("did not finish"), "{said}");
+    assert!(stated.contains("did not finish"), "{stated}");
 }
 
 /// Asserts that nothing was erased or written.

@@ -19,7 +19,7 @@ pub(super) fn by_hand(
 ) -> Result<String, Halt> {
     attendant.finish(Task::ZeroPose)?;
     let mut from = board.still(attendant)?;
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for (joint, direction) in Direction::ALL.into_iter().enumerate() {
         attendant.finish(Task::MoveAlong(direction, ABOUT_MM))?;
         let to = board.still(attendant)?;
@@ -27,10 +27,10 @@ pub(super) fn by_hand(
         let again = board.still(attendant)?;
         let (there, back) = (moved(from, to), moved(to, again));
         judge(joint, there, back)?;
-        told.push(format!("joint {}: {:+} counts", joint + 1, there[joint]));
+        reported.push(format!("joint {}: {:+} counts", joint + 1, there[joint]));
         from = again;
     }
-    Ok(told.join(", "))
+    Ok(reported.join(", "))
 }
 
 fn moved(from: [i32; 3], to: [i32; 3]) -> [i32; 3] {

@@ -44,16 +44,16 @@ fn ready_lines(
 }
 
 fn enable_line(attendant: &mut dyn Attendant) -> Result<String, Halt> {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for is in [BoardIs::Running, BoardIs::InReset, BoardIs::Unplugged] {
         let volts = attendant.read(Reading::EnableVolts(is))?;
         if volts.is_nan() || volts.abs() > LOW_V {
             return Err(Finding::EnableHigh(volts).into());
         }
-        told.push(format!("{volts:.2} V"));
+        reported.push(format!("{volts:.2} V"));
     }
     Ok(format!(
         "enable at {} running, in reset, unplugged",
-        told.join(", ")
+        reported.join(", ")
     ))
 }

@@ -34,9 +34,9 @@ pub(super) fn jogged(
     let record = super::zeroed(board, attendant)?;
     let sign = find_sign(board, attendant, &record, axis)?;
     let found = find_torque(board, attendant, &record, axis)?;
-    let said = f64::from(record.torque_constant[axis]);
+    let stated = f64::from(record.torque_constant[axis]);
     Ok(format!(
-        "turns joint {} the right way ({sign:+} in the record); {found:.4} Nm/A by the scale, {said:.4} in the record",
+        "turns joint {} the right way ({sign:+} in the record); {found:.4} Nm/A by the scale, {stated:.4} in the record",
         axis + 1
     ))
 }
@@ -90,12 +90,12 @@ fn jog(
         report.mode.drives() || report.fault.is_some()
     };
     let first = board.see(attendant, Task::PressDeadMan, began)?;
-    let (from, mut driven, mut now, mut told) = (angles(&first), first.clone(), first, false);
+    let (from, mut driven, mut now, mut reported) = (angles(&first), first.clone(), first, false);
     while now.health.report.mode.drives() {
         let full = now.health.currents_a.abs().max_element() > 0.99 * current_a.abs();
-        if on_scale && full && !told {
+        if on_scale && full && !reported {
             attendant.begin(Task::LookAtScale);
-            told = true;
+            reported = true;
         }
         driven = now;
         now = board.look()?;
@@ -171,13 +171,13 @@ fn find_torque(
     let pushed = attendant.read(Reading::ScaleGrams { pushed: true })?;
     let torque_nm = (pushed - rest) * N_PER_GRAM * 1e-3 * lever_mm(record, axis);
     let found = torque_nm / f64::from(current_a.abs() * record.ratio[axis]);
-    let said = f64::from(record.torque_constant[axis]);
-    match (said / TORQUE_FACTOR..said * TORQUE_FACTOR).contains(&found) {
+    let stated = f64::from(record.torque_constant[axis]);
+    match (stated / TORQUE_FACTOR..stated * TORQUE_FACTOR).contains(&found) {
         true => Ok(found),
         false => Err(Finding::WrongTorque {
             motor: axis + 1,
             found,
-            record: said,
+            record: stated,
         }
         .into()),
     }

@@ -23,7 +23,7 @@ struct PlaneContact {
     /// Maximum depth of the HIP below the proxy, mm, and the upward force there, N.
     deepest: (f32, f32),
     /// Maximum force, N.
-    most_n: f32,
+    max_n: f32,
     /// Present force, N.
     now_n: f32,
     /// Maximum depth until the last look, mm.
@@ -33,7 +33,7 @@ struct PlaneContact {
 impl PlaneContact {
     fn take(&mut self, sample: &TickRecord) {
         self.now_n = sample.force_n.length();
-        self.most_n = self.most_n.max(self.now_n);
+        self.max_n = self.max_n.max(self.now_n);
         let depth_mm = plane::depth_mm(sample);
         if depth_mm > self.deepest.0 {
             self.deepest = (depth_mm, sample.force_n.z);
@@ -52,7 +52,7 @@ pub(super) fn soft_plane(
     let params = plane::SOFT;
     let expected_n = (params.stiffness_n_per_mm * deep_mm).min(params.max_force_n);
     let pushed = (0.5 * expected_n..=1.1 * expected_n).contains(&up_n);
-    if !pushed || contact.most_n > 1.01 * params.max_force_n {
+    if !pushed || contact.max_n > 1.01 * params.max_force_n {
         return Err(Finding::NoFloor.into());
     }
     board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;

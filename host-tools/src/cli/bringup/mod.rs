@@ -20,7 +20,7 @@ use crate::phantom::Wiring;
 use terminal::UserAtTerminal;
 
 /// Time limit for a device's reply.
-pub(super) const PATIENCE: Duration = Duration::from_secs(4);
+pub(super) const TIMEOUT: Duration = Duration::from_secs(4);
 /// Time limit for a reply of a device in this program.
 const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
 
@@ -62,7 +62,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         since: Instant::now(),
         address: args.device.clone(),
     };
-    bring_up(args, &mut user, PATIENCE, |_| {
+    bring_up(args, &mut user, TIMEOUT, |_| {
         Ok(args.device.connect(native)?)
     })
 }
@@ -71,14 +71,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn bring_up<A: Attendant>(
     args: &Args,
     user: &mut A,
-    patience: Duration,
+    timeout: Duration,
     connect: impl Fn(&A) -> Result<Box<dyn Transport>, Failure>,
 ) -> Result<(), Failure> {
     let mut again_from = args.again_from;
     // A virtual arm's log is written on request only.
     let mut kept = None;
     loop {
-        let mut control = ControlSession::open(connect(user)?, patience)?;
+        let mut control = ControlSession::open(connect(user)?, timeout)?;
         let path = place(args, &control)?;
         let mut log = match (&path, kept.take()) {
             (Some(path), _) => Log::read(path)?,
@@ -101,8 +101,8 @@ fn bring_up<A: Attendant>(
             }
             (Err(error), control) => {
                 let ended = control.end();
-                if let Err(told @ (LinkError::NotConfirmed | LinkError::Taken)) = ended {
-                    tell(told);
+                if let Err(reported @ (LinkError::NotConfirmed | LinkError::Taken)) = ended {
+                    tell(reported);
                 }
                 return Err(error.into());
             }

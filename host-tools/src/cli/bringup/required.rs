@@ -4,11 +4,11 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_firmware::native;
 
-use super::PATIENCE;
+use super::TIMEOUT;
 use crate::board::BOARDS;
 use crate::bringup::{Identity, Log, Step};
 use crate::cli::failure::Failure;
-use crate::cli::options::device::EMULATED_PATIENCE;
+use crate::cli::options::device::EMULATED_TIMEOUT;
 use crate::link::{ControlSession, Transport};
 use heightfield::printable_text::printable;
 
@@ -18,7 +18,7 @@ use heightfield::printable_text::printable;
 /// # Errors
 /// The board was not brought up; no reply.
 pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let mut control = ControlSession::look(Box::new(transport), PATIENCE)?;
+    let mut control = ControlSession::look(Box::new(transport), TIMEOUT)?;
     if is_real(&control.device().board) {
         let record = control.calibration()?;
         let device = control.device();
@@ -40,7 +40,7 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
 /// # Errors
 /// It may drive an arm; no reply.
 pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let control = ControlSession::look(Box::new(transport), EMULATED_PATIENCE)?;
+    let control = ControlSession::look(Box::new(transport), EMULATED_TIMEOUT)?;
     let board = &control.device().board;
     if is_real(board) {
         let board = printable(board);
@@ -74,7 +74,7 @@ mod tests {
 
     fn device() -> DeviceHello {
         let native = Box::new(Native::for_replay().restless());
-        let control = ControlSession::open(native, PATIENCE).expect("it answers");
+        let control = ControlSession::open(native, TIMEOUT).expect("it answers");
         DeviceHello {
             board: "nucleo-g474re".try_into().expect("fits"),
             serial: SerialNumber::new([0x2A; 12]),

@@ -28,7 +28,7 @@ use set::Setting;
 /// Hint for a record that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
 /// Time limit for a reply of a device in this program.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra calibrate`.
 #[derive(Debug, clap::Args)]
@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.measure.zero {
         say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
-    let mut control = ControlSession::open(Box::new(device), PATIENCE)?;
+    let mut control = ControlSession::open(Box::new(device), TIMEOUT)?;
     calibrate(args, &mut control, &mut user)
 }
 

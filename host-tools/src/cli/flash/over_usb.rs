@@ -18,7 +18,7 @@ use crate::cli::terminal::writer::{self, say};
 use crate::link::{ControlSession, DeviceAddress, Usb};
 
 /// Time limit for the board's reply.
-const PATIENCE: Duration = Duration::from_secs(4);
+const TIMEOUT: Duration = Duration::from_secs(4);
 /// Time limit for a device to reappear as another; on Windows, a driver's first start takes
 /// seconds.
 const REAPPEARS: Duration = Duration::from_secs(15);
@@ -84,7 +84,7 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
 /// Makes a board enter its loader if it is the right board.
 fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
-    let mut control = ControlSession::open(transport, PATIENCE)?;
+    let mut control = ControlSession::open(transport, TIMEOUT)?;
     let running = control.device().board.as_str();
     if running != args.board.name {
         return Err(UpdateError::OtherBoard {
@@ -147,7 +147,7 @@ fn greet(place: &str) -> Result<(), Failure> {
         );
     };
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
-    let control = ControlSession::open(transport, PATIENCE)?;
+    let control = ControlSession::open(transport, TIMEOUT)?;
     say(format!(
         "started        {}",
         session_summary::device(control.device())

@@ -9,7 +9,7 @@ use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native};
 /// Time limit for all attempts on a device.
 const TRIED_FOR: Duration = Duration::from_secs(10);
 /// Time limit for a device's reply.
-const PATIENCE: Duration = Duration::from_secs(2);
+const TIMEOUT: Duration = Duration::from_secs(2);
 /// Interval between attempts.
 const RETRY: Duration = Duration::from_millis(200);
 
@@ -38,5 +38,5 @@ fn close(address: &str) -> Result<(), LinkError> {
     };
     let address: DeviceAddress = address.parse().map_err(absent)?;
     let line = address.connect(|| Native::new(HostClock::default(), None))?;
-    ControlSession::open(line, PATIENCE)?.disarm()
+    ControlSession::open(line, TIMEOUT)?.disarm()
 }

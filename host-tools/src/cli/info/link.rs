@@ -63,7 +63,7 @@ impl LinkFigures {
             match terrain.tile(key, &mut buffer) {
                 // A tile that a server did not send has no size to include.
                 Some((_, ReadStatus::Pending)) => unread += 1,
-                None | Some((Heights::Hole | Heights::Flat { .. }, _)) => others += 1,
+                None | Some((Heights::NoData | Heights::Flat { .. }, _)) => others += 1,
                 Some((heights, _)) => {
                     let bytes = frame_bytes(key, heights);
                     (tiles, sum, worst) = (tiles + 1, sum + bytes, worst.max(bytes));

@@ -13,9 +13,9 @@ use crate::link::{
 use crate::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script};
 
 /// Time limit for a real device's reply.
-const PATIENCE: Duration = Duration::from_secs(4);
+const TIMEOUT: Duration = Duration::from_secs(4);
 /// Time limit for an emulated board's reply, on a busy machine.
-pub(in crate::cli) const EMULATED_PATIENCE: Duration = Duration::from_secs(60);
+pub(in crate::cli) const EMULATED_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// A device named on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -151,12 +151,12 @@ impl Device {
         match &self.device {
             DeviceChoice::There(address) => {
                 let native = || Native::new(HostClock::default(), Some(Box::new(arm))).restless();
-                converse(open(address.connect(native)?, PATIENCE)?, talk)
+                converse(open(address.connect(native)?, TIMEOUT)?, talk)
             }
             DeviceChoice::Emulated(board) => {
                 let (_emulator, mut lines) = board.start()?;
                 move_arm_while(&mut lines.plant, &mut arm, || {
-                    converse(open(Box::new(lines.link), EMULATED_PATIENCE)?, talk)
+                    converse(open(Box::new(lines.link), EMULATED_TIMEOUT)?, talk)
                 })
             }
         }
@@ -168,23 +168,23 @@ fn converse<T>(
     mut control: ControlSession<'_>,
     talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let said = talk(&mut control)?;
+    let stated = talk(&mut control)?;
     control.end()?;
-    Ok(said)
+    Ok(stated)
 }
 
 fn opened<'t>(
     line: Box<dyn Transport + 't>,
-    patience: Duration,
+    timeout: Duration,
 ) -> Result<ControlSession<'t>, LinkError> {
-    ControlSession::open(line, patience)
+    ControlSession::open(line, timeout)
 }
 
 fn looked_at<'t>(
     line: Box<dyn Transport + 't>,
-    patience: Duration,
+    timeout: Duration,
 ) -> Result<ControlSession<'t>, LinkError> {
-    ControlSession::look(line, patience)
+    ControlSession::look(line, timeout)
 }
 
 /// Returns a virtual Phantom at rest in its zero pose.

@@ -104,7 +104,7 @@ fn placement(
 }
 
 /// Returns the place and scale of a terrain, in lines that `run` and `demo` print.
-pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn reported(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(
         "place          {} under the home position\nscale          {}\n",
@@ -173,17 +173,17 @@ pub(in crate::cli) fn picture_lines(
         ),
     });
     if let Some(times) = view.exaggeration {
-        let said = match (times - 1.0).abs() < 1e-9 {
+        let stated = match (times - 1.0).abs() < 1e-9 {
             true => "true to scale".to_owned(),
             false => format!("× {}", short(times)),
         };
-        lines.push(("heights".to_owned(), said));
+        lines.push(("heights".to_owned(), stated));
     }
     let home = coordinates_in_words(file, view.home_ground);
     lines.push(("home position".to_owned(), home));
     if let Some([longitude, latitude]) = file.to_lonlat(view.home_ground) {
-        let said = format!("{longitude:.5}, {latitude:.5}");
-        lines.push(("longitude, latitude".to_owned(), said));
+        let stated = format!("{longitude:.5}, {latitude:.5}");
+        lines.push(("longitude, latitude".to_owned(), stated));
     }
     lines
 }
@@ -254,14 +254,14 @@ mod tests {
 
     #[test]
     fn lengths_are_said_with_five_digits() {
-        for (value, said) in [
+        for (value, stated) in [
             (10.9, "10.9"),
             (0.123_456_7, "0.12346"),
             (1234.567, "1234.6"),
             (400_000.0, "400000"),
             (5.0, "5"),
         ] {
-            assert_eq!(short(value), said);
+            assert_eq!(short(value), stated);
         }
     }
 }

@@ -295,7 +295,7 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
 }
 
 /// Describes a new placement in one line.
-pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn reported(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(
         "view {number}: {}; {}; {}; {} under the home position",

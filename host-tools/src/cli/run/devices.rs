@@ -112,10 +112,10 @@ fn addresses_of(args: &Args) -> Vec<DeviceAddress> {
 /// Refuses options that are invalid for several devices.
 fn check(args: &Args) -> Result<(), Failure> {
     let count = args.device.len();
-    if count > shared_keyboard::MOST {
+    if count > shared_keyboard::MAX {
         let error = format!(
             "{count} devices; at most {} can be served",
-            shared_keyboard::MOST
+            shared_keyboard::MAX
         );
         return Err(Failure::new(error).hint("serve the others by another `hapterra run`"));
     }

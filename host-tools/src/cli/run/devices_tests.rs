@@ -74,8 +74,11 @@ fn a_device_that_is_named_twice_is_refused_also_by_two_names() {
             "are the same",
         ),
     ] {
-        let told = refused(more);
-        assert!(told.contains(says) && told.contains("hint: "), "{told}");
+        let reported = refused(more);
+        assert!(
+            reported.contains(says) && reported.contains("hint: "),
+            "{reported}"
+        );
     }
     for more in [
         "--device native --device native",
@@ -101,8 +104,11 @@ fn plant_line_is_part_of_an_emulated_boards_name() {
         (format!("{one} {other}"), "1 of 2 devices"),
         (format!("{one} {other}+plant:h:3"), "two devices have"),
     ] {
-        let told = refused(&more);
-        assert!(told.contains(says) && told.contains("hint: "), "{told}");
+        let reported = refused(&more);
+        assert!(
+            reported.contains(says) && reported.contains("hint: "),
+            "{reported}"
+        );
     }
     for bad in ["native+plant:h:3", "tcp:h:1+plant:h", "tcp:h:1+plant:"] {
         assert!(bad.parse::<ServedDevice>().is_err(), "{bad}");
@@ -111,10 +117,10 @@ fn plant_line_is_part_of_an_emulated_boards_name() {
 
 #[test]
 fn what_several_devices_cannot_be_given_is_refused_with_what_to_do() {
-    let told = refused("--device native --device native --view");
-    assert!(told.contains("hint: leave --view out"), "{told}");
+    let reported = refused("--device native --device native --view");
+    assert!(reported.contains("hint: leave --view out"), "{reported}");
     let ten = " --device native".repeat(10);
-    let told = refused(&ten);
-    assert!(told.contains("10 devices; at most 9"), "{told}");
+    let reported = refused(&ten);
+    assert!(reported.contains("10 devices; at most 9"), "{reported}");
     assert_eq!(devices(&" --device native".repeat(9)).len(), 9);
 }

@@ -98,7 +98,7 @@ impl<'t> Serving<'_, 't> {
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         device_console.say(format!("terrain        {}: {how}", args.terrain.name()));
-        device_console.show(placing::told(&placed.view, placed.terrain));
+        device_console.show(placing::reported(&placed.view, placed.terrain));
         if let Some(line) = session_summary::materials(placed.terrain) {
             device_console.say(line);
         }
@@ -144,13 +144,13 @@ impl<'t> Serving<'_, 't> {
         // The recording is saved first, regardless of the cause of the end.
         let log = watch.finish();
         let kept = log.kept.or_hint(OTHER_FILE);
-        let ended = told(end.why, end.disarmed, &tell).and(came(log.stood_still));
+        let ended = reported(end.why, end.disarmed, &tell).and(came(log.stood_still));
         may_be_armed(false);
         let summary = SessionSummary {
             ticks: log.ticks,
             device: hello,
             figures: log.figures,
-            tally: end.tally,
+            stats: end.stats,
         };
         device_console.show(summary.text());
         if placed.tour.is_some() && summary.figures.force_n.count() == 0 {
@@ -228,7 +228,7 @@ fn service<'s, 't: 's>(
             true => Arming::VIRTUAL,
             false => Arming::default(),
         },
-        patience: Timeouts {
+        timeouts: Timeouts {
             silence_s: args.silence,
             ..Timeouts::REAL_TIME
         },
@@ -241,7 +241,7 @@ fn service<'s, 't: 's>(
 }
 
 /// Returns the failure of the session; if there are two, prints the first.
-fn told(
+fn reported(
     why: Result<(), LinkError>,
     disarmed: Result<(), LinkError>,
     tell: &dyn Fn(&str),

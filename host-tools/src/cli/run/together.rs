@@ -79,16 +79,16 @@ mod tests {
     fn each_device_that_failed_is_named_with_what_to_do() {
         assert!(all_failures(2, vec![]).is_ok());
         let lost = || Failure::new("it is gone").hint("plug it in");
-        let told = |count, failures| match all_failures(count, failures) {
+        let reported = |count, failures| match all_failures(count, failures) {
             Ok(()) => panic!("nothing failed"),
             Err(failure) => failure.text(),
         };
-        let one = told(2, vec![("[2 usb:7]".into(), lost())]);
+        let one = reported(2, vec![("[2 usb:7]".into(), lost())]);
         assert_eq!(
             one,
             "error: 1 of 2 devices failed, the others did not:\n[2 usb:7] error: it is gone\n[2 usb:7] hint: plug it in"
         );
         let both = ["[1 a]", "[2 b]"].map(|name| (name.to_owned(), lost()));
-        assert!(told(2, both.into()).starts_with("error: all 2 devices failed:\n[1 a] "));
+        assert!(reported(2, both.into()).starts_with("error: all 2 devices failed:\n[1 a] "));
     }
 }

@@ -14,7 +14,7 @@ use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::device_console::DeviceConsole;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::cli::viewing::Shown;
-use crate::events::{Event as Told, Watcher};
+use crate::events::{Event as Reported, Watcher};
 use crate::link::{Event, HostRequest, LinkStats};
 use crate::output::OutputError;
 use crate::replay::settings::PlacementSettings;
@@ -105,7 +105,7 @@ impl<'t> Watch<'t> {
     /// Reports the end of the session to readers of events.
     pub(super) fn ended(&self, disarmed: bool) {
         if let Some(events) = &self.events {
-            events.say(&Told::End { disarmed });
+            events.say(&Reported::End { disarmed });
         }
     }
 
@@ -161,7 +161,7 @@ impl<'t> Watch<'t> {
         {
             self.described = view;
             self.device_console
-                .tell(steering::told(view, laid, &placement.terrain));
+                .tell(steering::reported(view, laid, &placement.terrain));
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
                 let settings = PlacementSettings::new(number, &placement.terrain, laid);
@@ -211,7 +211,7 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
         let (device_console, events) = (&self.device_console, &self.events);
         let refuse = |text: String| {
             if let Some(events) = events {
-                events.say(&Told::Refused { text: &text });
+                events.say(&Reported::Refused { text: &text });
             }
             device_console.tell(text);
         };
@@ -235,15 +235,15 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
     }
 
     /// Updates the status line, or prints one at intervals.
-    fn show(&mut self, tally: &LinkStats) {
+    fn show(&mut self, stats: &LinkStats) {
         if let Some(shown) = &mut self.shown {
-            shown.look(tally);
+            shown.look(stats);
         }
         let Some((sample, record)) = &self.latest else {
             return;
         };
         let (_, placement) = self.log.view();
-        let mut line = in_words(sample, record, &placement.terrain, tally);
+        let mut line = in_words(sample, record, &placement.terrain, stats);
         if self.log.views().count() > 1 {
             line += &format!("  [{}]", self.control.in_words());
         }
@@ -264,7 +264,7 @@ fn in_words(
     sample: &TickRecord,
     record: &Record,
     terrain: &Terrain<'_>,
-    tally: &LinkStats,
+    stats: &LinkStats,
 ) -> String {
     let force = glam::DVec3::from(record.force_n).length();
     let ([x, y, z], t_s) = (record.hip_mm, record.t_s);
@@ -272,7 +272,7 @@ fn in_words(
         true => "below ground: raise the tip above the surface to touch it",
         false => state_name(sample.state),
     };
-    let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);
+    let (tiles, lost) = (stats.tiles, stats.lost + stats.dropped);
     let fault = sample.fault;
     let fault = fault.map_or(String::new(), |f| format!(", FAULT {f:?}"));
     format!(

@@ -294,22 +294,22 @@ impl ArmingPrompts {
     /// may flicker; omitted lines are counted. An omitted question counts as not asked.
     pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
         let now = Instant::now();
-        let mut said = vec![];
+        let mut stated = vec![];
         for line in self.lines.drain(..) {
             let Some(left_out) = self.line_limit.admit(now) else {
                 continue;
             };
             if left_out > 0 {
-                said.push(format!("({left_out} lines left out)"));
+                stated.push(format!("({left_out} lines left out)"));
             }
             if line.asks.is_some() {
                 self.question = line.asks;
                 self.number = self.number.wrapping_add(1);
                 self.enter.forget();
             }
-            said.push(line.text);
+            stated.push(line.text);
         }
-        said
+        stated
     }
 }
 
@@ -417,8 +417,8 @@ mod tests {
                 ..Report::default()
             };
             prompts.on_event(&Event::Guard(&report));
-            let told = prompts.lines().join("\n");
-            assert_eq!(told.contains("press Enter to arm"), asks, "{told}");
+            let reported = prompts.lines().join("\n");
+            assert_eq!(reported.contains("press Enter to arm"), asks, "{reported}");
         }
         press.send(()).expect("listening");
         assert_eq!(prompts.messages(), [HostRequest::Request(Request::Arm)]);
@@ -427,17 +427,17 @@ mod tests {
     #[test]
     fn a_device_whose_state_flickers_does_not_flood_the_terminal() {
         let (_press, mut prompts) = with_a_user();
-        let mut said = 0;
+        let mut stated = 0;
         for flicker in 0..10_000 {
             let report = Report {
                 fault: (flicker % 2 == 0).then_some(Fault::EncoderJump),
                 ..Report::default()
             };
             prompts.on_event(&Event::Guard(&report));
-            said += prompts.lines().len();
+            stated += prompts.lines().len();
         }
         // Far fewer than all lines, even if the test ran slowly.
-        assert!((24..5_000).contains(&said), "{said} lines");
+        assert!((24..5_000).contains(&stated), "{stated} lines");
     }
 
     #[test]
@@ -445,10 +445,10 @@ mod tests {
         let (press, mut prompts) = with_a_user();
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
-        let told = prompts.lines().join("\n");
+        let reported = prompts.lines().join("\n");
         assert!(
-            told.contains("NOT_ZEROED") && told.contains("press Enter"),
-            "{told}"
+            reported.contains("NOT_ZEROED") && reported.contains("press Enter"),
+            "{reported}"
         );
         assert_eq!(prompts.messages(), []);
         press.send(()).expect("listening");
@@ -473,12 +473,12 @@ mod tests {
         };
         prompts.on_event(&Event::Guard(&report));
         prompts.on_event(&Event::Unanswered(&HostRequest::Request(Request::Arm)));
-        let told = prompts.lines().join("\n");
+        let reported = prompts.lines().join("\n");
         assert!(
-            told.contains("FAULT 3 EncoderJump") && told.contains("does not answer"),
-            "{told}"
+            reported.contains("FAULT 3 EncoderJump") && reported.contains("does not answer"),
+            "{reported}"
         );
-        assert!(!told.contains("Enter"), "{told}");
+        assert!(!reported.contains("Enter"), "{reported}");
     }
 
     #[test]
@@ -492,8 +492,8 @@ mod tests {
         prompts.on_event(&Event::Guard(&waits(Blockers::WATCHDOG_NOT_LIVE)));
         assert!(prompts.lines().is_empty());
         prompts.on_event(&Event::Guard(&waits(Blockers::empty())));
-        let told = prompts.lines().join("\n");
-        assert!(told.contains("press it"), "{told}");
+        let reported = prompts.lines().join("\n");
+        assert!(reported.contains("press it"), "{reported}");
         prompts.on_event(&Event::Guard(&waits(Blockers::empty())));
         assert!(prompts.lines().is_empty());
     }

@@ -15,7 +15,7 @@ use super::writer::tell;
 use crate::steering::keys::Key;
 
 /// Maximum number of devices, each selected by one digit.
-pub(in crate::cli) const MOST: usize = 9;
+pub(in crate::cli) const MAX: usize = 9;
 /// Maximum pending keys of a device; further keys are dropped.
 const WAITING: usize = 64;
 
@@ -196,10 +196,10 @@ mod tests {
     fn press(device_keys: &[Arc<DeviceKeys>], pressed: &[Pressed]) -> Vec<String> {
         let shared_keyboard = &device_keys[0].shared_keyboard;
         let mut state = shared_keyboard.state();
-        let told = pressed
+        let reported = pressed
             .iter()
             .map(|key| shared_keyboard.take(&mut state, *key));
-        told.collect::<Vec<_>>().into_iter().flatten().collect()
+        reported.collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
     /// Returns the keys of a device, without the real keyboard.
@@ -216,17 +216,17 @@ mod tests {
     #[test]
     fn enter_reaches_only_the_device_named_right_before() {
         let device_keys = two();
-        let no_device = |told: Vec<String>| {
-            let [.., line] = &told[..] else {
-                panic!("{told:?}");
+        let no_device = |reported: Vec<String>| {
+            let [.., line] = &reported[..] else {
+                panic!("{reported:?}");
             };
             assert!(line.contains("1 to 2, and then Enter"), "{line}");
         };
         no_device(press(&device_keys, &[Pressed::Enter]));
         assert_eq!(press(&device_keys, &[key('1'), Pressed::Enter]), [""; 0]);
         assert_eq!(got(&device_keys[0]), (vec![], 1));
-        let told = press(&device_keys, &[key('2'), Pressed::Enter]);
-        assert_eq!(told, ["keys go to [2 usb:7]"]);
+        let reported = press(&device_keys, &[key('2'), Pressed::Enter]);
+        assert_eq!(reported, ["keys go to [2 usb:7]"]);
         assert_eq!(got(&device_keys[1]), (vec![], 1));
         // The second device is still selected, but this Enter may be from the first one's user.
         no_device(press(&device_keys, &[Pressed::Enter]));
@@ -258,8 +258,8 @@ mod tests {
     fn a_device_that_is_not_served_any_more_is_told_when_it_is_chosen() {
         let mut device_keys = two();
         drop(device_keys.pop());
-        let told = press(&device_keys, &[key('2'), Pressed::Enter]);
-        assert_eq!(told, ["[2 usb:7] is not served any more"]);
+        let reported = press(&device_keys, &[key('2'), Pressed::Enter]);
+        assert_eq!(reported, ["[2 usb:7] is not served any more"]);
         assert_eq!(got(&device_keys[0]), (vec![], 0));
         // Even if a key is held down.
         press(&device_keys, &[key('+'); 10 * WAITING]);

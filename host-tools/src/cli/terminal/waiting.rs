@@ -98,13 +98,16 @@ mod tests {
             blocks.set(blocks.get() + 10);
             waits.get() < 4
         };
-        let mut said = vec![];
+        let mut stated = vec![];
         in_lines(
             || format!("{} of 40", blocks.get()),
             goes_on,
-            |line| said.push(line),
+            |line| stated.push(line),
         );
-        assert_eq!(said, ["10 of 40 (1 s)", "20 of 40 (4 s)", "30 of 40 (7 s)"]);
+        assert_eq!(
+            stated,
+            ["10 of 40 (1 s)", "20 of 40 (4 s)", "30 of 40 (7 s)"]
+        );
         in_lines(String::new, |_| false, |line| panic!("{line}"));
     }
 

@@ -20,7 +20,7 @@ use heightfield::printable_text::printable_lines;
 const WAITING: usize = 512;
 
 /// Text to write.
-enum Said {
+enum Stated {
     /// Unchanged text for standard output.
     Out(String),
     /// A line for standard error.
@@ -32,26 +32,26 @@ enum Said {
 }
 
 /// Queue of the writing thread; `None` if the thread cannot be started.
-static WRITER: OnceLock<Option<SyncSender<Said>>> = OnceLock::new();
+static WRITER: OnceLock<Option<SyncSender<Stated>>> = OnceLock::new();
 
 /// Writes a line to standard output.
 pub(in crate::cli) fn say(line: impl Display) {
-    speak(Said::Out(format!("{line}\n")));
+    speak(Stated::Out(format!("{line}\n")));
 }
 
 /// Writes to standard output, without a line end.
 pub(in crate::cli) fn show(text: impl Display) {
-    speak(Said::Out(text.to_string()));
+    speak(Stated::Out(text.to_string()));
 }
 
 /// Writes a line to standard error.
 pub(in crate::cli) fn tell(line: impl Display) {
-    speak(Said::Err(format!("{line}\n")));
+    speak(Stated::Err(format!("{line}\n")));
 }
 
 /// Replaces or removes the status line.
 pub(in crate::cli) fn status(line: Option<String>) {
-    speak(Said::Status(line));
+    speak(Stated::Status(line));
 }
 
 /// Waits until all output is written.
@@ -59,48 +59,48 @@ pub(in crate::cli) fn finish() {
     if let Some(Some(writer)) = WRITER.get() {
         let (done, is_done) = sync_channel(1);
         // If the thread has ended, there is nothing to wait for.
-        if writer.send(Said::Flush(done)).is_ok() {
+        if writer.send(Stated::Flush(done)).is_ok() {
             let _ = is_done.recv();
         }
     }
 }
 
-fn speak(said: Said) {
+fn speak(stated: Stated) {
     let writer = WRITER.get_or_init(|| {
-        let (writer, said) = sync_channel(WAITING);
+        let (writer, stated) = sync_channel(WAITING);
         let thread = Builder::new().name("voice".into());
-        thread.spawn(move || write_all(said)).ok().map(|_| writer)
+        thread.spawn(move || write_all(stated)).ok().map(|_| writer)
     });
     match writer {
         // If the queue is full or closed, this cannot be reported either.
-        Some(writer) => drop(writer.try_send(said)),
-        None => write(said, &mut None),
+        Some(writer) => drop(writer.try_send(stated)),
+        None => write(stated, &mut None),
     }
 }
 
-fn write_all(said: Receiver<Said>) {
+fn write_all(stated: Receiver<Stated>) {
     let mut bottom = None;
-    for said in said {
-        write(said, &mut bottom);
+    for stated in stated {
+        write(stated, &mut bottom);
     }
 }
 
 /// Writes above the status line.
-fn write(said: Said, bottom: &mut Option<ProgressBar>) {
-    match said {
-        Said::Out(text) => above(bottom, || put(io::stdout(), &text)),
-        Said::Err(line) => above(bottom, || put(io::stderr(), &line)),
-        Said::Status(Some(line)) => {
+fn write(stated: Stated, bottom: &mut Option<ProgressBar>) {
+    match stated {
+        Stated::Out(text) => above(bottom, || put(io::stdout(), &text)),
+        Stated::Err(line) => above(bottom, || put(io::stderr(), &line)),
+        Stated::Status(Some(line)) => {
             let bar = bottom.get_or_insert_with(ProgressBar::new_spinner);
             bar.set_message(printable_lines(&line));
             bar.tick();
         }
-        Said::Status(None) => {
+        Stated::Status(None) => {
             if let Some(bar) = bottom.take() {
                 bar.finish_and_clear();
             }
         }
-        Said::Flush(done) => {
+        Stated::Flush(done) => {
             let _ = done.send(());
         }
     }

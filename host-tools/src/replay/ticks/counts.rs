@@ -22,7 +22,7 @@ pub(super) fn pace(counts: &Counts, hz: u32) -> Option<String> {
 
 /// Returns the remarks, one sentence each.
 pub(super) fn remarks(counts: &Counts) -> Vec<String> {
-    let longest = (counts.longest_move_s * 1e6).round() / 1e6;
+    let longest = (counts.max_move_s * 1e6).round() / 1e6;
     let odd = counts.odd_moves;
     let remarks = [
         (
@@ -53,6 +53,6 @@ pub(super) fn remarks(counts: &Counts) -> Vec<String> {
             ),
         ),
     ];
-    let told = remarks.into_iter().filter(|(count, _)| *count > 0);
-    told.map(|(_, remark)| remark).collect()
+    let reported = remarks.into_iter().filter(|(count, _)| *count > 0);
+    reported.map(|(_, remark)| remark).collect()
 }

@@ -214,8 +214,8 @@ fn times_that_cannot_be_right_are_errors() {
             "line 3, column t_s: the HIP moves during a gap",
         ),
     ] {
-        let said = by_time(rows).expect_err("is wrong");
-        assert!(said.contains(expected), "{rows:?}: {said}");
+        let stated = by_time(rows).expect_err("is wrong");
+        assert!(stated.contains(expected), "{rows:?}: {stated}");
     }
 }
 
@@ -320,7 +320,10 @@ fn a_recording_has_whole_ticks_between_its_rows() {
     ] {
         match recorded(rows, tick_hz) {
             Ok(ticks) => assert_eq!((ticks.len(), expected), (4, "")),
-            Err(said) => assert!(!expected.is_empty() && said.contains(expected), "{said}"),
+            Err(stated) => assert!(
+                !expected.is_empty() && stated.contains(expected),
+                "{stated}"
+            ),
         }
     }
     // A clock that drifts against the ticks is detected by its fifth row at the latest.
@@ -328,8 +331,11 @@ fn a_recording_has_whole_ticks_between_its_rows() {
         .map(|row| (f64::from(row) * 1.003e-3).to_string())
         .collect();
     let rows: Vec<_> = times.iter().map(|t| (&t[..], 0.0)).collect();
-    let said = recorded(&rows, 1000).expect_err("drifts");
-    assert!(said.contains("line 6, column t_s: 0.004012 s"), "{said}");
+    let stated = recorded(&rows, 1000).expect_err("drifts");
+    assert!(
+        stated.contains("line 6, column t_s: 0.004012 s"),
+        "{stated}"
+    );
 }
 
 #[test]

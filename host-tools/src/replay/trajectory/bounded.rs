@@ -4,7 +4,7 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Max bytes of a line; rows have a few hundred.
-const LONGEST: usize = 1 << 20;
+const MAX: usize = 1 << 20;
 
 /// A stream that fails if a line is too long.
 pub(super) struct Bounded<R> {
@@ -27,8 +27,8 @@ impl<R: Read> Read for Bounded<R> {
             Some(end) => read - end - 1,
             None => self.open + read,
         };
-        if self.open > LONGEST {
-            let why = format!("a line of more than {LONGEST} bytes: this is no CSV");
+        if self.open > MAX {
+            let why = format!("a line of more than {MAX} bytes: this is no CSV");
             return Err(io::Error::new(io::ErrorKind::InvalidData, why));
         }
         Ok(read)
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn lines_pass_and_an_endless_one_does_not() {
-        let line = [&[b'1'; LONGEST][..], b"\n"].concat();
+        let line = [&[b'1'; MAX][..], b"\n"].concat();
         let mut whole = Vec::new();
         let mut lines = Bounded::new(io::Cursor::new(line.repeat(3)));
         assert_eq!(

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use super::bounded::Bounded;
 
 /// Max bytes of comments that are read: settings have less than two thousand.
-const LONGEST: usize = 1 << 16;
+const MAX_LINE_BYTES: usize = 1 << 16;
 /// A byte order mark, which some editors write.
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -21,10 +21,10 @@ pub(super) struct Again<R> {
 pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
     let mut rest = BufReader::with_capacity(1 << 16, Bounded::new(stream));
     let (mut head, mut comments) = (Vec::new(), String::new());
-    while head.len() < LONGEST {
+    while head.len() < MAX_LINE_BYTES {
         let from = head.len();
         rest.by_ref()
-            .take((LONGEST - from) as u64)
+            .take((MAX_LINE_BYTES - from) as u64)
             .read_until(b'\n', &mut head)?;
         let line = head.get(from..).unwrap_or_default();
         let line = line.strip_prefix(MARK).unwrap_or(line);
@@ -58,7 +58,7 @@ impl<R: Seek> Seek for Again<R> {
 /// First words of a comment block for a placement or a mark.
 const LATER: [&[u8]; 2] = [b"[[view]]", b"[[mark]]"];
 /// Max bytes of such blocks that are read: a placement has less than four hundred.
-const MOST: usize = 1 << 24;
+const MAX_BYTES: usize = 1 << 24;
 
 /// Reads the comments between rows that describe placements and marks, without their `#` and a
 /// space after it. Other comments are skipped, and so is one after the last row: it may be
@@ -70,7 +70,7 @@ pub(super) fn later(stream: impl Read) -> io::Result<String> {
     );
     let (mut found, mut block) = (String::new(), String::new());
     let (mut is_meant, mut was_comment) = (false, true);
-    while found.len() < MOST {
+    while found.len() < MAX_BYTES {
         line.clear();
         if reader.read_until(b'\n', &mut line)? == 0 {
             break;
@@ -85,7 +85,7 @@ pub(super) fn later(stream: impl Read) -> io::Result<String> {
                 if begins {
                     is_meant = LATER.iter().any(|table| text.starts_with(table));
                 }
-                if is_meant && block.len() < MOST {
+                if is_meant && block.len() < MAX_BYTES {
                     block += &String::from_utf8_lossy(text);
                 }
             }
@@ -150,7 +150,7 @@ mod tests {
         ] {
             assert_eq!(parts(text), (expected.to_owned(), text.to_vec()));
         }
-        let endless = [b'#'; 3 * LONGEST];
+        let endless = [b'#'; 3 * MAX_LINE_BYTES];
         assert_eq!(parts(&endless).1.len(), endless.len());
     }
 

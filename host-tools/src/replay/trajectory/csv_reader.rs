@@ -148,8 +148,8 @@ impl<R: Read + Seek> Rows<R> {
 
 /// Returns the beginning of an arbitrary text.
 fn shown(text: &str) -> String {
-    const LONGEST: usize = 60;
-    let mut short: String = text.chars().take(LONGEST).collect();
+    const MAX: usize = 60;
+    let mut short: String = text.chars().take(MAX).collect();
     if short.len() < text.len() {
         short.push('…');
     }

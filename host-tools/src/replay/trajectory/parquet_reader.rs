@@ -32,7 +32,7 @@ pub(super) struct Rows {
     read: Vec<Vec<f64>>,
     next: usize,
     /// Number of returned rows.
-    told: u64,
+    reported: u64,
 }
 
 impl Rows {
@@ -60,7 +60,7 @@ impl Rows {
             columns: Vec::new(),
             read: vec![Vec::new(); read.len()],
             next: 0,
-            told: 0,
+            reported: 0,
         };
         Ok((rows, text))
     }
@@ -78,25 +78,25 @@ impl Rows {
         for (number, (column, values)) in numbers.iter_mut().zip(columns) {
             let value = values.get(self.next).copied().filter(|x| x.is_finite());
             *number = value.ok_or_else(|| TrajectoryFault::Field {
-                at: format!("row {}", self.told + 1),
+                at: format!("row {}", self.reported + 1),
                 column,
                 what: "no finite number".into(),
             })?;
         }
         let view = self.views.get(self.next).copied().unwrap_or(0);
         let view = u32::try_from(view).map_err(|_| TrajectoryFault::Field {
-            at: format!("row {}", self.told + 1),
+            at: format!("row {}", self.reported + 1),
             column: VIEW,
             what: format!("{view} is no number of a view"),
         })?;
         self.next += 1;
-        self.told += 1;
+        self.reported += 1;
         Ok(Some(row(numbers, view)))
     }
 
     /// Returns the position of the present row, for a message.
     pub(super) fn place(&self) -> String {
-        format!("row {}", self.told)
+        format!("row {}", self.reported)
     }
 
     /// Reads some rows of the present group, or of the next; returns false after the last.

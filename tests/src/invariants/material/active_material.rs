@@ -4,7 +4,7 @@ use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::Texture;
 use hapterra_core::grid::GridPoint;
 
-use crate::invariants::texture::TextureJudge;
+use crate::invariants::texture::TextureOracle;
 use crate::scene::materials::Materials;
 
 /// Ticks of a whole change: 0.1 s.
@@ -36,7 +36,7 @@ pub(super) struct ActiveMaterial {
     texture: Texture,
     parts: u32,
     /// Oracle of its texture.
-    judge: Option<TextureJudge>,
+    judge: Option<TextureOracle>,
     /// The share of the texture at this speed.
     speed_share: f64,
     was_rendered: bool,
@@ -124,7 +124,7 @@ impl ActiveMaterial {
     }
 
     /// Returns the texture, if any, and the share of it that is rendered.
-    pub(super) fn texture(&self) -> Option<(&TextureJudge, f64)> {
+    pub(super) fn texture(&self) -> Option<(&TextureOracle, f64)> {
         let share = self.speed_share * f64::from(self.parts) / f64::from(FADE);
         self.judge.as_ref().map(|judge| (judge, share))
     }
@@ -136,11 +136,11 @@ impl ActiveMaterial {
 
     /// Returns true if it behaves like another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
-        let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_rendered);
-        let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);
+        let reported = |one: &Self| (one.wanted, one.done, one.parts, one.was_rendered);
+        let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureOracle::speed);
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
         let pairs = |of: fn(&Self) -> &Numbers| of(self).iter().zip(of(other)).all(is_near);
-        told(self) == told(other)
+        reported(self) == reported(other)
             && self.texture == other.texture
             && (speed(self) - speed(other)).abs() < 1e-9
             && pairs(|one| &one.numbers)
@@ -241,10 +241,10 @@ fn numbers(materials: &Materials, class: u8) -> Numbers {
 }
 
 /// Returns an oracle of a texture, in cells.
-fn judge(texture: &Texture, cell_mm: f32) -> Option<TextureJudge> {
+fn judge(texture: &Texture, cell_mm: f32) -> Option<TextureOracle> {
     let is_some = texture.pattern != Texture::NONE.pattern;
     is_some.then(|| {
-        TextureJudge::new(Texture {
+        TextureOracle::new(Texture {
             amplitude_mm: texture.amplitude_mm / cell_mm,
             wavelength_mm: texture.wavelength_mm / cell_mm,
             ..*texture

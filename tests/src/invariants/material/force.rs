@@ -8,7 +8,7 @@ use super::active_material::ActiveMaterial;
 /// Rounding, as a fraction of a force.
 const ROUNDING: f64 = 1e-5;
 /// Forces below this, N, count as zero.
-const LEAST_N: f64 = 1e-12;
+const MIN_N: f64 = 1e-12;
 
 /// Conditions of a tick.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +22,7 @@ pub(super) struct TickConditions<'p> {
     /// The HIP's velocity, mm/s.
     pub(super) velocity_mm_s: DVec3,
     /// The scene's largest force, N.
-    pub(super) most_n: f64,
+    pub(super) max_n: f64,
     /// Millimetres a cell.
     pub(super) cell_mm: f64,
 }
@@ -40,7 +40,7 @@ impl TickConditions<'_> {
     /// Returns the force without shading and edge fade.
     pub(super) fn force(&self, material: &ActiveMaterial) -> Wanted {
         let (mut stretch, mut allowed) = (self.way, self.allowed + ROUNDING * self.way.length());
-        if self.way.length() > LEAST_N
+        if self.way.length() > MIN_N
             && let Some((judge, share)) = material.texture()
         {
             let added = judge.adds(self.way, self.proxy, share);
@@ -49,7 +49,7 @@ impl TickConditions<'_> {
             allowed += added.allowed + 2.0 * self.allowed;
         }
         let newtons = material.stiffness() * self.cell_mm;
-        let spring = shortened(stretch * newtons, self.most_n);
+        let spring = shortened(stretch * newtons, self.max_n);
         let unsure = material.unsure_stiffness() * self.cell_mm * stretch.length();
         let allowed = 2.0 * allowed * newtons + unsure;
         self.damped(material, spring, allowed)
@@ -60,21 +60,21 @@ impl TickConditions<'_> {
         let (size, damping) = (spring.length(), 1e-3 * material.damping());
         let fast_mm_s = self.velocity_mm_s.length();
         let unsure = (1e-3 * material.unsure_damping() * fast_mm_s).min(size);
-        let rounding = allowed + ROUNDING * size + unsure + LEAST_N;
-        if damping == 0.0 || size <= LEAST_N {
-            let (force_n, allowed_n) = (spring, rounding.min(2.0 * self.most_n));
+        let rounding = allowed + ROUNDING * size + unsure + MIN_N;
+        if damping == 0.0 || size <= MIN_N {
+            let (force_n, allowed_n) = (spring, rounding.min(2.0 * self.max_n));
             return Wanted { force_n, allowed_n };
         }
         let along = spring / size;
         let against = (damping * self.velocity_mm_s.dot(along)).clamp(-size, size);
-        let force = shortened(spring - along * against, self.most_n);
+        let force = shortened(spring - along * against, self.max_n);
         // An error of the spring's direction is also one of the speed along it, and of the force.
         let fast = damping * fast_mm_s;
         let turned = (rounding / size).min(2.0);
         let allowed = (rounding + 2.0 * fast * (turned + ROUNDING)).min(3.0 * (size + rounding));
         Wanted {
             force_n: force,
-            allowed_n: (rounding + allowed).min(2.0 * self.most_n),
+            allowed_n: (rounding + allowed).min(2.0 * self.max_n),
         }
     }
 
@@ -84,7 +84,7 @@ impl TickConditions<'_> {
         let depth = self.way.length();
         let off = self.allowed + ROUNDING * depth;
         let (mut least, mut most) = (depth - off, depth + off);
-        if depth > LEAST_N
+        if depth > MIN_N
             && let Some((judge, share)) = material.texture()
         {
             let added = judge.adds(self.way, self.proxy, share);
@@ -98,7 +98,7 @@ impl TickConditions<'_> {
         }
         let newtons = material.stiffness() * self.cell_mm;
         let unsure = material.unsure_stiffness() * self.cell_mm;
-        let spring = |stretch: f64, newtons: f64| (stretch.max(0.0) * newtons).min(self.most_n);
+        let spring = |stretch: f64, newtons: f64| (stretch.max(0.0) * newtons).min(self.max_n);
         let (least, most) = (
             spring(least, newtons - unsure),
             spring(most, newtons + unsure),
@@ -107,10 +107,10 @@ impl TickConditions<'_> {
         // Damping of a fast HIP cancels nearly all force: a difference of two rounded values.
         let fast = 1e-3 * damping * self.velocity_mm_s.length() * (1.0 + ROUNDING);
         let least = if fades { 0.0 } else { (least - fast).max(0.0) };
-        let most = (most + fast.min(most)).min(self.most_n);
+        let most = (most + fast.min(most)).min(self.max_n);
         [
-            least * (1.0 - ROUNDING) - LEAST_N,
-            most * (1.0 + ROUNDING) + LEAST_N,
+            least * (1.0 - ROUNDING) - MIN_N,
+            most * (1.0 + ROUNDING) + MIN_N,
         ]
     }
 }

@@ -63,7 +63,7 @@ impl Judged {
 }
 
 /// Checks the points of one scene in turn.
-pub struct MaterialJudge<'g> {
+pub struct MaterialOracle<'g> {
     place: TickOracle<'g>,
     materials: &'g Materials,
     kind: Kind,
@@ -77,7 +77,7 @@ pub struct MaterialJudge<'g> {
     pub judged: Judged,
 }
 
-impl<'g> MaterialJudge<'g> {
+impl<'g> MaterialOracle<'g> {
     /// Creates the oracle of a scene that is shifted by this many cells.
     #[must_use]
     pub fn new(scene: &'g Scene, materials: &'g Materials, shift: [i32; 3]) -> Self {
@@ -204,7 +204,7 @@ impl<'g> MaterialJudge<'g> {
         let force = replied.sample.force_n.as_dvec3();
         let fades = replied.sample.limits.contains(Limits::EDGE_FADING);
         let is_whole = !fades && self.shading == Shading::None;
-        let mut told = String::new();
+        let mut reported = String::new();
         let changing = courses.iter().any(|course| !course.is_settled());
         courses.retain(|course| {
             let (is_rendered, wanted) = match is_whole {
@@ -220,12 +220,12 @@ impl<'g> MaterialJudge<'g> {
                 }
             };
             if !is_rendered {
-                told = format!("{force} N of {}, {wanted} by {course:?}", force.length());
+                reported = format!("{force} N of {}, {wanted} by {course:?}", force.length());
             }
             is_rendered
         });
         if courses.is_empty() {
-            return self.fail(Invariant::Material, format!("{told}: {replied:?}"));
+            return self.fail(Invariant::Material, format!("{reported}: {replied:?}"));
         }
         self.never_pulls(&output, force, replied)?;
         self.judged.changing += u64::from(changing);
@@ -260,7 +260,7 @@ impl<'g> MaterialJudge<'g> {
             allowed: seen.allowed_in_space(self.place.terrain),
             proxy: &replied.sample.proxy,
             velocity_mm_s: (hip - DVec3::from_array(from)) * (cell_mm * RATE_HZ),
-            most_n: f64::from(self.materials.params.max_force_n),
+            max_n: f64::from(self.materials.params.max_force_n),
             cell_mm,
         }
     }

@@ -6,7 +6,7 @@ use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
 
 use super::active_material::ActiveMaterial;
-use super::{MaterialJudge, RATE_HZ};
+use super::{MaterialOracle, RATE_HZ};
 use crate::invariants::Invariant;
 use crate::invariants::observed_tick::ObservedTick;
 use crate::invariants::oracle::Verdict;
@@ -20,7 +20,7 @@ const PRESSES: std::ops::Range<f64> = 1e-3..100.0;
 /// Tolerance of the distance by which a proxy trails due to its speed, as a fraction.
 const SLACK: f64 = 0.031;
 
-impl MaterialJudge<'_> {
+impl MaterialOracle<'_> {
     /// Checks that a proxy that slides on a plane, not too fast, ends where friction holds it.
     pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &ObservedTick) -> Verdict {
         let (friction, [_, most]) = (course.friction(), course.frictions());
@@ -35,14 +35,14 @@ impl MaterialJudge<'_> {
         };
         let is_plane = matches!(self.kind, Kind::Flat | Kind::Slope);
         let is_whole = |sample: &TickRecord| !sample.limits.contains(Limits::EDGE_FADING);
-        let is_told = is_plane
+        let is_reported = is_plane
             && touches(before.sample.state)
             && touches(seen.output.state)
             && is_whole(&before.sample)
             && [before.proxy, seen.proxy, seen.hip].into_iter().all(inside)
             && SLIDES.contains(&moved)
             && PRESSES.contains(&distance(seen.proxy, seen.hip));
-        if !is_told {
+        if !is_reported {
             return Ok(());
         }
         let [x, y, _] = seen.proxy;

@@ -80,10 +80,10 @@ impl Service for Microsoft {
         let own = format!("/{}/", account.name);
         let within = path.strip_prefix(&own);
         let path = within.map_or(path.to_owned(), |rest| format!("/{rest}"));
-        let said = request.headers.get(AUTHORIZATION);
-        match said.map(|said| said.to_str().unwrap_or_default()) {
-            Some(said) if said.starts_with("Bearer ") => principal::check(said)?,
-            Some(said) => shared_key::check(account, request, said)?,
+        let stated = request.headers.get(AUTHORIZATION);
+        match stated.map(|stated| stated.to_str().unwrap_or_default()) {
+            Some(stated) if stated.starts_with("Bearer ") => principal::check(stated)?,
+            Some(stated) => shared_key::check(account, request, stated)?,
             None if sas::is_in(request) => sas::check(account, request, bucket(&path))?,
             None => check_public(account, bucket(&path))?,
         }

@@ -14,7 +14,7 @@ const OLDEST: SignedDuration = SignedDuration::from_mins(15);
 
 /// # Errors
 /// If the request is not signed with the key of the account, or is too old.
-pub(super) fn check(account: &Account, request: &Parts, said: &str) -> Result<(), Refusal> {
+pub(super) fn check(account: &Account, request: &Parts, stated: &str) -> Result<(), Refusal> {
     let date = header(request, "x-ms-date");
     let date = if date.is_empty() {
         header(request, "date")
@@ -27,7 +27,7 @@ pub(super) fn check(account: &Account, request: &Parts, said: &str) -> Result<()
         return Err(failed("The date is too old."));
     }
     let signature = account.signature(&string_to_sign(account.name, request));
-    match said == format!("SharedKey {}:{signature}", account.name) {
+    match stated == format!("SharedKey {}:{signature}", account.name) {
         true => Ok(()),
         false => Err(failed("The signature did not match.")),
     }

@@ -3,7 +3,7 @@
 use hapterra_url_tests::bucket::{PUBLIC, Server};
 use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
 
-use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, said};
+use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, stated};
 
 /// The user's hint.
 const HINT: &str = "hint: set what the server wants: GOOGLE_APPLICATION_CREDENTIALS";
@@ -24,14 +24,14 @@ impl Google {
         Self { hills, server, key }
     }
 
-    fn said(&self, name: &str, environment: &[(&str, &str)]) -> String {
+    fn stated(&self, name: &str, environment: &[(&str, &str)]) -> String {
         let server = [("GOOGLE_BASE_URL", self.server.endpoint())];
-        said(name, &[&server, environment].concat())
+        stated(name, &[&server, environment].concat())
     }
 
-    fn said_with_key(&self, name: &str, key: &str) -> String {
+    fn stated_with_key(&self, name: &str, key: &str) -> String {
         std::fs::write(&self.key, key).expect("written");
-        self.said(name, &[("GOOGLE_APPLICATION_CREDENTIALS", &self.key)])
+        self.stated(name, &[("GOOGLE_APPLICATION_CREDENTIALS", &self.key)])
     }
 }
 
@@ -42,7 +42,7 @@ fn url() -> String {
 #[test]
 fn a_file_opens_with_the_key_of_an_account_and_is_fetched_in_parts() {
     let google = Google::start();
-    let output = google.said_with_key(&url(), &SURVEYOR.file());
+    let output = google.stated_with_key(&url(), &SURVEYOR.file());
     assert!(output.contains("read GeoTIFF"), "{output}");
     assert_fetched_in_parts(&google.server.take_seen(), google.hills.bytes);
 }
@@ -56,10 +56,10 @@ fn a_file_opens_with_a_token() {
         ("GOOGLE_BEARER_TOKEN", TOKEN),
         ("GCE_METADATA_HOST", address),
     ] {
-        let output = google.said(&url(), &[given]);
+        let output = google.stated(&url(), &[given]);
         assert!(output.contains("read GeoTIFF"), "{given:?}: {output}");
     }
-    let other = google.said(&url(), &[("GOOGLE_BEARER_TOKEN", "ya29.other")]);
+    let other = google.stated(&url(), &[("GOOGLE_BEARER_TOKEN", "ya29.other")]);
     assert_refused(&other, "AuthenticationRequired", HINT);
 }
 
@@ -67,15 +67,15 @@ fn a_file_opens_with_a_token() {
 fn a_file_of_a_public_bucket_opens_without_a_key_and_no_other_does() {
     let google = Google::start();
     let nobody = [("GOOGLE_SKIP_SIGNATURE", "true")];
-    let output = google.said(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
+    let output = google.stated(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
     assert!(output.contains("read GeoTIFF"), "{output}");
-    assert_refused(&google.said(&url(), &nobody), "AccessDenied", HINT);
+    assert_refused(&google.stated(&url(), &nobody), "AccessDenied", HINT);
 }
 
 #[test]
 fn a_file_that_is_not_there_is_told_so() {
     let google = Google::start();
-    let missing = google.said_with_key("gs://hills/south.tif", &SURVEYOR.file());
+    let missing = google.stated_with_key("gs://hills/south.tif", &SURVEYOR.file());
     assert!(
         missing.contains("there is no such file (gs://hills/south.tif)"),
         "{missing}"
@@ -85,10 +85,10 @@ fn a_file_that_is_not_there_is_told_so() {
 #[test]
 fn a_key_that_does_not_open_it_is_told_so() {
     let google = Google::start();
-    let stranger = google.said_with_key(&url(), &STRANGER.file());
+    let stranger = google.stated_with_key(&url(), &STRANGER.file());
     assert_refused(&stranger, "AccessDenied", HINT);
     let forged = SURVEYOR.file_with_key_of(&STRANGER);
-    let forged = google.said_with_key(&url(), &forged);
+    let forged = google.stated_with_key(&url(), &forged);
     assert_refused(&forged, "AuthenticationRequired", HINT);
     let seen = google.server.take_seen();
     assert_eq!(seen.bytes, 0, "{seen:?}");
@@ -97,13 +97,13 @@ fn a_key_that_does_not_open_it_is_told_so() {
 #[test]
 fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
     let google = Google::start();
-    let none = google.said(&url(), &[]);
-    let no_file = google.said(
+    let none = google.stated(&url(), &[]);
+    let no_file = google.stated(
         &url(),
         &[("GOOGLE_APPLICATION_CREDENTIALS", "/nowhere/key.json")],
     );
-    let no_key = google.said_with_key(&url(), r#"{"type":"service_account"}"#);
-    for (told, why) in [
+    let no_key = google.stated_with_key(&url(), r#"{"type":"service_account"}"#);
+    for (reported, why) in [
         (
             none,
             "the environment holds no key, and this computer has none of its own (gs://hills",
@@ -114,8 +114,8 @@ fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
         ),
         (no_key, "missing field `private_key`"),
     ] {
-        assert!(told.contains(why), "{told}");
-        assert!(told.contains(HINT), "{told}");
+        assert!(reported.contains(why), "{reported}");
+        assert!(reported.contains(HINT), "{reported}");
     }
     assert!(google.server.take_seen().requests.is_empty());
 }
@@ -126,11 +126,11 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
         ("GOOGLE_BASE_URL", "http://127.0.0.1:1"),
         ("GOOGLE_BEARER_TOKEN", TOKEN),
     ];
-    let told = said(&url(), &nowhere);
-    assert!(told.contains("Connection refused"), "{told}");
+    let reported = stated(&url(), &nowhere);
+    assert!(reported.contains("Connection refused"), "{reported}");
     assert!(
-        told.contains("hint: check the network, and GOOGLE_BASE_URL"),
-        "{told}"
+        reported.contains("hint: check the network, and GOOGLE_BASE_URL"),
+        "{reported}"
     );
 }
 
@@ -141,9 +141,9 @@ fn a_mosaic_here_that_names_a_bucket_is_refused() {
     let public = format!("/vsigs/{PUBLIC}/50% #2.tif");
     let files = ["/vsigs/hills/north ridge/hills-1.tif", &public];
     let mosaic = mosaic(google.hills.folder.path(), files);
-    let told = google.said_with_key(&mosaic, &SURVEYOR.file());
+    let reported = google.stated_with_key(&mosaic, &SURVEYOR.file());
     assert!(
-        told.contains("it names /vsigs/hills/north ridge/hills-1.tif"),
-        "{told}"
+        reported.contains("it names /vsigs/hills/north ridge/hills-1.tif"),
+        "{reported}"
     );
 }

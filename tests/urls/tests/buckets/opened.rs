@@ -70,7 +70,7 @@ pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
 
 /// Returns the output of the second process: a note that it rendered the file, or the messages of a
 /// failed command.
-pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
+pub(crate) fn stated(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
     process.args(["--exact", "opened::in_another_process", "--nocapture"]);
     // The user who runs the tests may have keys as well.
@@ -119,13 +119,13 @@ pub(crate) fn assert_fetched_in_parts(seen: &Seen, of: usize) {
 }
 
 /// Checks that the message has the fault, the server's text, the file and the remedy.
-pub(crate) fn assert_refused(told: &str, word: &str, hint: &str) {
+pub(crate) fn assert_refused(reported: &str, word: &str, hint: &str) {
     let why = format!(
         "error: cannot read what is there: it may not be read without a key that opens it: the server says {word} ("
     );
-    assert!(told.contains(&why), "{told}");
-    assert!(told.contains(&format!("hills/{NAME})")), "{told}");
-    assert!(told.contains(hint), "{told}");
+    assert!(reported.contains(&why), "{reported}");
+    assert!(reported.contains(&format!("hills/{NAME})")), "{reported}");
+    assert!(reported.contains(hint), "{reported}");
 }
 
 /// The other half of the tests.

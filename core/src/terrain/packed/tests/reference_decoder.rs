@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 /// Maximum height that can be addressed.
-const MOST: f32 = 536_870_912.0;
+const MAX: f32 = 536_870_912.0;
 
 struct Bits(Vec<bool>, usize);
 
@@ -93,7 +93,7 @@ pub(super) fn heights(bytes: &[u8]) -> Vec<u32> {
             let number = predicted.wrapping_add(difference as i32);
             numbers[row][col] = number;
             let height = height(number, &lines);
-            let held = if height.abs() <= MOST {
+            let held = if height.abs() <= MAX {
                 height
             } else {
                 f32::NAN

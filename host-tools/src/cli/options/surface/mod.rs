@@ -19,7 +19,7 @@ use crate::materials::{ClassMaterial, Looks, Materials};
 use crate::named_surfaces::{NAMED_SURFACES, NamedSurface};
 use crate::place::STIFFEST_N_PER_MM;
 use heightfield::{Raster, files_read_with};
-use numbers::{check, over, rubbed, told};
+use numbers::{check, over, reported, rubbed};
 use table::{MaterialEntry, PassivityName, ShadingName, TableFile};
 
 /// Surface of a terrain.
@@ -128,7 +128,7 @@ impl SurfaceOptions {
         if let Some(force) = self.max_force {
             params.max_force_n = force;
         }
-        check(&Material::of(params)).map_err(|why| told(&why))?;
+        check(&Material::of(params)).map_err(|why| reported(&why))?;
         let limit = params.max_force_n;
         if !(limit.is_finite() && limit >= 0.0) {
             return Err(format!("a largest force of {limit} N is not valid"))

@@ -44,7 +44,7 @@ pub(super) fn over(
     });
     made.map_err(|why| {
         let place = format!("{}, line {line}, {what}:", file.display());
-        told(&why).about(Some(&place))
+        reported(&why).about(Some(&place))
     })
 }
 
@@ -58,7 +58,7 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
     if !material.friction.is_valid() {
         return Err(format!(
             "a friction of {dynamic_mu}, {static_mu} at rest, trailing by {viscous_s} s: friction from 0 to {}, static_friction not below it, viscous_friction from 0 to {} s",
-            Friction::MOST,
+            Friction::MAX,
             Friction::MAX_VISCOUS_S
         ));
     }
@@ -82,7 +82,7 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
 }
 
 /// Returns the failure with a message and a hint.
-pub(super) fn told(why: &str) -> Failure {
+pub(super) fn reported(why: &str) -> Failure {
     let (what, next_step) = why
         .split_once(": ")
         .unwrap_or((why, "choose another number"));

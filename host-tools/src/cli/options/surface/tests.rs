@@ -117,13 +117,16 @@ fn options_that_no_surface_has_are_refused() {
 
 #[test]
 fn table_asks_for_no_more_stiffness_than_the_command_line() {
-    for (text, told, allowed) in [
+    for (text, reported, allowed) in [
         ("[default]\nstiffness = 3", "line 1: a stiffness of 3", true),
         ("[class.1]\nstiffness = 1.1", "a stiffness of 1.1", true),
         ("[class.1]\nstiffness = 1e30", "at most", false),
     ] {
         let why = load(SurfaceOptions::default(), text).expect_err(text);
-        assert!(why.contains(told) && why.contains("--stiffness"), "{why}");
+        assert!(
+            why.contains(reported) && why.contains("--stiffness"),
+            "{why}"
+        );
         let stiff = SurfaceOptions {
             stiffness: Some(3.0),
             ..SurfaceOptions::default()
@@ -167,8 +170,11 @@ fn no_hint_makes_classes_of_those_between_them() {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
     let error = Raster::open(folder.path(), &Default::default()).expect_err("two grids");
-    let told = of_classes(error).text();
-    assert!(told.contains("gdalwarp -r near -dstnodata"), "{told}");
+    let reported = of_classes(error).text();
+    assert!(
+        reported.contains("gdalwarp -r near -dstnodata"),
+        "{reported}"
+    );
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::terrain::{CellContent, Window};
 
 /// Start of a contact.
 #[derive(Clone, Debug)]
-pub(super) struct Landing {
+pub(super) struct Onset {
     /// Place over or under the surface; the height does not count.
     at: GridPoint,
     /// Vector from the HIP to the proxy, cells.
@@ -25,24 +25,24 @@ impl Contact {
     /// vector `displacement` from the HIP to it, cells. No force is rendered before the terrain
     /// there is known and [`Contact::land`] has placed the HIP.
     #[must_use]
-    pub fn landing(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
+    pub fn onset(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
         Self {
-            landing: Some(Landing { at, displacement }),
+            onset: Some(Onset { at, displacement }),
             ..Self::new(settings)
         }
     }
 
     /// Returns true if the contact waits to begin on the surface.
     #[must_use]
-    pub const fn is_landing(&self) -> bool {
-        self.landing.is_some()
+    pub const fn is_onset(&self) -> bool {
+        self.onset.is_some()
     }
 
     /// Returns the vector from the HIP to the proxy, cells, while the proxy touches or is about to.
     #[must_use]
     pub fn displacement(&self) -> Option<Vec3> {
-        match &self.landing {
-            Some(landing) => Some(landing.displacement),
+        match &self.onset {
+            Some(onset) => Some(onset.displacement),
             None if self.output.state == ContactState::Touching => {
                 Some(self.hip.to(&self.output.proxy))
             }
@@ -56,17 +56,17 @@ impl Contact {
     /// The force fades in as after a late tile.
     #[must_use]
     pub fn land<const D: usize>(&mut self, window: &Window<'_, D>) -> Option<GridPoint> {
-        let Landing { at, displacement } = self.landing.as_ref()?;
+        let Onset { at, displacement } = self.onset.as_ref()?;
         let (cell, frac) = (at.column(), at.frac());
         let (u, v) = (frac.x, frac.y);
         let point = SurfacePoint { cell, u, v };
         match window.ground(cell) {
             CellContent::Missing => return None,
-            CellContent::Hole => self.landing = None,
+            CellContent::NoData => self.onset = None,
             CellContent::Patch(_) => {
                 let surface = position_on(window, &point)?;
                 let hip = GridPoint::new(surface.cell(), surface.frac() - *displacement);
-                self.landing = None;
+                self.onset = None;
                 self.phase = Phase::OnSurface(OnSurface::at(point, 0.0));
                 self.hip = hip;
                 return Some(hip);
@@ -76,7 +76,7 @@ impl Contact {
     }
 }
 
-impl Landing {
+impl Onset {
     /// Returns the output while the terrain at the place is missing.
     #[cold]
     pub(super) fn waits(&self, budget: &mut Budget) -> ContactOutput {
@@ -110,10 +110,10 @@ mod tests {
         // Three cells deep in the wall from the west, relative to the proxy.
         let displacement = Vec3::new(-3.0, 0.1, 0.0);
         let mut contact =
-            Contact::landing(ContactSettings::AT_1_KHZ, column(10.5, 20.5), displacement);
-        assert!(contact.is_landing());
+            Contact::onset(ContactSettings::AT_1_KHZ, column(10.5, 20.5), displacement);
+        assert!(contact.is_onset());
         let hip = contact.land(&field.window).expect("the terrain is there");
-        assert!(!contact.is_landing());
+        assert!(!contact.is_onset());
         let expected = GridPoint::new([13, 20, 15], Vec3::new(0.5, 0.4, 0.0));
         assert!(hip.to(&expected).length() < 1e-5, "{hip:?}");
         let mut last = Vec3::ZERO;
@@ -134,7 +134,7 @@ mod tests {
         let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let displacement = Vec3::new(40.0, 0.0, 1.0);
         let mut contact =
-            Contact::landing(ContactSettings::AT_1_KHZ, column(60.5, 5.5), displacement);
+            Contact::onset(ContactSettings::AT_1_KHZ, column(60.5, 5.5), displacement);
         let hip = GridPoint::new([20, 5, 1], Vec3::splat(0.5));
         for _ in 0..3 {
             assert_eq!(contact.land(&field.window), None);
@@ -160,13 +160,13 @@ mod tests {
         });
         let displacement = Vec3::new(0.0, 0.0, 1.0);
         let mut contact =
-            Contact::landing(ContactSettings::AT_1_KHZ, column(30.5, 5.5), displacement);
+            Contact::onset(ContactSettings::AT_1_KHZ, column(30.5, 5.5), displacement);
         assert_eq!(contact.land(&field.window), None);
         let output = *contact.step(&field.window, &column(30.5, 5.5));
         assert_eq!(
             (output.state, output.missing_tile),
             (ContactState::Unseeded, None)
         );
-        assert!(!contact.is_landing());
+        assert!(!contact.is_onset());
     }
 }
