@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn no_point_around_the_closest_is_nearer() {
+    fn closest_point_has_no_nearer_neighbour() {
         let grid = rough();
         let mut random = Random(9);
         for _ in 0..2000 {
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_that_is_off_is_seen_to_be_off() {
+    fn oracle_measures_error_and_angle_of_an_answer() {
         let flat = Grid::from_fn("flat", [4, 4], |_, _| 2.0);
         let hip = Hip::at([1.5, 1.5, 1.75]);
         let exact = judge(&flat, &hip, &Answer::touching([0.0, 0.0, 0.25]));

@@ -69,7 +69,7 @@ fn the_kept_errors_are_below_what_they_may_be() {
 }
 
 #[test]
-fn what_is_written_has_every_row_of_the_table() {
+fn effects_csv_has_every_measured_row() {
     let grid = tick_states::terrain();
     let effort = Effort {
         ticks: 400,

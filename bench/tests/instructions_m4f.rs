@@ -14,7 +14,7 @@ use m4f::table::{Row, Table};
 use m4f::{chain, contact, soak, tiles};
 
 #[test]
-fn no_state_of_the_tick_costs_more_than_it_did() {
+fn tick_instruction_counts_do_not_exceed_the_stored_table() {
     let Some(board) = CountingBoard::found() else {
         return;
     };

@@ -14,7 +14,7 @@ fn output_text(output: &Output) -> String {
 }
 
 #[test]
-fn it_says_limits_and_writes_every_trial_and_a_picture() {
+fn stability_prints_limits_and_writes_trials_and_picture() {
     let folder = tempfile::tempdir().expect("a folder");
     let [csv, png] = ["trials.csv", "limits.png"].map(|name| folder.path().join(name));
     let [to_csv, to_png] = [&csv, &png].map(|path| path.to_str().expect("text"));
@@ -47,7 +47,7 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
 }
 
 #[test]
-fn what_cannot_be_tried_or_written_is_said_at_once() {
+fn invalid_options_and_unwritable_outputs_are_refused() {
     let twice = stability(&["-o", "both", "--picture", "both"]);
     assert!(
         output_text(&twice).contains("cannot be one file"),

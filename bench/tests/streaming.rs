@@ -35,7 +35,7 @@ fn streamed(name: &str, arguments: &[&str]) -> (bool, String, PathBuf) {
 }
 
 #[test]
-fn what_streaming_takes_does_not_grow_with_the_terrain() {
+fn streaming_cost_is_independent_of_terrain_size() {
     let (done, text, csv) = streamed("flat.csv", &["--sizes", "7,10"]);
     assert!(done, "{text}");
     let rows = rows(&csv);
@@ -93,7 +93,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
 }
 
 #[test]
-fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
+fn small_file_is_reported_and_the_other_is_measured() {
     let folder = tempfile::tempdir().expect("a folder");
     let [hills, small] = ["hills.asc", "small.asc"].map(|name| folder.path().join(name));
     let field = |side: usize, path: &Path| {
@@ -133,7 +133,7 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
 
 #[test]
 #[cfg(not(feature = "remote"))]
-fn latencies_without_a_server_are_refused_with_the_build_that_has_one() {
+fn latencies_without_remote_feature_are_refused_with_hint() {
     let output = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"))
         .args(["streaming", "--latency", "0ms,50ms"])
         .output()
@@ -146,7 +146,7 @@ fn latencies_without_a_server_are_refused_with_the_build_that_has_one() {
 }
 
 #[test]
-fn the_kept_figures_are_of_all_sizes_and_latencies_and_within_their_bounds() {
+fn kept_figures_cover_all_sizes_and_latencies_within_bounds() {
     let rows = kept();
     for side in SIDES {
         for latency in LATENCIES_MS {

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_put_is_taken_and_what_follows_is_left() {
+    fn checked_value_round_trips_and_leaves_trailing_bytes() {
         let mut buffer = [7; 12];
         let length = put(&0x1_2345_u32, &mut buffer).expect("fits").len();
         assert_eq!(length, 3 + 4);

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_rates_that_were_thought_of() {
+    fn only_supported_tick_rates_are_accepted() {
         assert_eq!(TickRate::new(999), None);
         assert_eq!(TickRate::new(10_001), None);
         assert_eq!(TickRate::new(1_500), None);

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_finite_is_told_from_what_is_not() {
+    fn is_finite_rejects_nan_and_infinities() {
         let finite = [
             0.0,
             -0.0,
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_root_is_as_near_as_is_said_at_every_size() {
+    fn root_error_stays_within_bound_at_every_magnitude() {
         let mut worst = 0.0_f64;
         for bits in (f32::MIN_POSITIVE.to_bits()..f32::MAX.to_bits()).step_by(9_973) {
             let x = f32::from_bits(bits);
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_gives_the_second() {
+    fn smaller_and_larger_ignore_a_nan_first_argument() {
         assert_eq!([smaller(f32::NAN, 1.0), larger(f32::NAN, 1.0)], [1.0; 2]);
         assert_eq!([smaller(1.0, 2.0), larger(1.0, 2.0)], [1.0, 2.0]);
         assert_eq!([smaller(2.0, 1.0), larger(2.0, 1.0)], [1.0, 2.0]);

@@ -230,7 +230,7 @@ fn dipped(tiles: &mut [Tile]) -> Device<'_, 3> {
 }
 
 #[test]
-fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
+fn late_tile_does_not_evict_tile_beside_proxy() {
     let mut tiles = buffers::<3>();
     let mut device = dipped(&mut tiles);
     let size = device.size;
@@ -264,7 +264,7 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
 }
 
 #[test]
-fn an_fallback_that_comes_last_is_kept_whatever_the_proxy_touches() {
+fn late_fallback_is_accepted_and_evicts_no_tile_beside_proxy() {
     let mut tiles = buffers::<3>();
     let mut device = dipped(&mut tiles);
     let of = |shift| CoarseTile {
@@ -312,7 +312,7 @@ fn disarmed_arm_has_no_force() {
 }
 
 #[test]
-fn the_weight_of_the_arm_is_held_with_the_sign_of_the_calibration() {
+fn gravity_currents_follow_signs_of_the_calibration() {
     for (encoder_sign, motor_sign) in [(Vec3::ONE, Vec3::ONE), (-Vec3::ONE, -Vec3::Z + Vec3::Y)] {
         let record = Calibration {
             encoder_sign,
@@ -344,7 +344,7 @@ fn begun_inside_the_terrain_there_is_no_force() {
 }
 
 #[test]
-fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
+fn fault_latches_until_cleared_and_encoder_jump_needs_new_zero() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     assert!(device.tick([0; 3]).drive.enabled);
@@ -377,7 +377,7 @@ fn pressed(tiles: &mut [Tile]) -> (Device<'_, 4>, Vec3) {
 }
 
 #[test]
-fn without_its_scene_or_with_another_force_goes_out_without_a_step() {
+fn force_ramps_down_without_step_on_scene_change_or_disarm() {
     let other = Scene {
         epoch: 2,
         ..scene(Source::Encoders)
@@ -496,7 +496,7 @@ fn a_jump_during_a_replay_is_noticed() {
 }
 
 #[test]
-fn a_replay_drives_nothing_and_says_why_it_cannot_be_armed() {
+fn replay_drives_no_motor_and_refuses_arming_with_its_blocker() {
     let mut tiles = buffers::<4>();
     let mut device = replaying(&mut tiles);
     device.say(Command::Arm);
@@ -520,7 +520,7 @@ fn a_replay_drives_nothing_and_says_why_it_cannot_be_armed() {
 }
 
 #[test]
-fn nothing_is_rendered_or_armed_without_a_calibration() {
+fn missing_calibration_prevents_rendering_and_arming() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     device.haptics.mechanism = None;
@@ -572,7 +572,7 @@ fn a_scene_that_is_not_valid_is_refused() {
 /// The window's size, the order of the tiles' arrival, and ticks that run out of work must not
 /// change the force.
 #[test]
-fn a_small_window_feels_what_a_whole_one_feels() {
+fn force_is_independent_of_window_size() {
     let mut tiles = buffers::<4>();
     let mut small = Device::<4>::new(&mut tiles, Source::Points, hills);
     let mut more_tiles = buffers::<32>();
@@ -609,7 +609,7 @@ fn a_small_window_feels_what_a_whole_one_feels() {
 }
 
 #[test]
-fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
+fn force_fades_past_edge_of_data_and_reports_the_limit() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, edge);
     // Home is 20 cells from the edge; a count of the first axis is 24 µm.
@@ -656,7 +656,7 @@ fn point_of_any_bits_is_made_valid_before_the_contact() {
 }
 
 #[test]
-fn held_outputs_reach_the_drive_only_while_the_amplifiers_are_off() {
+fn held_outputs_reach_drive_only_with_amplifiers_off() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     let held = Vec3::new(0.5, -0.5, 0.1);

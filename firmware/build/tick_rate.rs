@@ -53,7 +53,7 @@ mod tests {
     const H743: u32 = 57_000_000;
 
     #[test]
-    fn one_kilohertz_where_nothing_is_said() {
+    fn tick_rate_defaults_to_one_kilohertz() {
         assert_eq!(tick_hz(None, "a board", G474), Ok(1_000));
     }
 

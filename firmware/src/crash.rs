@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_comes_back_with_its_place() {
+    fn panic_record_keeps_file_line_and_tick() {
         let record = CrashRecord::panic("firmware/src/link/session.rs", 321, 77);
         let crash = CrashRecord::read(record.bytes()).expect("a crash");
         assert_eq!(crash.kind, CrashKind::Panic);
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hard_fault_and_a_stray_interrupt_come_back() {
+    fn hard_fault_and_stray_interrupt_records_round_trip() {
         let record = CrashRecord::hard_fault(0x0800_1234, 0x0800_4321, 0x8200, 9);
         let crash = CrashRecord::read(record.bytes()).expect("a crash");
         assert_eq!((crash.pc, crash.lr), (0x0800_1234, 0x0800_4321));
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stack_overflow_and_a_low_supply_come_back() {
+    fn stack_overflow_and_low_supply_records_round_trip() {
         let record = CrashRecord::stack_overflow(1, 2, 0x82, 3);
         let crash = CrashRecord::read(record.bytes()).expect("a crash");
         assert_eq!(crash.kind, CrashKind::StackOverflow);
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bare_record_tells_its_kind_and_no_flipped_bit_of_it_does() {
+    fn bare_record_keeps_kind_and_rejects_flipped_bits() {
         for kind in KINDS {
             let bare = *CrashRecord::bare(kind).bytes();
             let crash = CrashRecord::read(&bare).expect("a crash");
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn no_flipped_bit_and_nothing_that_ram_holds_by_itself_is_a_crash() {
+    fn flipped_bits_and_uninitialised_ram_are_not_a_crash() {
         let good = *CrashRecord::panic("x.rs", 1, 2).bytes();
         for bit in 0..8 * CRASH_BYTES {
             let mut bad = good;

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn every_signal_looks_different_within_ten_seconds() {
+    fn led_patterns_differ_within_ten_seconds() {
         let mut all = vec![
             LedPattern::Disarmed,
             LedPattern::Waiting,

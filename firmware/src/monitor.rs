@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_watched_does_not_matter() {
+    fn unwatched_parts_do_not_block_the_watchdog() {
         let monitor = Monitor::new();
         let watched = &PARTS[..2];
         monitor.check_in(Part::Tick);

@@ -140,7 +140,7 @@ fn files_and_those_beside_them_are_read_by_name() {
 }
 
 #[test]
-fn what_a_file_names_on_this_computer_is_not_opened() {
+fn vrt_references_outside_the_mount_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let [samples, header] = field(0);
     let local = folder.path().join("west.dat");
@@ -276,7 +276,7 @@ fn vrts_in_each_other_end() {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_is_a_fault_and_one_that_is_missing_is_none() {
+fn unreadable_file_is_a_fault_but_missing_file_is_not() {
     let vrts = [
         ("a/both.vrt", vrt("east.dat", true)),
         ("a/gone.vrt", vrt("gone.dat", true)),

@@ -84,7 +84,7 @@ fn windows_and_buffers_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_said_in_words() {
+fn failed_open_reports_its_path_or_a_zero_byte() {
     let Some(gdal) = gdal() else { return };
     let error = gdal.open("/no/such/file".as_ref(), &[]).expect_err("none");
     assert!(error.to_string().contains("/no/such/file"), "{error}");
@@ -105,7 +105,7 @@ fn vrt(folder: &Path, source: &str) -> std::path::PathBuf {
 }
 
 #[test]
-fn what_a_vrt_names_is_looked_at_before_it_is_opened() {
+fn vrt_sources_are_checked_before_opening() {
     let Some(gdal) = gdal() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path());
@@ -125,7 +125,7 @@ fn what_a_vrt_names_is_looked_at_before_it_is_opened() {
 }
 
 #[test]
-fn open_options_that_no_driver_knows_are_refused() {
+fn unknown_open_options_are_refused() {
     let Some(gdal) = gdal() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let refused = gdal

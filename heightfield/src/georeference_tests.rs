@@ -19,7 +19,7 @@ fn reference(epsg: Option<u16>) -> Option<ReferenceSystem> {
 }
 
 #[test]
-fn samples_and_coordinates_are_each_others_inverse_also_rotated_and_skewed() {
+fn transform_round_trips_when_rotated_or_skewed() {
     for (column, row) in [
         ([10.0, 0.0], [0.0, 10.0]),
         ([8.0, 6.0], [-6.0, 8.0]),
@@ -45,7 +45,7 @@ fn samples_and_coordinates_are_each_others_inverse_also_rotated_and_skewed() {
 }
 
 #[test]
-fn longitude_and_latitude_go_there_and_back_in_every_system() {
+fn lonlat_round_trips_in_every_reference_system() {
     for (epsg, origin, step, cell) in [
         (Some(26911), [386_000.0, 3_790_000.0], 10.0, metres(10.0)),
         (Some(3857), [1_000_000.0, 8_399_000.0], 10.0, metres(10.0)),
@@ -72,7 +72,7 @@ fn longitude_and_latitude_go_there_and_back_in_every_system() {
 
 /// Against PROJ (`cs2cs EPSG:26911 EPSG:4326`), (longitude, latitude).
 #[test]
-fn longitude_comes_first_and_is_where_proj_has_it() {
+fn lonlat_is_longitude_first_and_agrees_with_proj() {
     let map = transform([386_000.0, 3_790_000.0], [10.0, 0.0], [0.0, 10.0]);
     let utm = reference(Some(26911));
     let place = Georeference::new(map, utm.as_ref(), Some(metres(10.0)), [9.0, 9.0]);
@@ -82,7 +82,7 @@ fn longitude_comes_first_and_is_where_proj_has_it() {
 }
 
 #[test]
-fn what_is_not_stated_is_no_longitude() {
+fn unstated_reference_system_has_no_lonlat() {
     let map = transform([10.0, 60.0], [0.001, 0.0], [0.0, 0.001]);
     let guessed = CellSize {
         certainty: Certainty::Assumed,

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_body_is_none() {
+    fn globe_rejects_invalid_radius_and_flattening() {
         for (radius, inverse) in [(0.0, 298.0), (f64::NAN, 298.0), (6e6, 0.5), (6e6, -1.0)] {
             assert_eq!(Globe::new(radius, inverse), None, "{radius} {inverse}");
         }

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_grid_is_none() {
+    fn degenerate_or_non_finite_grid_is_rejected() {
         assert!(GroundMap::new([0.0, 0.0, 0.0], [0.0, 0.0, -1.0]).is_none());
         assert!(GroundMap::new([f64::NAN, 1.0, 0.0], [0.0, 0.0, -1.0]).is_none());
         assert!(GroundMap::new([0.0, f64::INFINITY, 0.0], [0.0, 0.0, -1.0]).is_none());

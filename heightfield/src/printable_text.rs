@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn no_character_that_controls_passes() {
+    fn printable_text_has_no_control_or_bidi_characters() {
         const TURN: [char; 12] = [
             '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}',
             '\u{202e}', '\u{2066}', '\u{2067}', '\u{2068}', '\u{2069}',

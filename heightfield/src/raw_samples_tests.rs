@@ -128,7 +128,7 @@ fn opened(path: &Path, most_in_memory_bytes: u64) -> Raster {
 }
 
 #[test]
-fn what_stays_in_its_file_is_the_same_on_all_levels() {
+fn blockwise_and_in_memory_heights_match_on_all_levels() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("hills.raw");
     let places = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row)));
@@ -159,7 +159,7 @@ fn what_stays_in_its_file_is_the_same_on_all_levels() {
 
 /// A header may say that a file begins in the south or in the east.
 #[test]
-fn levels_count_from_the_south_and_west_whatever_the_files_order() {
+fn levels_count_from_south_west_in_any_file_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("hills.flt");
     let places = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row)));
@@ -209,7 +209,7 @@ fn levels_count_from_the_south_and_west_whatever_the_files_order() {
 }
 
 #[test]
-fn a_file_that_became_shorter_has_a_hole_and_no_other_heights() {
+fn truncated_file_reads_as_no_data_past_its_end() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("hills.raw");
     let bytes = vec![7; 2 * SIZE[0] as usize * SIZE[1] as usize];

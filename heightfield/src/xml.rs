@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_come_with_those_around_them() {
+    fn elements_have_the_path_of_their_ancestors() {
         let text = "<?xml version='1.0'?><a><b k='1'>x &amp; &#233;</b><c/></a>";
         assert_eq!(seen(text).expect("XML"), ["a/b=x & é", "a/c=", "a="]);
     }

@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_writes_any_more_is_found_and_what_somebody_writes_is_not() {
+    fn abandoned_partial_files_are_found_and_active_ones_are_not() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("out.csv");
         let mut alive = Output::create(&path).expect("created");
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_is_known_by_every_name() {
+    fn output_over_an_input_is_refused_under_every_path() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("terrain.tif"), "heights").expect("written");
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_in_which_nothing_came_to_lie_is_gone_again() {
+    fn new_output_folder_is_removed_if_it_stays_empty() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("out");
         drop(OutputFolder::create(&path).expect("made"));

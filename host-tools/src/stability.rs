@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stiffest_and_the_finest_of_several_materials_are_warned_of() {
+    fn warnings_name_the_stiffest_and_finest_materials() {
         let soft = Material::of(&SurfaceParams::PREMIUM);
         let stiff = Material {
             stiffness_n_per_mm: 8.0,

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_never_counted_has_no_line_and_is_missing() {
+    fn uncounted_row_is_omitted_and_listed_as_missing() {
         let mut rows = Rows::<_, u32>::default();
         *rows.of("b") += 2;
         *rows.of("a") += 1;

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn knows_a_plane_and_a_wrong_proxy() {
+    fn oracle_finds_plane_surface_and_detects_wrong_proxy() {
         let height = |x: i64, _: i64| x as f64;
         let oracle = Oracle::new([10, 10], &height);
         assert_eq!(oracle.surface(2.5, 3.0), Some(2.5));
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_takes_every_patch_that_touches_it() {
+    fn no_data_removes_every_patch_that_touches_it() {
         let height = |x: i64, y: i64| if (x, y) == (5, 5) { f64::NAN } else { 0.0 };
         let oracle = Oracle::new([10, 10], &height);
         assert_eq!(oracle.surface(4.5, 5.0), None);

@@ -91,7 +91,7 @@ fn every_malformed_file_ends_in_an_error_or_a_terrain() {
 }
 
 #[test]
-fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
+fn non_terrain_file_is_refused_with_its_specific_fault() {
     let folder = std::env::temp_dir().join(format!("hapterra-bad-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for tries");
     let tries: [(&str, &[u8], &str); 9] = [
@@ -137,7 +137,7 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
 
 /// The program's errors name the fault, the file and the next step.
 #[test]
-fn an_error_says_what_where_and_what_next() {
+fn error_names_fault_file_and_next_step() {
     let output = Command::new(hapterra_binary())
         .args(["info", "no-such-terrain.tif"])
         .output()

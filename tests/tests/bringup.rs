@@ -108,7 +108,7 @@ fn wired(wiring: Wiring) -> VirtualBench {
 }
 
 #[test]
-fn an_arm_without_mistakes_comes_to_the_end() {
+fn correct_arm_completes_every_step() {
     let mut user = VirtualUser::new(Wiring::RIGHT);
     user.says = say;
     let mut log = Log::default();
@@ -119,7 +119,7 @@ fn an_arm_without_mistakes_comes_to_the_end() {
 }
 
 #[test]
-fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
+fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     let mut user = VirtualUser::new(Wiring::RIGHT.with_gain(1, -1.0));
     user.says = say;
     let mut log = Log::default();
@@ -217,7 +217,7 @@ fn found_of_the_board(mistakes: BenchMistakes) -> (Step, Finding) {
 }
 
 #[test]
-fn a_board_that_ticks_at_another_rate_than_it_says_is_named() {
+fn wrong_tick_rate_of_the_board_is_named() {
     for clock_slow_by in [0.05, -0.05, 0.5, -1.0] {
         let slow = BenchMistakes {
             clock_slow_by,
@@ -251,7 +251,7 @@ fn a_usb_clock_that_does_not_follow_the_host_is_named() {
 }
 
 #[test]
-fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
+fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     // On an arm without weight, the other joints keep their positions.
     let mut model = PhantomModel::premium_1_5();
     model.gravity_m_s2 = 0.0;
@@ -371,7 +371,7 @@ fn found_at(from: Step, mistakes: BenchMistakes) -> (Step, Finding) {
 }
 
 #[test]
-fn a_stop_that_is_wired_the_wrong_way_is_named() {
+fn miswired_emergency_stop_is_named() {
     let normally_open = BenchMistakes {
         stop_normally_open: true,
         ..BenchMistakes::default()
@@ -456,7 +456,7 @@ fn missing_amplifier_is_named_before_any_motor() {
 }
 
 #[test]
-fn amplifiers_that_do_not_say_whether_they_are_ready_are_noted() {
+fn amplifiers_without_ready_lines_are_noted() {
     let mistakes = BenchMistakes {
         ready_grounded: [true; 3],
         ..BenchMistakes::default()

@@ -44,7 +44,7 @@ fn errors(user: &VirtualUser, review: &Review) -> ([f64; 3], [f64; 2]) {
 }
 
 #[test]
-fn the_true_ratios_signs_and_weights_come_back() {
+fn calibration_recovers_true_ratios_signs_and_weights() {
     let mut user = VirtualUser::with_a_stylus();
     let review = calibrated(&mut user);
     let (ratios, weights) = errors(&user, &review);

@@ -5,7 +5,7 @@ use hapterra_tests::campaign::{SEED, report, run};
 use hapterra_tests::repository;
 
 #[test]
-fn nothing_that_goes_wrong_gets_past_the_guard() {
+fn guard_bounds_hold_under_every_injected_fault() {
     let stats = run(SEED, 60, &mut |_, _| {}).expect("no violation");
     assert!(stats.armed >= 60_000);
     for kind in Kind::ALL {

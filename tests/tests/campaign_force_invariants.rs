@@ -60,7 +60,7 @@ fn stated(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), S
 }
 
 #[test]
-fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
+fn pulling_force_is_reported_unless_slew_limited() {
     let shaded = SurfaceParams {
         shading: Shading::Smooth,
         ..PARAMS
@@ -78,7 +78,7 @@ fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
 }
 
 #[test]
-fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
+fn force_above_the_maximum_for_its_depth_is_reported() {
     let plain = OFF;
     let textured = SurfaceParams {
         texture: Texture {
@@ -137,7 +137,7 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
 }
 
 #[test]
-fn a_contact_that_gives_is_told_with_the_controller_on() {
+fn energy_created_by_taps_is_reported_with_controller_on() {
     // A spring that is sampled in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
     // and twice 0.75 mm.
     let (reported, given) = tap(&PARAMS, 0.0, true);
@@ -189,7 +189,7 @@ fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
 
 /// Taps during the ramp, with more force on the way out, as in an old version of the tick.
 #[test]
-fn a_tap_in_the_ramp_that_gives_is_told() {
+fn energy_created_by_taps_in_the_ramp_is_reported() {
     let tapped = |more: f32| {
         let mut watch = watch(&PARAMS, None);
         let mut reported = false;
@@ -219,7 +219,7 @@ fn a_tap_in_the_ramp_that_gives_is_told() {
 }
 
 #[test]
-fn a_force_that_grows_on_its_way_out_is_told() {
+fn rising_force_during_fade_out_is_reported() {
     let reported = |second_n: f32| {
         let mut watch = watch(&PARAMS, None);
         let fades = |tick, force_n| TickRecord {
@@ -233,7 +233,7 @@ fn a_force_that_grows_on_its_way_out_is_told() {
 }
 
 #[test]
-fn a_force_with_an_open_clutch_is_told() {
+fn force_with_open_clutch_is_reported_unless_slew_limited() {
     let reported = |limits| {
         let mut watch = watch(&PARAMS, None);
         let open = |tick, force_n| TickRecord {
@@ -248,7 +248,7 @@ fn a_force_with_an_open_clutch_is_told() {
 }
 
 #[test]
-fn a_tip_that_swings_is_told_and_tremor_is_not() {
+fn limit_cycle_is_reported_but_hand_tremor_is_not() {
     let reported = |hz: f32, amplitude_mm: f32| {
         let mut watch = watch(&PARAMS, None);
         let mut reported = false;

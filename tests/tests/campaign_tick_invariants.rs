@@ -90,7 +90,7 @@ fn a_tick_as_it_should_be_passes_and_is_measured() {
 }
 
 #[test]
-fn each_wrong_current_is_told() {
+fn each_wrong_current_is_reported() {
     let mut tick = Tick::pushing(up(1.0));
     tick.drive.currents_a.y = f32::NAN;
     assert!(tick.verdict().contains("not a number"));
@@ -103,7 +103,7 @@ fn each_wrong_current_is_told() {
 }
 
 #[test]
-fn amplifiers_on_against_an_input_are_told() {
+fn enabled_amplifiers_with_blocking_input_are_reported() {
     let forge: [fn(&mut GuardInputs); 4] = [
         |sense| sense.dead_man = false,
         |sense| sense.emergency_stop = true,
@@ -118,7 +118,7 @@ fn amplifiers_on_against_an_input_are_told() {
 }
 
 #[test]
-fn outputs_are_held_only_when_asked_for_and_with_the_amplifiers_off() {
+fn held_outputs_require_permission_and_disabled_amplifiers() {
     let held = |enabled, held, may_hold| {
         let mut tick = Tick::pushing(up(0.0));
         tick.drive = GuardOutputs {
@@ -139,14 +139,14 @@ fn outputs_are_held_only_when_asked_for_and_with_the_amplifiers_off() {
 }
 
 #[test]
-fn a_hot_winding_is_told() {
+fn hot_winding_is_reported() {
     let mut tick = Tick::pushing(up(1.0));
     tick.truth.winding_c[1] = 112.1;
     assert!(tick.verdict().contains("112.1 °C"));
 }
 
 #[test]
-fn more_than_the_clamp_by_the_encoders_is_told_whatever_is_true() {
+fn force_above_clamp_at_encoder_pose_is_reported() {
     for off in [0, 100_000] {
         let mut tick = Tick::pushing(up(7.67));
         tick.truth.counts[2] += off;
@@ -205,7 +205,7 @@ fn a_command_that_is_held_is_judged_by_what_is_true() {
 }
 
 #[test]
-fn motors_taken_for_colder_than_they_are_are_told() {
+fn underestimated_winding_temperature_is_reported() {
     let watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let mut tick = Tick::pushing(up(1.0));
     let reported =
@@ -223,7 +223,7 @@ fn motors_taken_for_colder_than_they_are_are_told() {
 }
 
 #[test]
-fn every_hostile_calibration_is_refused_and_would_be_told() {
+fn hostile_calibrations_are_refused_and_most_exceed_limits() {
     assert_eq!(hostile_calibrations::harmless().validate(), Ok(()));
     assert_eq!(
         hostile_calibrations::keeps_ceilings(&hostile_calibrations::harmless()),
@@ -264,7 +264,7 @@ fn reported(samples: &[TickRecord]) -> Result<(), String> {
 }
 
 #[test]
-fn each_wrong_force_that_is_told_is_told_of() {
+fn each_wrong_force_in_telemetry_is_reported() {
     let push = |newtons: f32| Vec3::Z * newtons;
     assert_eq!(
         reported(&[sample(1, push(7.65)), sample(2, push(6.65))]),

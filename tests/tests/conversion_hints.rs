@@ -109,7 +109,7 @@ fn python(folder: &Path, script: &str) {
 }
 
 #[test]
-fn what_gdal_reads_and_this_does_not_is_converted_by_the_hint() {
+fn hint_converts_formats_that_only_gdal_reads() {
     if !has_gdal() {
         return;
     }
@@ -207,7 +207,7 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
 
 /// Pictures and numbers that are not heights: the command selects one band unchanged.
 #[test]
-fn what_is_no_height_field_becomes_one_by_the_hint() {
+fn hint_turns_pictures_and_complex_data_into_heights() {
     if !has_gdal() {
         return;
     }
@@ -280,7 +280,7 @@ fn a_name_that_a_shell_would_read_is_quoted() {
 
 /// `hapterra info` for two copies of a file, one truncated: the command distinguishes them.
 #[test]
-fn a_check_sum_tells_a_whole_file_from_a_cut_one() {
+fn hinted_checksum_distinguishes_damaged_file_from_intact() {
     if !has_gdal() {
         return;
     }
@@ -316,7 +316,7 @@ fn a_check_sum_tells_a_whole_file_from_a_cut_one() {
 /// Both commands for an empty file that is larger than memory, with strips too large to be read one
 /// by one.
 #[test]
-fn what_is_too_large_is_cut_or_made_coarser_by_the_hint() {
+fn hints_crop_or_coarsen_a_raster_larger_than_memory() {
     if !has_gdal() {
         return;
     }
@@ -459,7 +459,7 @@ fn points_become_a_grid_by_the_hint() {
 
 /// Files that GDAL does not read have no hint for GDAL.
 #[test]
-fn no_hint_names_a_converter_that_cannot_read_the_file() {
+fn hint_omits_gdal_for_files_that_gdal_cannot_read() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in [
         "points.las",

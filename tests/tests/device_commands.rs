@@ -28,7 +28,7 @@ fn fails(words: &[&str], code: i32, says: &[&str]) {
 }
 
 #[test]
-fn list_says_what_it_looked_for() {
+fn list_names_boards_probes_and_addresses_searched() {
     // Port 1 is unused.
     let output = hapterra(&["list", "--tcp", "127.0.0.1:1"]);
     let text = output_text(&output);
@@ -92,7 +92,7 @@ fn status_of_the_device_in_memory_names_what_blocks_it() {
 }
 
 #[test]
-fn a_record_goes_to_a_file_and_comes_back() {
+fn calibration_record_round_trips_through_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("arm.toml");
     let file = file.to_str().expect("a plain path");
@@ -115,7 +115,7 @@ fn a_record_goes_to_a_file_and_comes_back() {
 
 /// A Premium 1.0's ratios have no source: a record without measured ratios needs explicit consent.
 #[test]
-fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
+fn guessed_ratios_need_measurement_or_explicit_consent() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];
     for model in ["premium-1.0", "premium-3.0", "omni"] {
         for skip in ["none", "zero,gravity"] {
@@ -140,7 +140,7 @@ fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
 }
 
 #[test]
-fn a_record_above_a_ceiling_is_refused_before_it_is_sent() {
+fn record_above_absolute_limit_is_refused_before_sending() {
     let base = [
         "calibrate",
         "--device",

@@ -101,7 +101,7 @@ fn files(folder_of_folders: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn another_run_reads_no_block_for_what_is_coarse_and_has_the_same_bits() {
+fn second_run_reads_no_coarse_block_and_has_identical_heights() {
     let bed = bed();
     let truth = truth(&bed.file);
     let (first, read) = look(&bed.file, &bed.cache);
@@ -161,7 +161,7 @@ fn a_file_that_is_another_now_has_its_own_heights() {
 }
 
 #[test]
-fn what_is_changed_while_it_is_read_is_not_taken_for_what_it_was() {
+fn file_overwritten_while_open_is_reread_by_next_run() {
     let bed = bed();
     let other = bed.folder.path().join("other.tif");
     hills(&other, 2);
@@ -227,7 +227,7 @@ fn whatever_becomes_of_the_folder_the_heights_are_right() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_or_has_no_room_is_as_if_absent() {
+fn unwritable_or_full_folder_behaves_like_no_cache() {
     let bed = bed();
     let truth = truth(&bed.file);
     let blocked = bed.folder.path().join("blocked");
@@ -285,7 +285,7 @@ fn tiles(folder: &Path) {
 }
 
 #[test]
-fn of_many_files_those_that_are_touched_tell_whether_they_are_the_same() {
+fn changed_file_of_a_mosaic_invalidates_its_cached_samples() {
     let folder = tempfile::tempdir().expect("a folder");
     let srtm = folder.path().join("srtm");
     fs::create_dir(&srtm).expect("made");

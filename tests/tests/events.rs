@@ -337,7 +337,7 @@ fn judge(events: &[Value], record: &Path) {
 
 /// A demo sends the events of a run, refuses impossible commands, and has marks.
 #[test]
-fn demo_tells_samples_marks_and_refusals() {
+fn demo_emits_samples_marks_and_refusals() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
     let out = folder.path().join("out");

@@ -303,7 +303,7 @@ fn made() -> Raster {
 }
 
 #[test]
-fn at_2000_cells_a_second_over_200_kb_a_second_there_is_no_hole() {
+fn fallback_prevents_missing_terrain_at_2000_cells_per_second() {
     let raster = made();
     let scale = Scale::new(CELL_MM, 0.1).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
@@ -324,7 +324,7 @@ fn at_2000_cells_a_second_over_200_kb_a_second_there_is_no_hole() {
 }
 
 #[test]
-fn on_the_emulated_board_over_real_ground_there_is_none_either() {
+fn fallback_prevents_missing_terrain_on_the_emulated_board() {
     let Some((qemu, image)) = emulated_board() else {
         return;
     };

@@ -41,7 +41,7 @@ fn converted(current_a: f32) -> f64 {
 }
 
 #[test]
-fn an_encoder_off_by_two_ticks_jumps_makes_no_force_above_the_records() {
+fn encoder_error_of_two_jumps_keeps_force_within_the_maximum() {
     let record = Calibration::PREMIUM_1_5;
     let mechanism = Kinematics::new(&record).expect("valid");
     let model = PhantomModel::premium_1_5();

@@ -107,7 +107,7 @@ fn an_image_cannot_reach_the_hosts_files() {
 }
 
 #[test]
-fn what_an_image_reports_does_not_control_the_terminal() {
+fn image_output_is_escaped_for_the_terminal() {
     let Some(qemu) = qemu() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("image.elf");

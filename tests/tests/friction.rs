@@ -123,7 +123,7 @@ const ON_REAL_GROUND: [(f64, f64, usize); 4] = [
 const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 200)];
 
 #[test]
-fn on_real_ground_it_slides_within_two_parts_in_a_hundred() {
+fn sliding_friction_on_real_terrain_is_within_three_percent() {
     let cases = ON_REAL_GROUND.map(|case| (case, 0.02));
     let sticky = ON_STICKY_GROUND.map(|case| (case, 0.03));
     let mut slides = [0; 2];

@@ -106,7 +106,7 @@ fn sensible_materials(random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn no_bytes_break_the_tick() {
+fn tick_survives_random_bytes() {
     let mut random = Random::new(11);
     for round in 0..20_000 {
         tick::run(&input(&mut random, round, 400, sensible_ticks));
@@ -114,7 +114,7 @@ fn no_bytes_break_the_tick() {
 }
 
 #[test]
-fn no_bytes_break_the_tick_on_materials() {
+fn tick_on_materials_survives_random_bytes() {
     let mut random = Random::new(13);
     for round in 0..20_000 {
         tick::run(&input(&mut random, round, 600, sensible_materials));
@@ -208,7 +208,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn no_bytes_break_the_link() {
+fn link_survives_random_bytes() {
     let mut random = Random::new(12);
     let mut wire = wire::Wire::default();
     for round in 0..20_000 {
@@ -234,7 +234,7 @@ fn sensible_tile(random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn no_bytes_break_a_tile() {
+fn tile_packing_survives_random_bytes() {
     let mut random = Random::new(13);
     for round in 0..4_000 {
         tile::run(&input(&mut random, round, 5000, sensible_tile));
@@ -304,7 +304,7 @@ const SMALL_PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x02\0\0\0\x02\x08
 \0\0\0\x0eIDATx\x9cc`db`f\x01\0\0\x1d\0\x0b\r\xb5R\x06\0\0\0\0IEND\xaeB`\x82";
 
 #[test]
-fn no_bytes_break_the_readers_of_terrain() {
+fn terrain_readers_survive_random_bytes() {
     for (kind, [name, _]) in terrain::KINDS.iter().enumerate() {
         assert!(terrain::run(&small_terrain(kind, 0)), "{name}");
     }
@@ -328,7 +328,7 @@ fn sensible_text(random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn no_bytes_break_the_readers_of_other_files() {
+fn readers_of_other_input_files_survive_random_bytes() {
     let mut random = Random::new(15);
     for round in 0..10_000 {
         text::run(&input(&mut random, round, 400, sensible_text));

@@ -60,7 +60,7 @@ fn force(terrain: &Terrain<'_>) -> [f64; 3] {
 }
 
 #[test]
-fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
+fn slope_on_degree_grid_is_rendered_true_in_any_direction() {
     for latitude in [0.0, 35.0, 60.0, -72.0] {
         for slope in [[1.0, 0.0], [0.0, 1.0], [0.5, -0.5]] {
             let raster = Raster::open(plane(latitude, slope), &OpenOptions::default());
@@ -81,7 +81,7 @@ fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
 /// Same through the command: at 1 mm a cell, a millimetre of the trajectory is a rendered cell, so
 /// a step east and a step north are equally far on the ground.
 #[test]
-fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
+fn replay_at_60_degrees_renders_slopes_alike_on_both_axes() {
     let folder = tempfile::tempdir().expect("a folder");
     let [path, out] = ["path.csv", "felt.csv"].map(|name| folder.path().join(name));
     for (slope, axis) in [([1.0, 0.0], 0), ([0.0, 1.0], 1)] {

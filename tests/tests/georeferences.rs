@@ -131,7 +131,7 @@ fn compare(raster: &Raster, row: &Row, reader: Reader) {
 /// For each: reference system, bounds, transformation to longitudes, cell's unit, vertical unit and
 /// datum, and their source.
 #[test]
-fn info_says_of_each_whether_it_is_stated_follows_or_is_assumed() {
+fn info_names_the_source_of_each_georeference_value() {
     let Some(folder) = shared("dem/real") else {
         return;
     };

@@ -137,7 +137,7 @@ fn terrain(folder: &Path) -> std::path::PathBuf {
 }
 
 #[test]
-fn nothing_that_a_device_says_controls_the_terminal() {
+fn device_text_cannot_control_the_terminal() {
     let device = started();
     let hapterra = |words: &[&str]| {
         let run = Command::new(hapterra_binary()).args(words).output();
@@ -151,7 +151,7 @@ fn nothing_that_a_device_says_controls_the_terminal() {
 }
 
 #[test]
-fn nothing_that_a_device_asks_for_floods_the_terminal() {
+fn device_requests_cannot_flood_the_terminal() {
     let folder = tempfile::tempdir().expect("a folder");
     let device = format!("tcp:{}", started());
     let with_plant = format!("{device}+plant:127.0.0.1:1");

@@ -75,7 +75,7 @@ fn names_it(run: &Output, left: &Path, content: &[u8]) {
 }
 
 #[test]
-fn a_killed_commands_recording_is_named_at_the_next_start_and_kept() {
+fn recording_of_a_killed_run_is_kept_and_named_at_next_start() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let terrain = terrain(folder);

@@ -127,7 +127,7 @@ fn a_mask_in_one_large_strip_is_read_row_by_row() {
 
 /// Without a place for unpacked data, everything is in memory, and the reason is reported.
 #[test]
-fn a_packed_mask_in_one_large_strip_is_unpacked_on_disk_or_it_is_named() {
+fn packed_mask_in_one_strip_is_unpacked_on_disk_or_reported() {
     let mask = zstd_bomb((MASKED * MASKED).div_ceil(128 * 1024) as usize);
     let (folder, path) = masked(50000, &mask);
     let has_remark = |raster: &Raster, words: [&str; 2]| {
@@ -269,7 +269,7 @@ fn strip_of_4_gb_is_read_in_the_memory_of_a_terrain() {
 /// The whole file is searched for a height, which uses no memory, but is reported, as it takes
 /// long.
 #[test]
-fn a_file_of_nothing_is_looked_through_and_it_says_so() {
+fn search_of_a_file_without_heights_is_reported() {
     const WIDE: u32 = 12_000;
     let image = floats_in_a_strip([WIDE; 2], FIRST);
     let folder = tempfile::tempdir().expect("a folder");

@@ -265,7 +265,7 @@ fn the_device_refuses_a_host_of_another_version() {
 }
 
 #[test]
-fn the_host_says_which_versions_do_not_fit() {
+fn version_mismatch_error_names_both_protocols() {
     /// Answers every message with a refusal.
     struct Newer;
     impl Transport for Newer {

@@ -41,7 +41,7 @@ fn undisturbed_it_ends_at_once_and_nothing_is_uncertain() {
 }
 
 #[test]
-fn any_one_frame_may_be_lost_repeated_or_late() {
+fn session_survives_any_single_lost_repeated_or_late_frame() {
     let harms = single_harms();
     eprintln!("{} runs", harms.len());
     for harm in harms {
@@ -57,7 +57,7 @@ fn any_one_frame_may_be_lost_repeated_or_late() {
 }
 
 #[test]
-fn any_two_frames_of_the_opening_may_be_lost_repeated_or_late() {
+fn session_survives_any_two_frame_faults_while_opening() {
     // The first frames in each direction: open, scene, zero, arm, the tile and their answers.
     let opening: Vec<_> = single_harms()
         .into_iter()
@@ -77,7 +77,7 @@ fn any_two_frames_of_the_opening_may_be_lost_repeated_or_late() {
 }
 
 #[test]
-fn any_two_frames_of_the_end_may_be_lost_repeated_or_late() {
+fn session_survives_any_two_frame_faults_while_closing() {
     let [to_device, to_host] = frames();
     let last: Vec<_> = single_harms()
         .into_iter()
@@ -140,7 +140,7 @@ fn the_device_may_be_reset_at_any_moment() {
 }
 
 #[test]
-fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
+fn close_of_an_armed_session_is_confirmed_once_disarmed() {
     let abrupt = || Plan {
         abrupt: true,
         ..Plan::default()
@@ -206,14 +206,14 @@ fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interrupt
 }
 
 #[test]
-fn all_that_was_said_may_come_again_at_any_moment() {
+fn replay_of_earlier_frames_does_not_change_the_outcome() {
     for way in [Direction::ToDevice, Direction::ToHost] {
         at_every_moment_after(&histories(), Interruption::Echo(way));
     }
 }
 
 #[test]
-fn what_a_device_said_before_its_reset_may_come_again_at_any_moment() {
+fn frames_from_before_a_reset_do_not_change_the_outcome() {
     let ticks = agree(&Plan::default()).ticks;
     let reset = [60, ticks / 2].map(|at| vec![(at, Interruption::DeviceReset)]);
     at_every_moment_after(&reset, Interruption::Echo(Direction::ToHost));
@@ -225,7 +225,7 @@ fn a_host_of_another_version_may_speak_at_any_moment() {
 }
 
 #[test]
-fn a_host_whose_device_is_taken_is_told_so_at_once() {
+fn replaced_host_reports_takeover_promptly() {
     let ticks = agree(&Plan::default()).ticks;
     let mut reported = 0;
     // Once alone, and once with its notification lost.
@@ -253,7 +253,7 @@ fn a_host_whose_device_is_taken_is_told_so_at_once() {
 }
 
 #[test]
-fn no_answer_that_comes_late_is_taken_for_that_to_a_later_question() {
+fn late_answer_is_never_matched_to_a_later_query() {
     let mut answers = 0;
     for seed in 0..60 {
         let plan = Plan {
@@ -295,7 +295,7 @@ fn every_request_is_done_or_refused_once_under_lost_frames() {
 }
 
 #[test]
-fn whatever_happens_between_requests_the_end_is_agreed_or_told() {
+fn interruption_between_requests_ends_in_confirmed_disarm() {
     let ticks = agree(&with_errands(vec![])).ticks;
     for what in [
         Interruption::HostKilled,
@@ -316,7 +316,7 @@ fn whatever_happens_between_requests_the_end_is_agreed_or_told() {
 }
 
 #[test]
-fn a_device_of_another_version_is_told_and_never_driven() {
+fn device_of_another_version_is_reported_and_never_driven() {
     let ticks = agree(&Plan::default()).ticks;
     let other = (0, Interruption::OtherDevice);
     let report = check(&Plan {
@@ -344,7 +344,7 @@ fn a_device_of_another_version_is_told_and_never_driven() {
 }
 
 #[test]
-fn a_host_that_is_gone_leaves_an_arm_that_is_let_go_in_time() {
+fn arm_is_disarmed_in_time_after_its_host_disappears() {
     let ticks = agree(&Plan::default()).ticks;
     for at in (0..ticks).step_by(MOMENTS) {
         let plan = Plan {
@@ -356,7 +356,7 @@ fn a_host_that_is_gone_leaves_an_arm_that_is_let_go_in_time() {
 }
 
 #[test]
-fn the_line_may_be_cut_one_way_at_any_moment() {
+fn cut_in_one_direction_ends_in_confirmed_disarm_or_report() {
     let ticks = agree(&Plan::default()).ticks;
     for long in [300, 1_500, 5_000] {
         for way in [Direction::ToDevice, Direction::ToHost] {
@@ -375,7 +375,7 @@ fn the_line_may_be_cut_one_way_at_any_moment() {
 }
 
 #[test]
-fn whatever_goes_wrong_at_random_the_end_is_agreed_or_told() {
+fn random_faults_end_in_confirmed_disarm_or_a_report() {
     let (mut agreed, mut reported) = (0, 0);
     for seed in 0..400 {
         let plan = Plan::random(seed);

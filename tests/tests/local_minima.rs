@@ -136,7 +136,7 @@ fn ways(
 }
 
 #[test]
-fn a_proxy_beside_its_place_is_seen_there() {
+fn proxy_displaced_from_its_minimum_is_detected() {
     let ground = Terrain::new(Kind::Hills, [60, 60], 4);
     let path = vec![
         [20.5, 20.25, 9.0],
@@ -159,7 +159,7 @@ fn scenes(numbers: std::ops::Range<u64>) -> impl Iterator<Item = (u64, Scene)> {
 }
 
 #[test]
-fn both_judges_say_the_same_of_random_scenes() {
+fn both_oracles_agree_on_random_scenes() {
     let mut buffers = Buffers::default();
     let mut total = Found::default();
     for (number, scene) in scenes(0..200) {
@@ -183,7 +183,7 @@ fn both_judges_say_the_same_of_random_scenes() {
 }
 
 #[test]
-fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
+fn every_proxy_on_real_terrain_rests_at_a_closest_point() {
     for file in ["pre_runout_DEM.asc", "bigtujunga.tif"] {
         let Some(path) = shared(&format!("dem/real/{file}")) else {
             return;
@@ -241,7 +241,7 @@ fn cut(raster: &Raster, steepness: f64) -> Terrain {
 /// A descent whose first step was 2⁻¹⁰ cell stepped over the minimum where it started, on a slope
 /// of 10⁶ with the HIP about 10⁻⁶ cell inside.
 #[test]
-fn the_judge_stays_where_it_is_when_that_is_a_closest_point() {
+fn descent_oracle_stays_at_a_closest_point() {
     const HIPS: [(u64, [f64; 3]); 5] = [
         (
             317,

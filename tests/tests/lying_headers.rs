@@ -222,7 +222,7 @@ fn an_overview_whose_tiles_are_not_there_leaves_the_full_image() {
 }
 
 #[test]
-fn tiles_that_are_not_where_they_are_said_to_be_are_holes() {
+fn tile_with_a_false_offset_is_no_data() {
     let places = |first: u32| {
         let mut places = vec![DATA; 16];
         places[0] = first;
@@ -244,7 +244,7 @@ fn tiles_that_are_not_where_they_are_said_to_be_are_holes() {
 }
 
 #[test]
-fn a_tile_that_says_it_is_huge_takes_no_memory() {
+fn tile_with_huge_stated_size_is_read_in_bounded_memory() {
     let packed = |bytes: u32, compression: u32, place: u32| {
         let mut sizes = vec![TILE_BYTES; 16];
         sizes[0] = bytes;

@@ -118,7 +118,7 @@ const SLOW: [f64; 2] = [18.51, 0.02];
 const BORDER: usize = 51;
 
 #[test]
-fn another_stiffness_than_that_on_the_way_is_found() {
+fn wrong_force_during_a_stiffness_change_is_detected() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::None);
     let judged = way.honest();
     assert_eq!((judged.in_whole, judged.open), (300, 0));
@@ -141,7 +141,7 @@ fn another_stiffness_than_that_on_the_way_is_found() {
 }
 
 #[test]
-fn where_two_are_equally_near_either_is_right_until_the_force_tells() {
+fn equidistant_materials_are_accepted_until_force_decides() {
     // Up to the line half way between two samples.
     let way = Way::over([SOFT, HARD], [18.5, 1.0 / 64.0], Shading::None);
     let on_line = 66;
@@ -217,7 +217,7 @@ fn another_damping_is_found() {
 }
 
 #[test]
-fn what_is_shaded_or_fades_is_judged_by_its_size() {
+fn shaded_force_is_checked_by_magnitude() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::Smooth);
     let judged = way.honest();
     assert_eq!((judged.in_whole, judged.by_size), (0, 300));

@@ -223,7 +223,7 @@ fn recording_keeps_its_materials_for_its_replay() {
 }
 
 #[test]
-fn the_demo_and_run_feel_materials_too() {
+fn demo_and_run_accept_and_record_materials() {
     let folder = Folder::new();
     let demo = [
         "demo",
@@ -258,7 +258,7 @@ fn the_demo_and_run_feel_materials_too() {
 }
 
 #[test]
-fn no_view_makes_one_of_the_materials_stiffer_than_a_view_may_be() {
+fn stiffness_change_is_limited_by_the_stiffest_material() {
     // The default has 0.5 N/mm and rock 1.0.
     let folder = Folder::new();
     let run = ["run", "level.asc", "--device", "native", "--duration", "3s"];
@@ -278,7 +278,7 @@ fn no_view_makes_one_of_the_materials_stiffer_than_a_view_may_be() {
 }
 
 #[test]
-fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
+fn invalid_materials_are_refused_with_a_hint() {
     let folder = Folder::new();
     let fails = |materials: &str, table: &str, wanted: &[&str]| {
         let options = ["x.csv", "--materials", materials, "--surface", table];
@@ -405,7 +405,7 @@ fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<(ContactStat
 }
 
 #[test]
-fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
+fn replay_with_materials_is_bit_identical_on_emulated_board() {
     let raster = Synth::new(Kind::Fractal, 3, 25.0).raster(150, 140);
     let raster = raster.expect("raster");
     let materials = patchwork(&raster);

@@ -144,7 +144,7 @@ fn tiles(folder: &Path, from: &Path) {
 }
 
 #[test]
-fn a_folder_a_pattern_and_a_vrt_have_the_samples_that_gdal_merges() {
+fn folder_pattern_and_vrt_have_the_samples_of_gdals_merge() {
     let Some(range) = shared("real/bigtujunga.tif") else {
         return;
     };
@@ -324,7 +324,7 @@ fn source(file: &str, at: &str) -> String {
 }
 
 #[test]
-fn gaps_are_holes_and_what_lies_outside_is_cut() {
+fn gaps_are_no_data_and_parts_outside_are_cut() {
     let place = folder();
     let at = place.path();
     two_tiles(at, 2);
@@ -350,7 +350,7 @@ fn gaps_are_holes_and_what_lies_outside_is_cut() {
 /// One bad file is no-data with a single warning that names it, and the others are rendered; a
 /// fault in the index's data is an error.
 #[test]
-fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
+fn unreadable_file_is_no_data_with_one_warning() {
     let place = folder();
     let at = place.path();
     two_tiles(at, 0);
@@ -379,7 +379,7 @@ fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_with_the_file_and_the_reason() {
+fn mismatched_file_is_refused_with_its_name_and_reason() {
     let place = folder();
     let at = place.path();
     for (other, why) in [
@@ -512,7 +512,7 @@ fn the_hint_for_files_that_do_not_fit_makes_one_of_them() {
 
 /// A damaged block of a TIFF is no-data, and the warning names the file.
 #[test]
-fn a_damaged_block_of_one_file_is_a_hole_that_is_named() {
+fn damaged_block_is_no_data_and_its_file_is_named() {
     let Some(range) = shared("real/bigtujunga.tif") else {
         return;
     };

@@ -108,7 +108,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
 
 /// The same for the closed loop of encoders, currents and the arm between them.
 #[test]
-fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
+fn emulated_demo_equals_native_and_is_never_late() {
     let Some((qemu, image)) = emulated_board() else {
         return;
     };

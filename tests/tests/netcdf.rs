@@ -282,7 +282,7 @@ fn axes_in_kilometres_are_as_long_on_the_ground() {
 }
 
 #[test]
-fn depths_are_told_by_positive_and_by_standard_name() {
+fn depth_sign_follows_positive_then_standard_name() {
     if !has_gdal() {
         return;
     }

@@ -58,7 +58,7 @@ fn rows() -> Vec<Row> {
 }
 
 #[test]
-fn info_and_placing_say_the_same_longitudes_and_latitudes_as_proj() {
+fn lonlat_of_bounds_and_middle_agrees_with_proj() {
     for row in rows() {
         let report = info(Path::new(&row.path()));
         let bounds = &report["bounds_lonlat"];
@@ -82,7 +82,7 @@ fn info_and_placing_say_the_same_longitudes_and_latitudes_as_proj() {
 }
 
 #[test]
-fn what_is_asked_for_by_longitude_and_latitude_is_there() {
+fn lonlat_target_resolves_to_its_sample() {
     for row in rows() {
         let raster = row.raster();
         let file = raster.georeference();
@@ -167,7 +167,7 @@ fn stated(file: &str) -> String {
 }
 
 #[test]
-fn info_says_what_its_longitudes_and_latitudes_are() {
+fn info_states_unit_datum_and_accuracy_of_lonlat() {
     for (file, parts) in [
         (
             "ntf_paris_grads",
@@ -194,7 +194,7 @@ fn info_says_what_its_longitudes_and_latitudes_are() {
 
 /// A sheared grid is rendered in its true shape, with a note.
 #[test]
-fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
+fn sheared_grid_is_resampled_to_true_shape_with_a_note() {
     let path = format!("{FOLDER}/sheared.tif");
     let raster = Raster::open(&path, &OpenOptions::default()).expect("a terrain");
     let grid = HapticGrid::new(&raster, HapticCells::Square);
@@ -217,7 +217,7 @@ fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
 /// A map in feet whose heights have no unit is rendered 3.28 times too steep if they are in feet as
 /// well: every command reports it until the unit is stated.
 #[test]
-fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
+fn assumed_height_unit_is_reported_until_stated() {
     let reported = |file: &str, more: &[&str]| {
         let output = Command::new(hapterra_binary())
             .args(["info", "--json", &format!("{FOLDER}/{file}")])
@@ -248,7 +248,7 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
 
 /// Unknown projections are named, with a remedy.
 #[test]
-fn a_projection_that_is_not_known_is_named_with_what_to_do() {
+fn unsupported_projection_is_named_with_a_remedy() {
     for (file, name) in [
         ("new_zealand.tif", "New Zealand Map Grid"),
         ("grinten.tif", "VanDerGrinten"),

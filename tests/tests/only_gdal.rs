@@ -78,7 +78,7 @@ fn large_files_stay_on_disk_and_overviews_survey_them() {
 }
 
 #[test]
-fn what_gdal_does_not_know_keeps_its_own_error() {
+fn file_unknown_to_gdal_keeps_its_own_error() {
     if !has_gdal() {
         return;
     }
@@ -97,7 +97,7 @@ fn what_gdal_does_not_know_keeps_its_own_error() {
 }
 
 #[test]
-fn gaps_of_a_vrt_without_no_data_are_said_to_be_heights() {
+fn vrt_gaps_without_no_data_are_reported_as_heights() {
     if !has_gdal() {
         return;
     }
@@ -352,7 +352,7 @@ fn formats_are_named_where_there_is_no_libgdal() {
 /// GDAL reads the no-data mark as a height of 0: such a file is refused, and one with a no-data
 /// number is read.
 #[test]
-fn holes_of_grass_are_no_heights() {
+fn grass_null_mark_is_refused_and_no_data_number_is_read() {
     if !has_gdal() {
         return;
     }

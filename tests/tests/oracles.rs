@@ -432,7 +432,7 @@ fn a_contact_that_pulls_is_found() {
 /// North of the proxy is no-data, and beyond its corner the HIP is above the ground: the line to
 /// the HIP first leads over no-data, while the proxy is before the corner.
 #[test]
-fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
+fn friction_at_no_data_edge_excuses_a_hip_above_ground() {
     let hole = Terrain::from_fn(Kind::NoData, SIZE, |x, y| match (x, y) {
         (19, 21) => f32::NAN,
         _ => 0.0_f32.max((20 - x) as f32),
@@ -468,7 +468,7 @@ const NEAR_SIDE: [f64; 3] = [19.4375, 10.5, 1.4375];
 const FAR_SIDE: [f64; 3] = [20.4375, 10.5, 1.5625];
 
 #[test]
-fn a_proxy_that_goes_over_a_ridge_to_be_farther_off_is_found() {
+fn proxy_crossing_a_ridge_to_a_farther_point_is_reported() {
     let honest = touching(IN_RIDGE, NEAR_SIDE);
     let forged = touching(IN_RIDGE, FAR_SIDE);
     let before = touching([19.75, 10.5, 1.0], [19.375, 10.5, 1.375]);
@@ -566,7 +566,7 @@ fn a_wall_that_is_passed_is_found() {
 }
 
 #[test]
-fn a_force_that_comes_or_goes_at_once_is_found() {
+fn abrupt_force_onset_or_release_is_reported() {
     let before = touching(BELOW, ON);
     let fades = |fade| faded(BELOW, ON, fade);
     let terrain = &flat();
@@ -662,7 +662,7 @@ fn other_bits_far_away_are_found() {
 }
 
 #[test]
-fn a_scene_that_feels_otherwise_mirrored_is_found() {
+fn result_differing_under_a_symmetry_is_reported() {
     let (scene, seen, mut buffers) = played(Supply::Held);
     for symmetry in symmetry::all() {
         let turned = |p| symmetry.point(&scene.terrain, p);

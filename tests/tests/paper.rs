@@ -62,7 +62,7 @@ fn eq_1_to_5_the_patch_is_uva_plus_ub_plus_vc_plus_d() {
 }
 
 #[test]
-fn eq_6_and_7_on_the_unit_grid_x_and_y_are_u_and_v_plus_the_cell() {
+fn eq_6_and_7_x_and_y_are_cell_plus_u_and_v_on_unit_grid() {
     for mut rule in rules(|_, _| 1.0) {
         rule([37.25, 12.75, 2.0]);
         assert_eq!(rule([37.25, 12.75, 0.9]), (true, [37.25, 12.75, 1.0]));
@@ -70,7 +70,7 @@ fn eq_6_and_7_on_the_unit_grid_x_and_y_are_u_and_v_plus_the_cell() {
 }
 
 #[test]
-fn eq_8_to_11_at_the_local_closest_point_the_partial_derivatives_vanish() {
+fn eq_8_to_11_partial_derivatives_vanish_at_closest_point() {
     let patch = Patch::new(CORNERS.map(|h| h - 0.4));
     let (p, q) = (0.55, 0.45);
     let found = nearest_downhill(&patch, (p, q), (0.5, 0.5));
@@ -133,7 +133,7 @@ fn step_1_segment_above_all_patches_is_free_space() {
 }
 
 #[test]
-fn step_2_the_search_goes_on_over_edges_and_vertices() {
+fn step_2_search_continues_over_edges_and_vertices() {
     for mut rule in rules(|x, _| 0.1 * x as f32) {
         rule([10.5, 10.5, 3.0]);
         rule([10.5, 10.5, 1.0]);
@@ -161,7 +161,7 @@ fn step_2_concave_places_rest_on_an_edge_or_a_vertex() {
 }
 
 #[test]
-fn step_3_the_sign_of_the_way_out_along_the_normal_decides() {
+fn step_3_sign_of_displacement_along_normal_decides_contact() {
     let [mut paper, _] = rules(rolling);
     let mut both = [0, 0];
     for i in 0..600 {
@@ -184,7 +184,7 @@ fn surface(x: f64, y: f64) -> f64 {
 }
 
 #[test]
-fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
+fn step_4_force_is_proportional_to_displacement() {
     let params = SurfaceParams::PREMIUM;
     let mut contact = FieldContact::new(64, rolling);
     contact.step([30.5, 30.5, 3.0]);

@@ -58,7 +58,7 @@ fn the_picture_of_texture_is_the_examples() {
 }
 
 #[test]
-fn a_picture_that_is_off_is_seen() {
+fn altered_picture_is_detected() {
     let line = |points: &str| format!("<polyline points=\"{points}\" stroke=\"#333\"/>");
     assert!(is_same(&line("0.0,1.2 0.5,1.3"), &line("0.0,1.2 0.5,1.4")));
     assert!(!is_same(&line("0.0,1.2 0.5,1.3"), &line("0.0,1.2 0.5,1.6")));

@@ -434,7 +434,7 @@ fn clutch_carries_the_terrain_with_the_hand() {
 }
 
 #[test]
-fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
+fn clutch_input_opens_clutch_and_allows_placement_changes() {
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();
@@ -471,7 +471,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
 }
 
 #[test]
-fn what_cannot_be_had_changes_nothing_and_is_told() {
+fn impossible_change_is_reported_and_changes_nothing() {
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();

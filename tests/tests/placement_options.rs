@@ -40,7 +40,7 @@ fn hapterra(command: &str, file: &Path, more: &[&str]) -> Output {
 }
 
 #[test]
-fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
+fn default_placement_fits_workspace_and_prints_scale() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     for command in ["run", "demo"] {
@@ -65,7 +65,7 @@ fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
 }
 
 #[test]
-fn place_scale_and_level_are_taken_and_said() {
+fn place_scale_and_level_options_are_applied_and_printed() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     for (more, parts) in [
@@ -111,7 +111,7 @@ fn place_scale_and_level_are_taken_and_said() {
 }
 
 #[test]
-fn what_cannot_be_placed_is_an_error_that_says_the_bounds_and_what_to_do() {
+fn impossible_placement_error_states_bounds_or_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     let bounds = "x 5000 to 5390, y 7000 to 7290";
@@ -232,7 +232,7 @@ fn narrower(from_deg: f64, to_deg: f64) -> f64 {
 /// Cells are measured at one point. If the arm reaches points where they are off by more than 0.1
 /// %, `run` and `demo` print by how much and where; `info` prints it for the whole file.
 #[test]
-fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
+fn cell_distortion_within_workspace_is_printed_at_start() {
     let folder = tempfile::tempdir().expect("a folder");
     // From 40° to 54.5° north.
     let file = grid(folder.path(), [10.0, 40.0], 0.5);

@@ -160,7 +160,7 @@ fn raw_samples_decode_with_a_stated_layout() {
 }
 
 #[test]
-fn an_srtm_tile_knows_its_place_and_its_voids() {
+fn srtm_tile_has_cell_size_of_its_latitude_and_no_data() {
     let Some(path) = shared("dem/variants/N27E086.hgt") else {
         return;
     };
@@ -188,7 +188,7 @@ fn an_srtm_tile_knows_its_place_and_its_voids() {
 }
 
 #[test]
-fn cells_and_units_come_from_the_file() {
+fn cell_size_and_units_are_read_from_the_file() {
     let Some(folder) = shared("dem/variants") else {
         return;
     };
@@ -292,7 +292,7 @@ fn every_real_file_opens() {
 /// Mount St. Helens' summit is at 562.2 km east, 5115.4 km north (UTM 10), and the quadrangle's
 /// first profile and lowest row are at 557.82 and 5108.01 km.
 #[test]
-fn real_files_are_the_right_way_up() {
+fn real_files_are_oriented_north_up() {
     let Some(folder) = shared("dem/real") else {
         return;
     };
@@ -419,7 +419,7 @@ fn every_tiff_reads_the_same_in_blocks_as_at_once() {
 
 /// An out-of-memory error has its reason and a remedy.
 #[test]
-fn a_large_file_that_is_read_as_a_whole_says_so() {
+fn large_file_read_as_a_whole_has_a_remark_with_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("grid.asc");
     let rows = "1 2 3 4 5 6 7 8\n".repeat(1000);

@@ -47,7 +47,7 @@ fn a_proxy_on_the_east_border_leaves_as_on_the_west_one() {
 /// The line from the proxy to the HIP led over no-data into solid ground behind it, and the contact
 /// was dropped with all its force at once.
 #[test]
-fn a_way_over_a_hole_into_the_solid_ends_a_contact_without_a_kick() {
+fn contact_over_no_data_into_solid_ends_without_force_step() {
     const N: f32 = f32::NAN;
     let rows: [[f32; 10]; 4] = [
         [
@@ -138,7 +138,7 @@ fn a_hip_just_below_a_vertex_is_not_let_through() {
 /// tile's base: 1.5·10⁻⁵ cell below the surface at 138 cells, its path ended at its start, and the
 /// HIP, 0.6 cell above, was pulled down.
 #[test]
-fn a_hip_that_leaves_high_ground_is_let_go() {
+fn hip_leaving_high_ground_is_released() {
     let height = |x: i32, y: i32| 140.0 - 0.797_21 * x as f32 - 1.051_4 * y as f32;
     let count = 1.0 / f64::from(1 << 20);
     let mut path = vec![[2.5, 2.5, 160.0]];
@@ -160,7 +160,7 @@ fn a_hip_that_leaves_high_ground_is_let_go() {
 /// A part of the path ended exactly on the border of the data, far below it: its entry from outside
 /// was treated as a crossing from above.
 #[test]
-fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
+fn path_part_ending_below_the_border_is_not_a_crossing() {
     let terrain = field([128, 64], |_, _| 2.0);
     let path = [
         [119.25, 1.5, 4.0],
@@ -183,7 +183,7 @@ fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
 /// ended at the border of the field, and the rest of the path had no known start: it made contact
 /// from below.
 #[test]
-fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
+fn path_entering_under_the_corner_makes_no_contact() {
     for depth in [50.0, 1e4, 1e8] {
         let terrain = field([4, 4], |_, _| 0.0);
         let path = [[1.5, 1.5, 3.0], [-1.0, -1.0, 3.0], [3.0, 3.0, -depth]];
@@ -199,7 +199,7 @@ fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
 /// A proxy that rounding kept at the foot of a spike was not released later either: at rest on
 /// level ground it pulled down the HIP above it.
 #[test]
-fn a_hip_straight_above_its_proxy_is_let_go() {
+fn hip_vertically_above_its_proxy_is_released() {
     let mut buffers = Buffers::default();
     for number in [9, 99, 186] {
         let scene = Scene::random(91, number);
@@ -247,7 +247,7 @@ fn a_proxy_held_where_it_left_climbs_on() {
 /// For a HIP 0.03 cell away the squared distance was considered more exact than the positions it is
 /// computed from, and the path over an edge was missed.
 #[test]
-fn a_near_hip_finds_the_way_over_an_edge() {
+fn proxy_finds_the_path_over_an_edge_to_a_near_hip() {
     let rows = [
         [-29.472_837, 13.072_403, -19.966_434, 31.896_08],
         [21.871_374, -11.741_989, 23.615_377, -18.654_66],
@@ -294,7 +294,7 @@ fn a_slope_far_above_the_hip_leads_on_to_its_end() {
 /// A path off a slope of 190 skipped its first step, 6·10⁻⁶ cell long, and hit the sample at the
 /// end of that step, 10⁻³ cell above the HIP.
 #[test]
-fn a_way_off_a_slope_hits_it_where_it_begins() {
+fn path_off_a_steep_slope_includes_its_first_short_step() {
     let mut buffers = Buffers::default();
     Scene::random(778, 38_673).run(&mut buffers).expect("holds");
 }
@@ -311,7 +311,7 @@ fn a_far_hip_lifts_no_proxy_to_a_vertex() {
 /// A proxy 2·10⁻⁸ cell beside a vertex left for a HIP 16,000 cells up, and hit the ground of the
 /// cell that its path crosses for those 2·10⁻⁸ cell.
 #[test]
-fn a_way_up_is_not_stopped_in_a_hairs_breadth() {
+fn upward_path_is_not_stopped_by_a_cell_that_it_grazes() {
     let mut buffers = Buffers::default();
     let scene = Scene::random(20_261_128, 2_411);
     scene.run(&mut buffers).expect("holds");

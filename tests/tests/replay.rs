@@ -131,7 +131,7 @@ fn proxy_is_local_closest_point_on_synthetic_terrains() {
 }
 
 #[test]
-fn on_real_terrains_too_whatever_their_holes() {
+fn proxy_is_local_closest_point_on_real_terrains() {
     for (file, cell_mm) in [
         ("dem/real/bigtujunga.tif", 1.0),
         ("dem/real/mt_everest_90m.tif", 0.3),
@@ -186,7 +186,7 @@ fn contact_begins_and_ends_at_the_surface() {
 }
 
 #[test]
-fn no_force_until_the_hip_has_been_above() {
+fn contact_requires_the_hip_to_have_been_above_the_surface() {
     let raster = synthetic(Kind::Plane);
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
@@ -213,7 +213,7 @@ fn holed() -> Raster {
 }
 
 #[test]
-fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
+fn no_data_and_positions_off_the_terrain_exert_no_force() {
     let raster = holed();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     for rule in [Rule::Swept, Rule::Paper] {
@@ -236,7 +236,7 @@ fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
 /// A slide over the edge of no-data releases gently; a return from the side below the surface makes
 /// no contact.
 #[test]
-fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
+fn no_data_edge_releases_smoothly_and_reentry_has_no_force() {
     let raster = holed();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");

@@ -86,7 +86,7 @@ fn number(text: &str) -> f64 {
 const PRESS: &str = "t_s,x_mm,y_mm,z_mm\n0,10.1,7.3,14\n0.001,10.1,7.3,9.6\n0.002,10.1,7.3,0.1e1\n0.003,10.123456789012345,7.3,13\n";
 
 #[test]
-fn one_row_a_row_with_the_columns_that_were_promised() {
+fn replay_writes_one_row_per_input_row_with_stated_columns() {
     let folder = Folder::new(PRESS);
     let rows = folder.replayed(&["--scale", "1mm/cell"]);
     assert_eq!(rows.len(), 4);
@@ -132,7 +132,7 @@ fn scale_stiffness_and_limit_are_as_stated() {
 }
 
 #[test]
-fn the_same_again_byte_for_byte_and_its_own_output_can_be_replayed() {
+fn replay_is_deterministic_and_accepts_its_own_output() {
     let folder = Folder::new(PRESS);
     let first = folder.replayed(&[]);
     let bytes = std::fs::read(folder.path("out.csv")).expect("there");
@@ -199,7 +199,7 @@ fn impossible_options_are_errors_before_anything_runs() {
 }
 
 #[test]
-fn a_device_that_is_not_there_is_an_error_that_says_what_was_looked_for() {
+fn missing_device_error_names_address_and_hint() {
     let folder = Folder::new(PRESS);
     let run = |device: &str| {
         let run = Command::new(hapterra_binary())

@@ -261,7 +261,7 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
 }
 
 #[test]
-fn rows_without_times_are_ticks_and_that_is_said() {
+fn rows_without_times_are_ticks_and_this_is_reported() {
     let folder = Folder::new();
     let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     let timed = sampled(1_000, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);

@@ -17,7 +17,7 @@ fn scenes_give_the_same_bits_on_the_emulated_processor() {
 
 /// The whole loop on materials, point by point: forces, proxies and work.
 #[test]
-fn scenes_on_materials_give_the_same_bits_on_the_emulated_processor() {
+fn material_scenes_match_bit_for_bit_on_the_emulator() {
     let Some(board) = CountingBoard::found() else {
         return;
     };

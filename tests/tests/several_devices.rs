@@ -116,7 +116,7 @@ fn rendered(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
 }
 
 #[test]
-fn two_arms_in_memory_feel_to_the_bit_what_each_feels_alone() {
+fn two_native_arms_render_the_same_bits_as_each_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let commands = folder.path().join("commands");
     let alone = |name: &str, lines: &str| {
@@ -238,7 +238,7 @@ fn the_second_signal_names_the_boards_that_have_not_confirmed() {
 }
 
 #[test]
-fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
+fn lost_device_is_waited_for_and_the_other_continues() {
     let gone = Arc::new(AtomicBool::new(false));
     let is_gone = Arc::clone(&gone);
     let mortal = SocketDevice::with(move || {
@@ -284,7 +284,7 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
 }
 
 #[test]
-fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
+fn absent_device_fails_alone_and_is_reported_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let there = format!("tcp:{}", served.address);
@@ -316,7 +316,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
 }
 
 #[test]
-fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
+fn fault_is_reported_only_for_the_affected_device() {
     // A current flows without a command.
     let conducts = SocketDevice::with(|| {
         let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
@@ -408,7 +408,7 @@ const ROW_BYTES: u64 = 4 * SIDE as u64;
 
 #[cfg(target_os = "linux")]
 #[test]
-fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
+fn second_device_causes_no_additional_terrain_reads() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("large.tif");
     terrain_file(&path, Kind::Fractal, SIDE, 1);

@@ -94,7 +94,7 @@ fn given_mj(rendered: &[TickRecord]) -> f64 {
 }
 
 #[test]
-fn on_real_ground_the_force_turns_a_tenth_as_fast() {
+fn shading_reduces_force_rotation_tenfold_on_real_terrain() {
     for (name, raster) in &real_ground::files() {
         let terrain = real_ground::terrain(raster);
         for depth in [0.02, 0.1, 0.3] {
@@ -145,7 +145,7 @@ fn given_by_rounds(terrain: &Terrain<'_>, depth: &dyn Fn(f64) -> f64) -> Vec<f64
 }
 
 #[test]
-fn a_shaded_round_gives_no_more_than_the_page_says() {
+fn energy_of_a_shaded_round_is_within_documented_bounds() {
     let even = |_: f64| 0.3;
     let deep = |angle: f64| 1.0 + 0.5 * angle.sin();
     let (mut most, mut rounds) = ([0.0_f64; 2], 0);

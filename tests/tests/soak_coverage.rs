@@ -158,7 +158,7 @@ fn every_promised_kind_of_scene_is_touched_and_checked() {
 
 /// Materials of a stress test's scenes, by all the names that fit.
 #[test]
-fn all_that_is_promised_of_materials_is_drawn() {
+fn random_scenes_cover_every_promised_kind_of_material() {
     let mut counts = Counts::new();
     let scenes = (0..800).map(|number| Scene::random(SEED, number).with_surface(Surface::Rough));
     for materials in scenes.filter_map(|scene| scene.materials) {

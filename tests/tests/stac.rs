@@ -139,7 +139,7 @@ fn has_gdal() -> bool {
 }
 
 #[test]
-fn items_that_say_where_their_files_lie_are_one_terrain() {
+fn items_with_absolute_paths_form_one_terrain() {
     if !has_gdal() {
         return;
     }
@@ -168,7 +168,7 @@ fn an_item_that_lies_elsewhere_than_its_file_is_named() {
 
 /// File names relative to the document, and items without a place.
 #[test]
-fn what_gdal_does_not_read_is_refused_with_a_command_that_works() {
+fn unsupported_items_are_refused_with_a_working_command() {
     if !has_gdal() {
         return;
     }
@@ -217,7 +217,7 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
 
 /// A document of any size gives an error, within the program's own address space.
 #[test]
-fn documents_that_are_too_large_or_too_deep_end_in_bounded_memory() {
+fn oversized_or_deep_documents_fail_in_bounded_memory() {
     let place = folder();
     let write = |name: &str, text: &str| {
         let path = place.path().join(name);

@@ -57,7 +57,7 @@ fn info_shows_what_is_stored() {
 }
 
 #[test]
-fn no_data_is_counted_before_it_is_filled() {
+fn no_data_is_counted_before_filling() {
     let folder = tempfile::tempdir().expect("a folder");
     let grid =
         "ncols 3\nnrows 2\nxllcorner 5000\nyllcorner 0\ncellsize 1\nNODATA_value -1\n1 -1 3 4 5 6";

@@ -60,7 +60,7 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
 }
 
 #[test]
-fn coarser_levels_feel_the_same_terrain_with_fewer_tiles() {
+fn coarser_levels_render_the_same_plane_with_fewer_tiles() {
     let raster = Raster::from_fn(1025, 1025, |x, y| (x + 2 * y) as f32 / 16.0).expect("raster");
     let tiles = [0u8, 3].map(|level| {
         let scale = Scale::new(0.25, 0.25).expect("scale");

@@ -441,7 +441,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
 
 /// `run` and `demo` are for a hand; a replay is for comparisons.
 #[test]
-fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
+fn run_and_demo_default_to_a_ball_but_replay_to_a_point() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     terrain_file(&folder.join("hills.tif"), Kind::Crater, 256, 1);

@@ -81,7 +81,7 @@ fn a_board_is_enumerated_and_found_by_the_client() {
 }
 
 #[test]
-fn windows_is_told_to_take_the_interface_without_a_driver() {
+fn microsoft_os_descriptors_request_winusb() {
     let (mut board, found) = enumerated();
     let version = u16::from_le_bytes([found.device[2], found.device[3]]);
     assert!(version >= 0x0201, "a BOS is asked for from 2.01 on");
@@ -107,7 +107,7 @@ fn windows_is_told_to_take_the_interface_without_a_driver() {
 }
 
 #[test]
-fn a_request_that_means_nothing_is_refused_and_the_next_one_answered() {
+fn invalid_control_request_stalls_and_next_one_is_answered() {
     let (mut board, _) = enumerated();
     for request in [(0x40, 0x77, 0, 0), (0x00, 9, 9, 0), (0x01, 11, 5, 3)] {
         let answer = control(&mut board, request);
@@ -187,7 +187,7 @@ fn a_packet_that_is_too_long_is_never_taken_and_harms_nothing() {
 }
 
 #[test]
-fn nothing_the_device_sends_needs_an_empty_packet_behind_it() {
+fn device_packets_never_need_a_zero_length_packet() {
     let (mut board, _) = enumerated();
     send_packet(&mut board, LINK, &hello()).expect("taken");
     for _ in 0..500 {
@@ -270,7 +270,7 @@ fn ticks(session: &mut Session<'_>, polls: usize) -> Vec<u32> {
 }
 
 #[test]
-fn tiles_go_in_and_samples_come_out() {
+fn tiles_and_samples_transfer_without_loss() {
     visit(|session, _| {
         let ticks = ticks(session, 400);
         let gaps = ticks.windows(2).filter(|w| w[1] != w[0] + 1).count();
@@ -294,7 +294,7 @@ fn half_a_transfer(board: &Rc<RefCell<Board>>) {
 }
 
 #[test]
-fn a_reset_of_the_bus_in_a_transfer_costs_a_handshake_and_no_terrain() {
+fn bus_reset_during_transfer_keeps_scene_and_tiles() {
     visit(|session, board| {
         let before = *ticks(session, 200).last().expect("samples");
         let tiles = session.stats().tiles;
@@ -312,7 +312,7 @@ fn a_reset_of_the_bus_in_a_transfer_costs_a_handshake_and_no_terrain() {
 }
 
 #[test]
-fn an_unplugged_board_goes_on_feeling_and_is_there_again() {
+fn unplugged_board_keeps_ticking_and_resumes_its_session() {
     visit(|session, board| {
         let before = *ticks(session, 200).last().expect("samples");
         half_a_transfer(board);

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_addressed_is_no_point() {
+    fn unaddressable_position_has_no_grid_point() {
         let scale = Scale::new(1.0, 1.0).expect("valid");
         for bad in [f64::NAN, f64::INFINITY, 5.4e8, -5.4e8] {
             assert_eq!(scale.to_grid([0.0, bad, 0.0]), None);

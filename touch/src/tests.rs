@@ -32,7 +32,7 @@ fn spring_pushes_up_by_its_stiffness() {
 }
 
 #[test]
-fn path_that_begins_below_ground_says_so() {
+fn start_below_ground_is_reported_without_force() {
     let mut contact = Contact::new(flat(2.0), Surface::default()).expect("a contact");
     let below = contact.step([5.0, 5.0, 1.0]).expect("a step");
     assert_eq!(below.state, State::BelowGround { surface_mm: 2.0 });
@@ -64,7 +64,7 @@ fn large_array_fits_a_stack_of_256_kb() {
 }
 
 #[test]
-fn rows_lie_where_their_order_says() {
+fn row_order_places_rows_south_or_north_first() {
     let rows = [[0.0_f32, 1.0, 2.0], [10.0, 11.0, 12.0]];
     let height = |order, x, y| {
         let terrain = Terrain::from_rows(1.0, order, &rows).expect("a terrain");
@@ -81,7 +81,7 @@ fn rows_lie_where_their_order_says() {
 }
 
 #[test]
-fn nan_is_a_hole() {
+fn nan_samples_are_no_data() {
     let hole = |x: u32, y: u32| if (x, y) == (10, 10) { f32::NAN } else { 1.0 };
     let terrain = Terrain::from_fn(40, 40, 1.0, hole).expect("a terrain");
     assert_eq!(terrain.height_mm(9.5, 9.5), None);

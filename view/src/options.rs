@@ -119,14 +119,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_said_is_this_machine_alone() {
+    fn default_options_bind_to_loopback_only() {
         let options = read(&[]).expect("valid").expect("no help");
         assert!(options.bind.is_loopback());
         assert_eq!(options, Options::default());
     }
 
     #[test]
-    fn what_is_said_is_taken_and_nonsense_is_not() {
+    fn valid_options_are_read_and_invalid_ones_refused() {
         let words = [
             "--port",
             "9",

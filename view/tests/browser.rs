@@ -128,7 +128,7 @@ fn remove(folder: &Path) {
 }
 
 #[test]
-fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
+fn page_shows_live_scene_and_plots_without_foreign_requests() {
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = folder("browser");
     let Some(mut browser) = browser_in(&folder) else {
@@ -176,7 +176,7 @@ fn a_browser_shows_terrain_hand_and_plots_and_asks_nobody_else() {
 }
 
 #[test]
-fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
+fn oversized_page_reloads_and_continues() {
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = folder("grown");
     let Some(mut browser) = browser_in(&folder) else {
@@ -210,7 +210,7 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
 }
 
 #[test]
-fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
+fn page_shows_live_contact_on_the_emulated_board() {
     let (Some(mut demo), Some(image)) = (hapterra(), emulated()) else {
         println!("SKIPPED: no hapterra and no emulated board; cargo xtask view --test names both");
         return;
@@ -430,11 +430,11 @@ fn killed(who: Killed, says: &str) {
 }
 
 #[test]
-fn a_page_says_that_hapterra_was_killed_and_the_viewer_ends_after_it() {
+fn page_reports_hapterra_killed_and_viewer_exits() {
     killed(Killed::Hapterra, "hapterra is gone");
 }
 
 #[test]
-fn a_page_says_that_the_viewer_was_killed_and_the_session_goes_on() {
+fn page_reports_viewer_killed_and_session_continues() {
     killed(Killed::Viewer, "hapterra-view has ended");
 }

@@ -35,7 +35,7 @@ fn status(answer: &str) -> u16 {
 }
 
 #[test]
-fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
+fn foreign_hosts_origins_and_write_methods_are_refused() {
     let (_viewer, port) = live("");
     let own = format!("127.0.0.1:{port}");
     let page = get(port, "/", &own, "");
@@ -87,7 +87,7 @@ fn reading(port: u16, bytes: usize) -> TcpStream {
 }
 
 #[test]
-fn pages_that_come_go_and_hang_hold_nothing_up() {
+fn stalled_and_disconnecting_pages_do_not_block_the_viewer() {
     let (mut viewer, port) = live("");
     let mut held = Vec::new();
     // One hangs without reading; others connect and disconnect.
@@ -135,7 +135,7 @@ fn a_stream_of_another_version_or_of_none_is_named() {
 }
 
 #[test]
-fn a_page_hears_whether_the_session_ended_or_hapterra_is_gone() {
+fn feed_end_distinguishes_session_end_from_lost_hapterra() {
     for (is_reported, last) in [(true, 0), (false, u32::MAX - 1)] {
         let (mut viewer, port) = live("");
         let mut page = reading(port, 1000);
@@ -150,7 +150,7 @@ fn a_page_hears_whether_the_session_ended_or_hapterra_is_gone() {
 }
 
 #[test]
-fn it_ends_by_itself_once_nobody_looks() {
+fn viewer_exits_after_the_last_page_disconnects() {
     let (mut viewer, port) = live("--linger 0.2");
     let page = reading(port, 1000);
     viewer.hang_up();
@@ -160,7 +160,7 @@ fn it_ends_by_itself_once_nobody_looks() {
 }
 
 #[test]
-fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
+fn viewer_exits_if_hapterra_dies_before_any_page_connects() {
     let (mut viewer, _) = live("");
     // No end is sent. The viewer's own time-out is 15 s.
     viewer.hang_up();
@@ -169,7 +169,7 @@ fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_under_the_rrd_file_leaves_the_page_alone_and_is_told() {
+fn full_disk_under_rrd_file_is_reported_and_page_still_works() {
     let (mut viewer, port) = live("--rrd /dev/full --linger 0");
     let mut held = Vec::new();
     for round in 1..100u64 {

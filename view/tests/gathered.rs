@@ -61,7 +61,7 @@ impl Reported {
 }
 
 #[test]
-fn the_same_rows_come_in_far_fewer_entries() {
+fn gathered_feed_has_the_same_rows_in_far_fewer_entries() {
     let mut viewer = Viewer::start("--linger 5");
     for message in [greeting(), scene(true), layer()] {
         assert!(viewer.tell(&message));

@@ -76,7 +76,7 @@ fn harm(reported: &str) -> Vec<&str> {
 }
 
 #[test]
-fn each_harm_is_found_alone() {
+fn each_bad_figure_is_reported_alone() {
     let good = "ticks          9 run, 0 late\n\
                 tiles          8 fetched (35044 bytes), 2 of them again\n\
                 telemetry      9 samples, 0 lost on the link, 0 dropped by the device\n";

@@ -24,7 +24,7 @@ fn rrd(into: &Path) -> String {
 }
 
 #[test]
-fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
+fn live_and_recorded_views_have_the_values_of_the_csv() {
     let Some(mut demo) = hapterra() else {
         println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
         return;
@@ -113,7 +113,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
 }
 
 #[test]
-fn the_map_says_what_is_laid_in_front_of_the_arm() {
+fn map_shows_the_extent_fitted_to_the_workspace() {
     if hapterra().is_none() {
         println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
         return;

@@ -56,7 +56,7 @@ fn check(reported: &Reported, finer: &[&str]) -> Duration {
 }
 
 #[test]
-fn a_page_is_told_the_coarse_whole_before_anything_finer() {
+fn page_receives_the_coarse_layer_before_finer_ones() {
     let mut viewer = Viewer::start("");
     let Message::Layer(whole) = layer() else {
         unreachable!()
@@ -85,7 +85,7 @@ fn a_page_is_told_the_coarse_whole_before_anything_finer() {
 
 /// Measures it with a file: `TERRAIN=FILE cargo test --release --test start -- --nocapture`.
 #[test]
-fn page_of_a_demo_is_told_the_coarse_whole_first() {
+fn demo_page_receives_the_coarse_layer_first() {
     let Some(mut demo) = hapterra() else {
         println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
         return;

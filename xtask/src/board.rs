@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_board_is_answered_with_the_known_ones() {
+    fn unknown_board_error_lists_the_known_boards() {
         let message = by_name("nucleo-f4").unwrap_err().to_string();
         assert!(message.contains("nucleo-f4") && message.contains("mps2-an386"));
     }

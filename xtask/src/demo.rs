@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_url_needs_a_build_with_urls() {
+    fn url_input_adds_build_features_and_a_path_adds_none() {
         let features = |file: &str| {
             let file = Some(file.into());
             let request = Request {
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn without_emulation_the_device_is_native() {
+    fn device_defaults_to_native_without_emulation() {
         let line = line(None, &["--out", "x"], false);
         assert_eq!(line, "demo --exaggeration auto --device native --out x");
     }
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn results_go_to_the_workspaces_demo_folder() {
+    fn results_default_to_the_workspace_demo_folder() {
         let line = line(None, &[], true);
         assert!(
             line.ends_with(&format!("--out {}", root().join("demo").display())),

@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_two_dashes_goes_to_the_run() {
+    fn arguments_after_two_dashes_are_passed_to_the_demo() {
         let request = demo(&["a.tif", "--", "--rounds", "3", "--"]).unwrap();
         assert_eq!(request.file, Some("a.tif".into()));
         assert_eq!(request.extra, ["--rounds", "3", "--"]);

@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_quiet_program_said_is_told_when_it_fails() {
+    fn failed_quiet_program_error_includes_its_output() {
         let message = run_quietly(cargo().arg("no-such-command"))
             .unwrap_err()
             .to_string();

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_over_its_budget_fails_and_says_which() {
+    fn image_over_budget_error_names_board_and_memory() {
         let path = std::env::temp_dir().join(format!("hapterra-size-{}.elf", std::process::id()));
         let try_size = |bytes| {
             std::fs::write(&path, elf(&[[FLASH, FLASH, bytes, bytes]])).unwrap();
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_elf_is_refused() {
+    fn non_elf_input_is_refused() {
         assert!(measure(b"not an elf", &BOARDS[1]).is_err());
     }
 }

@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_seen() {
+    fn row_reports_largest_jump_and_missed_share() {
         let still = Answer::touching([0.0, 0.0, 0.1]);
         let jumped = Answer::touching([0.03, 0.0, 0.14]);
         let label = Label {

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_force_that_pulls_or_is_too_large_is_seen() {
+    fn pulling_or_excessive_force_is_detected() {
         let params = Effect::All.params();
         let rendered = |force_n| EffectTick {
             hip: [0.0; 3],

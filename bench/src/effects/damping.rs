@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damper_that_is_off_late_or_pulls_is_seen() {
+    fn damping_check_detects_wrong_late_and_pulling_forces() {
         let grid = terrain();
         let arm = Arm::over(&grid);
         let way = arm.tap(2000).expect("in reach");

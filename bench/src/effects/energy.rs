@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_that_gives_is_seen() {
+    fn surface_that_adds_energy_is_detected() {
         let most = |more: f64| given_mj(&spring(more)).into_iter().fold(f64::MIN, f64::max);
         assert!(most(0.0).abs() < 0.005, "{}", most(0.0));
         // 72 mJ are stored; a two-thousandth more is returned.
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn without_the_controller_a_tap_gives() {
+    fn tap_gains_energy_only_without_passivity_controller() {
         let params = |controller| {
             let mut params = Effect::None.params();
             params.stiffness_n_per_mm = STIFFNESS;

@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_even_motion_is_met_and_a_jerk_shortens_the_window() {
+    fn foaw_fits_steady_motion_and_shortens_window_on_jerk() {
         let even: Vec<f64> = (0..20).map(|i| (0.3 * f64::from(i)).round()).collect();
         for slope in slopes(&even) {
             assert!((slope - 0.3).abs() < 0.11, "{slope}");

@@ -140,7 +140,7 @@ mod tests {
     use crate::tick_states::terrain;
 
     #[test]
-    fn friction_that_is_five_percent_off_is_seen() {
+    fn friction_error_of_five_percent_is_detected() {
         let (grid, mut params) = (terrain(), Effect::Friction.params());
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
         let mut worst = |mu: f32| {
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_proxy_that_creeps_is_seen() {
+    fn proxy_creep_is_measured_as_drift() {
         let rendered = EffectTick {
             hip: [0.0; 3],
             proxy: [0.0, 0.0, 0.1],
@@ -174,7 +174,7 @@ mod tests {
 
     /// A proxy without friction slips where friction would hold.
     #[test]
-    fn a_proxy_on_ice_drifts() {
+    fn frictionless_proxy_drifts() {
         let grid = terrain();
         let (hips, from) = held(&grid);
         let rendered = render(&grid, Effect::None.params(), &hips);

@@ -127,7 +127,7 @@ mod tests {
     use crate::tick_states::terrain;
 
     #[test]
-    fn a_direction_that_is_a_degree_off_is_seen_and_so_is_none() {
+    fn shading_error_of_one_degree_or_no_shading_is_detected() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
         let worst = |rendered: &[EffectTick]| off(&grid, rendered).into_iter().fold(0.0, f64::max);
@@ -149,7 +149,7 @@ mod tests {
 
     /// Bends of all sizes, and turns of more than 60°.
     #[test]
-    fn on_rough_ground_the_direction_is_the_documented_one_too() {
+    fn shading_on_rough_ground_matches_its_documentation() {
         let mut random = path::Random(3);
         let rough = Grid::from_fn("rough", [64, 64], |_, _| random.between(0.0, 6.0) as f32);
         let slide = path::slide_at(&rough, "", [STEP, DEPTH], 8000);

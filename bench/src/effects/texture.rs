@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_that_is_shifted_higher_or_another_is_seen() {
+    fn texture_error_in_position_or_parameters_is_detected() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [0.05, DEPTH], 2000);
         for effect in [Effect::Grain, Effect::Grating] {
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_that_does_not_fade_is_seen() {
+    fn missing_texture_fade_is_detected() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
         let params = Effect::Grating.params();

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn no_name_is_over_another_or_over_a_mark_however_crowded() {
+    fn crowded_labels_overlap_no_other_label_or_mark() {
         let mut random = Random(3);
         for _ in 0..200 {
             let named: Vec<Named> = (0..9)

@@ -90,7 +90,7 @@ fn verdict(trial: &Trial) -> Verdict {
 }
 
 #[test]
-fn the_arm_at_its_tip_is_what_its_data_say() {
+fn tip_parameters_match_the_data_of_the_arm() {
     let arm = AtTip::new(&PhantomModel::premium_1_5());
     // The upper link of 209.55 mm lifts the tip, geared 11.2 to 1 to 4,096 counts a turn.
     let (lever_m, counts) = (0.209_55, 11.2 * 4096.0);
@@ -153,7 +153,7 @@ fn a_tap_touches_the_surface_at_the_speed_that_it_is_called_by() {
 }
 
 #[test]
-fn what_a_tap_gives_is_what_the_age_of_the_force_says() {
+fn tap_energy_is_proportional_to_age_of_the_force() {
     // The force of a tick is half a tick old on average, plus the delay to the amplifiers and the
     // lag of the current loops. In proportion to this age it is too small on the way in and too
     // large on the way out.
@@ -178,7 +178,7 @@ fn what_a_tap_gives_is_what_the_age_of_the_force_says() {
 }
 
 #[test]
-fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
+fn passivity_controller_prevents_tap_energy_and_limit_cycle() {
     // The last two of these lines would need more than 1,000 N/s.
     for (hz, stiffness, delay_s, speeds) in [
         (1000, 0.5, 80e-6, &TAP_SPEEDS_M_S[..]),
@@ -281,7 +281,7 @@ fn damping_takes_from_what_a_tap_gives() {
 }
 
 #[test]
-fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
+fn map_lists_each_trial_once_and_limits_are_last_good_stiffness() {
     let plan = Plan {
         rates: vec![TickRate::DEFAULT],
         stiffness_n_per_mm: vec![0.5, 6.0],
@@ -342,19 +342,19 @@ fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
 }
 
 #[test]
-fn force_comes_in_without_swing_or_energy() {
+fn force_ramps_up_without_swing_or_energy_gain() {
     let all = |hz| (hz, 4.0, 4.0);
     enters_up_to(1.0, SHORT_S, [1000, 2000, 4000, 10_000].map(all));
 }
 
 #[test]
-fn force_comes_in_a_millisecond_late() {
+fn force_ramps_up_cleanly_with_one_millisecond_delay() {
     let all = |hz| (hz, 4.0, 4.0);
     enters_up_to(1.0, LONG_S, [1000, 2000, 4000, 10_000].map(all));
 }
 
 #[test]
-fn force_comes_in_on_a_tenth_of_the_friction() {
+fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
     let little = [
         (1000, 2.0, 1.0),
         (2000, 2.0, 2.0),
@@ -392,7 +392,7 @@ fn little_friction_makes_small_swings_only() {
 }
 
 #[test]
-fn without_the_controller_the_tip_swings() {
+fn tip_swings_during_ramp_up_without_passivity_controller() {
     let setting = Setting {
         arm_friction: 0.1,
         ..set(1000, 3.0, Grasp::Light, 0.1e-3, UNDAMPED)

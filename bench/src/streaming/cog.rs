@@ -175,7 +175,7 @@ mod tests {
     use heightfield::{OpenOptions, Raster, Wait};
 
     #[test]
-    fn every_place_of_a_terrain_has_the_relief_of_the_square_that_repeats() {
+    fn written_cog_repeats_one_square_of_relief_everywhere() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("made.tif");
         let (mut relief, side) = (Relief::new(), 7200);

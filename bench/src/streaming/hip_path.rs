@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn made_terrains_of_all_sizes_have_their_ways_over_the_same_samples() {
+    fn straight_path_crosses_same_samples_at_every_terrain_size() {
         for side in [3168, 10_016, 31_648, 100_000] {
             let [west, south] = in_the_square([side; 2], STRAIGHT);
             let top = side - 1 - south - STRAIGHT;

@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn what_is_read_is_counted() {
+    fn reads_of_this_process_are_counted() {
         let before = read_by_this_process().expect("Linux tells");
         let read = std::fs::read(std::env::current_exe().expect("a path")).expect("readable");
         let after = read_by_this_process().expect("Linux tells");

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hand_comes_up_to_its_speed_and_arrives_in_time() {
+    fn hand_ramps_up_to_speed_and_arrives_in_the_duration() {
         for speed in [0.1, 2.0, 20.0] {
             for cells in [1.0, 90.0, 2800.0] {
                 let ticks = duration(cells, speed);

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_answered_and_counted_and_nothing_beside_the_folder_is() {
+    fn ranges_are_served_and_counted_and_other_paths_refused() {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("a.tif"), "0123456789").expect("written");
         let server = Server::of(folder.path()).expect("a port");

@@ -86,7 +86,7 @@ fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u3
 }
 
 #[test]
-fn a_tick_looks_at_no_more_than_it_needs() {
+fn patches_and_evaluations_per_tick_are_bounded() {
     let high = |[x, y]: [f64; 2]| GridPoint::new([x as i32, y as i32, 9], Vec3::ZERO);
     let flies = |above: f64| places(0.5).map(move |at| hip(at, above));
     let slides = |step: f64| places(step).map(|at| hip(at, -0.1));

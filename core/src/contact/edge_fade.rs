@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_fades_over_a_patch_that_is_near_the_proxy() {
+    fn force_stays_full_over_patches_near_the_proxy() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         let over_patch = |hip: GridPoint, proxy| {

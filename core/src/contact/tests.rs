@@ -402,7 +402,7 @@ fn holds_on_rough_terrain() {
 }
 
 #[test]
-fn holds_on_spikes_and_holes() {
+fn contact_invariants_hold_on_spikes_and_no_data() {
     for seed in SEEDS {
         check(
             "spikes",
@@ -490,7 +490,7 @@ fn with_no_data(x: i32, y: i32) -> f32 {
 /// A patch has all four borders: a path straight down to the last sample in the east or north, or
 /// to one beside no-data, meets the surface.
 #[test]
-fn straight_down_onto_any_sample_meets_the_surface() {
+fn vertical_path_onto_any_valid_sample_touches_surface() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(16, 16), with_no_data);
     for (x, y) in (0..=16).flat_map(|y| (0..=16).map(move |x| (x, y))) {
@@ -643,7 +643,7 @@ fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
 
 /// Tents whose top is a vertex, or an edge eastward or northward; one side of the edge is steeper.
 #[test]
-fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
+fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
     let tent = |x: i32, y: i32, at: i32| -> f32 {
         let side = |c: i32, gentle: f32, steep: f32| match c - at {
             d if d < 0 => gentle * d as f32,

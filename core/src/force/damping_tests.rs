@@ -244,7 +244,7 @@ impl Taps {
 const LATE_S: [f64; 5] = [0.0, 0.08e-3, 0.2e-3, 0.6e-3, 1.19e-3];
 
 #[test]
-fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
+fn passivity_controller_removes_the_energy_every_tap_creates() {
     for hz in [1000, 2000, 4000, 10_000] {
         for stiffness in [0.2, 0.5, 1.0, 2.0, 4.0] {
             for late_s in LATE_S {
@@ -351,7 +351,7 @@ fn energy_of_unstated_latency_is_not_all_dissipated() {
 }
 
 #[test]
-fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
+fn force_earlier_than_stated_delay_creates_no_energy() {
     // A duty cycle is read 0.5 to 1 ms after it is set.
     for hz in [1000, 2000, 4000] {
         for late_s in [0.63e-3, 0.88e-3] {
@@ -384,7 +384,7 @@ fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
 }
 
 #[test]
-fn what_is_taken_back_is_not_much_more_than_was_created() {
+fn net_dissipation_stays_below_the_created_energy() {
     // With more damping the surface would be rendered as honey.
     for hz in [1000, 4000] {
         for late_s in LATE_S {
@@ -399,7 +399,7 @@ fn what_is_taken_back_is_not_much_more_than_was_created() {
 }
 
 #[test]
-fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
+fn surface_softens_for_fast_tip_and_recovers_at_rest() {
     let params = params(2.0, 0.0, Controller::On);
     let mut damper = damper(&params, 1000).expect("controlled");
     let mut share = |up_mm: f32, speed_mm_s: f32, ticks: u32| {
@@ -435,7 +435,7 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
 }
 
 #[test]
-fn what_was_created_is_forgotten_at_rest_and_never_more_than_a_little() {
+fn created_energy_is_capped_and_reset_at_rest() {
     let params = params(1.0, 0.0, Controller::On);
     let mut damper = damper(&params, 1000).expect("controlled");
     let mut at = |up_mm: f32, asked_n: f32| {

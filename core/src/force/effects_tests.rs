@@ -62,7 +62,7 @@ fn beside_a_ridge(params: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
 }
 
 #[test]
-fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
+fn shading_turn_shrinks_as_controller_dissipates_more() {
     let [plain, shaded] = beside_a_ridge(&PARAMS, 0.0);
     let angle = plain.angle_between(shaded);
     assert!(angle > 0.1, "{angle}");
@@ -89,7 +89,7 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
 }
 
 #[test]
-fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
+fn max_observed_energy_suppresses_the_shading_turn() {
     // A cell of a metre: an edge gives more than the observer records.
     let damper = |created_mj: f32| {
         let mut effects = Effects::of(&PARAMS, &context()).expect("shaded");
@@ -167,7 +167,7 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
 }
 
 #[test]
-fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
+fn controller_does_not_roughen_a_slide_over_facets() {
     for (stiffness, slope, depth, mm_s) in [
         (2.0, 0.2, 2.0, 100.0),
         (2.0, 0.2, 2.0, 30.0),

@@ -155,7 +155,7 @@ fn the_force_turns_evenly_over_valley_and_ridge() {
 }
 
 #[test]
-fn at_every_sample_the_force_is_along_the_mean_of_the_edges_that_meet() {
+fn shaded_normal_at_each_sample_averages_its_adjacent_edges() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
     for i in 0..cases(400, 20) as i32 {
@@ -185,7 +185,7 @@ fn at_every_sample_the_force_is_along_the_mean_of_the_edges_that_meet() {
 }
 
 #[test]
-fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
+fn shading_cuts_max_force_turn_tenfold_on_rough_terrain() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
     let (mut plain, mut shaded) = (0.0_f32, 0.0_f32);
@@ -263,7 +263,7 @@ fn missing_tile_is_named_and_ends_the_surface() {
 }
 
 #[test]
-fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
+fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
     fn holed(x: i32, y: i32) -> f32 {
         match (x, y) {
             (15..=16, 10..=11) => f32::NAN,
@@ -335,7 +335,7 @@ fn a_tile_may_count_its_heights_from_anywhere() {
 }
 
 #[test]
-fn what_friction_holds_is_turned_with_the_rest() {
+fn shading_turns_friction_together_with_normal_force() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(11.0, 13.0), (13.0, 11.0)] {

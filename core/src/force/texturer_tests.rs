@@ -66,7 +66,7 @@ fn amplitude(rendered: &[Vec3], hz: f64, part: fn(&Vec3) -> f32) -> f64 {
 }
 
 #[test]
-fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
+fn texture_reaches_its_amplitude_at_low_speed() {
     for (texture, ticks) in [(GRATING, 2_000), (GRAIN, cases(400_000, 200))] {
         let rendered = rendered(&texture, 10.0, 1.0, ticks);
         let most = rendered.iter().map(|v| v.z - 1.0).fold(f32::MIN, f32::max);
@@ -82,7 +82,7 @@ fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
 }
 
 #[test]
-fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
+fn grating_vibrates_only_at_speed_over_wavelength() {
     for hz in [10.0, 50.0, 100.0, 125.0] {
         // One wave per millimetre.
         let rendered = rendered(&GRATING, hz, 1.0, 4_000);
@@ -136,7 +136,7 @@ fn texture_fades_before_it_would_alias() {
 }
 
 #[test]
-fn a_place_feels_the_same_from_everywhere() {
+fn texture_at_rest_is_independent_of_the_previous_position() {
     for texture in [GRATING, GRAIN] {
         let there = place(0.7, -0.4);
         let rested = |from: GridPoint| {
@@ -154,7 +154,7 @@ fn a_place_feels_the_same_from_everywhere() {
 /// In steps of a millionth of a wave no force jumps: over cells, tiles and grains, and at contact
 /// onset and lift-off.
 #[test]
-fn nothing_steps_on_the_way() {
+fn texture_is_continuous_across_cells_tiles_and_contact_onset() {
     let textures = [
         GRATING,
         GRAIN,
@@ -314,7 +314,7 @@ fn the_share_of_a_texture_neither_flutters_nor_jumps() {
 
 /// With the contact itself: the proxy is the same as without texture.
 #[test]
-fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
+fn texture_acts_along_the_normal_of_a_slope() {
     let size = FieldSize::new(60, 60);
     let mut field = TileArena::<2>::from_fn(size, |x, _| 0.75 * x as f32).expect("a field");
     let window = field.window();
@@ -343,7 +343,7 @@ fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
 }
 
 #[test]
-fn what_no_number_is_gives_none() {
+fn texture_output_is_finite_for_non_finite_input() {
     for texture in [GRATING, GRAIN] {
         let mut texturer = texturer(&texture);
         for bad in [
@@ -377,7 +377,7 @@ fn what_no_number_is_gives_none() {
 }
 
 #[test]
-fn textures_too_small_to_feel_are_invalid() {
+fn out_of_range_texture_parameters_are_invalid() {
     assert!(Texture::NONE.is_valid() && GRATING.is_valid() && GRAIN.is_valid());
     let bad = [f32::NAN, f32::INFINITY, -1.0];
     let with = |change: fn(&mut Texture, f32), value| {
@@ -427,7 +427,7 @@ fn textures_too_small_to_feel_are_invalid() {
 }
 
 #[test]
-fn a_slow_hand_feels_the_shortest_wave_in_whole() {
+fn shortest_wavelength_depends_on_the_tick_rate() {
     assert_eq!(Texture::shortest_mm(RATE), 0.4);
     let fast = TickRate::new(4_000).expect("a rate");
     assert_eq!(Texture::shortest_mm(fast), 0.25);

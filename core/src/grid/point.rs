@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn any_bits_give_a_valid_point() {
+    fn point_is_valid_for_non_finite_or_huge_input() {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30] {
             let p = GridPoint::new([i32::MAX, i32::MIN, 0], Vec3::splat(bad));
             assert!(p.cell().iter().all(|c| c.abs() <= MAX_CELL));

@@ -71,7 +71,7 @@ fn held(current: Vec3) -> [i32; 3] {
 }
 
 #[test]
-fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
+fn jog_drives_only_its_motor_at_its_current_and_duration() {
     for rate in [1_000, 10_000].map(|hz| TickRate::new(hz).expect("in range")) {
         let (mut storage, ms) = (TileArena::<1>::new(), rate.ticks(1) as usize);
         let mut bench = Bench::new(&mut storage, rate);
@@ -163,7 +163,7 @@ fn whatever_blocks_arming_blocks_a_jog() {
 }
 
 #[test]
-fn letting_go_ends_a_jog_within_the_tick() {
+fn dead_man_release_ends_a_jog_within_the_tick() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.jog(JOG, 1_500, held);
@@ -213,7 +213,7 @@ fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
 }
 
 #[test]
-fn no_host_gets_more_than_a_jog_may_be() {
+fn out_of_range_jog_is_invalid_and_stays_bounded() {
     for (axis, current_a, hold_ms) in [
         (1, 5.0, 500),
         (1, f32::INFINITY, 500),

@@ -133,7 +133,7 @@ mod tests {
 
     /// A hand that accelerates and decelerates at random, beyond the limit and back.
     #[test]
-    fn the_rough_look_decides_as_the_close_one() {
+    fn rough_speed_check_agrees_with_the_exact_check() {
         let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
         let mut rough = SpeedMonitor::new(TickRate::DEFAULT);
         rough.configure(&mechanism);

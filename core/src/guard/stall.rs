@@ -85,18 +85,18 @@ mod tests {
     }
 
     #[test]
-    fn all_encoders_dead_under_load() {
+    fn dead_encoders_under_load_are_detected() {
         assert_eq!(ticks_until_found([0; 3], Vec3::Y * 1.3), Some(2_001));
     }
 
     #[test]
-    fn one_encoder_dead_while_its_motor_drives_the_arm_away() {
+    fn dead_encoder_of_a_driven_joint_is_detected() {
         let found = ticks_until_found([0, 0, -10], Vec3::Y * 0.7);
         assert_eq!(found, Some(801));
     }
 
     #[test]
-    fn one_channel_dead_goes_up_and_down_by_a_count() {
+    fn encoder_toggling_by_one_count_is_detected_as_dead() {
         let mut detector = StallDetector::default();
         let found = (1..10_000).find(|i| {
             let moved = [-10, if i % 2 == 0 { 1 } else { -1 }, 0];

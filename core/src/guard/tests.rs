@@ -197,7 +197,7 @@ fn a_request_does_not_wait_for_ever() {
 }
 
 #[test]
-fn a_large_force_keeps_it_confirming_and_a_release_goes_back_a_step() {
+fn confirming_requires_small_force_and_dead_man_press() {
     let mut bench = Bench::new();
     bench.wanted_n = Vec3::Z * 0.25;
     bench.guard.arm();
@@ -226,7 +226,7 @@ fn a_large_force_keeps_it_confirming_and_a_release_goes_back_a_step() {
 }
 
 #[test]
-fn force_comes_in_over_two_seconds_at_any_rate() {
+fn force_ramp_takes_two_seconds_at_any_tick_rate() {
     for khz in [1u32, 10] {
         let rate = TickRate::new(khz * 1_000).expect("in range");
         let mut bench = Bench::at(rate);
@@ -384,7 +384,7 @@ fn joint_limits_and_linkage_trip_while_armed() {
 }
 
 #[test]
-fn a_jumping_encoder_loses_the_zero_and_the_first_reading_is_no_jump() {
+fn encoder_jump_of_a_zeroed_arm_faults_and_clears_the_zero() {
     let mut bench = Bench::new();
     bench.zeroed = false;
     bench.sense.counts = [100_000, 0, 0];
@@ -404,7 +404,7 @@ fn a_jumping_encoder_loses_the_zero_and_the_first_reading_is_no_jump() {
 }
 
 #[test]
-fn at_ten_kilohertz_the_same_speed_is_a_tenth_of_the_counts() {
+fn encoder_jump_limit_scales_with_the_tick_period() {
     let mut bench = Bench::at(TickRate::new(10_000).expect("in range"));
     bench.tick();
     bench.sense.counts[0] += 13;
@@ -416,7 +416,7 @@ fn at_ten_kilohertz_the_same_speed_is_a_tenth_of_the_counts() {
 }
 
 #[test]
-fn the_force_is_clamped_as_a_vector_and_says_so() {
+fn force_clamp_keeps_direction_and_is_reported() {
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::new(30.0, -40.0, 0.0);
     bench.ticks(20);
@@ -427,7 +427,7 @@ fn the_force_is_clamped_as_a_vector_and_says_so() {
 }
 
 #[test]
-fn force_changes_at_the_slew_limit_and_says_so() {
+fn slew_limit_bounds_force_change_and_is_reported() {
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::Z * 2.5;
     bench.tick();
@@ -439,7 +439,7 @@ fn force_changes_at_the_slew_limit_and_says_so() {
 }
 
 #[test]
-fn currents_keep_their_direction_at_the_peak_and_say_so() {
+fn current_limit_keeps_direction_and_is_reported() {
     let mut bench = Bench::armed();
     let drive = bench.guard.limit_currents(Vec3::new(16.5, -8.25, 1.65));
     assert!((drive.currents_a - Vec3::new(5.5, -2.75, 0.55)).length() < 1e-5);
@@ -506,7 +506,7 @@ fn hurried(counts_a_tick: i32, ticks: u32) -> Bench {
 }
 
 #[test]
-fn above_the_speed_limit_force_is_less_and_far_above_it_is_a_fault() {
+fn speed_limit_reduces_force_and_excess_speed_is_a_fault() {
     // 28.7 µm a count: 30 counts a tick are 0.86 m/s, 52 are 1.49, 80 are 2.3.
     let slow = hurried(30, 40);
     assert_eq!(
@@ -533,7 +533,7 @@ fn a_motor_that_pushes_in_vain_is_a_fault() {
 }
 
 #[test]
-fn disarmed_by_the_host_force_goes_out_without_a_step() {
+fn host_disarm_fades_force_out_without_a_step() {
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::new(1.0, 2.0, 6.0);
     bench.ticks(20);
@@ -567,7 +567,7 @@ fn disarmed_by_the_host_force_goes_out_without_a_step() {
 }
 
 #[test]
-fn asked_to_arm_while_force_goes_out_is_refused() {
+fn arming_during_force_fade_out_is_refused() {
     let mut bench = Bench::armed();
     bench.guard.disarm();
     bench.tick();

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_kept_is_gone_on_from_and_a_little_warmer() {
+    fn kept_temperatures_are_raised_after_a_reset() {
         let kept = Temperatures {
             winding_k: Vec3::new(0.0, 10.0, 20.0),
             housing_k: Vec3::new(0.0, 60.0, 60.0),
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_no_motor_has_are_not_gone_on_from() {
+    fn impossible_kept_temperatures_are_rejected() {
         for bad in [f32::NAN, f32::INFINITY, -0.1, 201.0] {
             for axis in 0..3 {
                 let mut kept = Temperatures::HOT;
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_calibration_there_is_no_current() {
+    fn uncalibrated_motors_have_no_permitted_current() {
         assert_eq!(Motors::new(TickRate::DEFAULT).allowed_a, Vec3::ZERO);
     }
 
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn asked_for_the_peak_for_ever_it_derates_and_never_trips() {
+    fn permanent_peak_request_derates_and_never_trips() {
         let (motors, given) = after(khz(1), 3000, 5.5);
         assert!(!motors.too_hot, "{:?}", motors.winding_c());
         assert!(given.x < 1.4 && given.x >= 1.24, "{given}");

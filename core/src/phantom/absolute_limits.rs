@@ -325,7 +325,7 @@ mod tests {
     ];
 
     #[test]
-    fn no_record_raises_a_ceiling_of_its_model() {
+    fn record_beyond_any_model_limit_is_refused() {
         for model in MODELS {
             for (raise, field, axis) in RAISED {
                 let mut record = model.preset();
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_is_not_asked_for_more_than_it_commands() {
+    fn peak_current_above_board_limit_is_refused() {
         let record = Calibration::PREMIUM_1_5;
         assert_eq!(record.check_board(5.5), Ok(()));
         let bad = record.check_board(4.83).expect_err("too much");
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_names_the_model_and_its_ceiling() {
+    fn limit_error_names_the_model_and_its_range() {
         let mut record = Calibration::PREMIUM_1_5;
         record.max_force_n = 20.0;
         assert_eq!(

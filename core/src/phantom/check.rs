@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_names_the_value_the_range_and_what_to_do() {
+    fn range_error_names_value_range_and_remedy() {
         let record = Calibration {
             l1_mm: 3.0,
             ..Calibration::PREMIUM_1_5

@@ -15,7 +15,7 @@ fn along(limits: &JointLimits, axis: usize, steps: u32) -> impl Iterator<Item = 
 }
 
 #[test]
-fn every_tip_of_the_workspace_is_found_again_within_a_micrometre() {
+fn inverse_kinematics_round_trips_within_a_micrometre() {
     for model in [
         Model::Premium10,
         Model::Premium15,
@@ -65,7 +65,7 @@ fn the_branch_inside_the_limits_is_taken() {
 }
 
 #[test]
-fn near_the_singular_poses_the_tip_is_still_met() {
+fn inverse_kinematics_is_accurate_near_singular_poses() {
     let mut record = Calibration::PREMIUM_1_5;
     record.limits.q2_minus_q3_max_rad = 1.5;
     record.limits.q3_minus_q2_max_rad = 1.5;
@@ -91,7 +91,7 @@ fn near_the_singular_poses_the_tip_is_still_met() {
 }
 
 #[test]
-fn what_cannot_be_reached_says_why() {
+fn unreachable_position_returns_the_reason() {
     let record = Calibration::PREMIUM_1_5;
     let at = |x: f32, y: f32, z: f32| record.joints_at(Vec3::new(x, y, z));
     assert_eq!(at(f32::NAN, 0.0, 0.0), Err(Unreachable::NotFinite));
@@ -104,7 +104,7 @@ fn what_cannot_be_reached_says_why() {
 }
 
 #[test]
-fn whole_turns_are_taken_off_where_the_limits_lie_beyond_half_a_turn() {
+fn joint_angles_beyond_half_a_turn_are_found() {
     let mut record = Calibration::PREMIUM_1_5;
     record.limits.min_rad = Vec3::new(-1.5, -4.0, -4.0);
     record.limits.max_rad = Vec3::new(1.5, 2.0, 2.0);

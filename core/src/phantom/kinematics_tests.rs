@@ -52,7 +52,7 @@ fn the_tip_is_within_its_bound_over_the_workspace() {
 }
 
 #[test]
-fn torques_are_the_transposed_jacobian_and_velocity_is_the_jacobian() {
+fn torques_and_tip_velocity_match_the_jacobian() {
     let force = Vec3::new(1.5, -0.7, 2.2);
     let rates = Vec3::new(0.7, -1.9, 1.1);
     for q in workspace().step_by(97) {
@@ -89,7 +89,7 @@ fn directions() -> impl Iterator<Item = Vec3> {
 }
 
 #[test]
-fn torques_stay_within_the_levers_in_every_pose_singular_ones_included() {
+fn torques_stay_within_levers_even_in_singular_poses() {
     let (l1, l2) = (PREMIUM.l1_mm * 1e-3, PREMIUM.l2_mm * 1e-3);
     let bound = Vec3::new(l1 + l2, l1, l2) * 1.000_01;
     let right = core::f32::consts::FRAC_PI_2;

@@ -88,7 +88,7 @@ fn counts_follow_the_pose_for_any_zero() {
 }
 
 #[test]
-fn one_count_moves_the_tip_by_what_the_data_sheet_says() {
+fn one_count_moves_the_tip_by_the_data_sheet_resolution() {
     let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
     let home = mechanism.pose([0; 3], [0; 3]).tip_mm();
     assert_eq!(home, mechanism.home_mm());
@@ -101,7 +101,7 @@ fn one_count_moves_the_tip_by_what_the_data_sheet_says() {
 }
 
 #[test]
-fn a_newton_upwards_at_home_takes_the_current_that_the_lever_says() {
+fn one_newton_up_at_home_needs_the_current_of_its_lever() {
     let record = Calibration {
         motor_sign: Vec3::new(1.0, -1.0, 1.0),
         ..Calibration::PREMIUM_1_5

@@ -148,7 +148,7 @@ mod tests {
 
     /// Checks the tables here and in docs/reference/hardware.md.
     #[test]
-    fn a_premium_1_0_counts_as_the_tables_say_with_either_ratio() {
+    fn premium_1_0_resolution_matches_tables_for_both_ratios() {
         let counts_a_mm = |ratio: Vec3| {
             let record = Calibration {
                 ratio,

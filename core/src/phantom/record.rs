@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_in_comes_out_whatever_follows_it() {
+    fn record_round_trips_despite_trailing_bytes() {
         let mut bytes = bytes();
         assert!(
             (100..RECORD_BYTES - 32).contains(&bytes.len()),
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn no_flipped_bit_and_no_missing_byte_gets_through() {
+    fn record_with_flipped_bit_or_missing_byte_is_rejected() {
         let good = bytes();
         // Miri is some hundred times slower, so it tests only a few of each.
         let (bits, lengths) = if cfg!(miri) { (61, 17) } else { (1, 1) };
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn an_undamaged_record_that_makes_no_sense_is_told_apart() {
+    fn intact_record_with_bad_values_is_invalid_not_damaged() {
         let record = Calibration {
             l1_mm: 1.0,
             ..Calibration::PREMIUM_1_5

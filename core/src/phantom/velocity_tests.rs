@@ -44,7 +44,7 @@ fn errors(ticks: u32, at: impl Fn(f64) -> f64, speed: impl Fn(f64) -> f64) -> (E
 }
 
 #[test]
-fn even_motion_is_met_within_the_stated_bound() {
+fn constant_velocity_is_estimated_within_the_stated_bound() {
     let mut worst = 0.0f64;
     for i in (0..2000).step_by(cases(1, 200) as usize) {
         let speed = 0.0137 * f64::from(i) - 13.7;
@@ -58,7 +58,7 @@ fn even_motion_is_met_within_the_stated_bound() {
 }
 
 #[test]
-fn a_hand_moving_to_and_fro_is_followed_better_than_by_differences() {
+fn fitted_velocity_beats_differences_for_sinusoidal_motion() {
     // Read a thousand times a second. A fast change of speed shortens the window and its gain: ±20
     // mm at 2 Hz changes by 0.13 counts from one reading to the next.
     for (amplitude, hz, share) in [(800.0, 2.0, 1.0), (800.0, 0.5, 0.15), (200.0, 0.5, 0.06)] {
@@ -75,7 +75,7 @@ fn a_hand_moving_to_and_fro_is_followed_better_than_by_differences() {
 }
 
 #[test]
-fn a_sudden_stop_is_seen_within_a_few_readings() {
+fn sudden_stop_is_detected_within_two_readings() {
     let mut readings = Readings::default();
     readings.restart([0; 3]);
     let mut counts = 0;
@@ -97,7 +97,7 @@ fn a_sudden_stop_is_seen_within_a_few_readings() {
 }
 
 #[test]
-fn a_restart_forgets_and_wrapping_counts_go_on() {
+fn restart_clears_velocity_and_wrapping_counts_are_handled() {
     let mut readings = Readings::default();
     for i in 0..40 {
         readings.take([i * 10; 3]);

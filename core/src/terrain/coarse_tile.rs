@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn it_ends_where_it_ends_and_its_holes_are_its_own() {
+    fn coarse_tile_has_no_height_outside_and_keeps_no_data() {
         let coarse = tile(|col, row| if (col, row) == (2, 2) { f32::NAN } else { 1.0 });
         let height = |x, y| COARSE.height(&coarse, Cell::new(x, y));
         for beyond in [(-8, 200), (250, 200), (100, 99), (100, 357)] {
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_corners_of_a_cell_are_its_samples_to_the_bit_but_beside_holes() {
+    fn corners_equal_heights_bit_for_bit_except_beside_no_data() {
         let rough = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 997) as f32 / 7.0;
         let is_no_data = |col: usize, row: usize| (col, row) == (9, 4);
         let coarse = tile(|col, row| {
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_worked_with_is_refused() {
+    fn level_shift_or_origin_out_of_range_is_invalid() {
         let with = |first, shift| CoarseTile { first, shift };
         assert!(COARSE.is_valid(0) && COARSE.is_valid(252));
         assert!(!COARSE.is_valid(253));

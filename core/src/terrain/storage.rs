@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error_and_leaves_nothing() {
+    fn invalid_size_is_refused_and_leaves_the_field_empty() {
         let mut storage = TileArena::<1>::from_fn(FieldSize::new(5, 5), rough).unwrap();
         for (columns, rows) in [(33, 1), (1, i32::MAX), (0, 5), (5, i32::MIN)] {
             let size = FieldSize::new(columns, rows);

@@ -444,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn maxima_bound_every_block_and_ignore_holes() {
+    fn block_maxima_bound_heights_and_ignore_no_data() {
         let tile = filled(|col, row| match (col, row) {
             (8, 8) => 5.5, // belongs to four blocks
             (20, 20) => f32::NAN,
@@ -496,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_that_cannot_be_addressed_are_holes() {
+    fn heights_beyond_the_addressable_range_are_no_data() {
         let tile = filled(|col, _| if col == 0 { f32::INFINITY } else { 1e30 });
         assert!(tile.corners(Cell::new(0, 0)).iter().all(|h| h.is_nan()));
         assert_eq!(tile.top(), i32::MIN);

@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fallback_comes_before_all_others_and_once() {
+    fn fallback_tiles_are_requested_first_and_once() {
         let mut requester = requester();
         let fallback = fallback(Some(2));
         requester.lay(Some(fallback));
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn what_holds_the_proxy_up_comes_first() {
+    fn tile_that_blocks_the_proxy_is_requested_first() {
         let mut requester = requester();
         let demand = RequestHint {
             missing_tile: Some(TileIndex::new(9, 9)),
@@ -420,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn asks_again_after_the_time_out_and_not_before() {
+    fn request_is_repeated_only_after_the_timeout() {
         let mut requester = requester();
         assert_eq!(drain(&mut requester, 7, &at(48, 48)), [(1, 1)]);
         assert_eq!(drain(&mut requester, 6 + RETRY_TICKS, &at(48, 48)), []);
@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_that_is_out_of_reach_by_now_is_not_asked_for_again() {
+    fn tile_out_of_reach_is_not_requested_again() {
         let mut requester = requester();
         assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
         let far = drain(&mut requester, RETRY_TICKS, &at(400, 48));
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_made_older_is_overdue_sooner() {
+    fn aged_request_is_repeated_sooner() {
         let mut requester = requester();
         assert_eq!(drain(&mut requester, 7, &at(48, 48)), [(1, 1)]);
         requester.age(RETRY_TICKS / 2);
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn never_asks_outside_the_field_nor_for_more_than_the_limit() {
+    fn requests_stay_inside_the_field_and_within_the_limit() {
         let mut requester = requester();
         let demand = RequestHint {
             velocity: [-f32::MAX, f32::NAN],

@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_of_three_tiles_knows_what_is_clear_and_what_is_not() {
+    fn three_tile_window_reports_clear_boxes_correctly() {
         let mut buffers = buffers::<3>();
         let mut field = Field::<3>::over(&mut buffers, FieldSize::new(640, 640), rough);
         let mut seen = [0, 0];

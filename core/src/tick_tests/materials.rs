@@ -130,7 +130,7 @@ fn max_step(forces: &[Vec3]) -> f32 {
 }
 
 #[test]
-fn a_border_is_crossed_without_a_step_and_lies_half_way_between_the_samples() {
+fn stiffness_is_continuous_across_border_midway_between_samples() {
     for step in [0.001, 0.02, -0.02] {
         let mut tiles = tiles();
         let table = match step > 0.0 {
@@ -174,7 +174,7 @@ fn material_is_rendered_at_once_after_the_air() {
 }
 
 #[test]
-fn friction_changes_evenly_and_a_proxy_is_held_by_its_own_material() {
+fn friction_blends_evenly_and_stuck_proxy_keeps_its_material() {
     let rough = Material {
         friction: Friction::coulomb(0.8),
         ..SOFT
@@ -208,7 +208,7 @@ fn friction_changes_evenly_and_a_proxy_is_held_by_its_own_material() {
 }
 
 #[test]
-fn a_texture_goes_out_before_another_one_comes_in() {
+fn texture_fades_out_before_the_next_fades_in() {
     let textured = |texture| Material { texture, ..SOFT };
     let waves = |wavelength_mm| Texture {
         wavelength_mm,
@@ -336,7 +336,7 @@ fn replayed<'t, const D: usize>(
 }
 
 #[test]
-fn where_the_tile_has_no_materials_the_one_before_stays() {
+fn tile_without_materials_keeps_previous_material() {
     let mut tiles = buffers::<4>();
     let east_alone = |key: TileKey, _| (key.index.col >= 10).then_some(1);
     let mut device = replayed::<4>(&mut tiles, &[SOFT, HARD], |_, _| 0.0, east_alone);
@@ -358,7 +358,7 @@ fn where_the_tile_has_no_materials_the_one_before_stays() {
 }
 
 #[test]
-fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
+fn small_tile_windows_render_the_same_bits_as_a_large_one() {
     fn rendered<const D: usize>() -> Vec<(GridPoint, Vec3)> {
         let rough = Material {
             friction: Friction::coulomb(0.4),
@@ -457,7 +457,7 @@ fn a_scene_whose_table_is_not_here_is_refused() {
 }
 
 #[test]
-fn tables_are_told_apart_by_each_of_their_numbers() {
+fn material_table_check_sum_depends_on_every_field() {
     let plain = Material {
         friction: Friction {
             static_mu: 0.5,

@@ -183,7 +183,7 @@ fn terrain_stays_while_held_for_another_placement() {
 }
 
 #[test]
-fn a_hand_that_goes_far_takes_the_terrain_along_however_the_clutch_is_held() {
+fn far_hand_motion_carries_terrain_with_clutch_in_place() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     let home = |arm: &Watched<'_>| arm.device.haptics.scene.expect("a scene").home;
@@ -202,7 +202,7 @@ fn a_hand_that_goes_far_takes_the_terrain_along_however_the_clutch_is_held() {
 }
 
 #[test]
-fn taken_along_once_the_terrain_has_gone_with_the_hand() {
+fn one_with_hand_hold_carries_terrain_until_clutch_closes() {
     let mut tiles = buffers::<4>();
     for holds in [[InPlace, WithHand, InPlace], [WithHand, InPlace, InPlace]] {
         let mut arm = Watched::pressed(&mut tiles, plane);
@@ -226,7 +226,7 @@ fn taken_along_once_the_terrain_has_gone_with_the_hand() {
 }
 
 #[test]
-fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
+fn clutch_stays_open_until_board_input_and_host_release_it() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     let rendered = arm.tick();
@@ -279,7 +279,7 @@ fn held_clutch_input_opens_next_scene_but_no_replay() {
 }
 
 #[test]
-fn let_go_too_early_it_opens_to_the_end_first() {
+fn clutch_released_early_opens_fully_then_closes() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     arm.clutch(WithHand);
@@ -324,7 +324,7 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
 }
 
 #[test]
-fn in_the_air_the_hip_is_where_the_view_puts_it() {
+fn placement_sets_the_position_of_a_free_hip() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     go(&mut arm, [0, 420, 0], 600);
@@ -410,7 +410,7 @@ fn placement_during_contact_disarms_as_another_scene_does() {
 }
 
 #[test]
-fn no_host_makes_the_force_step() {
+fn force_rise_rate_stays_bounded_under_random_commands() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     let mut rng = 12_345_u32;
@@ -467,7 +467,7 @@ fn the_ground_is_not_armed_into_by_holding_the_clutch() {
 
 /// A replay of a recording makes the same change.
 #[test]
-fn points_go_on_in_another_view() {
+fn point_replay_continues_after_a_scene_change() {
     let mut tiles = buffers::<4>();
     let mut device = replaying_on(&mut tiles, gentle);
     let at = |z| GridPoint::new([320, 320, 0], Vec3::new(0.5, 0.5, z));

@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_in_comes_out_byte_by_byte_or_at_once() {
+    fn frames_decode_byte_by_byte_and_all_at_once() {
         let bytes = [frame(7), frame(0), frame(u32::MAX)].concat();
         let mut reader = FrameReader::new();
         assert_eq!(frames(&mut reader, &bytes), [Ok(7), Ok(0), Ok(u32::MAX)]);
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn no_flipped_bit_gets_through() {
+    fn frame_with_any_flipped_bit_is_rejected() {
         let good = frame(123_456);
         for bit in 0..good.len() * 8 {
             let mut bad = good.clone();

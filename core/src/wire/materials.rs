@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn they_come_back_from_the_shortest_form() {
+    fn packed_materials_round_trip_in_shortest_form() {
         let noise = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 61 % 16) as u8;
         let mut room = [0xAA; MAX_TILE_BYTES];
         let border = |col: usize, row: usize| u8::from(col + row / 3 > 20) * 9;
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_no_materials_are_refused_and_leave_the_buffer_vacant() {
+    fn invalid_material_bytes_are_refused_and_leave_tile_vacant() {
         let whole = [[3, 255]; 4].as_flattened().to_vec();
         let with = |more: &[u8]| [&whole[..], more].concat();
         let runs = [

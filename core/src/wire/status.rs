@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_crash_says_more_than_the_watchdog_that_followed_it() {
+    fn crash_takes_precedence_over_watchdog_reset() {
         let crash = |kind| Crash {
             kind,
             pc: 0,
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_brown_out_is_a_fault_and_a_chip_that_does_not_see_one_is_told() {
+    fn brown_out_is_a_fault_and_a_low_threshold_is_detected() {
         let boot = BootReport {
             cause: ResetCause::BrownOut,
             ..BootReport::default()

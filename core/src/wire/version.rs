@@ -45,7 +45,7 @@ mod tests {
     use crate::wire::session::{InSession, SessionNumber};
 
     #[test]
-    fn protocol_3_says_the_same_bytes() {
+    fn version_check_has_the_bytes_of_protocol_3() {
         let mut buffer = [0; 8];
         let asked = VersionCheck::Asked { protocol: 3 };
         assert_eq!(
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn no_session_looks_like_a_version_check() {
+    fn session_frame_is_never_read_as_a_version_check() {
         for random in [0, 1, 0x7F, 0x80, 0x100, 1 << 14, u32::MAX] {
             let framed = InSession {
                 session: SessionNumber::new(random),

@@ -123,7 +123,7 @@ fn every_register_is_read_in_turn() {
 }
 
 #[test]
-fn nothing_is_switched_on_before_all_of_it_read_back() {
+fn enable_stays_low_until_all_registers_read_back() {
     for ticks in 0..10 {
         let (mut off, wires, pin) = off();
         wires.take_frames();
@@ -162,7 +162,7 @@ fn lost_range_or_overload_is_reported_within_seven_ticks() {
 }
 
 #[test]
-fn a_broken_wire_is_told_at_once_and_keeps_the_amplifiers_off() {
+fn broken_wire_is_reported_at_once_and_blocks_enable() {
     let (mut on, wires, pin) = on();
     wires.0.borrow_mut().is_silent = true;
     on.write([1.0, 2.0, 3.0]);
@@ -174,7 +174,7 @@ fn a_broken_wire_is_told_at_once_and_keeps_the_amplifiers_off() {
 }
 
 #[test]
-fn outputs_are_held_with_the_enable_low_and_let_go() {
+fn held_outputs_are_written_disabled_and_zeroed_before_enable() {
     let (mut off, wires, pin) = off();
     (0..7).for_each(|_| off.rest([0.0; 3]));
     wires.take_frames();

@@ -37,7 +37,7 @@ mod tests {
     const ESCON_READS_S: f64 = 5e-6;
 
     #[test]
-    fn full_scale_keeps_away_from_what_an_escon_reads_as_a_broken_wire() {
+    fn full_scale_duty_stays_clear_of_escon_broken_wire_range() {
         // The timer's counts at 228 MHz, and smaller ones.
         for max in [60_000, 1_000, 200] {
             for (fraction, end) in [(-1.0, 0.1), (1.0, 0.9)] {
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_escon_reads_wrong_is_less_than_a_thirtieth_of_full_scale() {
+    fn escon_reading_error_is_below_a_thirtieth_of_full_scale() {
         let wrong = ESCON_READS_S * f64::from(DUTY_HZ) / f64::from(SPAN);
         assert!(wrong < 1.0 / 30.0, "{wrong}");
     }

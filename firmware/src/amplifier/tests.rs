@@ -63,7 +63,7 @@ fn amplifiers() -> (Off<Duties, Pin>, Log) {
 }
 
 #[test]
-fn zero_is_commanded_before_switching_on_and_off_comes_first_after() {
+fn enable_writes_zero_first_and_disable_switches_off_first() {
     let (off, log) = amplifiers();
     let mut on = off.enable();
     assert_eq!(log.take(), ["500", "500", "500", "on"]);
@@ -74,7 +74,7 @@ fn zero_is_commanded_before_switching_on_and_off_comes_first_after() {
 }
 
 #[test]
-fn the_command_stays_within_full_scale_whatever_is_asked() {
+fn command_is_clamped_to_full_scale_for_any_input() {
     let (off, log) = amplifiers();
     let mut on = off.enable();
     log.take();

@@ -70,14 +70,14 @@ mod tests {
     }
 
     #[test]
-    fn held_and_let_go_count_when_they_have_lasted() {
+    fn clutch_input_changes_count_after_debounce_time() {
         let reads = |tick| (101..=200).contains(&tick);
         assert_eq!(counts(1, reads), [(105, true), (220, false)]);
         assert_eq!(counts(4, reads), [(120, true), (280, false)]);
     }
 
     #[test]
-    fn what_bounces_counts_once_it_rests() {
+    fn bouncing_clutch_input_counts_once_it_is_stable() {
         // Closed for 4 ms and open for 1 ms, until it stays closed.
         let closing = |tick| tick % 5 != 0 || tick > 300;
         assert_eq!(counts(1, closing), [(305, true)]);

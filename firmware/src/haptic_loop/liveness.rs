@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn live_from_the_first_feeding_until_forty_milliseconds_without_one() {
+    fn liveness_starts_at_first_feeding_and_ends_after_40_ms() {
         let mut liveness = Liveness::new(TickRate::DEFAULT);
         assert!((0..100).all(|_| !liveness.tick(0)), "never fed");
         assert!(liveness.tick(1));

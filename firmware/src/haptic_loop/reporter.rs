@@ -78,7 +78,7 @@ mod tests {
     use hapterra_core::guard::{Limits, Mode};
 
     #[test]
-    fn samples_come_a_thousand_times_a_second() {
+    fn samples_are_sent_at_one_kilohertz_for_any_tick_rate() {
         for khz in [1, 4, 10] {
             let mut reporter = Reporter::new(TickRate::new(khz * 1000).expect("in range"));
             let sample = |tick| TickRecord {
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_told_at_once_and_the_rest_now_and_then() {
+    fn mode_change_is_reported_at_once_and_limits_periodically() {
         let mut reporter = Reporter::new(TickRate::DEFAULT);
         let mut report = Report::default();
         let mut reported = 0;

@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_goes_before_telemetry_but_never_into_it() {
+    fn request_precedes_telemetry_but_never_splits_a_frame() {
         let telemetry = || ToHost::Telemetry(Telemetry::default());
         let mut queue = TxQueue::new();
         queue.push_telemetry(SESSION, &telemetry());
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_cut_off_does_not_take_the_next_frame_with_it() {
+    fn truncated_frame_does_not_corrupt_the_next_frame() {
         let mut queue = TxQueue::new();
         queue.push(SESSION, &taken(1));
         let mut all = take(&mut queue, 3);

@@ -36,7 +36,7 @@ const RESETS: [ResetCause; 4] = [
 ];
 
 #[test]
-fn a_reset_goes_on_from_the_newest_temperatures() {
+fn reset_resumes_from_newest_temperatures() {
     for ticks in [100, 200, 300, 1_234] {
         let newest = ticks / 100 * 100;
         let copies = after(ticks, |tick| if tick < newest { WARM } else { WARMER });
@@ -67,7 +67,7 @@ fn a_copy_that_is_cut_off_leaves_the_one_before() {
 }
 
 #[test]
-fn no_flipped_bit_is_believed() {
+fn temperature_copies_with_a_flipped_bit_are_rejected() {
     let good = after(100, |_| WARM);
     for bit in 0..WORDS * 32 {
         let mut bad = good;
@@ -83,7 +83,7 @@ fn no_flipped_bit_is_believed() {
 }
 
 #[test]
-fn nothing_that_a_ram_holds_by_itself_is_believed() {
+fn uninitialised_ram_and_impossible_values_are_rejected() {
     for word in [0, u32::MAX, 0xAAAA_AAAA, MAGIC] {
         let begun = begun(ResetCause::Watchdog, &[[word; WORDS]; 2]);
         assert_eq!(begun, Temperatures::HOT);
@@ -98,7 +98,7 @@ fn nothing_that_a_ram_holds_by_itself_is_believed() {
 }
 
 #[test]
-fn what_was_taken_once_is_not_found_again() {
+fn temperature_copies_from_before_power_on_are_not_reused() {
     let old = after(1_000, |_| WARM);
     let (hot, copies) = begin(ResetCause::PowerOn, &old);
     assert_eq!(hot, Temperatures::HOT);

@@ -165,7 +165,7 @@ fn record_above_a_limit_is_refused_without_falling_back() {
 }
 
 #[test]
-fn nothing_then_something_then_the_latest() {
+fn load_returns_missing_then_always_the_latest_record() {
     let mut store = store(Flash::<8, 2048>::new(4096), 2048);
     assert_eq!(store.load(), Stored::Missing);
     for n in 0..40 {
@@ -176,7 +176,7 @@ fn nothing_then_something_then_the_latest() {
 }
 
 #[test]
-fn it_never_erases_and_says_when_it_is_full() {
+fn save_never_erases_and_reports_a_full_store() {
     full::<8, 2048>(2048, 2048 / PLACE);
     // A large sector is not used up.
     full::<32, 8192>(8192, 8);

@@ -4,7 +4,7 @@ use super::*;
 use crate::{Certainty, OpenOptions, Raster};
 
 #[test]
-fn notes_of_the_asked_band_are_read() {
+fn notes_of_the_requested_band_are_read() {
     let text = r#"<PAMDataset>
         <SRS dataAxisToSRSAxisMapping="1,2">EPSG:32632</SRS>
         <PAMRasterBand band="1"><NoDataValue>-9.999E3</NoDataValue><UnitType>ft</UnitType></PAMRasterBand>

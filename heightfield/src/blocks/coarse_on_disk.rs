@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_comes_back_to_the_bit_in_few_bytes() {
+    fn encoded_piece_round_trips_exactly_in_few_bytes() {
         for (values, bytes) in [
             (&[0.0, -0.0, 1.5, f64::from(f32::MIN_POSITIVE), 3e9][..], 4),
             (
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn what_two_know_is_joined() {
+    fn join_merges_the_known_samples_of_both_pieces() {
         let mut one = piece(&[1.0, 2.0, 3.0]);
         let mut other = Piece::unknown(3);
         (other.values[0], other.values[1]) = (7.0, 9.0);

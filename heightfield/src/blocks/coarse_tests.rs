@@ -191,7 +191,7 @@ fn coarse_levels_have_the_files_own_samples_whatever_its_order() {
 }
 
 #[test]
-fn a_second_look_reads_no_block_and_a_finer_one_serves_the_coarser() {
+fn repeated_read_is_cached_and_fine_level_fills_coarse_levels() {
     let seen = Seen::new("");
     let raster = raster(&seen, &DiskCache::off(), USUAL);
     check(&raster, 8, USUAL);
@@ -249,7 +249,7 @@ fn same(one: &[f64], other: &[f64]) {
 }
 
 #[test]
-fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
+fn nonblocking_read_loads_coarse_level_in_background() {
     let seen = Seen::new("");
     let waited = look(&raster(&seen, &DiskCache::off(), USUAL), 8, Wait::UntilRead).expect("here");
     let raster = raster(&seen, &DiskCache::off(), USUAL);
@@ -266,7 +266,7 @@ fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
 }
 
 #[test]
-fn whoever_is_served_reads_no_fine_block() {
+fn nonblocking_read_loads_fine_block_in_background() {
     let seen = Seen::new("");
     let raster = raster(&seen, &DiskCache::off(), USUAL);
     let there = |column| raster.read_height(column, 1000, Wait::Never);
@@ -283,7 +283,7 @@ fn whoever_is_served_reads_no_fine_block() {
 }
 
 #[test]
-fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
+fn late_block_is_pending_and_damaged_block_is_not_cached() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 26);
     let seen = Seen::new("one");
@@ -322,7 +322,7 @@ fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
 }
 
 #[test]
-fn another_run_on_the_same_file_reads_nothing_and_on_another_all() {
+fn disk_cache_serves_next_run_only_for_the_same_file_stamp() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 26);
     let seen = Seen::new("one");
@@ -349,7 +349,7 @@ fn another_run_on_the_same_file_reads_nothing_and_on_another_all() {
 }
 
 #[test]
-fn what_was_read_of_a_file_that_changed_meanwhile_is_not_kept() {
+fn samples_of_a_file_changed_while_open_are_not_cached() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 26);
     let seen = Seen::new("one");
@@ -364,7 +364,7 @@ fn what_was_read_of_a_file_that_changed_meanwhile_is_not_kept() {
 }
 
 #[test]
-fn the_memory_of_coarse_samples_is_bounded_and_what_gives_way_is_kept_on_disk() {
+fn coarse_memory_is_bounded_and_evicted_samples_stay_on_disk() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 30);
     let seen = Seen::new("one");
@@ -416,7 +416,7 @@ fn the_memory_of_coarse_samples_is_bounded_and_what_gives_way_is_kept_on_disk() 
 }
 
 #[test]
-fn what_lies_ahead_is_read_in_the_background_and_too_much_is_not() {
+fn prefetch_reads_in_background_and_skips_oversized_areas() {
     for order in [[true, false], [false, true]] {
         let seen = Seen::new("");
         let raster = raster(&seen, &DiskCache::off(), order);

@@ -173,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_very_many_blocks_those_that_are_listed_are_stored() {
+    fn listed_blocks_are_stored_and_limited_in_number() {
         let of = BlockImage {
             columns: 2048,
             rows: 2048,

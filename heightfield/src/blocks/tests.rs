@@ -120,7 +120,7 @@ fn a_touched_place_reads_its_block_once_and_nothing_else() {
 }
 
 #[test]
-fn missing_or_damaged_blocks_are_holes_and_the_rest_is_read() {
+fn missing_or_damaged_blocks_are_no_data_and_others_are_read() {
     let (field, _) = Field::new();
     let raster = raster(field, true, false);
     for (column, row, is_no_data) in [
@@ -143,7 +143,7 @@ fn missing_or_damaged_blocks_are_holes_and_the_rest_is_read() {
 }
 
 #[test]
-fn coarse_levels_come_from_the_overview_in_their_place_whatever_the_files_order() {
+fn coarse_levels_use_the_overview_in_any_file_orientation() {
     for (south_up, east_first) in [(true, false), (false, false), (true, true), (false, true)] {
         let (mut field, read) = Field::new();
         field.fault = false;
@@ -301,7 +301,7 @@ fn slow(elsewhere: bool) -> Slow {
 }
 
 #[test]
-fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_read() {
+fn cached_block_is_read_while_another_block_loads() {
     let field = slow(false);
     let (begun, go_on) = (field.begun.clone(), field.go_on.clone());
     let blocks = Blocks::new(Box::new(field));

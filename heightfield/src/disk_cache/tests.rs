@@ -85,7 +85,7 @@ fn a_record_that_is_not_whole_or_another_is_as_if_absent() {
 }
 
 #[test]
-fn the_records_used_longest_ago_go_first_and_nothing_else() {
+fn only_least_recently_used_records_are_evicted() {
     const MAX: u64 = 400 << 10;
     let (folder, cache) = cache(MAX);
     let foreign = folder.path().join(FORM).join("ab").join("mine.txt");
@@ -108,7 +108,7 @@ fn the_records_used_longest_ago_go_first_and_nothing_else() {
 }
 
 #[test]
-fn what_other_programs_write_counts_too() {
+fn size_limit_includes_records_of_other_programs() {
     const MAX: u64 = 1 << 20;
     let (folder, one) = cache(MAX);
     let other = DiskCache::at(folder.path(), MAX);
@@ -120,7 +120,7 @@ fn what_other_programs_write_counts_too() {
 }
 
 #[test]
-fn two_that_write_and_read_the_same_records_at_once_see_whole_ones() {
+fn concurrent_caches_read_only_whole_records() {
     let (folder, _) = cache(0);
     std::thread::scope(|scope| {
         for _ in 0..4 {
@@ -144,7 +144,7 @@ fn two_that_write_and_read_the_same_records_at_once_see_whole_ones() {
 }
 
 #[test]
-fn a_folder_that_is_off_or_cannot_be_made_keeps_nothing_and_says_nothing() {
+fn disabled_or_unusable_folder_stores_nothing_without_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("file");
     fs::write(&file, b"mine").expect("written");
@@ -191,7 +191,7 @@ fn folder_that_others_may_write_is_neither_read_nor_written() {
 
 #[cfg(unix)]
 #[test]
-fn folder_that_is_a_link_is_not_used_and_nothing_there_is_deleted() {
+fn linked_folder_is_refused_and_its_files_are_kept() {
     use std::os::unix::fs::symlink;
     let elsewhere = tempfile::tempdir().expect("a folder");
     let foreign = elsewhere.path().join(name(1).path());
@@ -212,7 +212,7 @@ fn folder_that_is_a_link_is_not_used_and_nothing_there_is_deleted() {
 }
 
 #[test]
-fn what_a_killed_program_has_left_goes() {
+fn leftover_file_of_a_killed_program_is_deleted() {
     let (folder, cache) = cache(64 << 10);
     let inner = folder.path().join(FORM).join("00");
     fs::create_dir_all(&inner).expect("made");
@@ -224,7 +224,7 @@ fn what_a_killed_program_has_left_goes() {
 }
 
 #[test]
-fn a_stamp_tells_a_file_from_others_and_from_itself_after_a_change() {
+fn file_stamp_differs_between_files_and_after_a_change() {
     let folder = tempfile::tempdir().expect("a folder");
     let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
     fs::write(&a, [1; 9]).expect("written");

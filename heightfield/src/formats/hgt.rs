@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_tells_the_place() {
+    fn file_name_determines_corner_or_is_rejected() {
         assert_eq!(corner("N44W072.hgt"), Some((-72.0, 44.0)));
         assert_eq!(corner("s05e100.SRTMGL1.hgt"), Some((100.0, -5.0)));
         assert_eq!(corner("N45W074T86.hgt"), None);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_length_tells_the_size() {
+    fn file_length_determines_size_or_is_rejected() {
         assert_eq!(size(2 * 1201 * 1201).unwrap(), (1201, 1201));
         assert_eq!(size(2 * 3601 * 3601).unwrap(), (3601, 3601));
         assert_eq!(size(2 * 1801 * 3601).unwrap(), (1801, 3601));

@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn layers_of_providers_are_told_from_heights() {
+    fn provider_layers_are_separated_from_heights() {
         for (heights, layers) in [
             (
                 "ASTGTMV003_N38E050_dem.tif",
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn type_tells_where_names_do_not() {
+    fn heights_are_chosen_by_name_and_then_by_sample_type() {
         use SampleType::{F32, I16, U8};
         let among = |files: &[(&str, SampleType)]| {
             let files: Vec<_> = files

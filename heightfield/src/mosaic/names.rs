@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_says_whether_a_file_is_a_tile() {
+    fn tiles_are_recognised_by_file_name() {
         for name in [
             "a.tif",
             "A.TIFF",

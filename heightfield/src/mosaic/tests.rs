@@ -101,7 +101,7 @@ fn few_files_are_open_at_once_and_all_are_read() {
 }
 
 #[test]
-fn what_is_not_touched_is_not_opened() {
+fn files_outside_the_read_part_are_not_opened() {
     let folder = tempfile::tempdir().expect("a folder");
     tiles(folder.path(), 2);
     let names = ["000-000.asc", "000-001.asc", "001-000.asc"];

@@ -186,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_server_says_is_short_on_one_line_and_holds_no_key() {
+    fn server_text_is_shortened_to_one_line_without_secrets() {
         let stated =
             "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
         let reported = in_short(&stated);
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_environment_lacks_is_told_where_a_file_is_opened() {
+    fn environment_errors_are_permanent_only_at_opening() {
         for (text, why) in [
             (
                 "Error performing PUT http://169.254.169.254/latest/api/token in 1s",
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn the_word_of_a_server_is_told_where_it_is_one() {
+    fn server_error_code_is_reported_only_if_well_formed() {
         let stated = |body: &str| {
             let text = format!("Server returned non-2xx status code: 400 Bad Request: {body}");
             reported(&generic(&text)).to_string()

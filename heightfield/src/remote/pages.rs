@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_asked_for_once_and_together() {
+    fn missing_pages_are_requested_once_in_merged_runs() {
         let mut pages = Pages::default();
         assert_eq!(pages.take_missing(1, 3..5), one(3..5));
         assert_eq!(pages.take_missing(1, 0..22), [0..3, 5..21, 21..22]);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn neither_what_is_kept_nor_what_is_on_its_way_grows_without_end() {
+    fn kept_and_requested_pages_are_bounded() {
         let mut pages = Pages::default();
         let asked = |runs: Vec<Range<u64>>| runs.iter().map(|run| run.end - run.start).sum::<u64>();
         assert_eq!(asked(pages.take_missing(1, 0..10_000)), MAX_COMING as u64);

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_is_joined_of_what_was_kept_and_what_came() {
+    fn page_run_joins_cached_and_fetched_pages() {
         let folder = tempfile::tempdir().expect("a folder");
         let disk = DiskCache::at(folder.path(), 1 << 24);
         let page = pages::PAGE as usize;

@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_and_its_key_go_to_the_server_as_they_are() {
+    fn url_splits_into_path_and_base_with_its_signature() {
         let (_, path) = at("https://h:81/a%20b/c.tif?sig=x%2Fy#part").expect("a URL");
         assert_eq!(path.as_ref(), "a b/c.tif");
         let (_, path) = at("s3://bucket/a/b.tif").expect("a URL");

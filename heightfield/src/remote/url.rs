@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_url_is_told_from_a_path() {
+    fn url_is_distinguished_from_path() {
         for url in [
             "https://h/a.tif",
             "s3://bucket/key",
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_behind_the_path_is_not_shown_and_goes_with_the_neighbours() {
+    fn query_key_is_hidden_and_kept_in_neighbour_urls() {
         let url = "https://h/d.e/a.b.tif?sig=x/y.z";
         assert_eq!(without_key(Path::new(url)), "https://h/d.e/a.b.tif");
         assert_eq!(without_key(Path::new("what?.tif")), "what?.tif");

@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_is_refused_in_words() {
+    fn missing_or_non_elf_image_or_emulated_board_is_refused() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("image");
         let board = Board::named("nucleo-g474re").expect("known");

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn probes_are_told_from_other_devices() {
+    fn probes_are_distinguished_from_other_devices() {
         assert_eq!(kind(0x0483, 0x374e, None), Some("ST-LINK"));
         // A user's own firmware with ST's virtual serial port.
         assert_eq!(kind(0x0483, 0x5740, Some("STM32 Virtual ComPort")), None);

@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn it_comes_back_from_its_file() {
+    fn log_round_trips_through_its_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("new").join("board.toml");
         assert_eq!(Log::read(&path).expect("none yet"), Log::default());
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn another_record_voids_what_depends_on_it_and_another_board_all() {
+    fn changed_calibration_voids_its_steps_and_new_firmware_all() {
         let mut log = complete();
         assert_eq!(log.meet(identity("0badcafe")), None);
         assert_eq!(log.next(), None);
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_gone_through_again_voids_what_came_after_it() {
+    fn repeated_step_voids_later_steps() {
         let mut log = complete();
         log.take(Step::Encoders, false, "dead".into());
         assert_eq!(log.next(), Some(Step::Encoders));

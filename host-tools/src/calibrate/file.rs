@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn every_preset_comes_back_to_the_bit() {
+    fn every_preset_round_trips_bit_for_bit() {
         for (_, model) in MODELS {
             let mut record = model.preset();
             record.zero_rad = Vec3::new(0.1, -1.0 / 3.0, 1e-7);
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn invalid_calibration_file_is_refused_with_the_reason() {
         let good = to_toml(&Calibration::PREMIUM_1_5);
         for (from, to, expected) in [
             ("calibration = 1", "calibration = 2", "format 2"),

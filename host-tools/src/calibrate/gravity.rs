@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_come_back() {
+    fn gravity_fit_recovers_the_true_weights() {
         let poses: Vec<_> = [[0.0, 0.2, 0.3], [0.0, -0.2, 0.6], [0.0, 0.5, 0.1]]
             .map(|q| holding(q, [0.07, -0.02]))
             .to_vec();
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_that_say_nothing_are_refused() {
+    fn poses_without_load_on_a_joint_are_refused() {
         let hanging = holding([0.0, 0.1, 0.0], [0.07, 0.0]);
         let error = fit_gravity(&Calibration::PREMIUM_1_5, &[hanging]).expect_err("q3 is 0");
         assert_eq!(error, FitError::NoWeight { joint: 3 });

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn ratios_and_signs_come_back() {
+    fn fit_recovers_ratios_and_signs() {
         let preset = Calibration::PREMIUM_1_5.ratio.to_array().map(f64::from);
         for factor in [[1.0, 1.0, 1.0], [1.07, -0.94, 1.02], [-0.9, -1.1, -1.0]] {
             let found = fit_ratios(&Calibration::PREMIUM_1_5, &checks(factor, 0.0));

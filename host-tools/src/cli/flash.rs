@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_boards_that_can_be_flashed_are_taken() {
+    fn emulated_and_unknown_boards_cannot_be_flashed() {
         assert!(parse_board("nucleo-g474re").is_ok());
         let refused = |name| parse_board(name).expect_err("refused");
         assert!(refused("mps2-an386").contains("emulated"));
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_board_on_usb_can_be_updated_over_usb() {
+    fn update_over_usb_accepts_only_usb_addresses() {
         let named = DeviceAddress::Usb(Some("0039001A".into()));
         assert_eq!(parse_usb("usb:0039001A"), Ok(named));
         assert!(parse_usb("native").is_err() && parse_usb("tcp:a:1").is_err());

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn beyond_so_many_a_second_lines_are_counted_and_the_count_is_told_once() {
+    fn lines_over_the_rate_limit_are_counted_and_reported_once() {
         let began = Instant::now();
         let at = |ms: u64| began + Duration::from_millis(ms);
         let mut one = LineLimit::new(1);

@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_device_causes_is_not_left_out_and_no_line_controls_the_terminal() {
+    fn host_lines_are_never_left_out_and_contain_no_controls() {
         let text = written(|| {
             for row in 0..10 {
                 tracing::warn!(target: "hapterra::replay", row, "odd");

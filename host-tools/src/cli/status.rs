@@ -276,7 +276,7 @@ mod tests {
 
     /// The emulated board cannot store a record, which `hapterra calibrate` also reports.
     #[test]
-    fn where_the_calibration_is_from_is_true_of_the_emulated_board() {
+    fn calibration_source_is_correct_for_the_emulated_board() {
         let mut status = status();
         status.calibration = CalibrationSource::Stored;
         assert!(text(&status).contains("stored on the device"));
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn before_the_first_tick_nothing_is_said_of_the_arm() {
+    fn status_omits_the_arm_before_the_first_tick() {
         let mut status = status();
         status.ticks.run = 0;
         let text = text(&status);

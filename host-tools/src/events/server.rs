@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn readers_hear_every_line_in_order_and_then_the_end() {
+    fn readers_receive_every_line_in_order_until_the_end() {
         let server = Server::listen(0).expect("listens");
         assert!(server.address().ip().is_loopback());
         assert_eq!(server.sender().readers_so_far(), None);
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stuck_reader_holds_nobody_up_and_is_told_what_it_missed() {
+    fn stuck_reader_delays_no_other_reader_and_gets_drop_count() {
         let server = Server::listen(0).expect("listens");
         let (stuck, quick) = (connected(&server), connected(&server));
         let sender = server.sender();
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_queue_is_counted_and_waited_for_by_nobody() {
+    fn full_queue_drops_and_counts_lines_without_blocking() {
         let (lines, _waiting) = sync_channel(2);
         let shared = Arc::<Shared>::default();
         let sender = Sender {
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn readers_that_are_gone_are_forgotten() {
+    fn disconnected_readers_are_removed() {
         let server = Server::listen(0).expect("listens");
         drop(connected(&server));
         let sender = server.sender();

@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn late_readers_are_told_the_open_question_once() {
+    fn late_reader_receives_the_open_query_once() {
         let server = Server::listen(0).expect("listens");
         let mut watcher = Watcher::new(server.sender(), 1);
         watcher.arming(vec!["press Enter".into()], Some(7));

@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_board_is_told_by_its_numbers_and_by_its_name_where_it_can_be_read() {
+    fn usb_ids_and_optional_product_name_identify_a_board() {
         assert!(is_hapterra(VENDOR_ID, PRODUCT_ID, Some("hapterra nucleo")));
         assert!(is_hapterra(VENDOR_ID, PRODUCT_ID, None));
         assert!(!is_hapterra(VENDOR_ID, PRODUCT_ID, Some("blinky")));
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn of_several_boards_only_the_one_that_is_named_is_taken() {
+    fn selection_among_several_boards_needs_a_unique_serial() {
         let serials = ["0039001A", "0039001B"].map(|serial| Some(serial.to_owned()));
         assert_eq!(the_one(&serials, None), Err(NotOne::Several));
         assert_eq!(the_one(&serials, Some("0039001b")), Ok(1));
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interface_of_another_class_or_with_one_direction_is_passed_over() {
+    fn endpoint_search_skips_non_vendor_or_one_way_interfaces() {
         let interface = |number, class, endpoints: &[u8]| {
             let mut bytes = vec![9, 4, number, 0, endpoints.len() as u8, class, 0, 0, 0];
             for address in endpoints {
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_long_is_cut_and_a_time_out_is_no_error() {
+    fn long_sends_are_split_and_receive_time_out_is_no_error() {
         let pipes = Scripted {
             sent: vec![],
             answer: || Err(io::ErrorKind::TimedOut.into()),

@@ -170,7 +170,7 @@ fn count_of(stated: &[String], what: &str) -> usize {
 }
 
 #[test]
-fn what_is_said_twice_opens_once() {
+fn repeated_device_messages_open_one_session() {
     on_bench(None, |bench| {
         let hello = ToHost::Hello(hello());
         let taken = bench.taken();
@@ -209,7 +209,7 @@ fn hello_is_repeated_whatever_else_arrives_and_then_given_up() {
 }
 
 #[test]
-fn the_scene_is_repeated_whatever_else_arrives_and_then_given_up() {
+fn scene_without_ack_times_out_after_ten_attempts() {
     on_bench(None, |bench| {
         bench.hear(&ToHost::Hello(hello()));
         let error = loop {
@@ -242,7 +242,7 @@ fn telemetry_alone_is_no_answer() {
 }
 
 #[test]
-fn an_arm_that_is_lost_is_repeated_and_then_told_and_taken_back() {
+fn unanswered_arm_is_retried_reported_and_then_disarmed() {
     on_bench(Some(Arming::default()), |bench| {
         bench.open();
         for _ in 0..80 {
@@ -277,7 +277,7 @@ fn an_answer_ends_the_repeating_and_brings_the_next_request() {
 }
 
 #[test]
-fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
+fn late_answer_to_an_earlier_query_is_ignored() {
     on_bench(None, |bench| {
         bench.open();
         let reported = |number, calibration| ToHost::Calibration {
@@ -330,7 +330,7 @@ fn repeated_query_keeps_its_number() {
 }
 
 #[test]
-fn tiles_wait_until_the_device_knows_its_zero() {
+fn tile_requests_wait_for_the_answer_to_zero() {
     on_bench(Some(Arming::VIRTUAL), |bench| {
         bench.open();
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
@@ -434,7 +434,7 @@ const fn over(number: u8, end: SessionEnd) -> ToHost {
 }
 
 #[test]
-fn a_host_whose_session_is_over_is_told_why_at_once() {
+fn session_closed_by_device_ends_client_with_its_reason() {
     for (end, is_passing) in [
         (SessionEnd::Replaced, false),
         (SessionEnd::HostSilent, true),
@@ -505,7 +505,7 @@ fn an_old_word_that_a_session_is_over_ends_no_other() {
 }
 
 #[test]
-fn who_leaves_a_session_that_is_over_is_told_or_waits_for_goodbye() {
+fn leaving_client_fails_only_if_session_was_replaced() {
     let leaving = |test: fn(&mut Bench<'_>)| {
         on_bench(None, |bench| {
             bench.open();
@@ -527,7 +527,7 @@ fn who_leaves_a_session_that_is_over_is_told_or_waits_for_goodbye() {
 }
 
 #[test]
-fn goodbye_is_repeated_until_it_is_answered_or_told_that_it_is_not() {
+fn close_request_is_retried_until_confirmed_or_times_out() {
     on_bench(None, |bench| {
         bench.open();
         bench.stated();
@@ -590,7 +590,7 @@ fn new_line_draws_a_new_session_number() {
 }
 
 #[test]
-fn tiles_that_there_are_not_are_counted_and_seldom_told() {
+fn nonexistent_tile_requests_are_counted_and_rarely_logged() {
     on_bench(None, |bench| {
         bench.open();
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 77, 0));
@@ -605,7 +605,7 @@ fn tiles_that_there_are_not_are_counted_and_seldom_told() {
 }
 
 #[test]
-fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
+fn reconnected_physical_arm_is_not_rearmed_automatically() {
     for (arming, again) in [(Arming::default(), 0), (Arming::VIRTUAL, 1)] {
         on_bench(Some(arming), |bench| {
             let arms = |bench: &mut Bench<'_>| {
@@ -633,7 +633,7 @@ fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
 }
 
 #[test]
-fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
+fn repeated_tile_requests_in_one_read_get_one_tile() {
     on_bench(None, |bench| {
         bench.open();
         bench.stated();
@@ -662,7 +662,7 @@ fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
 }
 
 #[test]
-fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
+fn placement_is_resent_until_acknowledged_then_applied() {
     on_bench(None, |bench| {
         bench.open();
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
@@ -702,7 +702,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
 }
 
 #[test]
-fn a_view_that_is_refused_or_not_answered_leaves_the_scene_as_it_is() {
+fn refused_or_unanswered_placement_keeps_the_scene() {
     on_bench(None, |bench| {
         bench.open();
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
@@ -721,7 +721,7 @@ fn a_view_that_is_refused_or_not_answered_leaves_the_scene_as_it_is() {
 }
 
 #[test]
-fn after_a_lost_line_the_device_tells_whether_it_took_the_view() {
+fn epoch_after_reconnect_resolves_pending_placement() {
     for took in [true, false] {
         on_bench(None, |bench| {
             bench.open();

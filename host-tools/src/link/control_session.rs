@@ -397,7 +397,7 @@ mod tests {
     const TIMEOUT: Duration = timeouts::HANG;
 
     #[test]
-    fn a_device_says_who_and_how_it_is() {
+    fn device_reports_board_status_and_calibration() {
         let device = Box::new(Native::for_replay().restless());
         let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");
         assert_eq!(control.device().board.as_str(), "native");
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_looks_takes_no_device_from_its_host() {
+    fn read_only_session_is_not_recorded_as_a_host() {
         let mut device = Native::for_replay().restless();
         let mut looks = ControlSession::look(Box::new(&mut device), TIMEOUT).expect("it answers");
         let known = looks.calibration().expect("it answers");
@@ -459,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_told_before_is_not_taken_for_what_is() {
+    fn repeated_old_answers_are_not_mistaken_for_new_ones() {
         let device = Late(Native::for_replay().restless(), vec![]);
         let mut control = ControlSession::open(Box::new(device), TIMEOUT).expect("it answers");
         let look = |control: &mut ControlSession<'_>, expected: Calibration| {
@@ -490,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_drove_says_goodbye_and_one_that_looked_does_not_hide_it() {
+    fn recorded_session_end_ignores_sessions_that_only_query() {
         let mut device = Native::for_replay().restless();
         open(&mut device).put_scene(scene()).expect("taken");
         for _ in 0..3 {
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_looked_keeps_what_the_device_holds() {
+    fn query_session_keeps_the_scene_and_recorded_session_end() {
         let mut device = Native::for_replay().restless();
         let held = scene();
         let mut vanishes = open(&mut device);
@@ -551,7 +551,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_not_heard_is_told_within_its_time() {
+    fn unconfirmed_close_is_an_error_within_bounded_time() {
         let timeout = Duration::from_millis(300);
         let time = Rc::new(Cell::new(Duration::ZERO));
         let open = || {
@@ -592,7 +592,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_says_nothing_or_nonsense_or_another_protocol_is_told_apart() {
+    fn protocol_mismatch_is_distinguished_from_silence() {
         let ask = |stated: Vec<u8>| {
             let opened = ControlSession::open(Box::new(Says(stated)), Duration::from_millis(5));
             opened.map(|_| ())

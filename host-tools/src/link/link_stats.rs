@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_a_session_is_told_at_the_beginning_of_the_next() {
+    fn losses_at_session_end_are_counted_by_the_next_session() {
         let mut stats = LinkStats::default();
         stats.opened(None);
         assert!(stats.received(&batch(0, 0)));
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restart_leaves_a_doubt_that_is_told() {
+    fn restart_counts_the_session_as_uncertain() {
         let mut stats = LinkStats::default();
         stats.opened(None);
         assert!(stats.received(&batch(0, 0)));

@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_between_the_hip_and_where_it_goes_is_wanted() {
+    fn prefetch_covers_tiles_from_hip_to_extrapolated_position() {
         assert_eq!(
             tiles(&at(40, 40), &at(40, 40), 10.0),
             Some([[1, 1], [1, 1]])

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_real_arm_is_armed_for_long_after_its_host_is_gone() {
+    fn silence_timeout_of_a_real_arm_is_5_to_30_seconds() {
         let control = Timeouts::of_a_dialogue(Duration::from_secs(60));
         for timeout in [Timeouts::REAL_TIME, control] {
             assert!((5..=30).contains(&timeout.silence_s), "{timeout:?}");

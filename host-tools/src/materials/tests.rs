@@ -171,7 +171,7 @@ fn scene_names_its_table_and_its_file_of_classes() {
 }
 
 #[test]
-fn what_cannot_be_laid_over_a_terrain_is_told() {
+fn class_raster_that_does_not_fit_terrain_is_refused() {
     let utm = |origin| raster((9, 9), origin, 10.0, Some(32632), |_, _| 1.0);
     let terrain = utm([500_000.0, 5_000_000.0]);
     let unplaced = Raster::from_fn(9, 9, |_, _| 1.0).expect("raster");
@@ -211,7 +211,7 @@ fn of_body(wkt: &str) -> Raster {
 }
 
 #[test]
-fn classes_of_another_body_are_not_laid_over_a_terrain() {
+fn class_raster_of_another_body_is_refused() {
     let system = |name: &str, spheroid: &str, unit: f64| {
         let (meridian, unit) = ("PRIMEM[\"Reference_Meridian\",0.0]", unit.to_radians());
         format!(

@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_amplifier_says_what_it_does() {
+    fn amplifier_fault_determines_ready_state_and_monitor() {
         let axis = PhantomModel::premium_1_5().drive[0];
         let broken = |fault| {
             let mut amplifier = settled(axis, -2.0);

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn knows_nothing_of_where_it_was_powered_up() {
+    fn counts_start_at_zero_at_power_up() {
         let axis = PhantomModel::premium_1_5().drive[1];
         let mut encoder = Encoder::new(&axis);
         encoder.power_up(0.7);

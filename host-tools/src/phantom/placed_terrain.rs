@@ -156,7 +156,7 @@ mod tests {
     use crate::terrain::Scale;
 
     #[test]
-    fn planning_ends_when_the_user_asks_for_an_end() {
+    fn planning_stops_when_the_user_interrupts() {
         let raster = Raster::from_fn(201, 201, |column, _| column as f32).expect("a raster");
         let scale = Scale::new(1.0, 0.1).expect("a scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");

@@ -159,7 +159,7 @@ fn dragged(substep_s: f64) -> DVec3 {
 }
 
 #[test]
-fn halving_the_substep_changes_less_than_a_tenth_of_a_micrometre() {
+fn max_substep_error_is_below_a_tenth_of_a_micrometre() {
     let exact = dragged(MAX_SUBSTEP_S / 32.0);
     let used = dragged(MAX_SUBSTEP_S).distance(exact);
     let coarse = dragged(8.0 * MAX_SUBSTEP_S).distance(exact);
@@ -174,7 +174,7 @@ fn the_same_inputs_give_the_same_bits() {
 }
 
 #[test]
-fn hand_feels_a_current_at_rest() {
+fn hand_force_balances_motor_force_at_rest() {
     let mut plant =
         Plant::new(premium().weightless().frictionless(), [0.0; 3]).held_by(HandModel::default());
     for _ in 0..3000 {

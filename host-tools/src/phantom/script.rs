@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn starts_waits_and_ends_where_it_says() {
+    fn script_starts_waits_and_ends_at_its_stated_points() {
         let plan = plan();
         assert_eq!(plan.target(-1.0).position_mm, [1.0, 2.0, 3.0]);
         assert_eq!(plan.target(0.4).position_mm, [1.0, 2.0, 3.0]);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repeated_plan_goes_back_to_its_beginning_and_ends_where_it_did() {
+    fn repeated_script_returns_to_start_and_keeps_its_end() {
         let (once, thrice) = (plan(), plan().repeated(3));
         let back_s = (thrice.duration_s() - 3.0 * once.duration_s()) / 2.0;
         assert!(back_s > 0.0);

@@ -186,14 +186,14 @@ mod tests {
     }
 
     #[test]
-    fn starting_in_a_hole_is_above_the_rim() {
+    fn start_over_no_data_is_above_the_rim() {
         let surface = |x: f64, _: f64| (x > 30.0).then_some(45.0);
         let plan = Touch::start(&surface, &HAND(), 0.5, [0.0, 0.0], 5.0).finish();
         assert_eq!(plan.end_mm(), [0.0, 0.0, 50.0]);
     }
 
     #[test]
-    fn a_slide_follows_the_slope_and_clears_a_hole() {
+    fn slide_follows_the_slope_and_clears_no_data() {
         let surface = |x: f64, _: f64| (!(20.0..30.0).contains(&x)).then_some(0.5 * x);
         let plan = Touch::start(&surface, &HAND(), 0.5, [0.0, 0.0], 5.0)
             .press(1.0, 0.1)

@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn stays_on_the_data_and_off_the_holes() {
+    fn tour_stays_on_known_terrain() {
         // Only the north-east quarter is known.
         let surface = |x: f64, y: f64| (x > 500.0 && y > 400.0).then_some(3.0);
         let tour = plan(&surface, [1000.0, 800.0]).plan().expect("in reach");
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn goes_round_a_hole_in_the_middle() {
+    fn tour_avoids_no_data_in_the_middle() {
         let ring = |x: f64, _: f64| ((x - 500.0).abs() > 30.0).then_some(0.0);
         let tour = plan(&ring, [1000.0, 800.0]).plan().expect("in reach");
         for [x, y, _] in tour.script.corners_mm() {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_settled_home_it_stays_where_the_arm_gets_to() {
+    fn tour_with_a_fixed_home_stays_in_reach_of_the_arm() {
         let ramp = |x: f64, _: f64| Some(0.05 * x);
         for home in [
             [500.0, 400.0, 40.0],
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn finds_a_small_island_in_a_sea_of_holes() {
+    fn tour_finds_a_small_island_surrounded_by_no_data() {
         let island = |x: f64, y: f64| ((x - 600.0).hypot(y - 240.0) < 60.0).then_some(3.0);
         let tour = plan(&island, [1000.0, 800.0]).plan().expect("in reach");
         for [x, y, _] in tour.script.corners_mm() {
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tall_terrain_is_toured_small_and_a_wall_of_a_metre_not_at_all() {
+    fn tour_shrinks_on_steep_terrain_and_fails_on_a_cliff() {
         let steep = |x: f64, _: f64| Some(2.0 * x);
         let tour = plan(&steep, [300.0, 200.0]).plan().expect("small tour");
         let wide = east_extent(&tour);

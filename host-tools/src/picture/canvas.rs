@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn says_which_file_it_cannot_write() {
+    fn failed_save_names_the_file() {
         let path = Path::new("/nonexistent-folder/picture.png");
         let error = Canvas::new(2, 2).save(path).expect_err("no folder");
         assert!(

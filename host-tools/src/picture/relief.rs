@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn light_comes_from_the_north_west_and_a_hole_is_striped() {
+    fn relief_is_lit_from_north_west_and_no_data_is_striped() {
         // A cone with no-data at its top.
         let height = |x: f64, y: f64, _: f64| {
             let r = (x - 50.0).hypot(y - 50.0);
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spike_does_not_stretch_the_colours_and_is_told() {
+    fn spike_widens_reported_extremes_but_not_colour_range() {
         let height = |x: f64, y: f64, _: f64| {
             let on_spike = x.hypot(y) < 2.0;
             Some(if on_spike { 900.0 } else { x })
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pixel_that_is_mostly_hole_is_a_hole() {
+    fn pixel_is_no_data_if_most_of_its_area_is() {
         let field = |known: &'static dyn Fn(f64) -> bool| {
             let height = move |x: f64, _: f64, _: f64| known(x).then_some(2.0);
             let field = Surface {
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_but_holes_and_wild_heights_still_shade() {
+    fn field_of_only_no_data_or_extreme_heights_still_shades() {
         for height in [None, Some(f64::INFINITY), Some(0.0), Some(1e30)] {
             let field = Surface {
                 height_mm: &|_, _, _| height,

@@ -121,7 +121,7 @@ fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
 }
 
 #[test]
-fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
+fn pan_keeps_hip_depth_and_is_refused_outside_terrain() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         let pan = |change| bounds.apply(terrain, &bounds.first, &[change], &hand);
@@ -151,7 +151,7 @@ fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
 }
 
 #[test]
-fn heights_and_stiffness_change_by_factors_and_come_back() {
+fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         let steeper = [
@@ -180,7 +180,7 @@ fn heights_and_stiffness_change_by_factors_and_come_back() {
 }
 
 #[test]
-fn what_cannot_be_had_is_said_and_names_the_bound() {
+fn refused_placement_change_names_the_bound() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         for (change, says) in [
@@ -210,7 +210,7 @@ fn what_cannot_be_had_is_said_and_names_the_bound() {
 }
 
 #[test]
-fn in_the_air_the_height_over_the_ground_stays() {
+fn zoom_in_air_keeps_height_above_surface() {
     Bench::new().with(|terrain, bounds| {
         let ground = terrain.height_mm(51.2, 51.2).expect("ground");
         let hand = Hand {
@@ -227,7 +227,7 @@ fn in_the_air_the_height_over_the_ground_stays() {
 }
 
 #[test]
-fn pending_ground_is_not_known_ground() {
+fn pending_ground_is_not_reported_as_available() {
     let folder = tempfile::tempdir().expect("a folder");
     let bench = Bench {
         raster: in_file(folder.path(), [2049, 600], |x, y| (x + y) as f32),

@@ -135,7 +135,7 @@ fn ground_at_home(grid: &HapticGrid<'_>, view: &Placement) -> [f64; 2] {
 }
 
 #[test]
-fn what_is_asked_for_is_under_the_home_position() {
+fn home_position_is_above_the_requested_location() {
     for (name, raster, on_globe) in made() {
         let file = raster.georeference();
         for sample in [[20.0, 15.0], [3.3, 28.9], [37.7, 1.2]] {
@@ -243,7 +243,7 @@ fn suited_heights_are_true_to_scale_or_exaggerated() {
 }
 
 #[test]
-fn the_scale_is_said_as_it_is_at_the_place_and_level() {
+fn reported_scale_matches_location_and_level() {
     for (name, raster, side) in [
         ("degrees", &made()[0].1, 55.66),
         ("UTM", &made()[2].1, 10.0),
@@ -393,7 +393,7 @@ fn box_with_west_and_east_swapped_is_refused() {
 
 /// Rasters around the globe have a border, and half of a box is an error.
 #[test]
-fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
+fn box_across_globe_seam_is_refused_with_its_two_parts() {
     let globe = |west: f64| {
         let raster = Raster::from_fn(360, 90, |column, row| (column + row) as f32);
         let ground = GroundTransform::new([west, -44.5], [1.0, 0.0], [0.0, 1.0]);
@@ -442,7 +442,7 @@ fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
 }
 
 #[test]
-fn what_cannot_be_placed_is_refused_with_the_bounds() {
+fn invalid_placement_is_refused_with_the_bounds() {
     let grids = made();
     let utm = &grids[2].1;
     let no_code = &grids[6].1;
@@ -539,7 +539,7 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
 }
 
 #[test]
-fn numbers_that_are_said_have_three_digits() {
+fn rounded_numbers_have_three_digits() {
     for (x, up, down) in [
         (0.123_45, 0.124, 0.123),
         (300.0, 300.0, 300.0),
@@ -620,7 +620,7 @@ fn place_in_another_reference_system_is_the_same_place() {
 }
 
 #[test]
-fn heights_that_were_not_read_are_no_holes() {
+fn unread_heights_are_reported_as_unread_not_no_data() {
     let folder = tempfile::tempdir().expect("a folder");
     let raster = in_file(folder.path(), [600, 600], |x, y| (x + y) as f32);
     let grid = HapticGrid::new(&raster, HapticCells::Stored).with_wait(Wait::Never);

@@ -283,7 +283,7 @@ mod tests {
 
     /// Checked against poses of all joints within their stops.
     #[test]
-    fn the_sides_of_the_reach_are_around_every_pose_and_no_farther_out() {
+    fn workspace_sides_enclose_all_poses_tightly() {
         for record in PRESETS {
             let reach = Reach::of(&record);
             let home = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_beyond_the_links_or_behind_the_base_is_not_reached() {
+    fn boxes_beyond_links_or_behind_base_are_out_of_reach() {
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         for (middle, size) in [
             ([0.0, 0.0, 0.0], [900.0, 10.0, 10.0]),
@@ -365,7 +365,7 @@ mod tests {
 
     /// The numbers of docs/how-to/place-and-scale.md.
     #[test]
-    fn the_encoders_tell_what_the_docs_say() {
+    fn encoder_resolution_matches_the_docs() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());
         for (found, stated) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
             assert!((found / stated - 1.0).abs() < 0.01, "{found} for {stated}");

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_that_can_be_had_leaves_a_valid_law() {
+    fn accepted_surface_change_leaves_valid_params() {
         for change in [
             friction(0.0, 0.0),
             friction(0.3, 0.5),
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_had_is_refused_with_what_can() {
+    fn refused_surface_change_states_the_accepted_range() {
         for (change, says) in [
             (friction(0.5, 0.3), "at rest not less"),
             (friction(-0.1, 0.0), "from 0 to 10"),

@@ -539,7 +539,7 @@ mod tests {
     }
 
     #[test]
-    fn they_come_back_from_their_text() {
+    fn settings_round_trip_through_toml() {
         let raster = raster(0.0);
         let settings = settings(&terrain(&raster));
         let text = settings.to_toml();
@@ -550,7 +550,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_comes_back_with_all_that_a_surface_has() {
+    fn surface_parameters_round_trip_through_toml() {
         let params = SurfaceParams {
             stiffness_n_per_mm: 0.75,
             max_force_n: 6.0,
@@ -599,7 +599,7 @@ mod tests {
     }
 
     #[test]
-    fn anything_else_is_no_settings_and_what_is_broken_or_later_is_told() {
+    fn broken_or_later_settings_are_errors_and_remarks_are_not() {
         assert_eq!(Settings::from_toml(" a remark\n").expect("none"), None);
         let later = Settings::from_toml("hapterra-recording = 2\nall = \"else\"");
         assert!(matches!(later, Err(SettingsError::Later { found: 2 })));
@@ -613,7 +613,7 @@ mod tests {
     }
 
     #[test]
-    fn another_terrain_is_told_apart_by_its_heights_and_its_cells() {
+    fn terrain_with_other_heights_or_cells_is_refused() {
         let (one, other) = (raster(0.0), raster(0.5));
         let settings = settings(&terrain(&one));
         assert_eq!(settings.check_terrain("same", &terrain(&one)), Ok(()));

@@ -224,7 +224,7 @@ fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String
 }
 
 #[test]
-fn who_has_seen_enough_says_goodbye_and_who_is_not_heard_is_told() {
+fn finished_run_closes_the_session_or_reports_no_confirmation() {
     let bench = Bench::new();
     let (end, _) = served(&bench, 5, &mut || {});
     assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
@@ -236,7 +236,7 @@ fn who_has_seen_enough_says_goodbye_and_who_is_not_heard_is_told() {
 }
 
 #[test]
-fn a_panic_says_goodbye_and_where_that_is_not_heard_the_user_is_told() {
+fn panic_closes_the_session_or_warns_the_user() {
     for deaf in [false, true] {
         let bench = Bench::new();
         let mut last = || {
@@ -278,7 +278,7 @@ fn failed_start_closes_the_session_or_warns_the_user() {
 }
 
 #[test]
-fn an_end_that_is_asked_for_while_it_greets_is_heeded() {
+fn interrupt_during_opening_closes_the_session() {
     let bench = Bench::new();
     let began = played(&bench, &|| false, &mut || bench.only_line(), |service| {
         open(service).map(|_| ())

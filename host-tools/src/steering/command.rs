@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_understood_is_told_with_what_is() {
+    fn invalid_command_error_shows_line_reason_and_commands() {
         for (line, why) in [
             ("zom 2", "no such word"),
             ("zoom", "one number"),

@@ -86,7 +86,7 @@ fn viewed(steering: &mut Steering<'_>, view: &SceneChange, taken: bool) {
 }
 
 #[test]
-fn a_view_that_is_taken_is_in_force_and_the_clutch_is_let_go() {
+fn accepted_placement_is_applied_and_releases_the_clutch() {
     with(|steering| {
         let view = put(steering);
         assert_eq!((view.number, steering.now().view.scale.cell_mm()), (1, 1.0));
@@ -101,7 +101,7 @@ fn a_view_that_is_taken_is_in_force_and_the_clutch_is_let_go() {
 }
 
 #[test]
-fn a_view_that_is_not_taken_leaves_everything_as_it_was_and_is_told() {
+fn refused_placement_changes_nothing_and_is_reported() {
     with(|steering| {
         let view = put(steering);
         viewed(steering, &view, false);
@@ -178,7 +178,7 @@ fn restarted_device_counts_placements_from_zero() {
 
 /// The board's switch still holds the clutch; the host has released it.
 #[test]
-fn a_clutch_that_the_boards_input_holds_open_is_let_go_by_the_host() {
+fn host_releases_a_clutch_held_by_the_board_input() {
     with(|steering| {
         let view = put(steering);
         viewed(steering, &view, true);

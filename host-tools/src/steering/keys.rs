@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_changes_and_go_back() {
+    fn opposite_keys_cancel_and_arrow_keys_pan() {
         let mut keys = Keys::default();
         let mut factor = |key| match keys.press(Key::Char(key), ms(0)) {
             Some(Steer::Change(

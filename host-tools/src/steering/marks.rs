@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_mark_is_asked_for_once_and_has_the_tick_of_its_answer() {
+    fn each_mark_is_requested_once_and_gets_its_answers_tick() {
         let mut marks = Marks::default();
         for text in ["a", "b", "c"] {
             assert_eq!(marks.mark(text.to_owned()), None);

@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_waits_neither_for_a_change_nor_for_what_is_before_it() {
+    fn answer_overtakes_pending_placement_changes() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
         std::fs::write(&path, "zoom 2\nenter 7\n").expect("written");

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_foretold_comes_true() {
+    fn size_estimate_matches_the_written_file() {
         for kind in [Kind::Fractal, Kind::Plane, Kind::Steps] {
             let (foretold, length) = foretold_and_true("a.tif", kind);
             assert!(
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_fit_is_refused_with_figures_and_nothing_is_left() {
+    fn oversized_output_is_refused_without_leaving_files() {
         let folder = tempfile::tempdir().expect("a folder");
         let grid = Grid {
             columns: 4_000_000_000,

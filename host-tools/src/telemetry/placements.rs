@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_name_the_views_that_they_were_put_in_with_also_after_they_wrap() {
+    fn number_finds_its_placement_after_it_wraps() {
         with(|mut views, terrain, laid| {
             assert_eq!(views.index_of(&of(0)), 0);
             for count in 1..=300_usize {
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_was_restarted_feels_the_latest_view_as_its_first() {
+    fn restarted_device_begins_with_the_latest_placement() {
         with(|mut views, terrain, laid| {
             views.put(1, terrain.clone(), laid);
             let device = hello();

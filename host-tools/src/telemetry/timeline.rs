@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn goes_on_through_a_restart() {
+    fn time_continues_after_a_device_restart() {
         let mut time = Timeline::new(1000);
         let tick = |tick| TickRecord {
             tick,

@@ -103,7 +103,7 @@ mod tests {
     /// other. The error of a cell that leans by 60° follows from the eigenvalues of its metric, 1 ±
     /// cos 60°, and its area, sin 60°.
     #[test]
-    fn what_stored_cells_are_off_is_what_the_worst_direction_is() {
+    fn stored_cell_distortion_is_that_of_the_worst_direction() {
         for (lean, sides, wanted) in [
             (0.0, (40.0, 10.0), 1.0),
             (0.5, (10.0, 10.0), (1.5 / 0.75_f64.sqrt()).sqrt() - 1.0),

@@ -56,7 +56,7 @@ impl DeviceTile {
 }
 
 #[test]
-fn the_near_tile_is_around_the_home_pose_and_within_the_wide_one() {
+fn near_tile_surrounds_home_and_lies_within_the_wide_tile() {
     let raster = hills();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
     let reach_mm = [-500.0, -300.0, 500.0, 400.0];
@@ -82,7 +82,7 @@ fn the_near_tile_is_around_the_home_pose_and_within_the_wide_one() {
 }
 
 #[test]
-fn the_surface_goes_on_evenly_over_the_border_of_the_near_tile() {
+fn surface_is_continuous_across_the_near_tile_border() {
     let raster = hills();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
     let (scene, Fallback { wide, near }) =
@@ -115,7 +115,7 @@ fn the_surface_goes_on_evenly_over_the_border_of_the_near_tile() {
 }
 
 #[test]
-fn where_the_wide_tile_has_a_hole_the_border_of_the_near_one_is_its_own() {
+fn near_tile_border_is_kept_where_wide_tile_has_no_data() {
     // A sample of the wide tile is no-data, and the near tile's border passes it.
     let hole = [1024, 384];
     let height = |x: u32, y: u32| match [x, y] == hole {
@@ -136,7 +136,7 @@ fn where_the_wide_tile_has_a_hole_the_border_of_the_near_one_is_its_own() {
 }
 
 #[test]
-fn only_the_names_of_its_own_tiles_are_those_of_an_fallback() {
+fn coarse_keys_outside_the_fallback_have_no_tile() {
     let raster = hills();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
     let (scene, fallback) = fallback(&terrain, [1000, 700], [-500.0, -300.0, 500.0, 400.0]);

@@ -573,7 +573,7 @@ pub(super) mod tests {
 
     /// Also for a map that is not true to scale, and for columns that lean.
     #[test]
-    fn stored_cells_count_as_squares_of_the_area_that_they_have_on_the_ground() {
+    fn stored_cells_count_as_squares_of_equal_ground_area() {
         for (map_scale, lean) in [((0.5, 0.5), 0.0), ((1.0, 1.0), 0.6), ((0.5, 0.8), -0.6)] {
             let cell = CellSize {
                 map_scale,
@@ -590,7 +590,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_finer_axis_keeps_its_samples_and_rows_read_as_single_samples_do() {
+    fn finer_axis_keeps_samples_and_row_reads_match_single_reads() {
         let raster = plane(cell(10.0, 25.0, 0.0), [0.3, 0.7]);
         let grid = HapticGrid::new(&raster, HapticCells::Square);
         assert_eq!((grid.columns(), grid.rows()), (41, 76));
@@ -608,7 +608,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_hole_is_as_large_as_the_patches_that_it_belongs_to() {
+    fn no_data_covers_exactly_the_samples_interpolated_from_it() {
         let raster = Raster::from_fn(9, 9, |column, row| match (column, row) {
             (4, 4) => f32::NAN,
             _ => 1.0,

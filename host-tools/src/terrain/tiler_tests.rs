@@ -98,7 +98,7 @@ fn a_constant_tile_is_one_number_even_at_the_border() {
 }
 
 #[test]
-fn holes_stay_holes_and_an_empty_tile_says_so() {
+fn no_data_samples_are_kept_and_empty_tile_is_no_data() {
     let raster = Raster::from_fn(70, 33, |x, y| {
         if x >= 32 || (x, y) == (3, 4) {
             f32::NAN
@@ -132,7 +132,7 @@ fn the_top_is_above_every_sample_however_far_up() {
 }
 
 #[test]
-fn too_tall_is_an_error_and_the_limit_is_not() {
+fn height_above_limit_is_an_error_and_limit_is_accepted() {
     let raster = Raster::from_fn(4, 4, |_, _| 1.0).expect("raster");
     let limit = f64::from(MAX_CELL);
     let scale = |height| Scale::new(1.0, height).expect("valid");
@@ -144,7 +144,7 @@ fn too_tall_is_an_error_and_the_limit_is_not() {
 }
 
 #[test]
-fn a_scenes_epoch_follows_heights_scale_and_law() {
+fn scene_epoch_depends_on_heights_scale_and_surface_params() {
     let scene = |bump: f32, cell_mm: f64, stiffness_n_per_mm: f32| {
         let raster = Raster::from_fn(9, 9, |x, y| if (x, y) == (4, 4) { bump } else { 0.0 });
         let raster = raster.expect("raster");
@@ -170,7 +170,7 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
 }
 
 #[test]
-fn tile_with_too_steep_step_is_a_hole() {
+fn tile_with_excessive_step_is_no_data() {
     let wall = |height: f32| {
         let raster = Raster::from_fn(64, 9, move |x, _| if x > 40 { height } else { 0.0 });
         raster.expect("raster")

@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewer_that_was_slow_is_told_no_sample_of_a_view_before_the_view() {
+    fn slow_viewer_receives_each_scene_before_its_samples() {
         let raster = Raster::from_fn(70, 70, |x, y| (x + y) as f32).expect("raster");
         let terrain = |mm| Terrain::new(&raster, Scale::new(mm, mm).expect("scale"), 0);
         let [first, second] = [0.5, 1.0].map(|mm| terrain(mm).expect("terrain"));

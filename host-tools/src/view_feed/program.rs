@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_beside_wins_and_what_is_nowhere_is_said() {
+    fn viewer_beside_the_program_is_preferred_to_the_path() {
         let folders = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
         let [beside, path] = folders.each_ref().map(|folder| folder.path().to_owned());
         let find = || Program::among(Some(beside.clone()), std::iter::once(path.clone()));
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_program_is_named() {
+    fn missing_viewer_error_names_its_path() {
         let missing = Program::at("/no/such/program".into());
         let stated = missing.start().expect_err("there is none").to_string();
         assert!(stated.contains("/no/such/program"), "{stated}");

@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_waits_for_a_reader_that_does_not_read() {
+    fn stalled_reader_never_blocks_the_sender() {
         let (pipe, out) = sync_channel(0);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);
         let taken = (0..1000).filter(|_| queue.offer(tiles(100))).count();
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_is_gone_takes_nothing() {
+    fn queue_without_reader_accepts_nothing_and_never_blocks() {
         let (pipe, out) = sync_channel(0);
         drop(out);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_layers_go_along_with_a_far_pan_and_stay_with_a_near_one() {
+    fn finer_layers_follow_a_far_pan_but_not_a_near_one() {
         assert_eq!(reported(&[([2000.0, 30.0], 9), ([1000.0, 10.0], 9)]), []);
         let layers = reported(&[([15_000.0, 30.0], 9), ([15_100.0, 30.0], 9)]);
         let [layer] = layers.as_slice() else {

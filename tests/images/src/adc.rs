@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_regulator_that_is_up_nothing_is_enabled() {
+    fn adc_is_not_enabled_before_its_regulator_is_up() {
         for (control, at_ns) in [(ADEN, UP_NS), (ON | DEEPPWD, UP_NS), (ON, UP_NS - 1)] {
             let mut adc = with_regulator(12);
             adc.write(CR, control, u32::MAX, at_ns);
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_queue_nothing_starts() {
+    fn injected_queue_prevents_conversions() {
         let mut adc = with_regulator(12);
         adc.write(CFGR, 0, u32::MAX, UP_NS);
         adc.write(CR, ON | JADSTART, u32::MAX, UP_NS);

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_comes_too_soon_is_lost() {
+    fn frame_before_the_minimum_gap_is_lost() {
         let mut converter = set_up();
         send(&mut converter, [0, 1, 2], 50_000);
         assert_eq!(converter.codes()[0], 0x0102);
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_asked_for_comes_with_the_next_frame() {
+    fn register_value_is_returned_in_the_next_frame() {
         let mut converter = set_up();
         assert_eq!(send(&mut converter, [0x8A, 0, 0], 50_000), 0);
         assert_eq!(send(&mut converter, [0x90, 0, 0], 60_000), 4);

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_filter_passes_what_is_longer_than_its_samples_and_nothing_shorter() {
+    fn filter_passes_only_pulses_longer_than_its_samples() {
         // Eight samples, one in 64 clocks of 10 ns: 5.12 µs.
         let filter = Filter::of(15, 1);
         let expected = Filter {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulse_across_the_other_channels_edge_is_drift_without_a_filter() {
+    fn pulse_across_other_channels_edge_drifts_without_filter() {
         // Channel A is low, and channel B changes once, in the middle of a pulse on A.
         let disturbed = |ns: f64| [(500e3 - 400.0..500e3 + 400.0).contains(&ns), ns > 500e3];
         let counted = |icf| count([Filter::of(icf, 0); 2], 100_000_000, 1, disturbed);

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn duty_cycles_need_a_counting_timer_a_mode_and_an_enable_of_each_channel() {
+    fn pulses_require_running_timer_pwm_mode_and_enabled_channels() {
         assert_eq!(outputs(&timer(), false), Outputs::Pulses);
         let with = |register, value| {
             let mut timer = timer();
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn without_moe_the_pins_are_held_low_or_let_go() {
+    fn pins_without_main_output_enable_are_low_or_floating() {
         let mut timer = timer();
         assert_eq!(outputs(&timer, true), Outputs::Low);
         timer.set(BDTR, OSSI);

@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_prescaled_timer_goes_round_in_exactly_its_period() {
+    fn prescaled_timer_wraps_in_exactly_its_period() {
         let mut timer = Timer::new(170_000_000);
         for (register, value) in [(PSC, 3), (ARR, 42_499), (DIER, 1), (CR1, CEN)] {
             timer.write(register, value, u32::MAX);

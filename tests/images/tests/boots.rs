@@ -48,7 +48,7 @@ fn run_until_reset(device: &Device<'_>, by: Stop, break_it: impl FnOnce(&mut Mac
 }
 
 #[test]
-fn a_panic_is_told_after_the_reset_with_its_place() {
+fn panic_is_reported_after_reset_with_file_and_line() {
     let reported = after_reset(Reset::Software, |device| {
         run_until_reset(device, Stop::Software, |machine, at| {
             machine.call_instead(at, machine.image.panicking());
@@ -66,7 +66,7 @@ fn a_panic_is_told_after_the_reset_with_its_place() {
 }
 
 #[test]
-fn a_hard_fault_is_told_after_the_reset_with_its_address() {
+fn hard_fault_is_reported_after_reset_with_address() {
     let reported = after_reset(Reset::Software, |device| {
         run_until_reset(device, Stop::Software, |machine, at| {
             machine.patch(at.address, &[0x00, 0xDE]);
@@ -89,7 +89,7 @@ fn a_hard_fault_is_told_after_the_reset_with_its_address() {
 }
 
 #[test]
-fn a_panic_is_told_even_where_its_record_cannot_be_made() {
+fn panic_is_reported_even_if_crash_record_creation_fails() {
     let reported = after_reset(Reset::Software, |device| {
         let record = {
             let mut machine = device.machine.borrow_mut();
@@ -113,7 +113,7 @@ fn a_panic_is_told_even_where_its_record_cannot_be_made() {
 }
 
 #[test]
-fn a_reset_by_the_watchdog_alone_is_told_and_a_crash_only_once() {
+fn watchdog_reset_is_reported_without_crash_record() {
     let reported = after_reset(Reset::Watchdog, |device| {
         run_until_reset(device, Stop::Watchdog, |machine, at| {
             machine.patch(at.address, &[0xFE, 0xE7]);
@@ -203,7 +203,7 @@ fn middle(machine: &Machine, place: u32) -> u32 {
 }
 
 #[test]
-fn what_was_being_written_when_the_power_went_leaves_the_record_before() {
+fn interrupted_calibration_write_keeps_previous_record() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let mut device = Device::open(machine, terrain, scene);
@@ -227,7 +227,7 @@ fn what_was_being_written_when_the_power_went_leaves_the_record_before() {
 }
 
 #[test]
-fn of_a_first_record_that_was_cut_off_nothing_is_left() {
+fn interrupted_first_calibration_write_leaves_no_record() {
     on_each(|mut machine, terrain, scene| {
         let board = machine.chip.board;
         let cut = middle(&machine, 0);
@@ -286,7 +286,7 @@ fn a_third_of_the_stack_is_never_used() {
 }
 
 #[test]
-fn a_g474_whose_flash_is_one_bank_starts_and_says_that_it_stores_nothing() {
+fn single_bank_g474_starts_and_refuses_to_store() {
     on_each(|machine, terrain, scene| {
         if machine.chip.is_m7 {
             return;

@@ -59,7 +59,7 @@ fn the_flash_of_a_g474_prefetches() {
 }
 
 #[test]
-fn the_status_says_whether_usbs_clock_follows_the_host() {
+fn status_reports_whether_usb_clock_follows_the_host() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;

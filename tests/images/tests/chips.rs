@@ -74,7 +74,7 @@ fn every_segment_lies_in_the_chips_memory() {
 }
 
 #[test]
-fn the_stack_lies_at_the_beginning_of_a_ram_and_nothing_static_below_it() {
+fn stack_is_lowest_in_ram_and_overlaps_no_segment() {
     for machine in machines() {
         let (chip, target) = (machine.chip, target(&machine));
         let top = machine.word(chip.memories[0].0);
@@ -110,7 +110,7 @@ fn the_emulated_chip_has_the_memories_of_the_real_one() {
 }
 
 #[test]
-fn the_boards_pages_say_what_the_tiles_take() {
+fn board_pages_state_the_size_of_the_tiles() {
     for machine in machines() {
         let board = machine.chip.board;
         let page = board.trim_end_matches("-spi");
@@ -127,7 +127,7 @@ fn the_boards_pages_say_what_the_tiles_take() {
 }
 
 #[test]
-fn no_image_holds_where_it_was_built() {
+fn images_contain_no_build_paths() {
     for machine in machines() {
         for segment in &machine.image.segments {
             let text = String::from_utf8_lossy(&segment.bytes);

@@ -30,7 +30,7 @@ fn limits(device: &Device<'_>) -> Limits {
 }
 
 #[test]
-fn a_switch_that_is_closed_lets_the_force_out_and_opened_it_comes_in_again() {
+fn clutch_switch_removes_force_and_its_release_restores_it() {
     Bench::new().on_each(|device| {
         device.wait_for_full_force();
         device.run_ms(40);

@@ -69,7 +69,7 @@ fn worse(rows: &[Row], columns: &[usize]) -> Vec<String> {
 }
 
 #[test]
-fn no_compared_scene_takes_more_cycles_than_it_did() {
+fn compared_scenes_do_not_exceed_recorded_cycles() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
@@ -81,7 +81,7 @@ fn no_compared_scene_takes_more_cycles_than_it_did() {
 /// `cargo xtask cycles` runs this; `--write` writes the table.
 #[test]
 #[ignore = "takes minutes: cargo xtask cycles"]
-fn no_state_of_the_tick_takes_more_cycles_than_it_did() {
+fn tick_states_do_not_exceed_recorded_cycles() {
     let Some(board) = CountingBoard::found() else {
         return;
     };

@@ -96,7 +96,7 @@ fn the_emergency_stop_takes_one_tick() {
 }
 
 #[test]
-fn letting_the_dead_man_switch_go_takes_one_tick() {
+fn deadman_release_trips_in_one_tick() {
     Bench::new().on_each(|device| {
         let pin = device.machine.borrow().chip.dead_man;
         let release = |machine: &mut Machine| machine.set_input(pin, true);
@@ -233,7 +233,7 @@ fn assert_off_at_once_and_for_good(machine: &mut Machine) {
 }
 
 #[test]
-fn a_hard_fault_switches_the_amplifiers_off_before_anything_else() {
+fn hard_fault_switches_amplifiers_off_first() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let at = machine.image.message_encoder();

@@ -11,7 +11,7 @@ use hapterra_tests::usb::host::{ScriptedPipes, enumerate, string};
 use nusb::descriptors::{ConfigurationDescriptor, DeviceDescriptor};
 
 #[test]
-fn the_serial_number_on_usb_and_on_the_link_is_the_chips_identifier() {
+fn serial_number_on_usb_and_link_is_the_chip_identifier() {
     for mut machine in machines() {
         let board = machine.chip.board;
         // RM0440, 48.1; RM0433, 61.1.

@@ -56,7 +56,7 @@ fn most(chip: &Chip, each: &[Cycles]) -> u32 {
 
 /// Slides over rough ground at a depth of a millimetre and a half.
 #[test]
-fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
+fn interrupt_cycles_stay_within_the_documented_maximum() {
     let plane = Plane::level(HOME_MM, 55.0);
     let raster = Raster::from_fn(201, 201, |x, y| 55.0 + 0.5 * ((x * y) % 3) as f32);
     on_each_board(

@@ -52,7 +52,7 @@ fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
 }
 
 #[test]
-fn no_frame_to_the_converter_comes_too_soon() {
+fn converter_frames_keep_the_data_sheets_minimum_gap() {
     on_each_armed(
         |_| (),
         |device| {
@@ -156,7 +156,7 @@ fn an_amplifier_that_is_not_ready_takes_three_ticks() {
 }
 
 #[test]
-fn a_current_that_was_not_commanded_is_found_where_there_are_monitors() {
+fn uncommanded_current_trips_a_fault_if_monitors_are_fitted() {
     for axis in 0..3 {
         let mut wrong = [0.0; 3];
         wrong[axis] = -2.0;
@@ -174,7 +174,7 @@ fn a_current_that_was_not_commanded_is_found_where_there_are_monitors() {
 }
 
 #[test]
-fn without_monitors_what_is_at_their_pins_does_not_matter() {
+fn monitor_pins_are_ignored_without_monitors() {
     on_each_armed(
         |machine| machine.bus().set_monitors([5.0, -5.0, 3.0]),
         |device| {
@@ -187,7 +187,7 @@ fn without_monitors_what_is_at_their_pins_does_not_matter() {
 }
 
 #[test]
-fn measured_currents_are_told_in_milliamperes() {
+fn measured_currents_are_reported_in_milliamperes() {
     for machine in machines() {
         let pin = machine.chip.monitors_fitted;
         let terrain = ground();
@@ -222,7 +222,7 @@ fn range(machine: &Machine) -> std::ops::RangeInclusive<i32> {
 }
 
 #[test]
-fn the_largest_currents_stay_where_outputs_and_amplifiers_are_specified() {
+fn max_currents_stay_within_the_specified_code_range() {
     on_each_armed(
         |_| (),
         |device| {
@@ -272,7 +272,7 @@ const CONVERTERS: [(u32, u32); 3] = [
 ];
 
 #[test]
-fn no_converter_on_the_chip_is_switched_on_before_it_holds_no_current() {
+fn on_chip_converters_are_enabled_only_at_zero_current() {
     for mut machine in machines() {
         if !matches!(machine.chip.commands, Commands::Converters(_)) {
             continue;

@@ -82,7 +82,7 @@ fn modes(machine: &Machine) -> Pins {
 }
 
 #[test]
-fn every_pin_is_set_up_as_its_boards_page_says() {
+fn pins_are_configured_as_on_the_board_page() {
     for mut machine in machines() {
         let board = machine.chip.board;
         let mut expected = modes(&machine);

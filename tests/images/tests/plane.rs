@@ -73,7 +73,7 @@ fn plane_at_a_millimetre_has_the_currents_of_f64() {
 const POSE: u32 = 120;
 
 #[test]
-fn the_pose_and_its_trigonometry_cost_what_is_said() {
+fn pose_runs_once_per_tick_within_instruction_budget() {
     let plane = plane();
     let raster = Raster::from_fn(201, 201, |_, _| 55.0).expect("raster");
     on_each_board(&raster, plane.place.home_mm, |machine, terrain, scene| {

@@ -62,7 +62,7 @@ fn rows(machine: &Machine) -> String {
 }
 
 #[test]
-fn the_haptic_interrupt_is_above_the_ceiling_and_the_page_says_so() {
+fn haptic_interrupt_outranks_maskable_ones_as_documented() {
     for mut machine in machines() {
         let chip = machine.chip;
         assert_eq!(machine.run_ms(200), Stop::Time);
@@ -84,7 +84,7 @@ fn the_haptic_interrupt_is_above_the_ceiling_and_the_page_says_so() {
 }
 
 #[test]
-fn only_programs_that_failed_mask_everything() {
+fn only_known_functions_mask_all_interrupts() {
     for machine in machines() {
         let image = &machine.image;
         let mut maskers = vec![];
@@ -132,7 +132,7 @@ fn only_programs_that_failed_mask_everything() {
 }
 
 #[test]
-fn a_tick_raised_in_any_critical_section_or_interrupt_is_not_delayed() {
+fn tick_is_not_delayed_by_critical_sections_or_interrupts() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |mut machine, terrain, scene| {
         let board = machine.chip.board;

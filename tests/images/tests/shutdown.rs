@@ -65,7 +65,7 @@ fn assert_low(machine: &Machine, why: &str) {
 }
 
 #[test]
-fn a_supply_that_falls_in_a_tick_switches_off_before_the_tick_goes_on() {
+fn supply_drop_disables_amplifiers_before_the_tick_resumes() {
     let fall = |device: &mut Device<'_>, _: Scene| {
         let mut machine = device.machine.borrow_mut();
         machine.slice = 1;
@@ -93,7 +93,7 @@ fn a_supply_that_falls_in_a_tick_switches_off_before_the_tick_goes_on() {
 }
 
 #[test]
-fn on_a_supply_that_is_too_low_no_program_starts() {
+fn boot_waits_while_the_supply_is_low() {
     for mut machine in machines() {
         let board = machine.chip.board;
         machine.set_supply_mv(TOO_LOW_MV);
@@ -118,7 +118,7 @@ fn on_a_supply_that_is_too_low_no_program_starts() {
 }
 
 #[test]
-fn a_brown_out_is_told_after_the_reset() {
+fn brown_out_is_reported_after_the_reset() {
     after(
         Reset::BrownOut,
         |_, _| {},
@@ -131,7 +131,7 @@ fn a_brown_out_is_told_after_the_reset() {
 }
 
 #[test]
-fn option_bytes_without_a_brown_out_level_are_told() {
+fn missing_brown_out_level_in_option_bytes_is_reported() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let mut device = Device::open(machine, terrain, scene);
@@ -291,7 +291,7 @@ fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
 }
 
 #[test]
-fn a_write_through_a_null_pointer_switches_off_and_changes_no_code() {
+fn null_pointer_write_disables_amplifiers_and_changes_no_code() {
     // movs r0, #0; str r0, [r0, #0x20]; bx lr: the first word of the tick's code in ITCM.
     const WRITE: [u8; 6] = [0x00, 0x20, 0x00, 0x62, 0x70, 0x47];
     const ITCM_BYTES: usize = 64 * 1024;
@@ -348,7 +348,7 @@ fn a_stack_that_overruns_switches_off_and_overwrites_nothing() {
 }
 
 #[test]
-fn a_fault_inside_a_log_line_is_told_as_what_it_was() {
+fn hard_fault_during_logging_is_reported_as_hard_fault() {
     let at = Cell::new(0);
     let break_log = |device: &mut Device<'_>, _: Scene| {
         let release = {
@@ -409,7 +409,7 @@ fn beats(machine: &mut Machine, ticks: usize) -> usize {
 }
 
 #[test]
-fn the_heartbeat_changes_in_each_tick_that_leaves_the_amplifiers_on() {
+fn heartbeat_toggles_each_tick_only_with_amplifiers_on() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let device = Device::arm(machine, terrain, scene);
@@ -445,7 +445,7 @@ fn a_tick_that_hangs_has_no_heartbeat() {
 }
 
 #[test]
-fn no_clock_comes_from_outside_of_the_chip() {
+fn firmware_runs_without_an_external_clock() {
     for mut machine in machines() {
         let board = machine.chip.board;
         // The model has no external clock.

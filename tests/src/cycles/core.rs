@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn short_programs_take_what_the_manual_says() {
+    fn m4_cycle_counts_match_the_manual() {
         // movs r0, #1; adds r0, r0, r1; muls r0, r1
         assert_eq!(m4_cycles(&[(0x2001, 0, false), (0x1840, 0, false)]), 2);
         // push {r4-r7, lr}: 1 + N; pop {r4-r7, pc}: 1 + N + P

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_waits_for_the_read_under_way_and_for_its_own() {
+    fn jump_waits_for_current_fetch_and_its_own_fetch() {
         let mut fetch = Fetch::new(G474);
         assert_eq!(fetch.instruction(0, 2, 0), 5);
         // The prefetch of the next line ends at 10.

@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_scripts_patterns_tell_the_functions_apart() {
+    fn script_patterns_match_only_functions_left_in_flash() {
         assert!(patterns().count() > 10);
         for pattern in patterns() {
             assert!(

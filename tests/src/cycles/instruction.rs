@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_beside_the_code_are_told_from_other_loads() {
+    fn literal_loads_are_distinguished_from_other_loads() {
         for (first, second, is) in [
             (0x4812, 0, true),       // ldr r0, [pc, #72]
             (0xF8DF, 0x0010, true),  // ldr.w r0, [pc, #16]

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_h743_has_in_flash_takes_a_read_for_each_line() {
+    fn h743_code_in_flash_costs_one_read_per_line() {
         let run = |in_flash| {
             let mut tick = Tick::default();
             for address in (0..64).step_by(2) {

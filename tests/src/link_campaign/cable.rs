@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_bits_flip_as_are_asked_for() {
+    fn flipped_bits_match_the_error_rate() {
         let mut random = Random::new(1);
         let mut flipped = 0;
         for _ in 0..1_000 {
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stalls_comes_later_and_what_is_cut_never() {
+    fn stalled_bytes_are_delayed_and_cut_bytes_are_lost() {
         let mut random = Random::new(2);
         let mut way = Way::default();
         let stalled = Harm {

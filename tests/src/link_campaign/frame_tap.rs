@@ -138,7 +138,7 @@ mod tests {
     use hapterra_core::wire::message::Telemetry;
 
     #[test]
-    fn what_is_dropped_at_the_end_of_a_scene_was_made_and_is_not_seen() {
+    fn samples_dropped_by_a_new_scene_count_as_unseen() {
         let mut tap = Tap::default();
         tap.begin(None);
         let mut say = |ticks: u64, message: ToHost| {

@@ -18,7 +18,7 @@ fn max_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
 }
 
 #[test]
-fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
+fn force_fades_at_edge_of_stored_tiles_after_host_leaves() {
     // Cells of a quarter of a millimetre: a tile is 8 mm, so the hand leaves the stored tiles.
     let raster = Raster::from_fn(801, 801, |_, _| PLANE_MM as f32).expect("raster");
     let scale = Scale::new(0.25, 1.0).expect("scale");

@@ -52,7 +52,7 @@ fn a_switch_held_from_the_beginning_never_arms() {
 }
 
 #[test]
-fn what_goes_wrong_under_a_press_is_zero_in_the_same_tick_and_latched() {
+fn fault_in_contact_zeroes_output_within_tick_and_latches() {
     type Case = (Wrong, Fault);
     let cases: [Case; 5] = [
         (
@@ -102,7 +102,7 @@ fn what_goes_wrong_under_a_press_is_zero_in_the_same_tick_and_latched() {
 }
 
 #[test]
-fn after_a_fault_it_takes_a_clearing_a_command_and_a_new_press() {
+fn rearming_after_fault_needs_clear_command_and_new_press() {
     let raster = plane();
     let terrain = on_plane(&raster);
     // Released, then held permanently half a second later; pressed again at 6 s.
@@ -177,7 +177,7 @@ fn a_dead_encoder_under_load_is_found() {
 }
 
 #[test]
-fn rubbed_and_pressed_without_harm_nothing_trips() {
+fn normal_rubbing_and_pressing_trips_no_fault() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let bed = Bed::new(&terrain, rub(1.2, 3), NOTHING).run(PRESSED + 14_000);
@@ -238,7 +238,7 @@ fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
 }
 
 #[test]
-fn what_was_found_at_boot_has_to_be_cleared_first() {
+fn boot_fault_must_be_cleared_before_arming() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let starved = BootReport {

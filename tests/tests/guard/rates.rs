@@ -13,7 +13,7 @@ use std::time::Duration;
 use crate::rig::{MIDDLE_MM, PLANE_MM, PRESSED, on_plane, plane, press};
 
 #[test]
-fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
+fn arming_ramp_and_force_are_unchanged_at_10_khz() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let [x, y] = MIDDLE_MM;

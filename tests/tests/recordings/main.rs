@@ -317,7 +317,7 @@ fn exists_as_before(path: &Path, bytes: &[u8]) {
 }
 
 #[test]
-fn no_command_writes_over_its_own_input() {
+fn commands_refuse_to_overwrite_their_input() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let terrain = std::fs::read(folder.path("hills.tif")).expect("there");
@@ -382,7 +382,7 @@ fn no_command_writes_over_its_own_input() {
 
 /// Sidecars that are read with a terrain: header, reference system, world file, mask, overviews.
 #[test]
-fn no_command_writes_over_a_file_beside_its_input() {
+fn commands_refuse_to_overwrite_sidecars_of_their_input() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let header = "ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\nbyteorder LSBFIRST\n";
@@ -450,7 +450,7 @@ fn a_calibration_file_is_text_and_show_prints_it() {
 }
 
 #[test]
-fn a_reader_who_goes_away_is_no_crash() {
+fn closed_output_pipe_causes_no_panic() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let [hills, input, out, demo] =
@@ -592,7 +592,7 @@ fn an_output_that_cannot_be_written_is_no_crash() {
 }
 
 #[test]
-fn odd_outputs_and_options_are_told() {
+fn unusual_outputs_and_options_work_or_are_reported() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let [hills, input] = ["hills.tif", "in.csv"].map(|name| folder.text(name));
@@ -645,7 +645,7 @@ fn odd_outputs_and_options_are_told() {
 }
 
 #[test]
-fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
+fn exaggeration_is_given_once_and_defaults_to_true_scale() {
     let folder = Folder::new();
     let hills = folder.text("hills.tif");
     for (more, expected) in [

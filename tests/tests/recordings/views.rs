@@ -141,7 +141,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
 }
 
 #[test]
-fn what_cannot_be_replayed_is_refused_and_named() {
+fn unreplayable_recording_is_refused_with_its_cause() {
     let folder = Folder::of(SIZE);
     demo(&folder);
     let refused = |from: &str, more: &[&str]| {
@@ -200,7 +200,7 @@ fn parquet_recording_of_placements_is_replayed() {
 }
 
 #[test]
-fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
+fn commands_are_read_from_stdin_and_missing_file_is_an_error() {
     use std::io::Write;
     let folder = Folder::of(SIZE);
     let [terrain, record] = ["hills.tif", "replayed.csv"].map(|name| folder.text(name));

@@ -90,7 +90,7 @@ fn lead(
 }
 
 #[test]
-fn one_signal_disarms_and_ends_a_bring_up() {
+fn single_signal_disarms_and_ends_bringup() {
     let folder = tempfile::tempdir().expect("a folder");
     let (served, bench) = at_a_bench();
     let child = armed(&served, &bench, folder.path());
@@ -103,7 +103,7 @@ fn one_signal_disarms_and_ends_a_bring_up() {
 }
 
 #[test]
-fn where_a_board_does_not_confirm_the_end_of_a_bring_up_the_user_is_told() {
+fn unconfirmed_bringup_end_warns_to_switch_amplifiers_off() {
     let folder = tempfile::tempdir().expect("a folder");
     let (served, bench) = at_a_bench();
     let child = armed(&served, &bench, folder.path());
@@ -131,7 +131,7 @@ fn second_signal_ends_bringup_and_warns_of_an_armed_arm() {
 }
 
 #[test]
-fn a_pipe_whose_reader_is_gone_ends_no_bring_up_with_an_armed_arm() {
+fn bringup_with_closed_output_pipe_ends_disarmed() {
     let folder = tempfile::tempdir().expect("a folder");
     let (served, bench) = at_a_bench();
     let mut child = armed(&served, &bench, folder.path());

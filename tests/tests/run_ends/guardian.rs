@@ -217,7 +217,7 @@ fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
 }
 
 #[test]
-fn user_is_told_where_guardian_gets_no_confirmation() {
+fn unconfirmed_guardian_disarm_prints_switch_off_request() {
     let armed = Armed::new();
     armed.served.deaf.store(true, Ordering::Relaxed);
     armed.kill_worker("KILL");

@@ -7,7 +7,7 @@ use hapterra_tests::socket_device::{command, has_begun, output_text, signal};
 use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
-fn a_device_that_asks_for_much_and_reads_little_holds_no_end_up() {
+fn greedy_device_does_not_block_the_end_of_a_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut command = command(greedy_device::start(), folder.path());
     let mut child = command.arg("--unchecked").spawn().expect("it runs");

@@ -47,7 +47,7 @@ fn the_end_of_the_time_is_a_goodbye_too() {
 }
 
 #[test]
-fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
+fn unconfirmed_disarm_is_reported_and_the_run_fails() {
     for name in ["INT", "TERM", "HUP"] {
         let folder = tempfile::tempdir().expect("a folder");
         let served = SocketDevice::start();
@@ -92,7 +92,7 @@ fn a_silence_that_no_device_keeps_to_is_refused() {
 }
 
 #[test]
-fn stiffness_that_no_arm_feels_is_refused() {
+fn stiffness_above_the_maximum_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let output = command(served.address, folder.path())
@@ -135,7 +135,7 @@ fn recording_that_fills_the_disk_is_kept_and_named() {
 }
 
 #[test]
-fn one_that_cannot_begin_tells_that_the_arm_may_be_armed() {
+fn failed_start_warns_that_the_arm_may_be_armed() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let killed = start(&served, folder.path(), &[]);

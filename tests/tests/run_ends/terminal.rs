@@ -67,7 +67,7 @@ fn a_terminal_window_that_is_closed_is_a_goodbye() {
 }
 
 #[test]
-fn a_reader_that_is_gone_costs_its_lines_and_nothing_else() {
+fn closed_output_does_not_stop_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let mut child = start(&served, folder.path(), &[]);
@@ -136,7 +136,7 @@ fn shows_all(window: &mut File, texts: &[&str]) -> String {
 
 /// An arm in its zero pose with a hand that allows arming, behind a socket; keys are typed.
 #[test]
-fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
+fn keys_change_the_placement_and_ctrl_c_restores_the_terminal() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let (mut window, end) = terminal();
@@ -193,7 +193,7 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
 /// Enter and keys go only to the device whose number was pressed: neither user arms the other's
 /// arm.
 #[test]
-fn enter_and_keys_go_to_the_device_that_was_chosen_and_to_no_other() {
+fn enter_and_keys_affect_only_the_selected_device() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = [SocketDevice::start(), SocketDevice::start()];
     let (mut window, end) = terminal();

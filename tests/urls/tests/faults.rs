@@ -36,7 +36,7 @@ fn expected(column: u32, row: u32) -> f64 {
 }
 
 #[test]
-fn what_the_server_cannot_answer_once_is_asked_for_again() {
+fn temporary_server_errors_are_retried() {
     for fault in [Fault::Error500, Fault::Cut] {
         let (_folder, server) = hills();
         server.fail(fault, 2);
@@ -47,7 +47,7 @@ fn what_the_server_cannot_answer_once_is_asked_for_again() {
 }
 
 #[test]
-fn what_it_never_answers_is_told_with_the_file_and_why() {
+fn permanent_server_error_names_file_and_reason() {
     let (_folder, server) = hills();
     let reported = open(&server, "valleys.tif").expect_err("none");
     assert!(reported.contains("there is no such file"), "{reported}");
@@ -84,7 +84,7 @@ fn long_page_of_an_error_is_not_read_to_its_end() {
 }
 
 #[test]
-fn bytes_that_were_not_asked_for_are_not_taken() {
+fn responses_of_wrong_range_or_length_are_rejected() {
     for fault in [Fault::OtherRange, Fault::Short, Fault::Endless] {
         let (_folder, server) = hills();
         server.fail(fault, usize::MAX);
@@ -115,7 +115,7 @@ fn comes(raster: &Raster, column: u32, row: u32) -> f64 {
 }
 
 #[test]
-fn a_mask_that_cannot_be_asked_for_is_not_taken_for_none() {
+fn unreadable_mask_is_an_error_unless_forbidden() {
     let (_folder, server) = hills();
     server.fail_at(".msk", Fault::Error500, usize::MAX);
     let reported = open(&server, "hills.tif").expect_err("who knows what is masked");
@@ -158,7 +158,7 @@ fn notes_beside_a_url_are_read_as_beside_a_file() {
 
 /// The error is the server's, and not a lack of data.
 #[test]
-fn place_on_a_terrain_whose_server_is_down_is_no_hole() {
+fn placement_reports_server_error_instead_of_no_data() {
     let (_folder, server) = hills();
     let raster = open(&server, "hills.tif").expect("opens");
     let grid = HapticGrid::new(&raster, HapticCells::Stored);
@@ -199,7 +199,7 @@ fn a_page_for_every_name_is_no_neighbour() {
 
 /// A planned path over terrain that does not arrive must fail with a message.
 #[test]
-fn what_did_not_come_is_told_before_anything_is_armed() {
+fn check_complete_reports_failed_reads_once() {
     let (_folder, server) = hills();
     let raster = open(&server, "hills.tif").expect("opens");
     assert!(raster.check_complete().is_ok());
@@ -222,7 +222,7 @@ fn what_did_not_come_is_told_before_anything_is_armed() {
 }
 
 #[test]
-fn missing_source_of_a_vrt_is_a_hole_and_the_others_are_read() {
+fn missing_vrt_source_is_no_data_and_other_sources_are_read() {
     if !has_gdal() {
         return;
     }
@@ -261,7 +261,7 @@ fn missing_source_of_a_vrt_is_a_hole_and_the_others_are_read() {
 }
 
 #[test]
-fn what_was_not_looked_at_for_want_of_an_answer_is_no_hole() {
+fn unreadable_overview_is_an_error_instead_of_no_data() {
     let (_folder, server) = hills();
     server.fail_beyond(Fault::Error500);
     let reported = open(&server, "hills.tif").expect_err("its overview is beyond");
@@ -269,7 +269,7 @@ fn what_was_not_looked_at_for_want_of_an_answer_is_no_hole() {
 }
 
 #[test]
-fn a_file_that_was_changed_meanwhile_is_not_mixed_with_what_is_held() {
+fn changed_file_is_not_mixed_with_cached_blocks() {
     let (_folder, server) = hills();
     let raster = open(&server, "hills.tif").expect("opens");
     assert_eq!(raster.height(100, 2000), expected(100, 2000));
@@ -289,7 +289,7 @@ fn a_file_that_was_changed_meanwhile_is_not_mixed_with_what_is_held() {
 }
 
 #[test]
-fn a_file_that_ends_before_its_header_says_is_told_as_one_on_disk() {
+fn truncated_file_is_an_error_from_disk_and_from_url() {
     let folder = tempfile::tempdir().expect("a folder");
     let bytes = cog(SIZE[0], SIZE[1], 3, height);
     std::fs::write(folder.path().join("cut.tif"), &bytes[..900_000]).expect("written");

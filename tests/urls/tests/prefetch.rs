@@ -114,7 +114,7 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
 /// every 10 ms along 3000 cells, without the tile under the HIP; answers take 100 ms.
 #[test]
 #[ignore = "it prints figures, and takes as long as the hand"]
-fn looks_without_a_tile_at_100_ms() {
+fn benchmark_counts_missing_tiles_at_100_ms_latency() {
     println!("cells/s  without  ahead  of looks");
     for speed in [200, 500, 1000, 2000] {
         let counts = [false, true].map(|reads_ahead| {

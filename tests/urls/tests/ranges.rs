@@ -53,7 +53,7 @@ fn same_tiles(one: &Raster, other: &Raster, level: u8) {
 }
 
 #[test]
-fn a_cog_is_the_same_from_its_server_and_little_of_it_is_fetched() {
+fn remote_cog_matches_local_file_and_opens_with_few_bytes() {
     let bytes = cog(3000, 2000, 3, height);
     let (_folder, path, server) = served("hills.tif", &bytes);
     let (here, there) = (in_blocks(&path), open(server.url("hills.tif")));
@@ -105,7 +105,7 @@ fn neighbours_of_a_file_are_found_beside_it_at_its_server() {
 }
 
 #[test]
-fn of_plain_samples_what_is_touched_is_fetched() {
+fn plain_samples_are_fetched_only_around_reads() {
     const SIZE: [u32; 2] = [5000, 3000];
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
@@ -137,7 +137,7 @@ fn of_plain_samples_what_is_touched_is_fetched() {
 }
 
 #[test]
-fn of_a_strip_that_has_all_samples_the_rows_that_are_touched_are_fetched() {
+fn single_strip_is_fetched_only_around_rows_read() {
     const SIZE: [u32; 2] = [5000, 3000];
     let heights: Vec<u8> = (0..SIZE[0] * SIZE[1])
         .flat_map(|index| height(index % SIZE[0], index / SIZE[0]).to_le_bytes())

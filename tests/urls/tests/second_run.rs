@@ -88,7 +88,7 @@ fn files(folder: &Path) -> Vec<std::path::PathBuf> {
 }
 
 #[test]
-fn a_second_run_asks_only_whether_the_file_is_the_same() {
+fn second_run_requests_only_file_start_and_sidecars() {
     let bed = bed();
     let (first, requests) = bed.look("hills.tif");
     assert!(requests > 10, "{requests}");
@@ -126,7 +126,7 @@ fn pages_of_a_file_that_was_changed_at_its_server_are_not_used() {
 }
 
 #[test]
-fn a_key_in_a_url_is_nowhere_to_be_seen_in_the_folder() {
+fn cache_folder_contains_no_part_of_the_url() {
     let bed = bed();
     bed.look("hills.tif?sig=VerySecretKey");
     bed.settle();

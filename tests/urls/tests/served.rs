@@ -51,7 +51,7 @@ fn comes(terrain: &Terrain<'_>) -> String {
 }
 
 #[test]
-fn what_is_not_here_yet_is_asked_for_and_comes_later() {
+fn unloaded_tile_is_fetched_without_blocking() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     // A wait would never end.
@@ -67,7 +67,7 @@ fn what_is_not_here_yet_is_asked_for_and_comes_later() {
 }
 
 #[test]
-fn a_server_that_is_gone_for_a_while_is_asked_again_and_nothing_becomes_a_hole() {
+fn server_outage_is_retried_and_is_not_no_data() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     server.fail(Fault::Error500, usize::MAX);
@@ -81,7 +81,7 @@ fn a_server_that_is_gone_for_a_while_is_asked_again_and_nothing_becomes_a_hole()
 
 /// A block of many chunks in several places of the file.
 #[test]
-fn all_that_a_touch_needs_is_asked_for_at_once() {
+fn all_chunks_of_a_block_are_requested_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let bytes = in_tiles(64, [2048, 1024], 3, height);
     std::fs::write(folder.path().join("hills.tif"), bytes).expect("written");
@@ -98,7 +98,7 @@ fn all_that_a_touch_needs_is_asked_for_at_once() {
 
 /// The possible names of a world file, for a picture without a georeference.
 #[test]
-fn all_neighbours_that_may_be_are_looked_for_at_once() {
+fn world_file_names_are_requested_in_parallel() {
     let folder = tempfile::tempdir().expect("a folder");
     let (side, first) = (40_u32, 8 + 2 + 12 * 9 + 4);
     let mut bytes = [
@@ -139,7 +139,7 @@ fn all_neighbours_that_may_be_are_looked_for_at_once() {
 }
 
 #[test]
-fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
+fn unloaded_vrt_source_is_incomplete_and_not_no_data() {
     if !has_gdal() {
         return;
     }
@@ -207,7 +207,7 @@ impl Transport for Line<'_> {
 }
 
 #[test]
-fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
+fn device_receives_tiles_only_after_they_are_loaded() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let home = GridPoint::new([640, 640, 100], Vec3::ZERO);

@@ -210,7 +210,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_pan_leaves_the_terrain_where_it_is_and_takes_home_elsewhere() {
+    fn pan_moves_home_and_leaves_the_terrain_in_place() {
         let scene = scene();
         let panned = Scene {
             home_mm: [45.0, 28.0, 12.0],

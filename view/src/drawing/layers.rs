@@ -546,7 +546,7 @@ mod tests {
     }
 
     #[test]
-    fn a_finer_layer_that_moves_leaves_no_hole_and_nothing_behind() {
+    fn moved_finer_layer_leaves_no_gap_or_leftover() {
         let (log, mut layers) = (Log::new(), Layers::default());
         let ground = Ground::new(&super::super::ground::tests::scene());
         let put = |layers: &mut Layers, layer| {

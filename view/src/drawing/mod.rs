@@ -314,7 +314,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_frame_is_laid_anew_where_the_hand_leaves_it_and_in_each_view() {
+    fn frame_is_redrawn_on_leaving_it_and_on_new_placement() {
         let mut drawing = None;
         let samples = |x: f64, scale: f64| {
             Message::Samples(vec![Sample {

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn light_comes_from_the_north_west() {
+    fn north_west_slope_is_brighter_than_south_east() {
         let mm = cone();
         let heights = of(&mm);
         let shade = Shade::of(&heights);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn holes_and_wild_heights_still_have_a_colour() {
+    fn no_data_and_extreme_heights_have_a_colour() {
         for value in [f32::NAN, f32::INFINITY, 0.0, 1e30, -1e30] {
             let mm = vec![value; 41 * 41];
             let heights = of(&mm);

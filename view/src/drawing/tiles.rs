@@ -368,7 +368,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ring_goes_once_around_and_closes() {
+    fn ring_is_closed_and_advances_one_sample_at_a_time() {
         let ring = ring();
         assert_eq!(ring.len(), 4 * (SIDE - 1) + 1);
         assert_eq!(ring.first(), ring.last());
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_skirt_goes_from_the_tile_to_the_coarse_mesh_and_no_farther() {
+    fn skirt_ends_on_the_coarse_mesh() {
         let ground = Ground::new(&super::super::ground::tests::scene());
         let up: Vec<f32> = (0..TILE_POSTS * TILE_POSTS)
             .map(|i| ((i * 7919) % 101) as f32)
@@ -438,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_told_around_the_tiles_that_came_or_went_and_no_others() {
+    fn outlines_are_sent_only_for_tiles_added_or_removed() {
         let (log, layers) = (Log::new(), Layers::default());
         let ground = Ground::new(&super::super::ground::tests::scene());
         let mut tiles = Tiles::default();

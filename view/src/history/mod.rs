@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_is_kept_once_and_what_happens_is_bounded() {
+    fn keyed_entries_are_kept_once_and_other_entries_are_bounded() {
         let history = History::new(20_000);
         history.begin(true);
         let (mut standing, mut happened) = (0, 0);
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_and_waits_is_told_once_and_bytes_are_counted_to_the_last() {
+    fn queue_keeps_the_latest_blob_per_key_and_counts_bytes() {
         let history = History::new(1 << 20);
         history.begin(true);
         history.put(vec![entry(Some("first"))]).expect("encodes");
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_hear_the_end_and_a_new_scene_makes_them_come_again() {
+    fn pages_receive_the_end_and_are_cut_off_by_a_new_scene() {
         let history = History::new(1 << 20);
         history.begin(true);
         let page = history.come(Pieces::Fine);

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn other_sites_read_nothing_and_nobody_writes() {
+    fn cross_site_reads_and_all_writes_are_refused() {
         let part = Asked {
             path: "/feed",
             ..PAGE

@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_come_back_in_order_and_the_end_is_none() {
+    fn messages_round_trip_in_order_until_the_end() {
         let mut pipe = Vec::new();
         for message in &messages() {
             write(&mut pipe, message).expect("memory");
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_refused_before_memory_is_taken() {
+    fn malformed_frame_is_refused_before_allocation() {
         let mut long: &[u8] = &[0xff, 0xff, 0xff, 0x7f, 0];
         assert!(matches!(read(&mut long), Err(FrameError::TooLong(_))));
         let mut nonsense: &[u8] = &[1, 0, 0, 0, 0xee];

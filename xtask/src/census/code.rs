@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn circle_of_three_files_is_found_and_a_folder_with_its_files_is_none() {
+    fn import_cycle_is_found_and_folder_module_is_no_cycle() {
         let folder = tempfile::tempdir().expect("a folder");
         let write = |name: &str, text: &str| {
             let path = folder.path().join(name);

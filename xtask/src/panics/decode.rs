@@ -98,7 +98,7 @@ mod tests {
 
     // The encodings are LLVM's for the instructions named.
     #[test]
-    fn branches_and_calls_go_where_the_assembler_meant() {
+    fn branch_and_call_targets_match_the_assembler() {
         assert_eq!(flow(0xF000, 0xF87E), Flow::To(0x1100), "bl forward");
         assert_eq!(flow(0xF7FF, 0xFFFE), Flow::To(0x1000), "bl to itself");
         assert_eq!(flow(0xF7FF, 0xBF7E), Flow::To(0x0F00), "b.w backward");
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_followed_is_told_from_a_return() {
+    fn indirect_branch_is_distinguished_from_return() {
         assert_eq!(flow(0x4770, 0), Flow::Next, "bx lr");
         assert_eq!(flow(0x4780, 0), Flow::Indirect, "blx r0");
         assert_eq!(flow(0x4718, 0), Flow::Indirect, "bx r3");

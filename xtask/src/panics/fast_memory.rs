@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_reached_lies_in_one_of_the_areas() {
+    fn reached_functions_lie_in_fast_memory_or_named_flash() {
         let reported = judged([0x20, 0x40, 0x0800_0000, 0x80]).expect("all are placed");
         assert!(reported.starts_with("2 of the 3 functions"), "{reported}");
         // A bridge may be anywhere.

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_two_calls_away_is_found_with_its_way() {
+    fn panic_two_calls_away_is_found_with_its_call_chain() {
         let message = complaint(&image(&[2, 5]), EMULATED);
         assert!(
             message.contains("slice_index_fail\n    -> core::panicking::panic_fmt"),
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_call_that_cannot_be_followed_must_be_known_and_is_followed_from_there() {
+    fn unlisted_indirect_call_is_reported_and_listed_one_followed() {
         let message = complaint(&image(&[6]), EMULATED);
         assert!(message.contains("register"), "{message}");
         let known = &[Exception {
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_known_panic_is_known_for_one_caller_only() {
+    fn panic_exception_applies_to_one_caller_only() {
         let known = |caller| Exception {
             caller,
             callee: "panic_fmt",
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_judged_where_nothing_could_be_found() {
+    fn image_without_symbols_or_vectors_is_an_error() {
         let mut stripped = image(&[5]);
         stripped.functions.truncate(2);
         stripped.functions[1].callees.clear();

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_loop_ends_and_the_shortest_way_is_kept() {
+    fn reach_stops_at_loops_and_keeps_the_shortest_chain() {
         let graph: [&[usize]; 5] = [&[1, 2], &[2, 0], &[3], &[0], &[0]];
         let reached = from(0, |n| graph[n].to_vec());
         assert_eq!(reached.all().collect::<Vec<_>>(), [0, 1, 2, 3]);

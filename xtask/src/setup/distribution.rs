@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_version_that_is_needed_is_known() {
+    fn required_version_is_parsed() {
         assert!(minor(NEEDED).is_some(), "{NEEDED}");
     }
 }

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_to_type_is_short_and_asks_for_root_where_needed() {
+    fn install_command_is_short_and_uses_sudo_where_needed() {
         let lines = MANAGERS.map(|(install, _)| typed(install, "qemu"));
         assert_eq!(
             lines,
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_found_is_not_installed() {
+    fn program_already_found_is_not_installed() {
         let found = found_or_installed(|| Ok(1), &["", "", "", ""]);
         assert_eq!(found.unwrap(), 1);
     }

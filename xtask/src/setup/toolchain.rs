@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_distribution_builds_core_and_in_its_own_place() {
+    fn distribution_builds_core_in_its_own_directory() {
         let args = |t: Toolchain| crate::run::shown(&t.cargo("build"));
         assert_eq!(
             args(Toolchain::Own),

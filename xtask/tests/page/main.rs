@@ -76,7 +76,7 @@ fn stroke(site: &mut Site) {
 }
 
 #[test]
-fn saved_path_feels_the_same_in_replay_bit_for_bit() {
+fn saved_path_replays_with_bit_identical_forces() {
     let _one = one();
     let Some(mut site) = Site::open(None) else {
         return;

@@ -403,7 +403,7 @@ mod tests {
     /// Half way up a wall of 300 cells, the last place of a coordinate is worth 10⁻⁵ of height: the
     /// heights of the place and of the entry differ by that much (seed 4243, scene 6738).
     #[test]
-    fn a_place_on_an_edge_up_a_wall_knows_the_slope_beyond() {
+    fn steepness_is_valid_on_a_wall_edge_but_not_beside_it() {
         let patch = Patch::new([-150.406_48, 149.704_83, -150.454_4, 149.704_83]);
         let view = HipView::new(GridPoint::new([1, 1, 0], Vec3::new(0.5, 0.0, 0.0)));
         let entry = SurfacePoint {

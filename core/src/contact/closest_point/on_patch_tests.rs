@@ -164,7 +164,7 @@ fn warm_started_it_takes_two_evaluations() {
 /// With a far HIP, the squared distance cannot decide which of two places is nearer, and on a steep
 /// twist cancellation hides it as well.
 #[test]
-fn ends_at_a_minimum_where_the_squares_do_not_tell() {
+fn search_ends_at_minimum_despite_rounding_of_distances() {
     type Place = (f32, f32);
     let cases: [([f32; 4], Place, Place); 3] = [
         (

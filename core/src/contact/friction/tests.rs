@@ -38,7 +38,7 @@ fn ratio(output: &ContactOutput, slope: [f32; 2]) -> f32 {
 }
 
 #[test]
-fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
+fn sliding_friction_equals_coefficient_on_any_slope() {
     for slope in [[0.0, 0.0], [0.5, 0.0], [-1.0, 0.3], [0.2, 4.0]] {
         for mu in [0.05, 0.3, 0.8] {
             let plane =
@@ -65,7 +65,7 @@ fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
 /// A tick that crosses a concave edge ends where friction would have ended it, beyond the edge or
 /// on it.
 #[test]
-fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
+fn friction_ratio_is_kept_in_ticks_that_cross_an_edge() {
     const MU: f32 = 0.4;
     for bend in [-0.8, -0.3, 0.2, 0.5_f32] {
         let roof = move |x: i32, _: i32| bend * (x - 24).max(0) as f32;
@@ -111,7 +111,7 @@ fn stuck_is_stuck_to_the_bit() {
 }
 
 #[test]
-fn static_friction_holds_until_it_breaks_and_comes_back_after_a_rest() {
+fn static_friction_breaks_away_and_returns_after_a_rest() {
     let friction = Friction {
         static_mu: 0.8,
         dynamic_mu: 0.3,
@@ -224,7 +224,7 @@ fn lifting_never_drags() {
 }
 
 #[test]
-fn what_is_no_friction_is_not_taken() {
+fn invalid_friction_parameters_are_rejected() {
     assert!(Friction::NONE.is_valid() && Friction::NONE.is_none());
     assert!(Friction::coulomb(0.5).is_valid());
     assert!(!Friction::coulomb(0.5).is_none());
@@ -287,7 +287,7 @@ fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
 /// by the ticks of trailing, it exceeded the friction that the proxy was compared with, and one in
 /// seven proxies moved to the HIP itself.
 #[test]
-fn a_proxy_that_trails_a_far_hip_does_not_go_for_it() {
+fn proxy_trailing_a_far_hip_does_not_jump_to_it() {
     let friction = Friction {
         viscous_s: 0.05,
         ..Friction::coulomb(0.05)

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn without_its_terrain_it_names_the_tile_and_makes_no_force() {
+    fn onset_without_terrain_names_missing_tile_and_has_no_force() {
         let mut tiles = buffers::<2>();
         let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let displacement = Vec3::new(40.0, 0.0, 1.0);
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn over_a_hole_there_is_no_contact() {
+    fn onset_over_no_data_ends_without_contact() {
         let mut tiles = buffers::<2>();
         let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), |x, _| {
             if x > 20 { f32::NAN } else { 0.0 }

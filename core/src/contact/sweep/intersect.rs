@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_leaves_the_surface_meets_it_again_or_not() {
+    fn next_crossing_exists_only_if_the_line_leaves_and_returns() {
         assert_eq!(next_crossing(-0.5, -1.0), None);
         assert_eq!(next_crossing(0.5, 1.0), None);
         let s = next_crossing(-0.5, 1.0).unwrap();

@@ -49,7 +49,7 @@ fn an_amplifier_that_is_not_ready_is_a_fault_in_the_third_tick() {
 }
 
 #[test]
-fn an_amplifier_has_ten_milliseconds_to_become_ready_after_the_enable() {
+fn amplifier_may_take_ten_milliseconds_to_become_ready() {
     for late in [10, 13] {
         let mut bench = Bench::new();
         bench.guard.arm();
@@ -98,7 +98,7 @@ fn oscillating(amplitude_a: f32, hz: f32) -> impl Fn(Vec3) -> Vec3 {
 }
 
 #[test]
-fn an_amplifier_that_oscillates_is_a_fault_at_whatever_frequency() {
+fn oscillating_amplifier_is_a_fault_at_any_frequency() {
     for hz in [333.0, 487.0, 970.0, 1_013.0, 2_477.0] {
         let took = compared(oscillating(2.0, hz));
         assert!(took.is_some_and(|ticks| ticks < 100), "{hz} Hz: {took:?}");
@@ -113,7 +113,7 @@ fn a_monitor_that_is_rough_is_no_fault() {
 }
 
 #[test]
-fn motors_are_as_warm_as_what_flows_and_not_as_what_was_commanded() {
+fn winding_temperature_follows_measured_not_commanded_current() {
     // Armed, and with the amplifiers off.
     for mut bench in [Bench::armed(), Bench::new()] {
         let winding = |bench: &Bench| bench.guard.motors().winding_c();
@@ -135,7 +135,7 @@ fn motors_are_as_warm_as_what_flows_and_not_as_what_was_commanded() {
 }
 
 #[test]
-fn monitors_that_tell_nonsense_for_hours_make_no_motor_hotter_than_can_be() {
+fn implausible_monitor_currents_keep_motor_temperatures_valid() {
     let mut bench = Bench::new();
     bench.sense.measured_ma = Some([i16::MIN; 3]);
     bench.ticks(200_000);
@@ -172,7 +172,7 @@ fn fastest_force_change_is_no_mismatch_for_late_amplifier() {
 }
 
 #[test]
-fn without_monitors_nothing_is_compared() {
+fn missing_monitors_disable_current_comparison() {
     let mut bench = Bench::armed();
     bench.sense.measured_ma = None;
     bench.wanted_n = Vec3::Z * 7.0;
@@ -181,7 +181,7 @@ fn without_monitors_nothing_is_compared() {
 }
 
 #[test]
-fn monitors_that_are_gone_while_armed_are_a_fault_and_none_at_all_are_not() {
+fn monitor_loss_is_a_fault_only_while_armed() {
     let mut bench = Bench::armed();
     (0..300).for_each(|_| _ = bench.tick());
     assert_eq!(bench.guard.report().fault, None, "there never were any");

@@ -47,7 +47,7 @@ fn whatever_else_begins_ends_the_hold() {
 }
 
 #[test]
-fn nothing_is_held_while_armed_or_arming_or_with_a_fault() {
+fn outputs_are_not_held_while_arming_armed_or_faulted() {
     let mut bench = Bench::new();
     let mut tried = 0;
     bench.guard.arm();

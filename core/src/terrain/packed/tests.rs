@@ -136,7 +136,7 @@ fn floats_without_a_step_are_whole_too() {
 }
 
 #[test]
-fn holes_stay_where_they_are() {
+fn packing_keeps_no_data_samples_in_place() {
     let base = 50;
     let hills = hills(30.0, base);
     let mut random = Random(3);
@@ -272,7 +272,7 @@ fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
 }
 
 #[test]
-fn a_damaged_byte_gives_a_tile_or_a_refusal_as_the_book_says() {
+fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
     let (mut taken, mut refused) = (0, 0);
     for whole in some() {
         let mut tile = Box::new(Tile::VACANT);
@@ -301,7 +301,7 @@ fn a_damaged_byte_gives_a_tile_or_a_refusal_as_the_book_says() {
 }
 
 #[test]
-fn any_bytes_are_taken_or_refused() {
+fn random_bytes_are_unpacked_or_refused() {
     let mut random = Random(11);
     let mut tile = Box::new(Tile::VACANT);
     for _ in 0..3000 {

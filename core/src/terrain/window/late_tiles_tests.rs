@@ -198,7 +198,7 @@ impl<'t> Bed<'t> {
 const HERE: Cell = Cell::new(140, 140);
 
 #[test]
-fn it_is_the_model_s_whatever_has_come_and_settled() {
+fn window_matches_the_f64_model_after_every_tile_and_blend() {
     let mut room = room();
     let mut bed = Bed::with_fallback(&mut room);
     assert_eq!(bed.judge(3..6), 96 * 96, "the fallback alone");
@@ -316,7 +316,7 @@ fn untouched_tile_is_the_surface_at_once() {
 }
 
 #[test]
-fn without_its_fallback_a_tile_is_the_surface_at_once_and_stays_it() {
+fn tile_arriving_before_its_fallback_is_not_blended() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
     assert_eq!(bed.window.ground(HERE), CellContent::Missing);
@@ -330,7 +330,7 @@ fn without_its_fallback_a_tile_is_the_surface_at_once_and_stays_it() {
 }
 
 #[test]
-fn no_data_of_a_tile_acts_at_once() {
+fn no_data_of_a_tile_takes_effect_without_blending() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
     bed.window.lay(Some(Fallback {
@@ -382,7 +382,7 @@ fn fallback_is_rendered_once_all_of_it_is_here() {
 }
 
 #[test]
-fn a_hole_of_the_near_tile_is_not_known_where_the_wide_one_has_none() {
+fn cell_is_missing_if_only_the_near_fallback_has_no_data() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
     bed.lays_part(WIDE, 3, &hills);
@@ -544,7 +544,7 @@ fn is_on_the_surface(window: &Window<'_, 4>, proxy: &GridPoint) {
 }
 
 #[test]
-fn a_hand_that_holds_still_feels_the_surface_move_and_no_step() {
+fn blending_under_a_still_hip_changes_force_smoothly() {
     for (mu, up, above) in [0.0, 0.8].into_iter().flat_map(|mu| {
         [(true, -0.5), (true, 0.2), (false, -0.2), (false, -0.9)].map(|(up, z)| (mu, up, z))
     }) {

@@ -93,7 +93,7 @@ fn at(column: i32) -> QueuedTick {
 }
 
 #[test]
-fn no_more_tiles_are_asked_for_than_there_are_buffers() {
+fn tile_requests_never_exceed_free_buffers() {
     let (mut link, mut loop_ends) = link();
     let mut total = 0;
     // The loop sleeps: no buffer returns, wherever the HIP moves.
@@ -116,7 +116,7 @@ fn no_more_tiles_are_asked_for_than_there_are_buffers() {
 }
 
 #[test]
-fn a_tile_that_the_window_would_not_have_is_asked_for_again() {
+fn rejected_tile_is_requested_again() {
     let (mut link, mut loop_ends) = link();
     let first = asked(&mut link);
     answer(&mut link, first[0]);

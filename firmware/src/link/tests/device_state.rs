@@ -22,7 +22,7 @@ const TO_ZERO: fn(&Request) -> bool = |r| matches!(r, Request::Zero { .. });
 const TO_ARM: fn(&Request) -> bool = |r| matches!(r, Request::Arm);
 
 #[test]
-fn armed_step_by_step_and_told_of_each() {
+fn arming_reports_each_mode_from_disarmed_to_armed() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(10);
     let report = rig.report().expect("told");
@@ -151,7 +151,7 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
 }
 
 #[test]
-fn nothing_is_stored_without_a_press_of_the_dead_man_switch() {
+fn calibration_store_times_out_without_deadman_press() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     let before = Stored::Found(Calibration::PREMIUM_1_5);
     rig.ask(set(Calibration::PREMIUM_3_0));
@@ -170,7 +170,7 @@ fn nothing_is_stored_without_a_press_of_the_dead_man_switch() {
 }
 
 #[test]
-fn what_waits_for_a_press_is_the_calibration_that_was_in_force() {
+fn calibration_change_is_refused_while_store_awaits_press() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.ask(Request::StoreCalibration);
     rig.ask(set(Calibration::PREMIUM_1_0));
@@ -214,7 +214,7 @@ fn while_something_waits_for_a_press_time_does_not_stand_still() {
 /// A record's limits do not justify its own values: each value is refused by name when the record
 /// is set and when it is found at the start.
 #[test]
-fn a_record_above_a_ceiling_is_refused_by_name_and_does_not_arm() {
+fn record_above_absolute_limit_is_refused_and_raises_fault() {
     type Case = (fn(&mut Calibration), CalibrationField);
     let hostile: [Case; 3] = [
         (
@@ -259,7 +259,7 @@ fn a_record_above_a_ceiling_is_refused_by_name_and_does_not_arm() {
 }
 
 #[test]
-fn what_was_found_at_boot_is_told_and_blocks() {
+fn boot_faults_are_reported_and_block_arming() {
     let crash = Crash {
         kind: CrashKind::Panic,
         pc: 0,
@@ -307,7 +307,7 @@ fn what_was_found_at_boot_is_told_and_blocks() {
 }
 
 #[test]
-fn goodbye_is_answered_when_the_force_is_out_and_the_scene_dropped() {
+fn close_is_confirmed_after_force_fade_and_scene_drop() {
     let mut rig = Rig::armed();
     rig.say(&ToDevice::Bye);
     let answered = |rig: &Rig| rig.received.iter().any(|m| matches!(m, ToHost::Goodbye(_)));
@@ -336,7 +336,7 @@ fn goodbye_is_answered_when_the_force_is_out_and_the_scene_dropped() {
 }
 
 #[test]
-fn while_force_goes_out_time_does_not_stand_still() {
+fn clock_keeps_running_while_force_fades_out() {
     let mut rig = Rig::armed();
     rig.ask(Request::DropScene);
     let mut ticks = 0;
@@ -354,7 +354,7 @@ fn while_force_goes_out_time_does_not_stand_still() {
 }
 
 #[test]
-fn a_link_that_hangs_is_seen_by_the_tick_within_forty_milliseconds() {
+fn stalled_link_task_disables_output_within_forty_ms() {
     let mut rig = Rig::armed();
     let sense = rig.sense;
     let ticks = (0..1_000).take_while(|_| rig.device.tick_alone(sense).enabled);

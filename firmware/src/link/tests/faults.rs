@@ -25,7 +25,7 @@ fn undisturbed() -> Vec<(u32, hapterra_core::Vec3)> {
 }
 
 #[test]
-fn another_protocol_is_refused_in_words_that_every_version_knows() {
+fn other_protocol_is_refused_with_device_protocol_number() {
     let mut rig = Rig::new();
     // A host of protocol 3 sends its open message and continues in its own protocol.
     rig.send(&asked(3));
@@ -58,7 +58,7 @@ fn a_host_of_another_protocol_does_not_end_a_session() {
 }
 
 #[test]
-fn what_belongs_to_another_session_is_not_heard() {
+fn messages_of_another_session_are_ignored() {
     let mut rig = Rig::armed();
     let other = SessionNumber::new(rig.session.get() + 1);
     let drop = ToDevice::Request {
@@ -105,7 +105,7 @@ fn a_hello_that_is_repeated_changes_nothing() {
 }
 
 #[test]
-fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
+fn open_of_previous_session_is_answered_as_replaced() {
     let mut rig = Rig::armed();
     let first = rig.session;
     rig.greet_anew();
@@ -138,7 +138,7 @@ fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
 }
 
 #[test]
-fn a_host_that_was_let_go_is_told_so_and_one_that_has_left_is_not() {
+fn session_closed_answers_silent_host_but_not_departed_host() {
     let mut rig = Rig::armed();
     let hello = HostHello {
         silence_s: 5,
@@ -169,7 +169,7 @@ fn a_host_that_was_let_go_is_told_so_and_one_that_has_left_is_not() {
 }
 
 #[test]
-fn a_request_is_done_once_however_often_it_comes() {
+fn duplicate_request_is_executed_once() {
     let mut rig = Rig::armed();
     rig.ask(Request::Disarm);
     let disarm = rig.number;
@@ -204,7 +204,7 @@ fn numbers_of_requests_wrap_around() {
 }
 
 #[test]
-fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
+fn host_silence_disarms_after_host_time_out() {
     let mut rig = Rig::armed();
     let hello = HostHello {
         silence_s: 7,
@@ -236,7 +236,7 @@ fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
 }
 
 #[test]
-fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
+fn read_only_host_opens_no_session_and_keeps_none_armed() {
     let mut rig = Rig::armed();
     rig.say(&ToDevice::Hello(HostHello {
         silence_s: 5,
@@ -297,7 +297,7 @@ fn the_time_for_silence_has_bounds() {
 }
 
 #[test]
-fn a_host_that_speaks_is_not_let_go() {
+fn heartbeats_keep_session_armed() {
     let mut rig = Rig::armed();
     rig.say(&ToDevice::Hello(HostHello {
         silence_s: 5,
@@ -339,7 +339,7 @@ fn look(rig: &mut Rig, silence_s: u16) {
 }
 
 #[test]
-fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
+fn detached_sessions_keep_arm_armed_and_last_report_intact() {
     let mut rig = Rig::armed();
     let first = rig.session;
     look(&mut rig, 60);
@@ -369,7 +369,7 @@ fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
 }
 
 #[test]
-fn an_arm_that_was_only_looked_at_is_let_go_after_the_time_too() {
+fn silence_after_detach_disarms_after_time_out() {
     let mut rig = Rig::armed();
     look(&mut rig, 7);
     let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
@@ -402,7 +402,7 @@ fn detached_host_arms_nothing_and_later_close_disarms() {
 }
 
 #[test]
-fn an_arm_command_that_is_under_way_ends_with_its_session() {
+fn pending_arm_request_ends_with_its_session() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.ask(Request::Zero { counts: [0; 3] });
     rig.ask(Request::Arm);
@@ -417,7 +417,7 @@ fn an_arm_command_that_is_under_way_ends_with_its_session() {
 }
 
 #[test]
-fn what_is_alive_is_answered_with_what_was_sent_before() {
+fn heartbeat_answer_counts_samples_sent_before() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(100);
     for ticks in 1..40 {
@@ -441,7 +441,7 @@ fn what_is_alive_is_answered_with_what_was_sent_before() {
 }
 
 #[test]
-fn goodbye_is_said_again_to_a_host_that_missed_it() {
+fn repeated_close_gets_same_answer_and_ends_requests() {
     let mut rig = Rig::armed();
     for _ in 0..3 {
         rig.say(&ToDevice::Bye);
@@ -461,7 +461,7 @@ fn goodbye_is_said_again_to_a_host_that_missed_it() {
 }
 
 #[test]
-fn damage_does_not_make_the_device_ask_again_for_what_is_on_its_way() {
+fn damaged_frames_trigger_no_repeated_tile_requests() {
     let mut rig = Rig::asking(scene(Source::Encoders));
     rig.run(5);
     let asked = rig.needs().len();
@@ -475,7 +475,7 @@ fn damage_does_not_make_the_device_ask_again_for_what_is_on_its_way() {
 }
 
 #[test]
-fn nothing_is_heeded_before_hello() {
+fn messages_before_open_are_ignored() {
     let mut rig = Rig::new();
     rig.send(&frame(&ToDevice::Scene(scene(Source::Points))));
     rig.send(&point(0, 0.0, 0.0));
@@ -484,7 +484,7 @@ fn nothing_is_heeded_before_hello() {
 }
 
 #[test]
-fn every_flipped_bit_of_the_first_tile_costs_a_retry_and_nothing_else() {
+fn damaged_tile_is_requested_again_and_forces_are_unchanged() {
     // One damaged bit in each rig; all bits would be 35,000 rigs.
     for bit in (0..8 * 4370).step_by(997) {
         let mut rig = Rig::asking(scene(Source::Points));
@@ -670,7 +670,7 @@ fn a_host_that_returns_with_another_scene_starts_afresh() {
 }
 
 #[test]
-fn tiles_of_another_scene_and_tiles_nobody_asked_for_are_dropped() {
+fn tiles_of_another_scene_or_unrequested_tiles_are_dropped() {
     let mut rig = Rig::asking(scene(Source::Points));
     let asked = rig.needs()[0];
     let unasked = hapterra_core::terrain::TileKey::new(asked.level, 9, asked.index.row);
@@ -713,7 +713,7 @@ fn a_slow_link_drops_telemetry_and_counts_it_and_nothing_else() {
 }
 
 #[test]
-fn a_tile_that_never_comes_is_asked_for_again_and_again() {
+fn missing_tile_is_requested_again_every_retry_period() {
     let mut rig = Rig::asking(scene(Source::Encoders));
     let first = rig.needs()[0];
     rig.run(4 * RETRY_TICKS + 1);
@@ -765,7 +765,7 @@ fn a_host_that_floods_is_held_back_not_obeyed() {
 }
 
 #[test]
-fn a_host_that_is_gone_has_no_arm_armed_and_no_record_stored() {
+fn dead_man_press_without_live_host_neither_arms_nor_stores() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.ask(Request::Zero { counts: [0; 3] });
     rig.ask(Request::Arm);
@@ -791,7 +791,7 @@ fn a_host_that_is_gone_has_no_arm_armed_and_no_record_stored() {
 }
 
 #[test]
-fn no_hello_of_the_last_sessions_opens_one_again() {
+fn opens_of_recent_sessions_do_not_reopen_them() {
     let mut rig = Rig::new();
     rig.say(&ToDevice::Hello(HELLO));
     rig.run(1);
@@ -814,7 +814,7 @@ fn no_hello_of_the_last_sessions_opens_one_again() {
 }
 
 #[test]
-fn nothing_is_armed_while_a_record_is_being_stored() {
+fn arm_is_refused_as_busy_during_calibration_store() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.ask(Request::Zero { counts: [0; 3] });
     rig.ask(Request::StoreCalibration);

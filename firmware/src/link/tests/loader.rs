@@ -16,7 +16,7 @@ fn enters(rig: &Rig) -> bool {
 }
 
 #[test]
-fn a_device_without_a_loader_says_so() {
+fn enter_loader_is_refused_without_a_loader() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.ask(Request::EnterLoader);
     rig.run(5);
@@ -59,7 +59,7 @@ fn nor_one_that_waits_for_the_dead_man_switch() {
 }
 
 #[test]
-fn on_its_way_into_the_loader_a_device_is_not_armed_any_more() {
+fn arming_is_refused_once_loader_entry_is_accepted() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.device.link.offer_loader();
     rig.ask(Request::Zero { counts: [0; 3] });
@@ -75,7 +75,7 @@ fn on_its_way_into_the_loader_a_device_is_not_armed_any_more() {
 }
 
 #[test]
-fn a_device_goes_only_when_its_answer_has_left_it() {
+fn loader_is_entered_only_after_the_answer_is_sent() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.device.link.offer_loader();
     rig.writer = 0;
@@ -89,7 +89,7 @@ fn a_device_goes_only_when_its_answer_has_left_it() {
 }
 
 #[test]
-fn outputs_that_are_held_are_let_go_before_the_loader_is_entered() {
+fn held_outputs_are_released_before_loader_entry() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.device.link.offer_loader();
     rig.ask(Request::HoldOutputs(Some([1.0; 3])));

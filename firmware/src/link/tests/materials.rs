@@ -142,7 +142,7 @@ fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
 }
 
 #[test]
-fn a_scene_is_refused_whose_table_did_not_come_or_is_none() {
+fn scene_with_missing_or_invalid_material_table_is_refused() {
     let mut rig = greeted();
     let (known, other) = (table(&[0.5, 1.0]), table(&[0.5, 2.0]));
     let alone = scene_of(&known, 9);
@@ -172,7 +172,7 @@ fn a_scene_is_refused_whose_table_did_not_come_or_is_none() {
 }
 
 #[test]
-fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
+fn consecutive_scenes_use_their_own_material_tables() {
     let mut rig = greeted();
     let (soft, hard) = (table(&[0.5]), table(&[1.0]));
     let mut room = [0; MAX_TABLE_BYTES];
@@ -195,7 +195,7 @@ fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
 }
 
 #[test]
-fn the_fallback_comes_without_materials() {
+fn fallback_tile_with_materials_is_a_bad_frame() {
     let mut rig = greeted();
     let table = table(&[0.5, 1.0]);
     let wide = CoarseTile {

@@ -24,7 +24,7 @@ fn introduces_itself() {
 }
 
 #[test]
-fn a_replay_feels_every_point_once_and_in_order() {
+fn replay_renders_every_point_once_in_order() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     let rendered = rig.descend(40);
     let numbers: Vec<u32> = rendered.iter().map(|(seq, _)| *seq).collect();
@@ -82,7 +82,7 @@ fn arm_is_rendered_and_reported_without_a_gap() {
 }
 
 #[test]
-fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
+fn clock_waits_for_a_missing_tile_only_with_hold_clock() {
     for hold_clock in [false, true] {
         let mut rig = Rig::new();
         rig.answers_tiles = false;
@@ -106,7 +106,7 @@ fn time_may_stand_still_while_a_tile_is_owed_only_if_the_scene_says_so() {
 }
 
 #[test]
-fn goodbye_comes_after_everything_was_said() {
+fn close_is_confirmed_after_all_samples_are_sent() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(21);
     // The writer stops for a while: more than one message is waiting.

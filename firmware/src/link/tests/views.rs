@@ -56,7 +56,7 @@ fn with_an_open_clutch() -> Rig {
 }
 
 #[test]
-fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
+fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     let mut rig = with_an_open_clutch();
     let wanted = view(1, latest(&rig).hip);
     rig.received
@@ -135,7 +135,7 @@ fn placement_during_contact_is_refused() {
 }
 
 #[test]
-fn the_clutch_of_a_host_that_is_gone_is_let_go() {
+fn clutch_hold_ends_with_the_session_of_its_host() {
     let closed = |rig: &mut Rig| {
         rig.run(700);
         latest(rig).limits == Limits::empty()

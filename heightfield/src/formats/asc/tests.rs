@@ -18,7 +18,7 @@ fn heights(text: &str) -> Vec<f64> {
 }
 
 #[test]
-fn any_white_space_key_case_and_order() {
+fn header_accepts_any_white_space_case_and_order() {
     let text = "\u{feff}NROWS\t2\r\n  nCols 3\r\nYLLCenter 5\r\nXLLCENTER 5\r\nCellSize 10\r\n\
                 NODATA_value -1\r\n1 2\r\n3\r\n\r\n4\t5   -1.000\r\n\u{1a}";
     let found = heights(text);
@@ -60,7 +60,7 @@ fn samples_take_the_narrowest_type_that_holds_them() {
 }
 
 #[test]
-fn degrees_are_told_from_metres_by_place_and_size() {
+fn cell_unit_is_inferred_from_place_and_size() {
     let cell = |header: &str| {
         let text = format!("ncols 2\nnrows 2\n{header}\n1 2 3 4");
         open(&text).expect("a grid").cell().expect("a cell")
@@ -78,7 +78,7 @@ fn degrees_are_told_from_metres_by_place_and_size() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn parse_error_names_its_cause() {
     let reported = |text: &str| open(text).expect_err("refused").to_string();
     let square = "ncols 2\nnrows 2\ncellsize 1\n";
     assert!(reported(&format!("{square}1 2 3")).contains("3 follow"));
@@ -97,7 +97,7 @@ fn what_is_wrong_is_named() {
 }
 
 #[test]
-fn samples_that_are_no_heights_are_holes() {
+fn infinite_nan_and_nodata_samples_are_no_data() {
     let square = "ncols 3\nnrows 2\ncellsize 1\n";
     for (header, samples, holes, remark) in [
         ("", "1 2 3 4 inf -inf", 2, "infinite"),

@@ -57,7 +57,7 @@ fn floats(values: [f32; 6], big: bool) -> Vec<u8> {
 }
 
 #[test]
-fn a_float_grid_with_its_place_and_holes() {
+fn float_grid_is_read_with_bounds_and_no_data() {
     let stored = [1.5, -2.0, 3.0, -9999.0, 5.25, 6.0];
     for (big, header) in [(false, FLT.to_owned()), (true, FLT.replace("LSB", "MSB"))] {
         let pair = Pair::new("dem.flt", &floats(stored, big), "dem.hdr", &header);
@@ -181,7 +181,7 @@ fn reported(data: &'static str, bytes: &[u8], header: &str) -> (String, Error) {
 }
 
 #[test]
-fn what_is_wrong_is_named_and_no_room_is_made_for_it() {
+fn invalid_headers_and_truncated_data_are_named() {
     let whole = floats([1.0; 6], false);
     let (text, _) = reported("a.flt", &whole[..23], FLT);
     assert!(

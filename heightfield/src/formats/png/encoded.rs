@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_are_exact_to_a_step_and_transparent_or_black_is_a_hole() {
+    fn heights_round_to_step_and_transparent_or_black_is_no_data() {
         for (encoding, step) in [
             (Encoding::TerrainRgb, 0.1),
             (Encoding::Terrarium, 1.0 / 256.0),
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_looks_encoded_is_told_from_a_photograph() {
+    fn encoded_picture_is_distinguished_from_photograph() {
         for encoding in [Encoding::TerrainRgb, Encoding::Terrarium] {
             for with_alpha in [true, false] {
                 let tile = picture(

@@ -65,7 +65,7 @@ fn an_opaque_colour_picture_is_not_a_height_field() {
 }
 
 #[test]
-fn transparent_grey_is_a_hole() {
+fn grey_pixel_with_zero_alpha_is_no_data() {
     use ::png::{BitDepth, ColorType};
     let bytes = [0, 10, 0, 1, 0, 20, 0, 0, 0, 30, 255, 255, 0, 0, 1, 0];
     let grey = picture(ColorType::GrayscaleAlpha, BitDepth::Sixteen, &bytes);
@@ -75,7 +75,7 @@ fn transparent_grey_is_a_hole() {
 }
 
 #[test]
-fn a_grey_that_is_called_transparent_is_a_hole() {
+fn grey_value_in_trns_chunk_is_no_data() {
     let mut file = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut file, 2, 2);
     encoder.set_color(::png::ColorType::Grayscale);

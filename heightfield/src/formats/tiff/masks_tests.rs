@@ -73,7 +73,7 @@ fn found(mask: &Mask, part: &Part) -> Vec<usize> {
 }
 
 #[test]
-fn a_mask_of_few_bits_is_the_same_in_each_way_of_reading_it() {
+fn mask_of_any_bit_depth_is_equal_in_every_read_path() {
     const BITS: [&[u32]; 4] = [&[1], &[2], &[4], &[8]];
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 30);
@@ -121,7 +121,7 @@ fn a_mask_of_few_bits_is_the_same_in_each_way_of_reading_it() {
 }
 
 #[test]
-fn all_of_a_mask_in_strips_is_read_row_after_row() {
+fn whole_mask_in_strips_is_read_in_row_order() {
     for chunk in [SIZE, [SIZE[0], 500]] {
         let made = Made {
             kind: KINDS[0],

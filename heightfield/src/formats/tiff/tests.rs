@@ -72,7 +72,7 @@ fn an_overview_before_the_full_image_is_passed_over() {
 }
 
 #[test]
-fn the_mask_beside_an_image_makes_holes() {
+fn mask_image_in_the_same_file_marks_no_data() {
     let mask = Part {
         kind: 4,
         size: (3, 2),
@@ -195,7 +195,7 @@ fn overviews_and_masks_beside_a_file_are_its_own() {
 }
 
 #[test]
-fn a_strip_that_is_cut_off_is_a_hole_in_a_file_that_is_not_held() {
+fn strip_beyond_file_end_is_no_data_when_read_in_blocks() {
     let samples: Vec<u8> = vec![5; 3000 * 900];
     let parts = [Part {
         kind: 0,
@@ -236,7 +236,7 @@ fn with_tag(mut bytes: Vec<u8>, tag: u16, count: u32, value: u32) -> Vec<u8> {
 }
 
 #[test]
-fn a_size_that_the_file_cannot_hold_is_refused_before_room_is_made() {
+fn size_larger_than_the_file_is_refused_before_allocation() {
     let wide = with_tag(file(&[FULL]), 256, 1, 4_000_000_000);
     let fault = open(wide).expect_err("refused");
     assert!(matches!(fault, RasterError::AbsurdSize(_)), "{fault}");
@@ -298,7 +298,7 @@ fn grey(size: [u16; 2], bands: u16) -> Vec<(u16, u16, u32, Vec<u8>)> {
 }
 
 #[test]
-fn what_its_alpha_calls_transparent_is_a_hole() {
+fn transparent_alpha_samples_are_no_data() {
     let samples = [1, 255, 2, 0, 3, 7, 4, 255];
     for (kind, holes) in [(1, 1), (2, 1), (0, 0)] {
         let mut tags = grey([2, 2], 2);
@@ -316,7 +316,7 @@ fn what_its_alpha_calls_transparent_is_a_hole() {
 
 /// A mask in `NAME.tif.msk`, as GDAL writes it.
 #[test]
-fn a_mask_in_a_file_beside_makes_holes() {
+fn msk_sidecar_file_marks_no_data() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("terrain.tif");
     std::fs::write(&path, file(&[FULL])).expect("written");
@@ -457,7 +457,7 @@ fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
 
 /// A sparse file is too large, but not damaged.
 #[test]
-fn what_memory_cannot_hold_is_no_damage() {
+fn sparse_file_beyond_memory_is_oversized_not_damaged() {
     // 200,000 × 200,000 in four deflated tiles, the last of which is stored.
     let mut tags = in_tiles(200_000, 100_000, [&[0, 0, 0, 8], &[0, 0, 0, 64]]);
     tags[3] = shorts(259, &[8]);

@@ -4,7 +4,7 @@ use super::super::test_files::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open,
 use crate::RasterError;
 
 #[test]
-fn all_types_of_either_order_are_what_was_written() {
+fn every_sample_type_decodes_in_both_byte_orders() {
     for kind in KINDS {
         for is_big_endian in [false, true] {
             let made = Made {
@@ -37,7 +37,7 @@ fn strips_and_tiles_of_several_bands_are_what_was_written() {
 }
 
 #[test]
-fn a_tile_that_is_left_out_is_a_hole_and_no_other_is() {
+fn only_the_omitted_tile_is_no_data() {
     let made = Made {
         chunk: [1024, 640],
         left_out: Some(1),
@@ -54,7 +54,7 @@ fn a_tile_that_is_left_out_is_a_hole_and_no_other_is() {
 }
 
 #[test]
-fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
+fn missing_strip_rows_are_no_data_and_the_others_are_read() {
     const ROW: u32 = 4 * SIZE[0];
     // The first strip ends 140 rows early, and the second states the missing rows.
     let made = Made {
@@ -77,7 +77,7 @@ fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
 }
 
 #[test]
-fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
+fn fill_order_and_predictor_are_left_to_the_decoder() {
     // The decoder reads each, or reports an error.
     let turned = Made {
         kind: KINDS[0],
@@ -99,7 +99,7 @@ fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
 
 /// The decoder rejects these; read by rows, they would be the heights of other bands.
 #[test]
-fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
+fn mixed_band_types_and_unknown_planar_config_are_refused() {
     for (tag, values, why) in [
         (258, &[32, 16, 32][..], "mixed BitsPerSample"),
         (339, &[3, 1, 3][..], "mixed SampleFormat"),
@@ -117,7 +117,7 @@ fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
 }
 
 #[test]
-fn a_strip_behind_the_end_is_told_before_anything_is_read() {
+fn strip_offset_beyond_the_file_end_is_refused_on_open() {
     let made = Made {
         other: Some((273, &[u32::MAX - 7])),
         ..ONE_STRIP

@@ -87,7 +87,7 @@ fn check_parts(made: &Made, layout: &Layout) {
 }
 
 #[test]
-fn each_compression_and_predictor_of_all_types_is_what_was_written() {
+fn each_compression_and_predictor_decodes_to_written_samples() {
     let mut all = vec![];
     for (code, pack) in [
         (5, lzw as fn(&[u8]) -> Vec<u8>),
@@ -142,7 +142,7 @@ const TILES: Made = Made {
 };
 
 #[test]
-fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
+fn two_tile_rows_stay_unpacked_at_any_limit_and_more_within_it() {
     let tile = 1024 * 400 * 4;
     for (most, kept) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
         let (_folder, layout) = layout(&TILES, TILES.bytes(), most);
@@ -158,7 +158,7 @@ fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
 
 /// Otherwise each block of a row of blocks would decompress both of its strips again.
 #[test]
-fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
+fn strips_and_tiles_under_a_row_of_blocks_stay_unpacked() {
     let at_border = Part {
         column: 0,
         row: 300,
@@ -220,7 +220,7 @@ fn a_tile_is_at_hand_once_it_is_unpacked() {
 }
 
 #[test]
-fn the_tile_that_was_asked_for_longest_ago_goes_first() {
+fn least_recently_read_tile_is_evicted_first() {
     let (_folder, layout) = layout(&TILES, TILES.bytes(), 1);
     let part = |[column, row]: [u32; 2]| Part {
         column,
@@ -263,7 +263,7 @@ fn cut_strip_keeps_its_rows_and_reports_the_missing_ones() {
 }
 
 #[test]
-fn what_lerc_has_packed_is_not_unpacked_by_rows() {
+fn unpacking_by_rows_refuses_lerc() {
     let made = Made {
         other: Some((259, &[34887])),
         ..ONE_STRIP

@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn one_device_is_taken_and_of_several_only_the_one_that_is_named() {
+    fn choice_among_several_devices_needs_a_unique_serial() {
         let [a, b, c] = [
             device("AB12", false),
             device("CD345", false),
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn none_is_told() {
+    fn no_matching_device_is_an_error() {
         assert!(matches!(
             choose(&[], None),
             Err(UpdateError::Nothing { .. })

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_flash_is_refused_and_nothing_panics() {
+    fn malformed_flash_layout_is_refused_without_panic() {
         for words in [
             "",
             "@",
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_loader_says_reaches_no_terminal_raw() {
+    fn control_characters_from_a_loader_are_removed() {
         let Err(UpdateError::Layout(stated)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}") else {
             panic!("refused");
         };

@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn an_h743_is_written_in_words_of_thirty_two_bytes_and_erased_by_sectors() {
+    fn h743_plan_writes_32_byte_words_and_erases_sectors() {
         const SECTOR: u64 = 128 * 1024;
         let board = Board::named("nucleo-h743zi2").expect("known");
         let words = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";

@@ -106,7 +106,7 @@ fn hint(failure: &UpdateFailure) -> String {
 }
 
 #[test]
-fn an_image_is_written_read_back_and_started_and_nothing_else_is_touched() {
+fn update_writes_and_starts_image_and_erases_no_other_page() {
     for rom in ROMS {
         let image = image(rom);
         let (device, done) = try_update(Scripted::new(rom, Faults::default()), &image);
@@ -149,7 +149,7 @@ fn the_vectors_are_erased_first_and_written_last() {
 }
 
 #[test]
-fn a_loader_that_something_else_has_left_in_the_middle_is_brought_to_rest() {
+fn update_succeeds_with_loader_left_mid_transfer_or_in_error() {
     for state in [
         State::Error,
         State::DownloadSync,
@@ -208,7 +208,7 @@ fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
 }
 
 #[test]
-fn what_does_not_read_back_is_not_started() {
+fn image_that_fails_verification_is_not_started() {
     for rom in ROMS {
         let image = image(rom);
         let ends = image.parts.iter().flat_map(|part| {
@@ -235,7 +235,7 @@ fn what_does_not_read_back_is_not_started() {
 }
 
 #[test]
-fn what_the_loader_refuses_is_told_in_words_and_ends() {
+fn loader_failure_aborts_update_and_names_the_reason() {
     let refused = |faults| {
         let (_, done) = try_update(Scripted::new(&G474, faults), &image(&G474));
         done.expect_err("refused").error.to_string()
@@ -292,7 +292,7 @@ fn foreign_loader_or_image_is_refused_before_erasing() {
 }
 
 #[test]
-fn what_is_no_loader_of_that_kind_is_refused() {
+fn unsuitable_loader_descriptor_or_layout_is_refused() {
     let open = |words: &str, functional: &[u8]| {
         let mut device = Scripted::new(&G474, Faults::default());
         let opened = Loader::open(&mut device, words, functional).map(|_| ());
@@ -327,7 +327,7 @@ fn what_is_no_loader_of_that_kind_is_refused() {
 }
 
 #[test]
-fn progress_ends_where_it_said_it_would() {
+fn update_progress_reaches_its_announced_totals() {
     for rom in ROMS {
         let mut device = Scripted::new(rom, Faults::default());
         let mut loader = Loader::open(&mut device, rom.words, &FUNCTIONAL).expect("a loader");

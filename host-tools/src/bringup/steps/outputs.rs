@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_expected_is_what_the_boards_put_out() {
+    fn expected_outputs_match_every_board() {
         let near = |found: f64, expected: f64, of: f64| (found - expected).abs() < 0.005 * of;
         for fraction in FRACTIONS {
             let expected = |board| {

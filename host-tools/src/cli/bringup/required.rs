@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_complete_log_of_this_board_and_record_will_do() {
+    fn bring_up_requires_complete_log_of_this_board_and_record() {
         let (device, record) = (device(), Calibration::PREMIUM_1_5);
         let mut log = Log::default();
         assert_eq!(
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_real_is_never_refused() {
+    fn only_real_boards_require_bring_up() {
         for (board, real) in [
             ("nucleo-g474re", true),
             ("nucleo-h743zi2", true),

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_setting_is_told() {
+    fn invalid_setting_is_refused() {
         for bad in ["ratio-1", "ratio-4=1", "ratio=1", "l1-mm=long", "colour=1"] {
             assert!(bad.parse::<Setting>().is_err(), "{bad}");
         }

@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn level_ground_and_holes_take_nothing_worth_counting() {
+    fn flat_and_no_data_tiles_are_excluded_from_link_figures() {
         let level = Raster::from_fn(70, 70, |x, _| if x > 40 { f32::NAN } else { 3.0 });
         let level = level.expect("raster");
         let figures = LinkFigures::of(&HapticGrid::new(&level, HapticCells::Square), 1.0);

@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_understood_is_named_with_what_is() {
+    fn invalid_input_setting_error_names_the_valid_form() {
         for (text, wanted) in [
             ("bands=2", "band=2"),
             ("stored", "cells=stored"),

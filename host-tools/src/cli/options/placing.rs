@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_are_said_with_five_digits() {
+    fn lengths_are_printed_with_five_significant_digits() {
         for (value, stated) in [
             (10.9, "10.9"),
             (0.123_456_7, "0.12346"),

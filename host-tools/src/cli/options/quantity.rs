@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_bit_by_bit() {
+    fn written_quantity_is_read_back_bit_for_bit() {
         for value in [0.1_f32, 0.3, 1.0 / 3.0, 8.5, f32::MIN_POSITIVE] {
             assert_eq!(STIFFNESS.read_single(&STIFFNESS.say(value)), Ok(value));
             let value = f64::from(value);

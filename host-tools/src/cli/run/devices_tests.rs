@@ -28,7 +28,7 @@ fn refused(more: &str) -> String {
 }
 
 #[test]
-fn one_device_has_the_files_name_and_its_lines_have_none() {
+fn single_device_keeps_the_file_name_and_has_no_console_name() {
     for more in ["", "--device native", "--device usb"] {
         let [only] = &devices(&format!("{more} --out felt.csv"))[..] else {
             panic!("{more}");
@@ -39,7 +39,7 @@ fn one_device_has_the_files_name_and_its_lines_have_none() {
 }
 
 #[test]
-fn each_of_several_devices_has_its_number_its_name_and_its_recording() {
+fn several_devices_have_numbered_names_and_recordings() {
     let devices = devices(
         "--device native --device usb:7 --device native --device tcp:h:1 --out out/felt.x.csv",
     );
@@ -116,7 +116,7 @@ fn plant_line_is_part_of_an_emulated_boards_name() {
 }
 
 #[test]
-fn what_several_devices_cannot_be_given_is_refused_with_what_to_do() {
+fn view_of_several_devices_and_a_tenth_device_are_refused() {
     let reported = refused("--device native --device native --view");
     assert!(reported.contains("hint: leave --view out"), "{reported}");
     let ten = " --device native".repeat(10);

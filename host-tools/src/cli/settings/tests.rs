@@ -118,7 +118,7 @@ fn errors_name_file_and_line() {
 }
 
 #[test]
-fn no_settings_are_read_where_none_are_wanted() {
+fn command_line_without_settings_is_left_unchanged() {
     let words =
         |line: &str| -> Vec<OsString> { line.split_whitespace().map(OsString::from).collect() };
     for line in [
@@ -223,7 +223,7 @@ fn options_win_over_a_recording_and_are_named() {
 }
 
 #[test]
-fn recorded_surface_has_all_bits_of_its_law() {
+fn recorded_surface_restores_every_bit_of_its_params() {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, settings) = recording(folder.path());
     let options = SurfaceOptions {

@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_that_nobody_has_read_of_is_not_cleared() {
+    fn enter_pressed_before_a_fault_is_shown_does_not_clear_it() {
         let (press, mut prompts) = with_a_user();
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_that_comes_back_disarmed_is_armed_by_enter() {
+    fn enter_arms_a_device_that_resumes_disarmed() {
         let (press, mut prompts) = with_a_user();
         let device = crate::link::hello();
         let resumed = true;
@@ -441,7 +441,7 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_that_is_not_zeroed_is_told_and_enter_asks_for_its_counts() {
+    fn missing_zero_is_reported_and_enter_requests_status() {
         let (press, mut prompts) = with_a_user();
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_script_what_is_wrong_is_told_and_nothing_else() {
+    fn scripted_run_reports_errors_without_prompts() {
         let mut prompts = ArmingPrompts::for_a_script();
         for mode in [Mode::Disarmed, Mode::Requested, Mode::Ramping, Mode::Armed] {
             let report = Report {
@@ -482,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn that_it_waits_for_the_hand_is_told_once() {
+    fn dead_man_prompt_is_shown_once() {
         let (_press, mut prompts) = with_a_user();
         let waits = |more| Report {
             mode: Mode::Requested,
@@ -499,7 +499,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_told_once_and_enter_clears_it_and_arms() {
+    fn fault_is_shown_once_and_enter_clears_it_and_arms() {
         let (press, mut prompts) = with_a_user();
         let report = Report {
             fault: Some(Fault::DeadManReleased),

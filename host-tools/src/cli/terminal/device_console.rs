@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_device_is_not_named_and_of_several_each_line_is() {
+    fn console_prefixes_lines_only_with_several_devices() {
         let alone = DeviceConsole::of_each(&["usb"]);
         assert_eq!(alone[0].named("a\nb"), "a\nb");
         assert_eq!(alone[0].name(), None);

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_ends_it_at_once_is_told_of_each_board_that_may_be_armed() {
+    fn immediate_exit_names_each_board_that_may_be_armed() {
         let of = |names: &[&str]| {
             let names = names.iter().map(|name| (*name).to_owned());
             not_confirmed(&names.collect())

@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_typed_before_a_question_is_no_answer_and_what_a_pipe_holds_is() {
+    fn forget_typed_drops_typed_answers_but_not_piped_lines() {
         let (typed, lines) = sync_channel(WAITING);
         let (press, pressed) = sync_channel(WAITING);
         let mut keyboard = Keyboard {
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_and_lines_come_in_their_order() {
+    fn typed_lines_become_key_presses_but_piped_lines_do_not() {
         let (typed, lines) = sync_channel(WAITING);
         let (press, pressed) = sync_channel(WAITING);
         let mut keyboard = Keyboard {

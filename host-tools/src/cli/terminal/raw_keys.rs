@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_told_apart() {
+    fn characters_and_escape_sequences_decode_to_keys() {
         let key = |key| Typed::Pressed(Pressed::Key(key));
         let arrow = |east, north| key(Key::Arrow(east, north));
         for (bytes, expected) in [

@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_go_to_the_device_that_was_chosen_last() {
+    fn keys_reach_the_device_selected_last() {
         let device_keys = two();
         press(&device_keys, &[key('+'), key('2'), key('-')]);
         // There is no third device, and 0 is an ordinary key.
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_is_not_served_any_more_is_told_when_it_is_chosen() {
+    fn unserved_device_is_reported_when_selected() {
         let mut device_keys = two();
         drop(device_keys.pop());
         let reported = press(&device_keys, &[key('2'), Pressed::Enter]);

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_said_from_the_first_second_until_the_work_ends() {
+    fn progress_lines_appear_from_first_second_until_work_ends() {
         let (blocks, waits) = (Cell::new(0), Cell::new(0));
         let goes_on = |time| {
             assert_eq!(time, if waits.get() == 0 { FIRST } else { BETWEEN });

@@ -63,7 +63,7 @@ fn rows_of(path: &Path) -> Vec<Row> {
 }
 
 #[test]
-fn both_forms_come_back_as_the_same_trajectory() {
+fn csv_and_parquet_read_back_as_the_same_trajectory() {
     let folder = tempfile::tempdir().expect("a folder");
     let csv = rows_of(&recorded(&folder, "r.csv"));
     assert_eq!(csv.len(), ROWS as usize);
@@ -152,7 +152,7 @@ fn marks() -> Vec<Mark> {
 }
 
 #[test]
-fn marks_come_back_from_both_forms() {
+fn marks_read_back_from_csv_and_parquet() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["m.csv", "m.parquet"] {
         let path = folder.path().join(name);

@@ -274,7 +274,7 @@ fn rows_without_times_are_ticks_and_so_are_rows_of_one_time() {
 }
 
 #[test]
-fn rows_are_ticks_whatever_their_times_where_that_is_asked_for() {
+fn row_by_row_pace_makes_each_row_one_tick() {
     for times in [["0", "0.01", "0.02"], ["9", "3", "5"], ["0", "0", "1e9"]] {
         let rows = [(times[0], 1.0), (times[1], 2.0), (times[2], 3.0)];
         let (_folder, mut ticks) = ticks_of(&path(&rows), Pace::RowByRow, 1000);
@@ -339,7 +339,7 @@ fn a_recording_has_whole_ticks_between_its_rows() {
 }
 
 #[test]
-fn nothing_is_filled_in_in_a_long_gap_of_a_recording() {
+fn long_recording_gaps_are_not_interpolated() {
     let rows = [("0", 1.0), ("0.001", 2.0), ("3", 9.0), ("3.002", 11.0)];
     let (_folder, mut ticks) = ticks_of(&path(&rows), Pace::Recorded, 1000);
     let expected = [
@@ -358,7 +358,7 @@ fn nothing_is_filled_in_in_a_long_gap_of_a_recording() {
 }
 
 #[test]
-fn nothing_is_filled_in_between_two_views() {
+fn rows_of_different_placements_are_not_interpolated() {
     let text =
         "t_s,x_mm,y_mm,z_mm,view\n0,1,7,-1,0\n0.002,3,7,-1,0\n0.005,50,7,-1,1\n0.007,60,7,-1,1\n";
     let (_folder, mut ticks) = ticks_of(text, Pace::Recorded, 1000);

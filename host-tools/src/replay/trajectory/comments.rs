@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_are_told_apart_and_nothing_is_lost() {
+    fn comments_are_separated_and_all_bytes_are_kept() {
         for (text, expected) in [
             (
                 &b"# a = 1\n#\n#b\r\nt_s\n0\n# later\n"[..],

@@ -104,7 +104,7 @@ fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
 }
 
 #[test]
-fn says_what_is_wrong_and_where() {
+fn parse_error_names_file_line_and_column() {
     let cases = [
         ("", "line 1 is not the header"),
         ("0,1,2,3\n", "line 1 is not the header"),
@@ -144,7 +144,7 @@ fn a_header_after_comments_is_named_with_its_line() {
 }
 
 #[test]
-fn settings_that_cannot_be_used_are_told_and_remarks_are_no_settings() {
+fn later_settings_format_is_refused_and_remarks_are_ignored() {
     let later = message("# hapterra-recording = 9\nt_s,x_mm,y_mm,z_mm\n");
     assert!(later.contains("format 9"), "{later}");
     assert_eq!(
@@ -154,7 +154,7 @@ fn settings_that_cannot_be_used_are_told_and_remarks_are_no_settings() {
 }
 
 #[test]
-fn bytes_that_only_begin_as_parquet_does_are_told() {
+fn file_with_only_the_parquet_magic_is_refused() {
     let wrong = message("PAR1 and so on");
     assert!(wrong.contains("cannot read the trajectory"), "{wrong}");
 }

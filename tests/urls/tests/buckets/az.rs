@@ -58,7 +58,7 @@ fn url() -> String {
 }
 
 #[test]
-fn a_file_opens_with_the_key_of_its_account_and_is_fetched_in_parts() {
+fn file_opens_with_account_key_and_is_fetched_in_parts() {
     let microsoft = Microsoft::start(SURVEYORS);
     let output = microsoft.stated_with_key(&url(), SURVEYORS.key);
     assert!(output.contains("read GeoTIFF"), "{output}");
@@ -133,7 +133,7 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
 }
 
 #[test]
-fn a_file_of_an_emulator_opens_with_the_key_that_everybody_knows() {
+fn emulator_file_opens_only_with_the_well_known_key() {
     let microsoft = Microsoft::start(EMULATOR);
     let output = microsoft.said_by_emulator(&url(), &[]);
     assert!(output.contains("read GeoTIFF"), "{output}");
@@ -143,7 +143,7 @@ fn a_file_of_an_emulator_opens_with_the_key_that_everybody_knows() {
 }
 
 #[test]
-fn a_file_of_a_public_container_opens_without_a_key_and_no_other_does() {
+fn only_public_container_opens_without_a_key() {
     let microsoft = Microsoft::start(EMULATOR);
     let nobody = [("AZURE_SKIP_SIGNATURE", "true")];
     let output = microsoft.stated(&format!("az://{PUBLIC}/{NAME}"), &nobody);
@@ -157,7 +157,7 @@ fn a_file_of_a_public_container_opens_without_a_key_and_no_other_does() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_told_so() {
+fn missing_file_is_reported() {
     let microsoft = Microsoft::start(SURVEYORS);
     let missing = microsoft.stated_with_key("az://hills/south.tif", SURVEYORS.key);
     assert!(
@@ -167,7 +167,7 @@ fn a_file_that_is_not_there_is_told_so() {
 }
 
 #[test]
-fn a_key_that_does_not_open_it_is_told_so() {
+fn wrong_key_is_refused_and_no_data_is_sent() {
     let microsoft = Microsoft::start(SURVEYORS);
     let reported = microsoft.stated_with_key(&url(), EMULATOR.key);
     assert_refused(&reported, "AuthenticationFailed", HINT);
@@ -176,7 +176,7 @@ fn a_key_that_does_not_open_it_is_told_so() {
 }
 
 #[test]
-fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
+fn environment_error_names_variable_and_sends_no_request() {
     let microsoft = Microsoft::start(SURVEYORS);
     let over_http = [
         ("AZURE_STORAGE_ENDPOINT", microsoft.server.endpoint()),
@@ -205,7 +205,7 @@ fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
 }
 
 #[test]
-fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
+fn refused_connection_error_names_cause_and_hint() {
     let nowhere = [
         ("AZURE_STORAGE_ENDPOINT", "http://127.0.0.1:1"),
         ("AZURE_ALLOW_HTTP", "true"),

@@ -40,7 +40,7 @@ fn url() -> String {
 }
 
 #[test]
-fn a_file_opens_with_the_key_of_an_account_and_is_fetched_in_parts() {
+fn service_account_key_opens_a_file_fetched_in_parts() {
     let google = Google::start();
     let output = google.stated_with_key(&url(), &SURVEYOR.file());
     assert!(output.contains("read GeoTIFF"), "{output}");
@@ -64,7 +64,7 @@ fn a_file_opens_with_a_token() {
 }
 
 #[test]
-fn a_file_of_a_public_bucket_opens_without_a_key_and_no_other_does() {
+fn unsigned_access_opens_only_public_buckets() {
     let google = Google::start();
     let nobody = [("GOOGLE_SKIP_SIGNATURE", "true")];
     let output = google.stated(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
@@ -73,7 +73,7 @@ fn a_file_of_a_public_bucket_opens_without_a_key_and_no_other_does() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_told_so() {
+fn missing_file_error_names_its_url() {
     let google = Google::start();
     let missing = google.stated_with_key("gs://hills/south.tif", &SURVEYOR.file());
     assert!(
@@ -83,7 +83,7 @@ fn a_file_that_is_not_there_is_told_so() {
 }
 
 #[test]
-fn a_key_that_does_not_open_it_is_told_so() {
+fn rejected_key_error_names_the_server_code() {
     let google = Google::start();
     let stranger = google.stated_with_key(&url(), &STRANGER.file());
     assert_refused(&stranger, "AccessDenied", HINT);
@@ -95,7 +95,7 @@ fn a_key_that_does_not_open_it_is_told_so() {
 }
 
 #[test]
-fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
+fn credential_environment_errors_include_a_hint() {
     let google = Google::start();
     let none = google.stated(&url(), &[]);
     let no_file = google.stated(
@@ -121,7 +121,7 @@ fn what_is_wrong_with_the_environment_is_told_with_what_to_set() {
 }
 
 #[test]
-fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
+fn unreachable_server_error_names_cause_and_hint() {
     let nowhere = [
         ("GOOGLE_BASE_URL", "http://127.0.0.1:1"),
         ("GOOGLE_BEARER_TOKEN", TOKEN),

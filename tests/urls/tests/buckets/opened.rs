@@ -72,7 +72,11 @@ pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
 /// failed command.
 pub(crate) fn stated(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
-    process.args(["--exact", "opened::in_another_process", "--nocapture"]);
+    process.args([
+        "--exact",
+        "opened::child_process_opens_and_reads_the_file",
+        "--nocapture",
+    ]);
     // The user who runs the tests may have keys as well.
     for (key, _) in std::env::vars_os() {
         let key = key.to_string_lossy();
@@ -130,7 +134,7 @@ pub(crate) fn assert_refused(reported: &str, word: &str, hint: &str) {
 
 /// The other half of the tests.
 #[test]
-fn in_another_process() {
+fn child_process_opens_and_reads_the_file() {
     let Ok(name) = std::env::var(VARIABLE) else {
         return;
     };

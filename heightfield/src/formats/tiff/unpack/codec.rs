@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_go_on_from_piece_to_piece() {
+    fn packbits_runs_continue_across_chunks() {
         // The example of the TIFF specification, with a code without effect.
         let packed = b"\xfe\xaa\x02\x80\x00\x2a\x80\xfd\xaa\x03\x80\x00\x2a\x22\xf7\xaa";
         let found = all(32773, packed).expect("unpacked");
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn lzw_goes_on_from_piece_to_piece_and_ends() {
+    fn lzw_continues_across_chunks_and_keeps_truncated_prefix() {
         let bytes: Vec<u8> = (0..40_000_u32)
             .map(|index| ((index * index) >> 7) as u8)
             .collect();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_not_unpacked() {
+    fn unknown_compression_codes_are_unsupported() {
         for code in 0..=u16::MAX {
             let is_unsupported =
                 unpacked(code, &[][..]).is_err_and(|error| error.kind() == ErrorKind::Unsupported);

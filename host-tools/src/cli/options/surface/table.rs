@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_comes_with_its_lines() {
+    fn table_is_read_with_line_numbers() {
         let table = read(
             "# what\n[default]\nstiffness = 0.6\n\n[class.10]\nname = \"trees\"\nfriction = 0.6\ntexture = \"grain\"\n[class.-3]\n",
         );
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn table_error_names_its_line() {
         for (text, wanted) in [
             ("[default]\nfrictoin = 1\n", ["line 2", "frictoin"]),
             ("[class.10]\n\n[class.trees]\n", ["line 3", "whole number"]),

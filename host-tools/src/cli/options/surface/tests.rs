@@ -116,7 +116,7 @@ fn options_that_no_surface_has_are_refused() {
 }
 
 #[test]
-fn table_asks_for_no_more_stiffness_than_the_command_line() {
+fn table_stiffness_is_limited_by_the_command_line() {
     for (text, reported, allowed) in [
         ("[default]\nstiffness = 3", "line 1: a stiffness of 3", true),
         ("[class.1]\nstiffness = 1.1", "a stiffness of 1.1", true),
@@ -162,7 +162,7 @@ fn surface_is_a_name_or_a_file() {
 }
 
 #[test]
-fn no_hint_makes_classes_of_those_between_them() {
+fn resampling_hint_for_classes_uses_nearest_neighbour() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, cell) in [("a.asc", 10.0), ("b.asc", 17.0)] {
         let header = format!("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize {cell}\n");

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_stated_is_as_usual() {
+    fn unset_texture_options_use_defaults() {
         assert_eq!(asked(None, [None; 3]), Ok(Texture::NONE));
         let grain = asked(Some(TextureName::Grain), [None; 3]).expect("valid");
         assert_eq!((grain.amplitude_mm, grain.wavelength_mm), (0.1, 1.0));
