@@ -7,7 +7,7 @@ import { asc } from "./asc.js";
 import { hgt } from "./hgt.js";
 import { npy } from "./npy.js";
 import { png } from "./png.js";
-import { Told } from "./samples.js";
+import { ReadError } from "./samples.js";
 import { tiff } from "./tiff.js";
 
 const KINDS = "GeoTIFF, .hgt, Esri ASCII (.asc), grey PNG or NumPy (.npy)";
@@ -15,7 +15,7 @@ const KINDS = "GeoTIFF, .hgt, Esri ASCII (.asc), grey PNG or NumPy (.npy)";
 /** Returns the bytes of a file named `name` as a terrain. */
 export async function read(name, bytes) {
   const raw = await reader(name, bytes)(bytes, name).catch((why) => {
-    throw why instanceof Told ? why : new Told(`${name}: it cannot be read: ${why.message}. Is the file whole? Try to open it with gdalinfo.`);
+    throw why instanceof ReadError ? why : new ReadError(`${name}: it cannot be read: ${why.message}. Is the file whole? Try to open it with gdalinfo.`);
   });
   return { name, ...raw };
 }
@@ -28,5 +28,5 @@ function reader(name, bytes) {
   if (/\.hgt$/i.test(name)) return hgt;
   const text = new TextDecoder("latin1").decode(bytes.subarray(0, 64));
   if (/^\s*(ncols|nrows)\s/i.test(text)) return asc;
-  throw new Told(`${name}: its kind is not known here. Drop a ${KINDS}; \`cargo xtask demo --touch FILE\` opens many more.`);
+  throw new ReadError(`${name}: its kind is not known here. Drop a ${KINDS}; \`cargo xtask demo --touch FILE\` opens many more.`);
 }

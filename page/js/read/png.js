@@ -1,7 +1,7 @@
 // Grey PNG, 8 or 16 bits a sample. The browser's own decoder would keep only 8 of 16 bits.
 
 import { turned } from "../terrain.js";
-import { Told } from "./samples.js";
+import { ReadError } from "./samples.js";
 
 const GREY = 0;
 const GREY_AND_ALPHA = 4;
@@ -10,9 +10,9 @@ export async function png(bytes, name) {
   const view = new DataView(bytes.buffer, bytes.byteOffset);
   const [nx, ny] = [view.getUint32(16), view.getUint32(20)];
   const [depth, colour, interlaced] = [bytes[24], bytes[25], bytes[28]];
-  if (![GREY, GREY_AND_ALPHA].includes(colour)) throw new Told(`${name}: it is a picture in colours. Save it as grey, 16 bits: gdal_translate -of PNG -ot UInt16.`);
-  if (![8, 16].includes(depth)) throw new Told(`${name}: it has ${depth} bits a sample. Save it with 8 or 16.`);
-  if (interlaced) throw new Told(`${name}: it is interlaced. Save it without.`);
+  if (![GREY, GREY_AND_ALPHA].includes(colour)) throw new ReadError(`${name}: it is a picture in colours. Save it as grey, 16 bits: gdal_translate -of PNG -ot UInt16.`);
+  if (![8, 16].includes(depth)) throw new ReadError(`${name}: it has ${depth} bits a sample. Save it with 8 or 16.`);
+  if (interlaced) throw new ReadError(`${name}: it is interlaced. Save it without.`);
   const parts = [];
   for (let at = 8; at + 12 <= bytes.length; at += 12 + view.getUint32(at)) {
     const kind = new TextDecoder("latin1").decode(bytes.subarray(at + 4, at + 8));
@@ -21,7 +21,7 @@ export async function png(bytes, name) {
   const stream = new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate"));
   const packed = new Uint8Array(await new Response(stream).arrayBuffer());
   const step = (depth / 8) * (colour === GREY ? 1 : 2);
-  if (packed.length < ny * (1 + nx * step)) throw new Told(`${name}: the picture is cut off. Copy it again.`);
+  if (packed.length < ny * (1 + nx * step)) throw new ReadError(`${name}: the picture is cut off. Copy it again.`);
   const pixels = unfiltered(packed, nx * step, ny, step);
   const heights = new Float32Array(nx * ny);
   for (let i = 0; i < heights.length; i++) heights[i] = depth === 8 ? pixels[i * step] : pixels[i * step] * 256 + pixels[i * step + 1];

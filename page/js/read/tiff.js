@@ -1,7 +1,7 @@
 // GeoTIFF, read by geotiff.js, which is loaded when the first one is dropped.
 
 import { turned } from "../terrain.js";
-import { Told, degree } from "./samples.js";
+import { ReadError, degree } from "./samples.js";
 
 const LIBRARY = "geotiff.js";
 const GEOGRAPHIC = 2;
@@ -12,7 +12,7 @@ function library() {
     const script = document.createElement("script");
     script.src = LIBRARY;
     script.onload = () => resolve(globalThis.GeoTIFF);
-    script.onerror = () => reject(new Told(`This page was made without ${LIBRARY}, so it cannot read GeoTIFF. Make it again with npm and a network, or convert the file: gdal_translate -of AAIGrid in.tif out.asc.`));
+    script.onerror = () => reject(new ReadError(`This page was made without ${LIBRARY}, so it cannot read GeoTIFF. Make it again with npm and a network, or convert the file: gdal_translate -of AAIGrid in.tif out.asc.`));
     document.head.append(script);
   });
 }
