@@ -131,7 +131,7 @@ async function follow(viewer, memory, feed) {
     await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
   }
   state.isOver = true;
-  say(state.isLost ? "hapterra is gone: it was killed, or crashed. This is the last that it told." : "");
+  say(state.isLost ? "hapterra is gone: it was killed, or it crashed. The page shows its last data." : "");
 }
 
 async function main() {

@@ -186,7 +186,7 @@ impl Hint for LinkError {
             }
             Self::Version { .. } => "install the hapterra command that belongs to the firmware",
             Self::Taken => {
-                "if nobody holds the arm, switch its amplifiers off; end the other host; start again"
+                "switch the amplifiers off if no hand holds the arm; end the other host; start again"
             }
             Self::NotConfirmed => "then see hapterra status",
             Self::Interrupted => "start again",
