@@ -22,7 +22,7 @@ bitflags! {
         const EMERGENCY_STOP = 1 << 5;
         /// The encoders or amplifiers report that they cannot work.
         const HARDWARE = 1 << 6;
-        /// The joints read a pose beyond their limits.
+        /// The joints' readings exceed their limits.
         const OUTSIDE_LIMITS = 1 << 7;
         /// The watchdog is not being fed.
         const WATCHDOG_NOT_LIVE = 1 << 8;
@@ -94,15 +94,13 @@ impl Blockers {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
         match lowest {
             Self::NO_CALIBRATION => "there is no calibration record: calibrate the arm",
-            Self::NOT_ZEROED => "where the joints are is not known: put the arm into its zero pose",
+            Self::NOT_ZEROED => "the joints' positions are unknown: put the arm into its zero pose",
             Self::NO_SCENE => "no scene is loaded: run a terrain",
             Self::REPLAY => "a trajectory is being replayed: end it first",
-            Self::FAULT_LATCHED => "a fault is latched: see to its cause, then clear it",
+            Self::FAULT_LATCHED => "a fault is latched: remove its cause, then clear it",
             Self::EMERGENCY_STOP => "the emergency stop is pressed, or its wire is broken",
             Self::HARDWARE => "the encoders or amplifiers cannot work: check supply and cables",
-            Self::OUTSIDE_LIMITS => {
-                "the joints read a pose beyond their limits: zero the arm again"
-            }
+            Self::OUTSIDE_LIMITS => "the joints' readings exceed their limits: zero the arm again",
             Self::WATCHDOG_NOT_LIVE => "the watchdog is not being fed: a task on the board hangs",
             Self::HOST_DISARMED => "the host has not asked to arm",
             Self::DEAD_MAN_STILL_HELD => "the dead-man switch is held: let it go, then press it",
@@ -112,7 +110,7 @@ impl Blockers {
                 "an amplifier is not ready: check supplies, fault lights and ready wires"
             }
             Self::OUTPUTS_NOT_AS_SET => {
-                "the converter does not read back as set: check its supply and its wires"
+                "the converter reads back wrong settings: check its supply and its wires"
             }
             _ => "",
         }
@@ -133,9 +131,9 @@ impl Limits {
             Self::FORCE_CLAMPED => "the force is at the device's limit",
             Self::SLEW_LIMITED => "the force changes as fast as it may",
             Self::CURRENT_LIMITED => "a motor is at its peak current",
-            Self::THERMAL_DERATED => "a motor is warm and may have less current",
+            Self::THERMAL_DERATED => "a motor is warm: its current is reduced",
             Self::SPEED_LIMITED => "the tip is too fast for the full force",
-            Self::RAMPING => "force is coming in after arming",
+            Self::RAMPING => "the force rises after arming",
             Self::FADING => "the force ramps down before disarming",
             Self::TERRAIN_MISSING => "terrain that may be touched here has not arrived yet",
             Self::EDGE_FADING => {
