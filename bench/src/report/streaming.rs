@@ -40,7 +40,7 @@ pub const STREAMING_HEADER: [&str; 35] = [
     "coarse_turning_500",
     "coarse_turning_2000",
     "coarse_turning_5000",
-    "holes_underlaid",
+    "no_data_over_fallback",
 ];
 
 /// Writes all rows.
