@@ -477,7 +477,7 @@ impl<'t> World<'t> {
             (_, Step::Over(_)) => {}
             // To the device, late frames of an earlier host look like another host's.
             (LinkError::NotConfirmed | LinkError::Taken, _) => {
-                self.step = Step::Over(End::Reported)
+                self.step = Step::Over(End::Reported);
             }
             (LinkError::Version { .. }, _) if self.other_device => {
                 self.step = Step::Over(End::Reported);
