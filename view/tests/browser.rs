@@ -414,7 +414,10 @@ fn killed(who: Killed, says: &str) {
         demo.interrupt();
         assert!(demo.end());
         let reported = demo.words();
-        assert!(reported.contains(" 0 lost on the link, 0 dropped"), "{reported}");
+        assert!(
+            reported.contains(" 0 lost on the link, 0 dropped"),
+            "{reported}"
+        );
         assert!(
             reported.contains("were not shown: the viewer was slow, or gone"),
             "{reported}"

@@ -98,11 +98,7 @@ fn gathered_feed_has_the_same_rows_in_far_fewer_entries() {
     for (other, of, most_s) in [(&gathered, &fine, 1.1), (&late, &gathered, 11.0)] {
         let (entries, of) = (other.entries, of.entries);
         assert!(4 * entries < of, "{entries} of {of}");
-        assert!(
-            (other.max_ns as f64) < most_s * 1e9,
-            "{} ns",
-            other.max_ns
-        );
+        assert!((other.max_ns as f64) < most_s * 1e9, "{} ns", other.max_ns);
     }
     assert!(20 * gathered.entries < fine.entries, "{}", gathered.entries);
 }

@@ -10,7 +10,7 @@ use re_sdk_types::components::{Color, Radius};
 use super::ground::Ground;
 use super::layers::Layers;
 use super::log::{Entry, Log};
-use super::shade::{NO_DATA, Heights, Rgb};
+use super::shade::{Heights, NO_DATA, Rgb};
 
 /// Samples along the side of a tile.
 const SIDE: usize = TILE_CELLS as usize + 1;

@@ -70,7 +70,9 @@ impl Running {
 
     /// Waits for a line on standard output with this beginning.
     pub fn tells(&self, beginning: &str) {
-        while !{ self.reported.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {}
+        while !{ self.reported.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning)
+        {
+        }
     }
 
     /// Returns the port of its viewer's page, from one of the lines.
