@@ -173,6 +173,7 @@ fn command() -> Result<ExitCode> {
                 "miri" => miri::miri()?,
                 "setup" => setup()?,
                 "deny" => deny::check_all()?,
+                "help" => print!("{HELP}"),
                 _ => bail!("there is no command {plain}:\n\n{HELP}"),
             }
         }
@@ -184,7 +185,7 @@ fn command() -> Result<ExitCode> {
 fn is_help(words: impl Iterator<Item = OsString>) -> bool {
     words
         .take_while(|word| word != "--")
-        .any(|word| word == "-h" || word == "--help" || word == "help")
+        .any(|word| word == "-h" || word == "--help")
 }
 
 fn setup() -> Result<()> {
@@ -317,6 +318,7 @@ mod tests {
         assert!(asks(&["demo", "--touch", "--help"]));
         assert!(asks(&["test", "-h"]));
         assert!(!asks(&["demo", "--", "--help"]));
+        assert!(!asks(&["demo", "help"]));
     }
 
     #[test]
