@@ -59,8 +59,8 @@ fn permanent_server_error_names_file_and_reason() {
     let reported = open(&server, "hills.tif").expect_err("broken");
     assert!(reported.contains("500"), "{reported}");
     drop(server);
-    let nobody = "http://127.0.0.1:1/hills.tif";
-    let error = Raster::open(nobody, &OpenOptions::default()).expect_err("nobody");
+    let no_server = "http://127.0.0.1:1/hills.tif";
+    let error = Raster::open(no_server, &OpenOptions::default()).expect_err("no server");
     assert!(matches!(error.fault(), RasterError::Remote(_)), "{error}");
     for (url, why) in [
         ("ftp://h/hills.tif", "ftp://"),

@@ -75,19 +75,20 @@ pub struct Args {
     pub yes: bool,
 }
 
-/// Models with a preset: name on the command line, description, model.
-const MODELS: [(&str, &str, Model); 4] = [
-    ("premium-1.0", "Phantom Premium 1.0", Model::Premium10),
-    ("premium-1.5", "Phantom Premium 1.5", Model::Premium15),
-    ("premium-3.0", "Phantom Premium 3.0", Model::Premium30),
-    ("omni", "Phantom Omni, also called Touch", Model::Omni),
+/// Models with a preset, and their descriptions.
+const MODELS: [(Model, &str); 4] = [
+    (Model::Premium10, "Phantom Premium 1.0"),
+    (Model::Premium15, "Phantom Premium 1.5"),
+    (Model::Premium30, "Phantom Premium 3.0"),
+    (Model::Omni, "Phantom Omni, also called Touch"),
 ];
 
 fn models() -> impl TypedValueParser<Value = Model> {
-    let names = MODELS.map(|(name, what, _)| PossibleValue::new(name).help(what));
-    PossibleValuesParser::new(names).try_map(|name| {
-        let model = MODELS.iter().find(|model| model.0 == name);
-        model.map(|model| model.2).ok_or("no such model")
+    let value = |(model, what)| PossibleValue::new(file::model_name(model)).help(what);
+    PossibleValuesParser::new(MODELS.map(value)).try_map(|name| {
+        let mut models = MODELS.iter().map(|(model, _)| *model);
+        let model = models.find(|model| file::model_name(*model) == name);
+        model.ok_or("no such model")
     })
 }
 
@@ -189,7 +190,10 @@ fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, 
         }
         (None, None, None) => (
             Model::Premium15.preset(),
-            "the preset premium-1.5 (the device has no record; --model selects another)".into(),
+            format!(
+                "the preset {} (the device has no record; --model selects another)",
+                file::model_name(Model::Premium15)
+            ),
         ),
     };
     for setting in &args.set {

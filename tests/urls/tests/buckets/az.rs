@@ -3,7 +3,9 @@
 use hapterra_url_tests::azure::{Account, EMULATOR, PRINCIPAL, SURVEYORS, TOKEN, served};
 use hapterra_url_tests::bucket::{PUBLIC, Seen, Server};
 
-use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, stated};
+use crate::opened::{
+    Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
+};
 
 /// The user's hint.
 const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
@@ -30,17 +32,17 @@ impl Microsoft {
     }
 
     /// Opens a file with the name of the account and its address in the environment.
-    fn stated(&self, name: &str, environment: &[(&str, &str)]) -> String {
+    fn output_of(&self, name: &str, environment: &[(&str, &str)]) -> String {
         let server = [
             ("AZURE_STORAGE_ENDPOINT", self.server.endpoint()),
             ("AZURE_ALLOW_HTTP", "true"),
             ("AZURE_STORAGE_ACCOUNT_NAME", self.account.name),
         ];
-        stated(name, &[&server, environment].concat())
+        output_of(name, &[&server, environment].concat())
     }
 
     fn stated_with_key(&self, name: &str, key: &str) -> String {
-        self.stated(name, &[("AZURE_STORAGE_ACCOUNT_KEY", key)])
+        self.output_of(name, &[("AZURE_STORAGE_ACCOUNT_KEY", key)])
     }
 
     /// Opens a file as from an emulator on this computer, usually `Azurite`.
@@ -49,7 +51,7 @@ impl Microsoft {
             ("AZURE_STORAGE_USE_EMULATOR", "true"),
             ("AZURITE_BLOB_STORAGE_URL", self.server.endpoint()),
         ];
-        stated(name, &[&server, environment].concat())
+        output_of(name, &[&server, environment].concat())
     }
 }
 
@@ -75,14 +77,14 @@ fn a_file_opens_with_what_is_set_for_microsofts_command() {
         ("AZURE_STORAGE_ACCOUNT", SURVEYORS.name),
         ("AZURE_STORAGE_KEY", SURVEYORS.key),
     ];
-    let output = stated(&url(), &environment);
+    let output = output_of(&url(), &environment);
     assert!(output.contains("read GeoTIFF"), "{output}");
 }
 
 #[test]
 fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
     let microsoft = Microsoft::start(SURVEYORS);
-    let with = |sas: &str| microsoft.stated(&url(), &[("AZURE_STORAGE_SAS_TOKEN", sas)]);
+    let with = |sas: &str| microsoft.output_of(&url(), &[("AZURE_STORAGE_SAS_TOKEN", sas)]);
     for mark in ["", "?"] {
         let output = with(&format!("{mark}{}", SURVEYORS.sas("hills", ONE_DAY)));
         assert!(output.contains("read GeoTIFF"), "{output}");
@@ -101,7 +103,7 @@ fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
 #[test]
 fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
     let microsoft = Microsoft::start(SURVEYORS);
-    let with_token = |token: &str| microsoft.stated(&url(), &[("AZURE_STORAGE_TOKEN", token)]);
+    let with_token = |token: &str| microsoft.output_of(&url(), &[("AZURE_STORAGE_TOKEN", token)]);
     assert!(with_token(TOKEN).contains("read GeoTIFF"));
     assert_refused(&with_token("eyJ0.other"), "InvalidAuthenticationInfo", HINT);
     let [tenant, name, secret] = PRINCIPAL;
@@ -112,7 +114,7 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
             ("AZURE_CLIENT_ID", name),
             ("AZURE_CLIENT_SECRET", secret),
         ];
-        microsoft.stated(&url(), &environment)
+        microsoft.output_of(&url(), &environment)
     };
     let _ = microsoft.server.take_seen();
     let output = with_secret(secret);
@@ -145,14 +147,14 @@ fn emulator_file_opens_only_with_the_well_known_key() {
 #[test]
 fn only_public_container_opens_without_a_key() {
     let microsoft = Microsoft::start(EMULATOR);
-    let nobody = [("AZURE_SKIP_SIGNATURE", "true")];
-    let output = microsoft.stated(&format!("az://{PUBLIC}/{NAME}"), &nobody);
+    let anonymous = [("AZURE_SKIP_SIGNATURE", "true")];
+    let output = microsoft.output_of(&format!("az://{PUBLIC}/{NAME}"), &anonymous);
     assert!(output.contains("read GeoTIFF"), "{output}");
-    let reported = microsoft.stated(&url(), &nobody);
+    let reported = microsoft.output_of(&url(), &anonymous);
     assert_refused(&reported, "NoAuthenticationInformation", HINT);
     // In most accounts nothing is public, and the answer has the status of a conflict.
     let microsoft = Microsoft::start(SURVEYORS);
-    let reported = microsoft.stated(&url(), &nobody);
+    let reported = microsoft.output_of(&url(), &anonymous);
     assert_refused(&reported, "PublicAccessNotPermitted", HINT);
 }
 
@@ -185,18 +187,18 @@ fn environment_error_names_variable_and_sends_no_request() {
     ];
     for (reported, why) in [
         (
-            stated(&url(), &[]),
+            output_of(&url(), &[]),
             "the environment names no storage account (az://hills",
         ),
         (
-            microsoft.stated(&url(), &[]),
+            microsoft.output_of(&url(), &[]),
             "the environment holds no key, and this computer has none of its own (az://hills",
         ),
         (
             microsoft.stated_with_key(&url(), "not base 64"),
             "error: cannot read what is there: Invalid Access Key",
         ),
-        (stated(&url(), &over_http), "URL scheme is not allowed"),
+        (output_of(&url(), &over_http), "URL scheme is not allowed"),
     ] {
         assert!(reported.contains(why), "{reported}");
         assert!(reported.contains(HINT), "{reported}");
@@ -212,7 +214,7 @@ fn refused_connection_error_names_cause_and_hint() {
         ("AZURE_STORAGE_ACCOUNT_NAME", SURVEYORS.name),
         ("AZURE_STORAGE_ACCOUNT_KEY", SURVEYORS.key),
     ];
-    let reported = stated(&url(), &nowhere);
+    let reported = output_of(&url(), &nowhere);
     assert!(reported.contains("Connection refused"), "{reported}");
     assert!(
         reported.contains(

@@ -3,7 +3,9 @@
 use hapterra_url_tests::bucket::{PUBLIC, Server};
 use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
 
-use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, stated};
+use crate::opened::{
+    Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
+};
 
 /// The user's hint.
 const HINT: &str = "hint: set what the server wants: GOOGLE_APPLICATION_CREDENTIALS";
@@ -24,14 +26,14 @@ impl Google {
         Self { hills, server, key }
     }
 
-    fn stated(&self, name: &str, environment: &[(&str, &str)]) -> String {
+    fn output_of(&self, name: &str, environment: &[(&str, &str)]) -> String {
         let server = [("GOOGLE_BASE_URL", self.server.endpoint())];
-        stated(name, &[&server, environment].concat())
+        output_of(name, &[&server, environment].concat())
     }
 
     fn stated_with_key(&self, name: &str, key: &str) -> String {
         std::fs::write(&self.key, key).expect("written");
-        self.stated(name, &[("GOOGLE_APPLICATION_CREDENTIALS", &self.key)])
+        self.output_of(name, &[("GOOGLE_APPLICATION_CREDENTIALS", &self.key)])
     }
 }
 
@@ -56,20 +58,20 @@ fn a_file_opens_with_a_token() {
         ("GOOGLE_BEARER_TOKEN", TOKEN),
         ("GCE_METADATA_HOST", address),
     ] {
-        let output = google.stated(&url(), &[given]);
+        let output = google.output_of(&url(), &[given]);
         assert!(output.contains("read GeoTIFF"), "{given:?}: {output}");
     }
-    let other = google.stated(&url(), &[("GOOGLE_BEARER_TOKEN", "ya29.other")]);
+    let other = google.output_of(&url(), &[("GOOGLE_BEARER_TOKEN", "ya29.other")]);
     assert_refused(&other, "AuthenticationRequired", HINT);
 }
 
 #[test]
 fn unsigned_access_opens_only_public_buckets() {
     let google = Google::start();
-    let nobody = [("GOOGLE_SKIP_SIGNATURE", "true")];
-    let output = google.stated(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
+    let anonymous = [("GOOGLE_SKIP_SIGNATURE", "true")];
+    let output = google.output_of(&format!("gs://{PUBLIC}/{NAME}"), &anonymous);
     assert!(output.contains("read GeoTIFF"), "{output}");
-    assert_refused(&google.stated(&url(), &nobody), "AccessDenied", HINT);
+    assert_refused(&google.output_of(&url(), &anonymous), "AccessDenied", HINT);
 }
 
 #[test]
@@ -97,8 +99,8 @@ fn rejected_key_error_names_the_server_code() {
 #[test]
 fn credential_environment_errors_include_a_hint() {
     let google = Google::start();
-    let none = google.stated(&url(), &[]);
-    let no_file = google.stated(
+    let none = google.output_of(&url(), &[]);
+    let no_file = google.output_of(
         &url(),
         &[("GOOGLE_APPLICATION_CREDENTIALS", "/nowhere/key.json")],
     );
@@ -126,7 +128,7 @@ fn unreachable_server_error_names_cause_and_hint() {
         ("GOOGLE_BASE_URL", "http://127.0.0.1:1"),
         ("GOOGLE_BEARER_TOKEN", TOKEN),
     ];
-    let reported = stated(&url(), &nowhere);
+    let reported = output_of(&url(), &nowhere);
     assert!(reported.contains("Connection refused"), "{reported}");
     assert!(
         reported.contains("hint: check the network, and GOOGLE_BASE_URL"),

@@ -70,7 +70,7 @@ pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
 
 /// Returns the output of the second process: a note that it rendered the file, or the messages of a
 /// failed command.
-pub(crate) fn stated(name: &str, environment: &[(&str, &str)]) -> String {
+pub(crate) fn output_of(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
     process.args([
         "--exact",
@@ -87,8 +87,8 @@ pub(crate) fn stated(name: &str, environment: &[(&str, &str)]) -> String {
             process.env_remove(&*key);
         }
     }
-    let nobodys = std::env::temp_dir().join("hapterra-nobody");
-    process.env("HOME", nobodys);
+    let empty_home = std::env::temp_dir().join("hapterra-anonymous");
+    process.env("HOME", empty_home);
     // No keys are at these addresses, as on a computer outside of a cloud.
     process.env("GCE_METADATA_HOST", "127.0.0.1:1");
     process.env("GCE_METADATA_IP", "127.0.0.1:1");

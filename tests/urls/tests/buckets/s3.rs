@@ -2,7 +2,7 @@
 
 use hapterra_url_tests::s3::{KEY, Server};
 
-use crate::opened::{NAME, hills, stated};
+use crate::opened::{NAME, hills, output_of};
 
 fn said_with(server: &Server, url: &str, key: [&str; 2]) -> String {
     let environment = [
@@ -11,7 +11,7 @@ fn said_with(server: &Server, url: &str, key: [&str; 2]) -> String {
         ("AWS_ACCESS_KEY_ID", key[0]),
         ("AWS_SECRET_ACCESS_KEY", key[1]),
     ];
-    stated(url, &environment)
+    output_of(url, &environment)
 }
 
 #[test]
