@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Writes one field in encodings that this repository has no encoder for, for
-`tests/tests/encodings.rs`:
+`tests/tests/terrain/encodings.rs`:
 
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4
     venv/bin/python tests/data/by_gdal.py tests/data/by_gdal

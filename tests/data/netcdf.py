@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes one field in the forms in which NetCDF stores a variable, for `tests/tests/netcdf.rs`:
+"""Writes one field in the forms in which NetCDF stores a variable, for `tests/tests/terrain/netcdf.rs`:
 
     python3 -m venv venv && venv/bin/pip install numpy==2.4.6 netCDF4==1.7.5.1 h5py==3.16.0 hdf5plugin==7.1.0
     venv/bin/python tests/data/netcdf.py tests/data/netcdf

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes small terrains with unusual georeferences, for `tests/tests/odd_places.rs`, and their
+"""Writes small terrains with unusual georeferences, for `tests/tests/terrain/odd_places.rs`, and their
 positions by GDAL and PROJ (without grids):
 
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2

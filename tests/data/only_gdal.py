@@ -1,7 +1,7 @@
 """Files that only GDAL reads, written with rasterio: python tests/data/only_gdal.py
 
 5 × 4 samples, height 100.5 + 7 column - 3 row, no-data at column 3, row 1. A second band is
-1000 higher. `tests/tests/only_gdal.rs` reads them.
+1000 higher. `tests/tests/terrain/only_gdal.rs` reads them.
 """
 
 import pathlib

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the positions of the shared terrain files by GDAL, for `tests/tests/georeferences.rs`:
+"""Writes the positions of the shared terrain files by GDAL, for `tests/tests/terrain/georeferences.rs`:
 
     python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2
     venv/bin/python tests/data/places_by_gdal.py ../shared/dem > tests/data/places_by_gdal.csv

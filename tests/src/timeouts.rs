@@ -8,7 +8,7 @@
 //! - If the product itself waits in real time ([`pass`]), the test may wait for it. On a slow
 //!   machine such a test covers less, but does not fail.
 //!
-//! `tests/tests/wall_clock.rs` searches the sources of all tests for other uses.
+//! `tests/tests/project/wall_clock.rs` searches the sources of all tests for other uses.
 
 use std::fs::File;
 use std::path::Path;

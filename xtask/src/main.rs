@@ -52,7 +52,7 @@ cargo xtask COMMAND
                          all tests, with images, budgets, dependencies, the page and the
                          Python package; what failed is listed at the end; --quick: the
                          emulated board only, no dependencies, page and Python; ARGS go to
-                         `cargo test` and select programs, as `--test usb`
+                         `cargo test` and select programs, as `--test link`
   lint                   formatting, clippy and documentation, warnings as errors
   census [--write]       words, options, public items, circles of files and lines of code, beside
                          the kept table and the bounds; --write: keep these
@@ -304,9 +304,9 @@ mod tests {
     #[test]
     fn test_arguments_follow_two_dashes() {
         let request = |words: &[&str]| test_words(&mut lexopt::Parser::from_args(words));
-        let some = request(&["--quick", "--", "--test", "usb"]).unwrap();
+        let some = request(&["--quick", "--", "--test", "link"]).unwrap();
         assert!(some.quick);
-        assert_eq!(some.only, ["--test", "usb"]);
+        assert_eq!(some.only, ["--test", "link"]);
         assert_eq!(request(&[]).unwrap(), test::Request::default());
         let message = request(&["--test"]).unwrap_err().to_string();
         assert!(message.contains("after `--`"), "{message}");

@@ -86,7 +86,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
         only.args(&request.only);
         failed_targets(only, |line| println!("{line}"))
     })?;
-    failures.extend(failed.iter().map(|target| repeat(target, request.quick)));
+    failures.extend(failed.iter().map(|failed| repeat(failed, request.quick)));
     if request.only.is_empty() && !request.quick {
         // The other interfaces: each prints its skipped tests if there is no browser or no Python.
         for (repeat, test) in [
@@ -125,9 +125,18 @@ const HALVES: [&[&str]; 2] = [
     &["--test", "[!a-f]*"],
 ];
 
+/// A test program with a failure.
+#[derive(Debug, PartialEq)]
+struct Failed {
+    /// Cargo's arguments for it: `-p PACKAGE --lib`.
+    target: String,
+    /// The names of its failed tests; empty if it did not come so far.
+    tests: Vec<String>,
+}
+
 /// Builds all tests, runs both halves at once, and then the examples in the documentation. Returns
-/// the targets that failed.
-fn failed_of_all(tests: &(dyn Fn() -> Command + Sync)) -> Result<Vec<String>> {
+/// the programs that failed.
+fn failed_of_all(tests: &(dyn Fn() -> Command + Sync)) -> Result<Vec<Failed>> {
     let with = |words: &[&str]| {
         let mut command = tests();
         command.args(words);
@@ -149,7 +158,7 @@ fn failed_of_all(tests: &(dyn Fn() -> Command + Sync)) -> Result<Vec<String>> {
 
 /// Returns the same as [`failed_targets`]; prints the lines of each program together, when it has
 /// ended.
-fn by_program(command: Command) -> Result<Vec<String>> {
+fn by_program(command: Command) -> Result<Vec<Failed>> {
     let mut lines = String::new();
     let failed = failed_targets(command, |line| {
         if begins_program(line) {
@@ -162,9 +171,8 @@ fn by_program(command: Command) -> Result<Vec<String>> {
     failed
 }
 
-/// Runs `cargo test`, and shows each line of its output. Returns the targets that failed, as
-/// cargo's arguments: `-p PACKAGE --lib`.
-fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
+/// Runs `cargo test`, and shows each line of its output. Returns the programs that failed.
+fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Vec<Failed>> {
     let line = shown(&command);
     let (from, to) = io::pipe()?;
     command.stdout(to.try_clone()?).stderr(to);
@@ -172,13 +180,14 @@ fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Ve
     // The pipe ends when all programs that write to it have ended.
     drop(command);
     let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
-    let mut failed = vec![];
-    for stated in BufReader::new(from).split(b'\n') {
-        let stated = stated?;
-        let stated = String::from_utf8_lossy(&stated);
-        show(&stated);
-        failed.extend(listed_target(&stated).map(str::to_owned));
+    let mut failures = Failures::default();
+    for line in BufReader::new(from).split(b'\n') {
+        let line = line?;
+        let line = String::from_utf8_lossy(&line);
+        show(&line);
+        failures.read(&line);
     }
+    let failed = failures.failed;
     let status = child.wait()?;
     if !status.success() && failed.is_empty() {
         bail!("`{line}` failed ({status})");
@@ -192,19 +201,51 @@ fn begins_program(line: &str) -> bool {
     line.starts_with("Running ") || line.starts_with("Doc-tests ")
 }
 
-/// Returns the target in a line of the list at the end of `cargo test --no-fail-fast`.
-fn listed_target(line: &str) -> Option<&str> {
-    line.strip_prefix("    `")?.strip_suffix('`')
+/// Failures in the output of `cargo test`.
+#[derive(Default)]
+struct Failures {
+    failed: Vec<Failed>,
+    /// Failed tests of the running program.
+    tests: Vec<String>,
 }
 
-/// Returns the command that runs a target's programs again. It names no packages, because the
-/// selected packages determine the build, and only all of them select the same programs.
-fn repeat(target: &str, quick: bool) -> String {
+impl Failures {
+    /// Reads the next line of the output.
+    fn read(&mut self, line: &str) {
+        if begins_program(line) {
+            self.tests.clear();
+        }
+        let test = line.strip_prefix("test ");
+        if let Some(test) = test.and_then(|line| line.strip_suffix(" ... FAILED")) {
+            self.tests.push(test.to_owned());
+        }
+        // "error: test failed, to rerun pass `-p PACKAGE --lib`", with `doctest` for examples.
+        let target = line.strip_prefix("error: ").and_then(|line| {
+            let (_, target) = line.split_once("test failed, to rerun pass `")?;
+            target.strip_suffix('`')
+        });
+        if let Some(target) = target {
+            self.failed.push(Failed {
+                target: target.to_owned(),
+                tests: std::mem::take(&mut self.tests),
+            });
+        }
+    }
+}
+
+/// Returns the command that runs the failed tests of a program again. It names no packages, because
+/// the selected packages determine the build, and only all of them select the same programs.
+fn repeat(Failed { target, tests }: &Failed, quick: bool) -> String {
     let of_package = target.strip_prefix("-p ");
     let kind = of_package.and_then(|target| target.split_once(' '));
     let (package, kind) = kind.unwrap_or((target, ""));
     let quick = if quick { " --quick" } else { "" };
-    format!("cargo xtask test{quick} -- {kind}    # {package}")
+    // The name of an example is a place in a file, with spaces.
+    let tests = match tests.join(" ") {
+        tests if tests.is_empty() || kind == "--doc" => String::new(),
+        tests => format!(" -- {tests}"),
+    };
+    format!("cargo xtask test{quick} -- {kind}{tests}    # {package}")
 }
 
 /// Builds the images of `boards`.
@@ -240,18 +281,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn failed_target_is_repeated_by_its_kind() {
-        let stated = [
-            "     Running tests/fallback.rs (target/debug/deps/fallback-1)",
-            "error: test failed, to rerun pass `-p hapterra-tests --test fallback`",
-            "error: 2 targets failed:",
-            "    `-p hapterra-tests --test fallback`",
-            "    `-p hapterra-core --doc`",
+    fn failed_tests_are_repeated_by_program_and_name() {
+        let output = [
+            "     Running tests/link/main.rs (target/debug/deps/link-1)",
+            "test fallback::late ... ok",
+            "test usb::stalls ... FAILED",
+            "test usb::resets ... FAILED",
+            "error: test failed, to rerun pass `-p hapterra-tests --test link`",
+            "     Running tests/docs.rs (target/debug/deps/docs-1)",
+            "error: test failed, to rerun pass `-p hapterra-tests --test docs`",
+            "   Doc-tests hapterra_core",
+            "test core/src/crc.rs - crc (line 5) ... FAILED",
+            "error: doctest failed, to rerun pass `-p hapterra-core --doc`",
+            "error: 3 targets failed:",
+            "    `-p hapterra-tests --test link`",
         ];
-        let failed = stated.iter().filter_map(|line| listed_target(line));
-        let commands: Vec<_> = failed.map(|target| repeat(target, false)).collect();
+        let mut failures = Failures::default();
+        output.iter().for_each(|line| failures.read(line));
+        let commands: Vec<_> = failures
+            .failed
+            .iter()
+            .map(|failed| repeat(failed, false))
+            .collect();
         let expected = [
-            "cargo xtask test -- --test fallback    # hapterra-tests",
+            "cargo xtask test -- --test link -- usb::stalls usb::resets    # hapterra-tests",
+            "cargo xtask test -- --test docs    # hapterra-tests",
             "cargo xtask test -- --doc    # hapterra-core",
         ];
         assert_eq!(commands, expected);

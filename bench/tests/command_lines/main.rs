@@ -194,7 +194,7 @@ fn wrong_lines_are_found() {
                 cargo xtask view --tset\ncargo install --locked --path no/where\n```\n\
                 Text with `hapterra stability` and `cargo run -p nothing`.\n";
     let right = "```sh\nhapterra info FILE --json  # a comment\nhapterra run FILE --device \\\n  native\n\
-                 cargo xtask test -- --test usb\ncargo install --locked --path host-tools\n```\n\
+                 cargo xtask test -- --test link\ncargo install --locked --path host-tools\n```\n\
                  Text with `hapterra run`, `hapterra.read()` and `cargo run -r -p hapterra-lab -- synth`.\n";
     let found = |text: &str| {
         let lines = lines(Path::new("page.md"), text);

@@ -1,6 +1,6 @@
 //! Invariants of every tick, on any terrain, for any path of the HIP. They are checked in f64, by
-//! methods independent of the product, in `tests/tests/properties.rs`, `quick_soak.rs` and `cargo
-//! xtask soak`. `tests/tests/oracles.rs` shows that each can fail.
+//! methods independent of the product, in `tests/tests/contact/properties.rs`, `quick_soak.rs` and `cargo
+//! xtask soak`. `tests/tests/contact/oracles.rs` shows that each can fail.
 //!
 //! [`oracle`] lists the invariants in the order in which they are checked; [`material`] checks the
 //! forces of a scene with materials. [`observed_tick`] is one tick as the oracle receives it.

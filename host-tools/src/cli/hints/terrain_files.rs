@@ -1,6 +1,6 @@
 //! Hints for a terrain file that does not open.
 //!
-//! `tests/tests/conversion_hints.rs` runs the commands of other programs if these are installed.
+//! `tests/tests/terrain/conversion_hints.rs` runs the commands of other programs if these are installed.
 
 use std::io::ErrorKind;
 use std::path::Path;

@@ -340,7 +340,7 @@ fn unplugged_board_keeps_ticking_and_resumes_its_session() {
 
 #[test]
 fn the_udev_rule_names_the_board_as_it_names_itself() {
-    let rules = include_str!("../../host-tools/udev/70-hapterra.rules");
+    let rules = include_str!("../../../host-tools/udev/70-hapterra.rules");
     let rule = rules
         .lines()
         .find(|line| line.starts_with("SUBSYSTEM"))

@@ -6,7 +6,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{GuardInputs, GuardOutputs, Limits, Mode};
 use heightfield::Raster;
 
-use crate::rig::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
+use crate::guard::rig::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
 
 /// Returns the largest change of the currents from one tick to the next, A.
 fn max_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {

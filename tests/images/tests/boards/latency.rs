@@ -1,7 +1,7 @@
 //! Time of the haptic interrupt in the boards' own images, from the model of cycles
 //! (docs/reference/cycles.md), compared with the page, the build and the images.
 
-#[path = "../../../firmware/build/tick_rate.rs"]
+#[path = "../../../../firmware/build/tick_rate.rs"]
 #[allow(dead_code)] // Only the table.
 mod tick_rate;
 

@@ -10,7 +10,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use crate::rig::{MIDDLE_MM, PLANE_MM, PRESSED, on_plane, plane, press};
+use crate::guard::rig::{MIDDLE_MM, PLANE_MM, PRESSED, on_plane, plane, press};
 
 #[test]
 fn arming_ramp_and_force_are_unchanged_at_10_khz() {

@@ -13,7 +13,7 @@ const HAPTIC: u8 = 0x10;
 /// Priority of the supply's interrupt, whose handler does not return.
 const SUPPLY: u8 = 0x00;
 /// The page with the table.
-const PAGE: &str = include_str!("../../../docs/explanation/priorities.md");
+const PAGE: &str = include_str!("../../../../docs/explanation/priorities.md");
 
 /// Returns the name of the handler in the vector table.
 fn handler(machine: &Machine, interrupt: usize) -> String {

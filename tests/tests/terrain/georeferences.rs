@@ -7,7 +7,7 @@ use hapterra_tests::reader::Reader;
 use hapterra_tests::{info, shared};
 use heightfield::{Bounds, OpenOptions, Raster};
 
-const TABLE: &str = include_str!("../data/places_by_gdal.csv");
+const TABLE: &str = include_str!("../../data/places_by_gdal.csv");
 /// Tolerance in metres or degrees: the table has full bounds, degrees to 9 digits.
 const SAME_PLACE: f64 = 1e-6;
 

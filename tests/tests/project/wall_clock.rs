@@ -50,7 +50,7 @@ const ALLOWED: [(&str, &str, &[&str]); 11] = [
         &["set_read_timeout"],
     ),
     (
-        "tests/tests/hostile_device.rs",
+        "tests/tests/link/hostile_device.rs",
         "the pace of a device that plays a board in real time; it fails nothing",
         &["set_read_timeout"],
     ),

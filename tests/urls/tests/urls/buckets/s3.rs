@@ -2,7 +2,7 @@
 
 use hapterra_url_tests::s3::{KEY, Server};
 
-use crate::opened::{NAME, hills, output_of};
+use crate::buckets::opened::{NAME, hills, output_of};
 
 fn said_with(server: &Server, url: &str, key: [&str; 2]) -> String {
     let environment = [

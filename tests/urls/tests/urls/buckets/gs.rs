@@ -3,7 +3,7 @@
 use hapterra_url_tests::bucket::{PUBLIC, Server};
 use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
 
-use crate::opened::{
+use crate::buckets::opened::{
     Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
 };
 

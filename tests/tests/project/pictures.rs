@@ -4,13 +4,13 @@ use std::error::Error;
 
 use hapterra_tests::repository;
 
-#[path = "../../core/examples/shaded_force.rs"]
+#[path = "../../../core/examples/shaded_force.rs"]
 #[expect(dead_code, reason = "the example's own main")]
 mod shaded_force;
-#[path = "../../core/examples/stick_slip.rs"]
+#[path = "../../../core/examples/stick_slip.rs"]
 #[expect(dead_code, reason = "the example's own main")]
 mod stick_slip;
-#[path = "../../core/examples/textured_force.rs"]
+#[path = "../../../core/examples/textured_force.rs"]
 #[expect(dead_code, reason = "the example's own main")]
 mod textured_force;
 
