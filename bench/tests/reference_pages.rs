@@ -230,11 +230,11 @@ fn faults_are_those_of_the_code() {
         );
     }
     page +=
-        "\n## Blockers\n\nA blocker keeps the arm from being armed while its cause is there.\n\n";
+        "\n## Blockers\n\nA blocker prevents arming while its cause exists.\n\n";
     for (name, meaning) in Blockers::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }
-    page += "\n## Limits\n\nA limit is why the force is not that of the surface.\n\n";
+    page += "\n## Limits\n\nA limit says why the force differs from the surface's force.\n\n";
     for (name, meaning) in Limits::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }
