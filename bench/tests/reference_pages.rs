@@ -133,13 +133,23 @@ fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTre
     }
 }
 
-/// Returns the texts of all arguments, each with the number of commands that have it.
-fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, usize> {
-    let mut texts = BTreeMap::new();
-    for arg in commands.flat_map(own) {
-        *texts.entry(about(arg)).or_default() += 1;
+/// Returns the texts of all arguments, each with the names of the commands that have it.
+fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, Vec<&'c str>> {
+    let mut texts = BTreeMap::<_, Vec<_>>::new();
+    for command in commands {
+        for arg in own(command) {
+            texts
+                .entry(about(arg))
+                .or_default()
+                .push(command.get_name());
+        }
     }
     texts
+}
+
+/// Returns the option in a text.
+fn option(text: &str) -> &str {
+    text.split("`:").next().unwrap_or_default()
 }
 
 /// Returns the command of a program, in its parsed form.
@@ -178,12 +188,23 @@ fn command_line_is_that_of_the_programs() {
          | options in `hapterra run -h` | {listed} |\n\
          | lines of `hapterra run -h` | {lines} |\n"
     );
-    let known = texts(programs.iter().flat_map(Command::get_subcommands));
-    let shared: BTreeSet<String> = { known.into_iter() }
-        .filter_map(|(text, times)| (times > 1).then_some(text))
-        .collect();
+    let mut shared = texts(programs.iter().flat_map(Command::get_subcommands));
+    shared.retain(|_, commands| commands.len() > 1);
     page += "\n## Options of several commands\n\n";
-    shared.iter().for_each(|text| item(&mut page, text));
+    for (text, commands) in &shared {
+        // An option with two meanings: each names its commands.
+        let is_ambiguous = shared
+            .keys()
+            .filter(|other| option(other) == option(text))
+            .count()
+            > 1;
+        let commands = match is_ambiguous {
+            true => format!(" Commands: `{}`.", commands.join("`, `")),
+            false => String::new(),
+        };
+        item(&mut page, &format!("{text}{commands}"));
+    }
+    let shared: BTreeSet<String> = shared.into_keys().collect();
     for program in &programs {
         let commands = program.get_subcommands();
         for command in commands.filter(|command| command.get_name() != "help") {
@@ -209,11 +230,11 @@ fn faults_are_those_of_the_code() {
         );
     }
     page +=
-        "\n## Blockers\n\nA blocker keeps the arm from being armed while its cause is there.\n\n";
+        "\n## Blockers\n\nA blocker prevents arming while its cause exists.\n\n";
     for (name, meaning) in Blockers::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }
-    page += "\n## Limits\n\nA limit is why the force is not that of the surface.\n\n";
+    page += "\n## Limits\n\nA limit says why the force differs from the surface's force.\n\n";
     for (name, meaning) in Limits::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }

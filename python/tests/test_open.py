@@ -103,7 +103,7 @@ def test_bad_words_have_the_text_of_the_command(tmp_path):
         (ValueError, "cannot be used with", file, {"cell_mm": 1, "scale": 2}),
         (ValueError, 'give ground a millimetre, as "100 m/mm"', file, {"scale": "100"}),
         (ValueError, "a cell of -1 mm", file, {"cell_mm": -1}),
-        (ValueError, "-1 ground metres a device millimetre", file, {"scale": -1}),
+        (ValueError, "-1 ground metres per device millimetre", file, {"scale": -1}),
         (ValueError, "hint: choose another --exaggeration", file, {"exaggeration": 0}),
         (ValueError, "heights reach .* cells", file, {"exaggeration": 1e9}),
     ]:

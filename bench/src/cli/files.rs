@@ -27,7 +27,7 @@ pub struct Files {
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
 
-    /// File for a picture of them, as PNG
+    /// File for a picture of the figures, as PNG
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub picture: Option<PathBuf>,
 }

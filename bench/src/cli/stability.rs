@@ -24,11 +24,11 @@ pub struct Args {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_value = "1kHz,2kHz,4kHz,10kHz", value_parser = parse_rate)]
     pub rate: Vec<TickRate>,
 
-    /// Stiffnesses, as 0.5N/mm
+    /// Stiffnesses, such as 0.5N/mm
     #[arg(long, value_name = "N/MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
     pub stiffness: Vec<f64>,
 
-    /// Dampings of the surface, as 2Ns/m
+    /// Dampings of the surface, such as 2Ns/m
     #[arg(long, value_name = "NS/M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
     pub damping: Vec<Damping>,
 
@@ -46,8 +46,8 @@ pub struct Args {
     )]
     pub passivity: Vec<Passivity>,
 
-    /// Time from reading the encoders to the amplifiers; a nucleo-g474re may take 200us, and a
-    /// nucleo-h743zi2 with duty cycles takes less than 1130us
+    /// Time from reading the encoders to the amplifiers: up to 200us on a nucleo-g474re, and up to
+    /// 1130us on a nucleo-h743zi2 with duty cycles
     #[arg(long, value_name = "TIME", default_value = "200us", value_parser = parse_delay)]
     pub delay: f64,
 

@@ -19,7 +19,7 @@ pub struct Args {
           default_values_t = [6, 7, 8, 9, 10], value_parser = clap::value_parser!(u32).range(6..=10))]
     pub sizes: Vec<u32>,
 
-    /// Latencies of a web server, as 20ms; 0ms is a file on disk [default: 0ms,20ms,50ms,100ms,200ms,
+    /// Latencies of a web server, such as 20ms; 0ms is a file on disk [default: 0ms,20ms,50ms,100ms,200ms,
     /// or 0ms without the feature remote]
     #[arg(long, value_name = "TIME,…", value_delimiter = ',', value_parser = parse_latency)]
     pub latency: Vec<u32>,

@@ -28,11 +28,11 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    /// Side of a cell, as 10m
+    /// Side of a cell, such as 10m
     #[arg(long, value_name = "LENGTH", default_value = "10m", value_parser = parse_length)]
     pub cell: f64,
 
-    /// Height of the terrain, from its lowest to its highest place at most, as 500m
+    /// Height of the terrain, from its lowest to its highest place at most, such as 500m
     /// [default: what suits the kind, some tens of cells; a plane rises by a fifth of a
     /// cell per cell to the east]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]

@@ -102,26 +102,26 @@ impl Fault {
             Self::EncoderJump => "an encoder moved farther in a tick than the arm can",
             Self::Hardware => "the encoder or amplifier hardware did not answer",
             Self::EmergencyStop => "the emergency stop was pressed, or its wire broke",
-            Self::DeadManReleased => "the dead-man switch was let go while the motors were on",
+            Self::DeadManReleased => "the dead-man switch was released while the amplifiers were on",
             Self::MotorTooHot => "a motor winding is too hot",
-            Self::JointLimit => "a joint reads beyond its stops",
-            Self::Linkage => "joints 2 and 3 read a pose that the linkage does not allow",
+            Self::JointLimit => "a joint's reading is beyond its stops",
+            Self::Linkage => "the readings of joints 2 and 3 are a pose that the linkage does not allow",
             Self::NoMotion => "a motor pushed and its encoder did not move",
             Self::TooFast => "the tip stayed above twice the speed limit",
             Self::TaskStalled => "a task on the board stopped, so the watchdog was not fed",
             Self::WatchdogReset => "the watchdog had to reset the board",
-            Self::Panicked => "the board's program panicked before it was reset",
-            Self::HardFault => "the board's processor met a hard fault before it was reset",
+            Self::Panicked => "the board's program panicked, then the board was reset",
+            Self::HardFault => "the board's processor met a hard fault, then the board was reset",
             Self::CalibrationCorrupt => "the calibration record on the board is damaged",
-            Self::AmplifierNotReady => "an amplifier says that it is not ready",
-            Self::CurrentMismatch => "a motor's measured current is not what was commanded",
+            Self::AmplifierNotReady => "an amplifier reports that it is not ready",
+            Self::CurrentMismatch => "a motor's measured current differs from the commanded one",
             Self::SupplyLow => "the board's supply fell too low",
             Self::OutputsNotAsSet => {
                 "the converter's settings do not read back as they were written"
             }
-            Self::StackOverflow => "the board's program overran its stack before it was reset",
-            Self::JogRanAway => "a joint moved faster or farther than a jog may move it",
-            Self::TickGap => "the board stood still between two ticks",
+            Self::StackOverflow => "the board's program overran its stack, then the board was reset",
+            Self::JogRanAway => "a joint moved faster or farther than a jog permits",
+            Self::TickGap => "more than one and a half periods passed between two ticks",
         }
     }
 
@@ -136,7 +136,7 @@ impl Fault {
             }
             Self::Hardware => "check supply and cables of encoders and amplifiers",
             Self::EmergencyStop => "make sure that the arm is safe, then release the stop",
-            Self::DeadManReleased => "nothing is wrong: clear it, arm, and press the switch again",
+            Self::DeadManReleased => "nothing is wrong: clear the fault, arm, and press the switch again",
             Self::MotorTooHot => "let the motors cool for some minutes; lower the force",
             Self::JointLimit => "zero the arm again; check ratios and signs of the calibration",
             Self::Linkage => "zero the arm again; check the encoder of joint 2 or 3",
@@ -160,7 +160,7 @@ impl Fault {
             Self::StackOverflow => "please report it with the crash shown by `hapterra status`",
             Self::JogRanAway => "check the motor's wiring and the axis; make the current smaller",
             Self::TickGap => {
-                "attach no debug probe while the arm is armed; if there was none, please report it"
+                "attach no debug probe while the arm is armed; without a probe, please report it"
             }
         }
     }

@@ -102,8 +102,8 @@ impl Blockers {
             Self::HARDWARE => "the encoders or amplifiers cannot work: check supply and cables",
             Self::OUTSIDE_LIMITS => "the joints' readings exceed their limits: zero the arm again",
             Self::WATCHDOG_NOT_LIVE => "the watchdog is not being fed: a task on the board hangs",
-            Self::HOST_DISARMED => "the host has not asked to arm",
-            Self::DEAD_MAN_STILL_HELD => "the dead-man switch is held: let it go, then press it",
+            Self::HOST_DISARMED => "the host has not requested arming",
+            Self::DEAD_MAN_STILL_HELD => "the dead-man switch is held: release it, then press it",
             Self::DEAD_MAN_RELEASED => "the dead-man switch is not held: press it",
             Self::FORCE_TOO_LARGE => "the tip is inside the terrain: lift it off",
             Self::AMPLIFIER_NOT_READY => {
@@ -129,7 +129,7 @@ impl Limits {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
         match lowest {
             Self::FORCE_CLAMPED => "the force is at the device's limit",
-            Self::SLEW_LIMITED => "the force changes as fast as it may",
+            Self::SLEW_LIMITED => "the force changes at its maximum rate",
             Self::CURRENT_LIMITED => "a motor is at its peak current",
             Self::THERMAL_DERATED => "a motor is warm: its current is reduced",
             Self::SPEED_LIMITED => "the tip is too fast for the full force",
@@ -137,13 +137,13 @@ impl Limits {
             Self::FADING => "the force ramps down before disarming",
             Self::TERRAIN_MISSING => "terrain that may be touched here has not arrived yet",
             Self::EDGE_FADING => {
-                "the force ramps down at the edge of the surface, or up after a wait"
+                "the force ramps down at the edge of the surface, or up after a late tile"
             }
             Self::CLUTCH_OPEN => "the clutch is open: no force",
             Self::CLUTCH_MOVES => {
                 "the force ramps down before a change of placement, or up after one"
             }
-            Self::CLUTCH_INPUT => "the board's clutch input is held",
+            Self::CLUTCH_INPUT => "the clutch switch at the board is held",
             Self::ENERGY_DISSIPATED => {
                 "the surface is damped to dissipate the energy leak of the sampled wall"
             }

@@ -8,7 +8,7 @@ use super::{Cli, Failure, report};
 /// Arguments of `hapterra completions`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The shell: its start-up file reads what is printed
+    /// Shell; its start-up file has to run the printed script
     #[arg(value_enum)]
     pub shell: Shell,
 }

@@ -63,7 +63,7 @@ pub struct Args {
     #[arg(short, long, value_name = "DIR", default_value = "demo", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
 
-    /// End after this time of the device, as 60s
+    /// End after this time of the device, such as 60s
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<f64>,
 

@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "VID:PID[:SERIAL]")]
     pub probe: Option<String>,
 
-    /// Only hold the image against the chip's memories; needs no board
+    /// Only check that the image fits into the chip's memories; needs no board
     #[arg(long)]
     pub check: bool,
 }

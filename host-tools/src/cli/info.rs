@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["file", "link", "json"])]
     pub formats: bool,
 
-    /// Show the tiles on a link of this many megabytes a second [1 without a number]
+    /// Show how fast a link of this many MB/s carries the tiles [1 without a number]
     ///
     /// Bytes of a tile, tiles a second, and the cells a second that the HIP may move along an axis.
     #[arg(long, value_name = "MB_PER_S", num_args = 0..=1, default_missing_value = "1", value_parser = rate)]

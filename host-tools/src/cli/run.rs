@@ -73,11 +73,11 @@ pub struct Args {
     #[arg(short, long, value_name = "OUT", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
 
-    /// End after this time of the device, as 60s
+    /// End after this time of the device, such as 60s
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<f64>,
 
-    /// Disarm after this time without a message from here, as 10s
+    /// Disarm after this time without a message from here, such as 10s
     ///
     /// The device does so by itself; a number alone is in seconds.
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = silence)]

@@ -135,7 +135,7 @@ pub enum PlaceError {
     #[error("the file does not state its cell size on the ground")]
     NoGroundSize,
     /// An invalid scale.
-    #[error("{0} ground metres a device millimetre: it must be above zero, and finite")]
+    #[error("{0} ground metres per device millimetre: it must be above zero, and finite")]
     GroundScale(f64),
     /// An invalid exaggeration.
     #[error("heights × {0}: it must be finite and not zero")]

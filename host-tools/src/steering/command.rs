@@ -12,7 +12,7 @@ use heightfield::printable_text::printable;
 pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
      exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
      tip RADIUS (mm), shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
-     clutch on, clutch off, mark TEXT, enter QUESTION; `at SECONDS` before any of them, and before that \
+     clutch on, clutch off, mark TEXT, enter NUMBER; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
 /// A command and its time.

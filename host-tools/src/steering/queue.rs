@@ -179,7 +179,7 @@ fn for_each(
     let is_enter = |command: &Command| matches!(command.wanted, Wanted::Enter(_));
     if devices > 1 && device.is_none() && command.as_ref().is_some_and(is_enter) {
         return Err(wrong(
-            "`enter` is for one device: `on NUMBER enter QUESTION`".into(),
+            "`enter` is for one device: `on DEVICE enter NUMBER`".into(),
         ));
     }
     Ok(command.map(|command| (device, command)))

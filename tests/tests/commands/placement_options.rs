@@ -73,21 +73,21 @@ fn place_scale_and_level_options_are_applied_and_printed() {
             &["--at", "5100,7150", "--scale", "4m/mm"][..],
             [
                 "place          x 5100, y 7150",
-                "4 ground metres a device millimetre; at level 0 a cell is 10 m, 2.5 mm",
+                "4 ground metres per device millimetre; at level 0 a cell is 10 m, 2.5 mm",
             ],
         ),
         (
             &["--at", "5100,7150"],
             [
                 "x 5100, y 7150",
-                "10 ground metres a device millimetre; at level 0 a cell is 10 m, 1 mm",
+                "10 ground metres per device millimetre; at level 0 a cell is 10 m, 1 mm",
             ],
         ),
         (
             &["--at=5100,7150", "--scale", "2mm/cell", "--level", "2"],
             [
                 "x 5100, y 7150",
-                "5 ground metres a device millimetre; at level 2 a cell is 40 m, 8 mm",
+                "5 ground metres per device millimetre; at level 2 a cell is 40 m, 8 mm",
             ],
         ),
         (

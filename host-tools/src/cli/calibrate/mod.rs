@@ -41,8 +41,7 @@ pub struct Args {
     #[arg(long, value_name = "MODEL", value_parser = models())]
     pub model: Option<Model>,
 
-    /// Print a record as the text of a file and do nothing else: the one in FILE, else
-    /// what the device holds
+    /// Only print the record in FILE as text [default: the record on the device]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, num_args = 0..=1,
           conflicts_with = "out")]
     pub show: Option<Option<PathBuf>>,
@@ -51,7 +50,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with = "model")]
     pub from: Option<PathBuf>,
 
-    /// Change a number of the record before the walk, as --set ratio-1=13.2
+    /// Change a number of the record before measuring, such as --set ratio-1=13.2
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<Setting>,
 

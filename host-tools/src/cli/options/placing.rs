@@ -144,7 +144,7 @@ pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
     let (level, cell_mm) = (view.level, short(view.haptic_cell_mm()));
     match (view.ground_m_per_mm(), view.haptic_cell_m()) {
         (Some(scale), Some(cell_m)) => format!(
-            "{} ground metres a device millimetre; at level {level} a cell is {} m, {cell_mm} mm at the device",
+            "{} ground metres per device millimetre; at level {level} a cell is {} m, {cell_mm} mm at the device",
             short(scale),
             short(cell_m)
         ),

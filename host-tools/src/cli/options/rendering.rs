@@ -17,18 +17,18 @@ const HAND_MM: f64 = 7.0;
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Rendering {
-    /// Ground metres a device millimetre (5m/mm), or 1.5mm/cell
+    /// Ground metres per device millimetre (5m/mm), or size of a cell (1.5mm/cell)
     ///
     /// [default: replay 1mm/cell; else the terrain is fitted to the workspace, and with --at it is
     /// 1mm/cell] mm/cell is the size of a haptic cell; a number alone is in m/mm.
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub scale: Option<MapScale>,
 
-    /// Heights: times true to scale, auto, or 0.05mm/unit
+    /// Factor on the true height, auto, or 0.05mm/unit
     ///
-    /// [default: 1] mm/unit: device millimetres a vertical unit of the file. auto: as many times as make 15 mm of relief, and once where there is more. A file that states no
-    /// size of its cells has no true scale: without this option a vertical unit is 1 mm, or the relief
-    /// is fitted.
+    /// [default: 1] mm/unit: device millimetres per vertical unit of the file. auto: the factor that
+    /// makes 15 mm of relief, at least 1. A file that states no size of its cells has no true scale:
+    /// without this option a vertical unit is 1 mm, or the relief is fitted.
     #[arg(long, value_name = "TIMES|auto", allow_hyphen_values = true)]
     pub exaggeration: Option<Exaggeration>,
 
@@ -38,7 +38,7 @@ pub struct Rendering {
     #[arg(long)]
     pub level: Option<u8>,
 
-    /// Radius of the ball at the tip, as 2mm
+    /// Radius of the ball at the tip, such as 2mm
     ///
     /// [default: 7 mm; replay 0] The HIP is the ball's centre; 0 is a point, the default with --level. The level is such that the
     /// radius is at most 8 cells.

@@ -60,7 +60,7 @@ impl FromStr for MapScale {
             }
             Ok(scale) => Ok(scale),
             Err(why) => Err(format!(
-                "{why}; ground metres a device millimetre, as 5m/mm, or the size of a haptic cell, as 1.5mm/cell"
+                "{why}; ground metres per device millimetre, as 5m/mm, or the size of a haptic cell, as 1.5mm/cell"
             )),
         }
     }

@@ -27,13 +27,13 @@ use crate::terrain::Terrain;
 pub struct Commands {
     /// File with commands, a line each, or - for standard input
     ///
-    /// As `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `surface sand`, `stiffness 0.5`, `friction 0.4`,
+    /// Commands: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `surface sand`, `stiffness 0.5`, `friction 0.4`,
     /// `damping 2`, `tip 3`, `shading smooth`, `texture grain 0.1 1`, `clutch on`, `clutch off`,
     /// `reset`, `mark TEXT`.
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
 
-    /// End as after Ctrl-C when standard input ends; with --commands -
+    /// With --commands -: end, as after Ctrl-C, when standard input is closed
     #[arg(long, hide_short_help = true)]
     pub end_with_input: bool,
 }

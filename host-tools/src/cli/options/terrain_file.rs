@@ -40,7 +40,7 @@ pub struct TerrainFile {
 /// Statements of the user about a terrain file.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ReadingOptions {
-    /// Statement about the file, as no-data=-9999, band=2 or cell=30m
+    /// Statement about the file, such as no-data=-9999, band=2 or cell=30m
     ///
     /// May be repeated. raw=512x400:i16:le: raw samples, north row first, their type and byte order;
     /// no-data=VALUE: the stored value without a height; fill=N: samples without data get heights from

@@ -27,10 +27,10 @@ pub const COLUMNS: [(&[&str], &str); 12] = [
     (&["state"], "`free`, `touching`, `releasing`, or `unseeded`"),
     (
         &[TICK, WORK],
-        "`run`: number of the tick; units of contact work",
+        "`run`: number of the tick; its contact work in work units",
     ),
-    (&[COST], "`run`: clock ticks of the tick before"),
-    (&[LATE], "`run`: late ticks"),
+    (&[COST], "`run`: duration of the previous tick, in counts of the device's clock"),
+    (&[LATE], "`run`: number of late ticks so far"),
     (&["mode"], "`run`, `demo`: progress of arming"),
     (
         &["limits"],

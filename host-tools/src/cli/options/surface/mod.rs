@@ -37,7 +37,7 @@ pub struct SurfaceOptions {
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
     pub surface: Option<SurfaceChoice>,
 
-    /// Stiffness, as 0.5N/mm [default: the surface's]
+    /// Stiffness, such as 0.5N/mm [default: the surface's]
     #[arg(long, value_name = "N/MM", value_parser = |text: &str| STIFFNESS.read_single(text),
           allow_negative_numbers = true)]
     pub stiffness: Option<f32>,
@@ -46,12 +46,12 @@ pub struct SurfaceOptions {
     #[arg(long, value_name = "MU", allow_negative_numbers = true)]
     pub friction: Option<f32>,
 
-    /// Largest force, as 8N [default: 8.5]
+    /// Largest force, such as 8N [default: 8.5]
     #[arg(long, value_name = "N", value_parser = |text: &str| FORCE.read_single(text),
           allow_negative_numbers = true)]
     pub max_force: Option<f32>,
 
-    /// Raster of classes of the ground; --surface has them
+    /// Raster of ground classes; the file of --surface has a surface for each
     ///
     /// As land cover: in a grid and a reference system of its own.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
