@@ -138,6 +138,10 @@ fn cargo(words: &[String]) -> Result<(), String> {
         let manifest = match *option {
             "--path" => repository().join(value).join("Cargo.toml"),
             "-p" | "--package" => manifest_of(value)?,
+            "run" => {
+                chooses_program(&words)?;
+                continue;
+            }
             _ => continue,
         };
         if !manifest.is_file() && !value.starts_with("..") {
@@ -145,6 +149,27 @@ fn cargo(words: &[String]) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Checks that cargo can choose a program to run: in the package there is one, or a default, or the
+/// line names it.
+fn chooses_program(words: &[&str]) -> Result<(), String> {
+    let value = |option| words.iter().skip_while(move |word| **word != option).nth(1);
+    let Some(package) = value("-p") else {
+        return Ok(());
+    };
+    let folders = repository().read_dir().expect("the repository").flatten();
+    let manifests = folders.map(|folder| folder.path().join("Cargo.toml"));
+    let named = format!("name = \"{package}\"\n");
+    let manifest = manifests
+        .filter_map(|path| std::fs::read_to_string(path).ok())
+        .find(|text| text.contains(&named))
+        .unwrap_or_default();
+    let has_choice = manifest.matches("[[bin]]").count() > 1 && !manifest.contains("default-run");
+    match has_choice && value("--bin").or(value("--example")).is_none() {
+        true => Err(format!("cargo cannot choose a program of {package}")),
+        false => Ok(()),
+    }
 }
 
 /// Returns the manifest of a package in the workspace.
