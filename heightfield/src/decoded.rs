@@ -230,7 +230,7 @@ impl Decoded {
         match survey.summary.has_none() {
             true => Err(RasterError::AllNoData {
                 // Some samples were read twice.
-                samples: survey.summary.holes.min(columns * rows),
+                samples: survey.summary.no_data.min(columns * rows),
             }),
             false => Ok(survey),
         }

@@ -98,10 +98,10 @@ fn write_npy(folder: &Path) -> PathBuf {
     path
 }
 
-fn options(within: u32, most_in_memory_bytes: u64) -> OpenOptions {
+fn options(within: u32, max_in_memory_bytes: u64) -> OpenOptions {
     OpenOptions {
         fill: Fill::within(within),
-        most_in_memory_bytes,
+        max_in_memory_bytes,
         ..OpenOptions::default()
     }
 }
@@ -146,7 +146,7 @@ fn filled_heights_are_those_of_the_reference() {
     for path in [write_flt(folder.path()), write_npy(folder.path())] {
         for (within, in_memory) in [(1, 0), (10, 0), (64, 0), (10, u64::MAX)] {
             let raster = Raster::open(&path, &options(within, in_memory)).expect("opened");
-            assert_eq!(raster.is_known_whole(), in_memory > 0);
+            assert_eq!(raster.is_summary_complete(), in_memory > 0);
             check(&raster, within);
         }
     }
@@ -221,7 +221,7 @@ fn a_file_without_data_is_refused_and_classes_are_not_filled() {
     // The weights are equal: 1, 3, and 5 below.
     assert_eq!(filled.height(1, 1), 3.0);
     assert_eq!(
-        (filled.summary().holes, filled.fill()),
+        (filled.summary().no_data, filled.fill()),
         (1, Fill::within(1))
     );
     let classes = OpenOptions {
@@ -284,7 +284,7 @@ impl BlockReader for Late {
         Ok(Block {
             samples: columns.map(value).collect::<Vec<_>>().into(),
             holes: None,
-            is_lacking: false,
+            is_incomplete: false,
         })
     }
 

@@ -25,7 +25,7 @@ pub(super) struct FileBytes {
     data: Data,
     outline: bool,
     /// Source of neighbouring files at URLs.
-    elsewhere: RemoteFetcher,
+    fetcher: RemoteFetcher,
 }
 
 /// Source of the bytes.
@@ -41,19 +41,19 @@ pub(super) enum Data {
 
 impl FileBytes {
     /// Opens a file on disk or at a URL.
-    pub(super) fn open(path: &Path, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
+    pub(super) fn open(path: &Path, fetcher: &RemoteFetcher) -> Result<Self, RasterError> {
         let bytes = match path.to_str().filter(|name| is_url(name)) {
-            Some(url) => Self::at_url(url, elsewhere)?,
+            Some(url) => Self::at_url(url, fetcher)?,
             None => Self::on_disk(path)?,
         };
         Ok(Self {
-            elsewhere: elsewhere.clone(),
+            fetcher: fetcher.clone(),
             ..bytes
         })
     }
 
-    fn at_url(url: &str, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
-        let file = elsewhere.open(url).map_err(RasterError::Remote)?;
+    fn at_url(url: &str, fetcher: &RemoteFetcher) -> Result<Self, RasterError> {
+        let file = fetcher.open(url).map_err(RasterError::Remote)?;
         let (len, data) = (file.len(), Data::Remote(file, url.to_owned()));
         Ok(Self::new(file_name(url), len, data))
     }
@@ -81,7 +81,7 @@ impl FileBytes {
             len,
             data,
             outline: false,
-            elsewhere: RemoteFetcher::default(),
+            fetcher: RemoteFetcher::default(),
         }
     }
 
@@ -127,8 +127,8 @@ impl FileBytes {
     }
 
     /// Returns the fetcher of the files at URLs.
-    pub(super) const fn elsewhere(&self) -> &RemoteFetcher {
-        &self.elsewhere
+    pub(super) const fn fetcher(&self) -> &RemoteFetcher {
+        &self.fetcher
     }
 
     /// Returns the file, if it is at a URL.
@@ -172,7 +172,7 @@ impl FileBytes {
         };
         let own = Self::new(&self.name, self.len, data);
         Ok(Some(Self {
-            elsewhere: self.elsewhere.clone(),
+            fetcher: self.fetcher.clone(),
             ..own
         }))
     }

@@ -188,17 +188,17 @@ impl Raster {
         options: &OpenOptions,
         decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, RasterError>,
     ) -> Result<Self, Error> {
-        options.elsewhere.set_disk_cache(&options.disk_cache);
+        options.fetcher.set_disk_cache(&options.disk_cache);
         decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
             .and_then(|mut decoded| {
                 decoded.storage.set_path(path);
                 decoded.storage.set_disk_cache(&options.disk_cache);
-                decoded.tell_if_whole(options.most_in_memory_bytes);
+                decoded.tell_if_whole(options.max_in_memory_bytes);
                 Self::checked(decoded, options.no_data)
             })
-            .inspect(|_| options.elsewhere.touch())
+            .inspect(|_| options.fetcher.set_terrain_open())
             .map(|raster| Self {
                 path: path.to_owned(),
                 fill: options.fill.filter(|_| !options.classes),
@@ -279,7 +279,7 @@ impl Raster {
     pub fn blocks(&self) -> u64 {
         match &self.source.storage {
             Storage::Held { .. } => 0,
-            Storage::Blocks(blocks) => blocks.count(),
+            Storage::Blocks(blocks) => blocks.block_count(),
         }
     }
 
@@ -532,7 +532,7 @@ impl Raster {
     }
 
     /// Returns true if the summary covers all samples: always if they are in memory.
-    pub fn is_known_whole(&self) -> bool {
+    pub fn is_summary_complete(&self) -> bool {
         self.samples().is_some()
     }
 

@@ -85,9 +85,9 @@ fn or_by_gdal(
     match (gdal::decode(path, options), fault) {
         (Ok(decoded), _) => Ok(decoded),
         (Err(by_gdal), UnknownFormat) => Err(by_gdal),
-        (Err(by_gdal @ RasterError::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
+        (Err(by_gdal @ RasterError::NeedsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
         // This crate's fault is more specific than these errors of GDAL, but not than others.
-        (Err(UnknownFormat | ByGdal(_) | RasterError::WantsGdal { .. }), fault) => Err(fault),
+        (Err(UnknownFormat | ByGdal(_) | RasterError::NeedsGdal { .. }), fault) => Err(fault),
         (Err(by_gdal), _) => Err(by_gdal),
     }
 }

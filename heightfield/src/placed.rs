@@ -116,7 +116,7 @@ impl Decoded {
     /// Sets the side of the cells in metres to the user's value, if the file does not state it.
     ///
     /// # Errors
-    /// [`RasterError::CellKnown`] if the file states it.
+    /// [`RasterError::CellSizeStated`] if the file states it.
     pub(super) fn with_ground_cell(mut self, side_m: Option<f64>) -> Result<Self, RasterError> {
         let Some(side_m) = side_m else {
             return Ok(self);
@@ -126,7 +126,7 @@ impl Decoded {
             .filter(|cell| cell.certainty != Certainty::Assumed)
         {
             let (east, north) = cell.ground_metres();
-            return Err(RasterError::CellKnown(format!("{east:.3} × {north:.3} m")));
+            return Err(RasterError::CellSizeStated(format!("{east:.3} × {north:.3} m")));
         }
         let metre = CellUnit::Length { metres: 1.0 };
         let sides = match self.cell {

@@ -8,7 +8,7 @@ use std::hash::Hasher;
 
 use twox_hash::XxHash64;
 
-use super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
+use super::blocks::{Block, BlockImage, BlockReader, SurveyParts, Part};
 use super::input::FileBytes;
 use super::read::Stored;
 use super::samples::{Endian, SampleType, Samples, with_samples};
@@ -90,8 +90,8 @@ impl RawSamples {
         let count = u64::from(self.columns) * u64::from(self.rows);
         let bytes = count.saturating_mul(self.stored.bytes());
         let most = match input.remote() {
-            Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
-            None => options.most_in_memory_bytes,
+            Some(_) => options.max_in_memory_bytes.min(FEW_BYTES),
+            None => options.max_in_memory_bytes,
         };
         if bytes > most
             && let Some(own) = input.again()?
@@ -271,19 +271,19 @@ impl BlockReader for PlainBlocks {
         subsampled::set_order(&mut self.images, south_up, east_first);
     }
 
-    fn want(&self, image: usize, parts: &[Part]) {
+    fn prefetch(&self, image: usize, parts: &[Part]) {
         if let Some(remote) = self.input.remote() {
             let grain = self.grain(image);
-            remote.want(parts.iter().flat_map(|part| self.plain.ranges(part, grain)));
+            remote.prefetch(parts.iter().flat_map(|part| self.plain.ranges(part, grain)));
         }
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
-        self.want(image, std::slice::from_ref(part));
+        self.prefetch(image, std::slice::from_ref(part));
         Ok(Block {
             samples: self.plain.read(&self.input, part, self.grain(image))?,
             holes: None,
-            is_lacking: false,
+            is_incomplete: false,
         })
     }
 
@@ -310,13 +310,13 @@ impl BlockReader for PlainBlocks {
         Some(format!("{settled} {:?}", self.plain))
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         Some(subsampled::places(&self.images[0], PLACES))
     }
 
-    fn kept_bytes(&self) -> usize {
+    fn max_memory_bytes(&self) -> usize {
         match self.is_remote {
-            true => crate::remote::RemoteFile::kept_bytes(),
+            true => crate::remote::RemoteFile::max_memory_bytes(),
             false => 0,
         }
     }

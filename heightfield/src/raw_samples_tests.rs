@@ -113,7 +113,7 @@ fn samples_that_lie_far_apart_are_read_where_they_are() {
     assert_eq!(read.expect("inside"), Samples::from(expected));
 }
 
-fn opened(path: &Path, most_in_memory_bytes: u64) -> Raster {
+fn opened(path: &Path, max_in_memory_bytes: u64) -> Raster {
     let options = OpenOptions {
         raw: Some(RawLayout {
             columns: SIZE[0],
@@ -121,7 +121,7 @@ fn opened(path: &Path, most_in_memory_bytes: u64) -> Raster {
             sample: SampleType::I16,
             endian: Endian::Little,
         }),
-        most_in_memory_bytes,
+        max_in_memory_bytes,
         ..OpenOptions::default()
     };
     Raster::open(path, &options).expect("opens")
@@ -138,7 +138,7 @@ fn blockwise_and_in_memory_heights_match_on_all_levels() {
     std::fs::write(&path, bytes).expect("written");
     let (held, blocks) = (opened(&path, u64::MAX), opened(&path, 0));
     assert!(held.samples().is_some() && blocks.samples().is_none());
-    assert!(!blocks.is_known_whole());
+    assert!(!blocks.is_summary_complete());
     for level in 0..9 {
         let count = ((SIZE[0] - 1) >> level) + 1;
         let mut rows = [vec![0.0; count as usize], vec![0.0; count as usize]];
@@ -179,9 +179,9 @@ fn levels_count_from_south_west_in_any_file_order() {
             if down == "-1" { "1" } else { "-1" }
         );
         std::fs::write(folder.path().join("hills.hdr"), header).expect("written");
-        let [held, blocks] = [u64::MAX, 0].map(|most_in_memory_bytes| {
+        let [held, blocks] = [u64::MAX, 0].map(|max_in_memory_bytes| {
             let options = OpenOptions {
-                most_in_memory_bytes,
+                max_in_memory_bytes,
                 ..OpenOptions::default()
             };
             Raster::open(&path, &options).expect("opens")

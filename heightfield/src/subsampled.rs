@@ -1,6 +1,6 @@
 //! Images with every 2ᵏ-th sample of a field, for files without overviews.
 
-use super::blocks::{BlockImage, Looks, Part};
+use super::blocks::{BlockImage, SurveyParts, Part};
 
 /// Side, in samples, of the parts that are read at opening, if a file is not read whole.
 const PLACE: u32 = 64;
@@ -39,7 +39,7 @@ pub(super) fn set_order(images: &mut [BlockImage], south_up: bool, east_first: b
 }
 
 /// Returns parts spread over a full image, `each` per direction.
-pub(super) fn places(full: &BlockImage, each: u32) -> Looks {
+pub(super) fn places(full: &BlockImage, each: u32) -> SurveyParts {
     let along = |count: u32, number: u32| {
         let size = PLACE.min(count);
         let last = u64::from(count - size) * u64::from(number) / u64::from(each.max(2) - 1);
@@ -56,7 +56,7 @@ pub(super) fn places(full: &BlockImage, each: u32) -> Looks {
             rows,
         }
     });
-    Looks {
+    SurveyParts {
         image: 0,
         parts: parts.collect(),
     }

@@ -24,7 +24,7 @@ fn height(column: u32, row: u32) -> f64 {
 /// Each band is 1000 above the one before.
 fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &str) {
     assert_eq!((raster.columns(), raster.rows()), (columns, rows), "{name}");
-    assert_eq!(raster.summary().holes, 1, "{name}");
+    assert_eq!(raster.summary().no_data, 1, "{name}");
     for row in 0..rows {
         for column in 0..columns {
             let found = raster.height(column, rows - 1 - row);
@@ -145,7 +145,7 @@ fn a_cell_size_is_for_files_that_state_none() {
     };
     let error = Raster::open(path("lerc_i16.tif"), &sized).expect_err("it states 30 m");
     assert!(
-        matches!(error.fault(), RasterError::CellKnown(_)),
+        matches!(error.fault(), RasterError::CellSizeStated(_)),
         "{error}"
     );
     let folder = tempfile::tempdir().expect("a folder");

@@ -40,7 +40,7 @@ impl Case {
     /// Returns the options of a terrain.
     pub(super) fn options(reading: Reading) -> OpenOptions {
         OpenOptions {
-            most_in_memory_bytes: match reading {
+            max_in_memory_bytes: match reading {
                 Reading::Blocks => 0,
                 Reading::Whole => u64::MAX,
             },
@@ -258,7 +258,7 @@ impl Row {
         Self {
             terrain: case.terrain.clone(),
             // Some formats are always read as a whole.
-            reading: match raster.is_known_whole() {
+            reading: match raster.is_summary_complete() {
                 true => Reading::Whole,
                 false => case.reading,
             },

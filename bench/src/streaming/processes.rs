@@ -185,7 +185,7 @@ impl Subject<'_> {
         let raster = raster.map_err(|error| NotMeasured(error.to_string()))?;
         let samples = u64::from(raster.columns()) * u64::from(raster.rows());
         let ways = HipPaths::over(&terrain(&raster)?, self.is_made)?;
-        Ok((ways, samples, raster.is_known_whole()))
+        Ok((ways, samples, raster.is_summary_complete()))
     }
 }
 

@@ -38,7 +38,7 @@ impl Notes {
         let (text, name) = match super::text_appended(input, "aux.xml") {
             Ok(Some(found)) => found,
             Ok(None) => return Ok(Self::default()),
-            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) if fault.is_connection_error() => return Err(fault),
             Err(fault) => return Ok(Self::unread(&fault.to_string())),
         };
         let mut notes = Self::of(&text, band).unwrap_or_else(|fault| {

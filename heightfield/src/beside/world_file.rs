@@ -42,7 +42,7 @@ fn find(
     own: &[&'static str],
 ) -> Result<Option<(GroundMap, String)>, RasterError> {
     let extensions = || own.iter().copied().chain(["wld"]);
-    super::look_for(input, extensions());
+    super::prefetch_files(input, extensions());
     for extension in extensions() {
         let Some((text, name)) = text(input, extension)? else {
             continue;

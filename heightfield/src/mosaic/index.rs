@@ -41,7 +41,7 @@ pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Deco
         unwrap_turns(&mut index.spots, around);
     }
     let mut decoded = index.decoded(options)?;
-    decoded.remarks.extend(layers::left_out(&layers));
+    decoded.remarks.extend(layers::remark_ignored(&layers));
     Ok(decoded)
 }
 

@@ -248,7 +248,7 @@ fn missing_vrt_source_is_no_data_and_other_sources_are_read() {
     let refused = Raster::open(&url, &OpenOptions::default()).expect_err("small");
     assert!(refused.to_string().contains("valleys.tif"), "{refused}");
     let in_blocks = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     let raster = Raster::open(&url, &in_blocks).expect("one of two");

@@ -24,7 +24,7 @@ fn open(path: impl AsRef<Path>) -> Raster {
 
 fn in_blocks(path: &Path) -> Raster {
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     Raster::open(path, &options).expect("opens")
@@ -329,7 +329,7 @@ fn a_stac_at_a_url_is_refused_with_the_files_to_make_a_vrt_of() {
     let (_folder, _, server) = served("items.json", stac.as_bytes());
     let refused = Raster::open(server.url("items.json?key=a"), &OpenOptions::default());
     let error = refused.expect_err("a STAC");
-    let RasterError::ToBuild { files, .. } = error.fault() else {
+    let RasterError::NeedsVrt { files, .. } = error.fault() else {
         panic!("{error}");
     };
     let west = format!("/vsicurl/{}", server.url("west.tif"));

@@ -107,7 +107,7 @@ fn infinite_nan_and_nodata_samples_are_no_data() {
         ("nodata_value -9999,0\n", "1 2 3 4 5 -9999.00", 1, ""),
     ] {
         let raster = open(&format!("{square}{header}{samples}")).expect("a grid");
-        assert_eq!(raster.summary().holes, holes, "{header}{samples}");
+        assert_eq!(raster.summary().no_data, holes, "{header}{samples}");
         assert_eq!(raster.summary().lowest, 1.0, "{header}{samples}");
         let stated = raster.remarks().join(" ");
         assert!(stated.contains(remark), "{stated}");

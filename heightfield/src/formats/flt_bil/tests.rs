@@ -66,7 +66,7 @@ fn float_grid_is_read_with_bounds_and_no_data() {
         let raster = pair.open(None).expect("a grid");
         let found = heights(&raster);
         assert_eq!(found[..3], [1.5, -2.0, 3.0]);
-        assert!(found[3].is_nan() && raster.summary().holes == 1);
+        assert!(found[3].is_nan() && raster.summary().no_data == 1);
         let bounds = raster.bounds().expect("placed");
         let sides = [bounds.west, bounds.south, bounds.east, bounds.north];
         assert_eq!(sides, [500_000.0, 4_100_000.0, 500_090.0, 4_100_060.0]);
@@ -259,7 +259,7 @@ fn number_type_and_unit_are_read() {
         let raster = raster.expect("a grid");
         let summary = raster.summary();
         assert_eq!(
-            (summary.lowest, summary.highest, summary.holes),
+            (summary.lowest, summary.highest, summary.no_data),
             (-5.0, 960.0, 1)
         );
         assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));

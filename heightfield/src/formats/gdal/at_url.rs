@@ -30,7 +30,7 @@ const PARTS_OF_FREE: u64 = 2;
 /// The files at one host or in one bucket.
 #[derive(Clone)]
 pub(super) struct Served {
-    elsewhere: RemoteFetcher,
+    fetcher: RemoteFetcher,
     /// As `https://host/`.
     root: String,
     /// Query of each URL, possibly with a key.
@@ -40,10 +40,10 @@ pub(super) struct Served {
 
 impl Served {
     /// Returns the server of a URL, and the file's name there.
-    pub(super) fn of(url: &str, elsewhere: &RemoteFetcher) -> (Self, String) {
+    pub(super) fn of(url: &str, fetcher: &RemoteFetcher) -> (Self, String) {
         let [root, name, rest] = parts(url);
         let served = Self {
-            elsewhere: elsewhere.clone(),
+            fetcher: fetcher.clone(),
             root: root.to_owned(),
             rest: rest.to_owned(),
             roots: gdal_names(root).into(),
@@ -59,13 +59,13 @@ impl Served {
 
 impl FileSystem for Served {
     fn open(&self, name: &str) -> io::Result<Box<dyn ReadAt>> {
-        let file = self.elsewhere.open(&self.url(name))?;
+        let file = self.fetcher.open(&self.url(name))?;
         Ok(Box::new(Remote(file)))
     }
 
     fn beside(&self, name: &str) -> io::Result<Vec<String>> {
         let url = self.url(name);
-        let input = FileBytes::open(Path::new(&url), &self.elsewhere).map_err(io_error)?;
+        let input = FileBytes::open(Path::new(&url), &self.fetcher).map_err(io_error)?;
         beside::names_at_url(&input, &url).map_err(io_error)
     }
 
@@ -114,9 +114,9 @@ pub(super) fn is_fetched(head: &[u8]) -> bool {
 /// [`RasterError::AbsurdSize`] if it is too large for that.
 pub(super) fn fetched(
     url: &str,
-    elsewhere: &RemoteFetcher,
+    fetcher: &RemoteFetcher,
 ) -> Result<(TempDir, String), RasterError> {
-    let input = FileBytes::open(Path::new(url), elsewhere)?;
+    let input = FileBytes::open(Path::new(url), fetcher)?;
     let folder = tempfile::tempdir().map_err(RasterError::Unreadable)?;
     let free = fs4::available_space(folder.path()).unwrap_or(u64::MAX);
     let most = MAX_FETCHED_BYTES.min(free / PARTS_OF_FREE);

@@ -8,7 +8,7 @@ use twox_hash::XxHash64;
 
 use super::place::Place;
 use super::{NAME, at_url, fault};
-use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, usual_block};
+use crate::blocks::{Block, BlockImage, BlockReader, SurveyParts, MAX_BLOCK_BYTES, Part, usual_block};
 use crate::encoding::codes;
 use crate::raw_samples::{transposed, turned};
 use crate::samples::{NoDataMask, SampleType, with_samples};
@@ -156,7 +156,7 @@ impl GdalBlocks {
         Ok(Block {
             samples,
             holes: holes.filter(|holes| !holes.is_clear()),
-            is_lacking: false,
+            is_incomplete: false,
         })
     }
 }
@@ -210,7 +210,7 @@ impl BlockReader for GdalBlocks {
         self.index
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         // Overviews cover the whole image.
         match &self.images[..] {
             [full] => Some(subsampled::places(full, PLACES)),
@@ -292,7 +292,7 @@ impl BlockReader for Turned {
         self.blocks.index
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         Some(subsampled::places(&self.images[0], PLACES))
     }
 }

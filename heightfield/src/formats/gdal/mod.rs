@@ -49,15 +49,15 @@ const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
 /// Reads a file, folder or other source that a driver opens.
 ///
 /// # Errors
-/// [`RasterError::UnknownFormat`] if no driver does; [`RasterError::WantsGdal`] without a libgdal;
+/// [`RasterError::UnknownFormat`] if no driver does; [`RasterError::NeedsGdal`] without a libgdal;
 /// else the file's fault.
 pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let head = head(path, options)?;
     let library = gdal().map_err(|why| match names::of(path, &head) {
-        Some(format) => RasterError::WantsGdal { format, why },
+        Some(format) => RasterError::NeedsGdal { format, why },
         None => RasterError::UnknownFormat,
     })?;
-    let place = Place::of(&library, path, &head, &options.elsewhere)?;
+    let place = Place::of(&library, path, &head, &options.fetcher)?;
     let packing = packed::Packing::of(&head);
     let place = Arc::new(match packing {
         Some(_) => place.under_a_new_name()?,
@@ -102,7 +102,7 @@ pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
 /// Returns the reference system that GDAL finds in a file.
 pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
     let library = gdal().ok()?;
-    let place = Place::of(&library, input.path()?, &[], input.elsewhere()).ok()?;
+    let place = Place::of(&library, input.path()?, &[], input.fetcher()).ok()?;
     let dataset = library.open(&place.path, &[]).ok()?;
     ReferenceSystem::from_wkt(&dataset.wkt()?).0
 }
@@ -111,7 +111,7 @@ pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
 fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, RasterError> {
     match path.is_dir() {
         true => Ok(Vec::new()),
-        false => FileBytes::open(path, &options.elsewhere)?.head(HEAD_BYTES),
+        false => FileBytes::open(path, &options.fetcher)?.head(HEAD_BYTES),
     }
 }
 
@@ -184,7 +184,7 @@ fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset
 
 /// Returns true if a text contains a star, which GRASS writes for no-data.
 fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> {
-    let input = FileBytes::open(&place.source, &options.elsewhere)?;
+    let input = FileBytes::open(&place.source, &options.fetcher)?;
     let mut reader = input.reader()?;
     loop {
         let chunk = reader.fill_buf().map_err(RasterError::Unreadable)?;
@@ -352,7 +352,7 @@ fn read(
     let held = blocks.sample_type();
     let format = format!("{driver} by GDAL, {}", held.none().type_name());
     let samples = u64::from(full.columns) * u64::from(full.rows);
-    if samples * held.bytes() > options.most_in_memory_bytes {
+    if samples * held.bytes() > options.max_in_memory_bytes {
         // Fails now if GDAL cannot decompress the samples; later, they would be no-data.
         blocks.read(0, &full.part([0, 0]))?;
         return Ok(Decoded::new(format, size, blocks));

@@ -28,7 +28,7 @@ impl Place {
         library: &Library,
         source: &Path,
         head: &[u8],
-        elsewhere: &RemoteFetcher,
+        fetcher: &RemoteFetcher,
     ) -> Result<Self, RasterError> {
         let here = Self {
             library: library.clone(),
@@ -41,14 +41,14 @@ impl Place {
             return Ok(here);
         };
         if is_fetched(head) {
-            let (folder, name) = fetched(url, elsewhere)?;
+            let (folder, name) = fetched(url, fetcher)?;
             return Ok(Self {
                 path: folder.path().join(name),
                 _folder: Some(folder),
                 ..here
             });
         }
-        let (served, name) = Served::of(url, elsewhere);
+        let (served, name) = Served::of(url, fetcher);
         let mount = library.mount(Box::new(served.clone())).map_err(fault)?;
         Ok(Self {
             path: mount.path(&name).into(),

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::place::Place;
 use crate::input::FileBytes;
-use crate::remote::{is_url, without_rest};
+use crate::remote::{is_url, without_query};
 use crate::{OpenOptions, RasterError, file_name};
 
 /// Max size of a document, bytes. In memory it takes fifty times as much.
@@ -44,7 +44,7 @@ pub(super) fn refused(
 /// Checks that files lie at the places in their items, and that GDAL has found the same files.
 ///
 /// # Errors
-/// [`RasterError::ToBuild`] if one does not.
+/// [`RasterError::NeedsVrt`] if one does not.
 pub(super) fn check_places(
     library: &Library,
     opened: &Dataset,
@@ -88,7 +88,7 @@ fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
         match &item.assets[..] {
             [(_, file)] => files.push(file.clone()),
             assets => {
-                return Err(RasterError::WhichAsset {
+                return Err(RasterError::AmbiguousAssets {
                     why: match assets {
                         [] => format!(
                             "the item {} has no asset of that name, or no raster",
@@ -101,7 +101,7 @@ fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
             }
         }
     }
-    Ok(RasterError::ToBuild {
+    Ok(RasterError::NeedsVrt {
         why: why.to_owned(),
         files,
     })
@@ -117,7 +117,7 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
     if !is_named || path.is_dir() {
         return Ok(None);
     }
-    let input = FileBytes::open(path, &options.elsewhere)?;
+    let input = FileBytes::open(path, &options.fetcher)?;
     if input.len() > MAX_BYTES {
         return Err(RasterError::AbsurdSize(format!(
             "a JSON document of {} bytes",
@@ -140,7 +140,7 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
         _ => return Ok(None),
     };
     // Also for a URL, without its query.
-    let named = url.map_or(path, |url| Path::new(without_rest(url)));
+    let named = url.map_or(path, |url| Path::new(without_query(url)));
     let folder = named.parent().unwrap_or(Path::new(""));
     let items = features
         .into_iter()

@@ -155,7 +155,7 @@ mod tests {
             for with_alpha in [true, false] {
                 let raster = open(&picture(colour, with_alpha), Some(encoding)).expect("heights");
                 let holes = 1 + u64::from(with_alpha);
-                assert_eq!(raster.summary().holes, holes, "{encoding:?}");
+                assert_eq!(raster.summary().no_data, holes, "{encoding:?}");
                 assert!(raster.height(3, SIDE - 1 - 4).is_nan());
                 for (column, row) in [(0, 0), (7, 30), (31, 31)] {
                     let height = raster.height(column, SIDE - 1 - row);

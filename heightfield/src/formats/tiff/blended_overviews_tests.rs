@@ -29,7 +29,7 @@ fn opened(folder: &Path, rim: f32) -> Raster {
     std::fs::write(&path, tiff(&[full, coarse].concat(), &images)).expect("written");
     let options = OpenOptions {
         no_data: Some(NO_DATA),
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     Raster::open(path, &options).expect("a terrain")

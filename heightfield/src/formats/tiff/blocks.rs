@@ -14,7 +14,7 @@ use super::masks::Mask;
 use super::samples::{heights, holes};
 use super::uncompressed::rows;
 use super::{budget, images, unpack};
-use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, stored_parts};
+use crate::blocks::{Block, BlockImage, BlockReader, SurveyParts, MAX_BLOCK_BYTES, Part, stored_parts};
 use crate::decoder_panic::guarded;
 use crate::disk_cache::{DiskCache, FileStamp};
 use crate::input::FileBytes;
@@ -246,7 +246,7 @@ impl TiffBlocks {
         Ok(Block {
             samples: heights(layout, part)?,
             holes: holes(layout, masks, part)?,
-            is_lacking: false,
+            is_incomplete: false,
         })
     }
 
@@ -273,7 +273,7 @@ impl TiffBlocks {
         let masked = || holes(layout, masks, part);
         let masked = match guarded(super::FORMAT.name, masked) {
             Ok(masked) => masked,
-            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) if fault.is_connection_error() => return Err(fault),
             Err(fault) => {
                 self.unread.warn(image, part, &fault);
                 return Ok(all);
@@ -290,7 +290,7 @@ impl TiffBlocks {
                 let block = Block {
                     samples,
                     holes: None,
-                    is_lacking: false,
+                    is_incomplete: false,
                 };
                 copy(&block, &row, &mut all, part);
             }
@@ -314,7 +314,7 @@ impl TiffBlocks {
         }
         match guarded(super::FORMAT.name, read) {
             Ok(read) => Ok(Some(read)),
-            Err(fault) if fault.is_of_the_line() => Err(fault),
+            Err(fault) if fault.is_connection_error() => Err(fault),
             Err(fault) => {
                 self.unread.warn(image, piece, &fault);
                 Ok(None)
@@ -332,7 +332,7 @@ impl TiffBlocks {
         Block {
             samples,
             holes: Some(holes),
-            is_lacking: true,
+            is_incomplete: true,
         }
     }
 }
@@ -454,18 +454,18 @@ impl BlockReader for TiffBlocks {
         chunks.any(|chunk| chunk.bytes > 0)
     }
 
-    fn want(&self, image: usize, parts: &[Part]) {
+    fn prefetch(&self, image: usize, parts: &[Part]) {
         let Image { file, layout, .. } = &self.images[image];
         if let Some(remote) = &self.remote[*file] {
-            remote.want(parts.iter().flat_map(|part| ranges(layout, part)));
+            remote.prefetch(parts.iter().flat_map(|part| ranges(layout, part)));
         }
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         // The decoder requests the chunks one by one, so they are prefetched together.
-        self.want(image, std::slice::from_ref(part));
+        self.prefetch(image, std::slice::from_ref(part));
         match self.block(image, part) {
-            Err(fault) if !fault.is_of_the_line() => {
+            Err(fault) if !fault.is_connection_error() => {
                 match self.images[image].layout.is_read_by_rows() {
                     true => self.by_rows(image, part),
                     false => self.by_chunks(image, part),
@@ -485,16 +485,16 @@ impl BlockReader for TiffBlocks {
         Some(text)
     }
 
-    fn kept_bytes(&self) -> usize {
+    fn max_memory_bytes(&self) -> usize {
         let pages = match self.remote.iter().any(Option::is_some) {
-            true => RemoteFile::kept_bytes(),
+            true => RemoteFile::max_memory_bytes(),
             false => 0,
         };
         let lists = self.images.iter().map(|image| image.layout.index_bytes());
         pages + lists.sum::<usize>()
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         let image = self.images.len() - 1;
         let layout = &self.images[image].layout;
         // The same parts of a file are read whether it is local or remote, and in whole strips or
@@ -508,7 +508,7 @@ impl BlockReader for TiffBlocks {
             ..self.blocks[image]
         };
         let is_stored = |part: &Part| self.is_stored(image, part);
-        layout.is_plain.then(|| Looks {
+        layout.is_plain.then(|| SurveyParts {
             image,
             parts: stored_parts(&looked_at, is_stored),
         })

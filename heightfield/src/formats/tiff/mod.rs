@@ -146,8 +146,8 @@ fn stored(
     let input = files[0];
     let most = match input.remote() {
         // Parts that are not accessed are not downloaded.
-        Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
-        None => options.most_in_memory_bytes,
+        Some(_) => options.max_in_memory_bytes.min(FEW_BYTES),
+        None => options.max_in_memory_bytes,
     };
     let mut reported = None;
     if image.layout.bytes() > most {
@@ -195,7 +195,7 @@ fn stored(
     }
     let all = Part::whole(layout.columns, layout.rows);
     if let Some(remote) = input.remote() {
-        remote.want(once(0..input.len()));
+        remote.prefetch(once(0..input.len()));
     }
     let mut storage = Storage::from(samples::heights(layout, &all)?);
     storage.set_no_data(samples::holes(layout, &image.masks, &all)?);

@@ -70,10 +70,10 @@ fn colours_encode_heights_in_memory_and_in_the_file() {
         long(278, SIZE[1]),
         long(279, data.len() as u32),
     ];
-    for most_in_memory_bytes in [0, 1 << 20] {
+    for max_in_memory_bytes in [0, 1 << 20] {
         let options = OpenOptions {
             encoding: Some(Encoding::TerrainRgb),
-            most_in_memory_bytes,
+            max_in_memory_bytes,
             ..OpenOptions::default()
         };
         let raster = opened(&data, tags.clone(), &options).expect("a terrain");

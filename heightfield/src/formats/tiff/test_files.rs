@@ -240,10 +240,10 @@ impl Made {
     }
 }
 
-pub(super) fn open(made: &Made, most_in_memory_bytes: u64) -> Result<Raster, RasterError> {
+pub(super) fn open(made: &Made, max_in_memory_bytes: u64) -> Result<Raster, RasterError> {
     let options = OpenOptions {
         band: (made.bands > 1).then_some(BAND),
-        most_in_memory_bytes,
+        max_in_memory_bytes,
         ..OpenOptions::default()
     };
     let input = FileBytes::unpacked("test.tif", made.bytes());

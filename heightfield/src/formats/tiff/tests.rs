@@ -84,7 +84,7 @@ fn mask_image_in_the_same_file_marks_no_data() {
         samples: &[0; 4],
     };
     let raster = open(file(&[FULL, other, mask])).expect("a masked image");
-    assert_eq!(raster.summary().holes, 2);
+    assert_eq!(raster.summary().no_data, 2);
     assert!(raster.height(1, 1).is_nan() && raster.height(2, 0).is_nan());
     assert_eq!(raster.height(2, 1), 3.0);
 }
@@ -114,10 +114,10 @@ fn the_numbers_of_a_palette_are_classes_and_no_heights() {
         open(with_palette()),
         Err(RasterError::NotAHeightField(what)) if what.contains("palette")
     ));
-    for most_in_memory_bytes in [0, 1 << 20] {
+    for max_in_memory_bytes in [0, 1 << 20] {
         let options = OpenOptions {
             classes: true,
-            most_in_memory_bytes,
+            max_in_memory_bytes,
             ..OpenOptions::default()
         };
         let input = FileBytes::unpacked("test.tif", with_palette());
@@ -131,7 +131,7 @@ fn the_numbers_of_a_palette_are_classes_and_no_heights() {
 /// Returns options that leave samples in the file, whatever their size.
 fn in_blocks() -> OpenOptions {
     OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     }
 }
@@ -191,7 +191,7 @@ fn overviews_and_masks_beside_a_file_are_its_own() {
     assert_eq!(raster.surface(1, [30.0, 30.0]), 7.0);
     assert_eq!(raster.surface(2, [30.0, 30.0]), 9.0);
     assert!(raster.surface(2, [0.0, 47.0]).is_nan());
-    assert_eq!(raster.summary().holes, 1);
+    assert_eq!(raster.summary().no_data, 1);
 }
 
 #[test]
@@ -305,7 +305,7 @@ fn transparent_alpha_samples_are_no_data() {
         tags.push(shorts(338, &[kind]));
         let raster = open(by_hand(&tags, &samples)).expect("a band and its alpha");
         assert_eq!(
-            raster.summary().holes,
+            raster.summary().no_data,
             holes,
             "extra samples of kind {kind}"
         );
@@ -327,7 +327,7 @@ fn msk_sidecar_file_marks_no_data() {
     };
     std::fs::write(folder.path().join("terrain.tif.msk"), file(&[mask])).expect("written");
     let raster = Raster::open(&path, &crate::OpenOptions::default()).expect("opens");
-    assert_eq!(raster.summary().holes, 2);
+    assert_eq!(raster.summary().no_data, 2);
     assert!(raster.height(1, 1).is_nan() && raster.height(2, 0).is_nan());
 }
 

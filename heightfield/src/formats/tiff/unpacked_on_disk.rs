@@ -62,7 +62,7 @@ impl Unpacked {
         disk: &DiskCache,
     ) -> io::Result<Self> {
         let count = (disk.max_bytes() / each.max(1)).clamp(*counts.start(), *counts.end());
-        let unnamed = disk.file_without_name(each.saturating_mul(count))?;
+        let unnamed = disk.create_unnamed(each.saturating_mul(count))?;
         let slots = (0..count).map(|_| None).collect();
         Ok(Self {
             unnamed,
