@@ -180,8 +180,8 @@ impl Mounted {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         let mut inner = Vec::new();
         for named in &named {
-            let beside = named.at_server(&root).map_err(refused)?;
-            inner.extend(beside.and_then(|beside| match beside.strip_prefix(&root) {
+            let neighbour = named.at_server(&root).map_err(refused)?;
+            inner.extend(neighbour.and_then(|neighbour| match neighbour.strip_prefix(&root) {
                 Some(absolute) => plain(absolute),
                 None => plain(&format!("{folder}/{beside}")),
             }));
@@ -194,9 +194,9 @@ impl Mounted {
     }
 
     /// Returns the names of the files beside a file, if they are known.
-    pub(crate) fn beside(&self, name: &str) -> Option<Vec<String>> {
+    pub(crate) fn neighbours(&self, name: &str) -> Option<Vec<String>> {
         let name = plain(name)?;
-        self.read(|| self.files.beside(&name))
+        self.read(|| self.files.neighbours(&name))
     }
 
     /// Reads bytes of an open file.

@@ -50,7 +50,7 @@ impl Settings {
     pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
         // The number is random, so no URL ends like this.
         let number = RandomState::new().build_hasher().finish();
-        let nothing = format!(".nothing-is-fetched-{number:016x}");
+        let unused = format!(".nothing-is-fetched-{number:016x}");
         let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
         let mut options = vec![
             ("GDAL_CACHEMAX", cache.as_str()),
@@ -61,7 +61,7 @@ impl Settings {
             ("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO"),
         ];
         if !is_fetching_allowed() {
-            options.push((FETCHED, nothing.as_str()));
+            options.push((FETCHED, unused.as_str()));
         }
         for (name, value) in options {
             let (name, value) = (to_c(name)?, to_c(value)?);

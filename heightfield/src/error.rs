@@ -91,12 +91,12 @@ pub enum RasterError {
         bands: u16,
     },
     /// The user chose a band or variable that is not there.
-    #[error("there is no {asked}: {there}")]
+    #[error("there is no {requested}: {available}")]
     NoSuchPart {
         /// The request.
-        asked: String,
+        requested: String,
         /// The available parts.
-        there: String,
+        available: String,
     },
     /// The user gave a cell size, but the file states another.
     #[error("the file states its own cell size: {0}")]

@@ -283,7 +283,7 @@ impl BlockReader for Late {
         };
         Ok(Block {
             samples: columns.map(value).collect::<Vec<_>>().into(),
-            holes: None,
+            no_data_mask: None,
             is_incomplete: false,
         })
     }

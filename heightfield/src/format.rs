@@ -46,17 +46,17 @@ impl Format {
     pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), RasterError> {
         if options.encoding.is_some() && !["PNG", "TIFF"].contains(&self.name) {
             return Err(RasterError::NoSuchPart {
-                asked: "picture with heights in its colours".into(),
-                there: format!("the file is {}", self.name),
+                requested: "picture with heights in its colours".into(),
+                available: format!("the file is {}", self.name),
             });
         }
-        let refused = |asked: String| {
+        let refused = |requested: String| {
             let has = match self.parts {
                 Parts::One => "one field of heights",
                 Parts::Bands => "bands, chosen by number",
             };
-            let there = format!("{} has {has}", self.name);
-            Err(RasterError::NoSuchPart { asked, there })
+            let available = format!("{} has {has}", self.name);
+            Err(RasterError::NoSuchPart { requested, available })
         };
         match (&options.variable, options.band) {
             (Some(variable), _) => refused(format!("variable {variable}")),

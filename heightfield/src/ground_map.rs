@@ -28,13 +28,13 @@ pub struct Bounds {
 impl Bounds {
     /// Returns the smallest rectangle around some points; `None` without a finite point.
     pub(super) fn around(points: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
-        let nothing = Self {
+        let empty = Self {
             west: f64::INFINITY,
             south: f64::INFINITY,
             east: f64::NEG_INFINITY,
             north: f64::NEG_INFINITY,
         };
-        let all = points.into_iter().fold(nothing, |all, (x, y)| Self {
+        let all = points.into_iter().fold(empty, |all, (x, y)| Self {
             west: all.west.min(x),
             south: all.south.min(y),
             east: all.east.max(x),

@@ -108,8 +108,8 @@ fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), Rast
     match &options.open_options[..] {
         [] => Ok(()),
         [first, ..] => Err(RasterError::NoSuchPart {
-            asked: format!("open option {first}"),
-            there: format!("the file is {format}, which is read without GDAL"),
+            requested: format!("open option {first}"),
+            available: format!("the file is {format}, which is read without GDAL"),
         }),
     }
 }

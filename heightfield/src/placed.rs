@@ -95,8 +95,8 @@ impl Decoded {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
         let other_unit = self.system.as_ref().and_then(ReferenceSystem::other_unit);
-        let said = turned(&map).into_iter().chain(other_unit);
-        let new = said.filter(|line| !self.remarks.contains(line));
+        let new_remarks = turned(&map).into_iter().chain(other_unit);
+        let new = new_remarks.filter(|line| !self.remarks.contains(line));
         self.remarks.extend(new.collect::<Vec<_>>());
         let unit = unit.or(self.system.as_ref().map(GroundUnit::of));
         let degrees = unit.map_or(1.0, |unit| unit.degrees);

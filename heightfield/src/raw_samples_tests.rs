@@ -29,7 +29,7 @@ fn file(folder: &Path) -> (FileBytes, RawSamples) {
     let plain = RawSamples {
         columns: SIZE[0],
         rows: SIZE[1],
-        stored: Stored::Held(SampleType::I16),
+        stored: StoredType::Held(SampleType::I16),
         endian: Endian::Big,
         first: 37,
         row: u64::from(SIZE[0]) * 3 + 5,
@@ -68,11 +68,11 @@ fn a_part_of_every_image_has_its_own_samples_in_either_order() {
             };
             Samples::from(values)
         };
-        let grain = Grain {
+        let subsampling = Subsampling {
             every,
             first: [0; 2],
         };
-        let read = plain.read(&input, &part, grain).expect("inside");
+        let read = plain.read(&input, &part, subsampling).expect("inside");
         assert_eq!(read, expected(false), "{every}");
         let turned = Part {
             column: part.row,
@@ -80,7 +80,7 @@ fn a_part_of_every_image_has_its_own_samples_in_either_order() {
             columns: part.rows,
             rows: part.columns,
         };
-        let read = plain.turned().read(&input, &turned, grain);
+        let read = plain.turned().read(&input, &turned, subsampling);
         assert_eq!(read.expect("inside"), expected(true), "{every}, turned");
     }
 }
@@ -102,14 +102,14 @@ fn samples_that_lie_far_apart_are_read_where_they_are() {
         i16::from_be_bytes([bytes[at], bytes[at + 1]])
     };
     // Every second sample, over more rows than one read covers.
-    let grain = Grain {
+    let subsampling = Subsampling {
         every: 2,
         first: [0, 1],
     };
     let places = [1, 3].into_iter();
     let places = places.flat_map(|row| [0, 2, 4].map(|column| (column, row)));
     let expected: Vec<i16> = places.map(|(column, row)| at(column, row)).collect();
-    let read = far.read(&input, &part(0, 0, 3, 2), grain);
+    let read = far.read(&input, &part(0, 0, 3, 2), subsampling);
     assert_eq!(read.expect("inside"), Samples::from(expected));
 }
 
@@ -136,15 +136,15 @@ fn blockwise_and_in_memory_heights_match_on_all_levels() {
         .flat_map(|(column, row)| value(column, row).to_le_bytes())
         .collect();
     std::fs::write(&path, bytes).expect("written");
-    let (held, blocks) = (opened(&path, u64::MAX), opened(&path, 0));
-    assert!(held.samples().is_some() && blocks.samples().is_none());
+    let (in_memory, blocks) = (opened(&path, u64::MAX), opened(&path, 0));
+    assert!(in_memory.samples().is_some() && blocks.samples().is_none());
     assert!(!blocks.is_summary_complete());
     for level in 0..9 {
         let count = ((SIZE[0] - 1) >> level) + 1;
         let mut rows = [vec![0.0; count as usize], vec![0.0; count as usize]];
         for row in (0..SIZE[1] >> level).step_by(7) {
             assert!(
-                held.read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
+                in_memory.read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
                     .is_complete()
             );
             assert!(
@@ -179,7 +179,7 @@ fn levels_count_from_south_west_in_any_file_order() {
             if down == "-1" { "1" } else { "-1" }
         );
         std::fs::write(folder.path().join("hills.hdr"), header).expect("written");
-        let [held, blocks] = [u64::MAX, 0].map(|max_in_memory_bytes| {
+        let [in_memory, blocks] = [u64::MAX, 0].map(|max_in_memory_bytes| {
             let options = OpenOptions {
                 max_in_memory_bytes,
                 ..OpenOptions::default()
@@ -191,7 +191,7 @@ fn levels_count_from_south_west_in_any_file_order() {
         let mut rows = [[0.0; 60], [0.0; 60]];
         for (level, row) in [(0, 3), (1, 200), (2, 100), (4, 30)] {
             assert!(
-                held.read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
+                in_memory.read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
                     .is_complete()
             );
             assert!(

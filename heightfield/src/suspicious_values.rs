@@ -97,13 +97,13 @@ mod tests {
     use super::*;
 
     fn remarks(values: &[f64], is_declared: bool) -> String {
-        let mut seen = Outermost::NONE;
-        values.iter().for_each(|value| seen.add(*value));
-        seen.remarks(is_declared).join("; ")
+        let mut outermost = Outermost::NONE;
+        values.iter().for_each(|value| outermost.add(*value));
+        outermost.remarks(is_declared).join("; ")
     }
 
     #[test]
-    fn values_that_stand_for_no_data_elsewhere_are_named() {
+    fn common_no_data_values_are_reported() {
         for value in LOW.into_iter().chain(HIGH) {
             let stated = remarks(&[367.0, value, 400.0], false);
             assert!(

@@ -38,7 +38,7 @@ pub(super) struct Node {
 
 /// A parser that consumes a text.
 struct Reader<'t> {
-    left: &'t str,
+    rest: &'t str,
     /// Number of nodes that may still be read.
     nodes: usize,
 }
@@ -48,7 +48,7 @@ impl<'t> Reader<'t> {
     fn node(&mut self, levels: usize) -> Option<Node> {
         let keyword = self.word();
         self.nodes = self.nodes.checked_sub(1)?;
-        if keyword.is_empty() || !self.takes(&['[', '(']) {
+        if keyword.is_empty() || !self.skip(&['[', '(']) {
             return None;
         }
         let mut node = Node {
@@ -57,42 +57,42 @@ impl<'t> Reader<'t> {
             children: Vec::new(),
         };
         loop {
-            let before = self.left;
-            if self.takes(&['"']) {
+            let before = self.rest;
+            if self.skip(&['"']) {
                 node.values.push(self.quoted()?);
             } else {
                 let word = self.word();
-                if self.left.starts_with(['[', '(']) {
-                    self.left = before;
+                if self.rest.starts_with(['[', '(']) {
+                    self.rest = before;
                     node.children.push(self.node(levels.checked_sub(1)?)?);
                 } else if !word.is_empty() {
                     node.values.push(word.to_owned());
                 }
             }
-            if self.takes(&[']', ')']) {
+            if self.skip(&[']', ')']) {
                 let is_empty = node.values.is_empty() && node.children.is_empty();
                 return (!is_empty).then_some(node);
             }
-            if !self.takes(&[',']) {
+            if !self.skip(&[',']) {
                 return None;
             }
         }
     }
 
     /// Consumes one of some characters, after spaces.
-    fn takes(&mut self, characters: &[char]) -> bool {
-        let left = self.left.trim_start();
+    fn skip(&mut self, characters: &[char]) -> bool {
+        let left = self.rest.trim_start();
         let rest = left.strip_prefix(characters);
-        self.left = rest.unwrap_or(left);
+        self.rest = rest.unwrap_or(left);
         rest.is_some()
     }
 
     /// Consumes a keyword or a number.
     fn word(&mut self) -> &'t str {
-        let left = self.left.trim_start();
+        let left = self.rest.trim_start();
         let end = left.find(['[', ']', '(', ')', ',', '"']);
         let (word, rest) = left.split_at(end.unwrap_or(left.len()));
-        self.left = rest;
+        self.rest = rest;
         word.trim_end()
     }
 
@@ -100,11 +100,11 @@ impl<'t> Reader<'t> {
     fn quoted(&mut self) -> Option<String> {
         let mut text = String::new();
         loop {
-            let (part, rest) = self.left.split_once('"')?;
+            let (part, rest) = self.rest.split_once('"')?;
             text += part;
-            self.left = rest;
+            self.rest = rest;
             match rest.strip_prefix('"') {
-                Some(rest) => self.left = rest,
+                Some(rest) => self.rest = rest,
                 None => return Some(text),
             }
             text.push('"');
@@ -122,14 +122,14 @@ impl Node {
     /// one, after a comma.
     pub(super) fn parse_both(text: &str) -> Option<(Self, Option<Self>)> {
         let mut reader = Reader {
-            left: text,
+            rest: text,
             nodes: MAX_NODES,
         };
         if text.len() > MAX_BYTES {
             return None;
         }
         let first = reader.node(MAX_LEVELS)?;
-        let second = reader.takes(&[',']).then(|| reader.node(MAX_LEVELS));
+        let second = reader.skip(&[',']).then(|| reader.node(MAX_LEVELS));
         Some((first, second.flatten()))
     }
 

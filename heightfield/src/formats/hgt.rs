@@ -8,7 +8,7 @@ use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::placed::GroundUnit;
 use crate::raw_samples::RawSamples;
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{
     CellSize, CellUnit, Certainty, Endian, OpenOptions, RasterError, ReferenceSystem, SampleType,
 };
@@ -29,7 +29,7 @@ const VOID: f64 = -32768.0;
 /// neighbours.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let (columns, rows) = size(input.len())?;
-    let stored = Stored::Held(SampleType::I16);
+    let stored = StoredType::Held(SampleType::I16);
     let plain = RawSamples::packed((columns, rows), stored, Endian::Big, 0);
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), plain.storage(input, options)?);

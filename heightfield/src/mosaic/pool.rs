@@ -110,7 +110,7 @@ impl Pool {
                 found.0, found.1
             )));
         }
-        decoded.settle_no_data(options.no_data);
+        decoded.resolve_no_data(options.no_data);
         if let Storage::Blocks(blocks) = &decoded.storage {
             blocks.set_path(&source.path);
             let unreadable = self.unreadable.get(&number).copied().unwrap_or_default();
@@ -184,7 +184,7 @@ fn with_timeout<T: Send + 'static>(
 /// # Errors
 /// [`RasterError::Unsupported`] if that is too large.
 pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, RasterError> {
-    let Storage::Held { samples, .. } = &outline.storage else {
+    let Storage::Memory { samples, .. } = &outline.storage else {
         return Ok(0);
     };
     let (columns, rows) = (outline.columns, outline.rows);

@@ -88,7 +88,7 @@ impl OpenFile {
     /// Returns its memory, bytes, and the number of its unreadable blocks.
     pub(super) fn cache_use(&self) -> (usize, u32) {
         match &self.decoded.storage {
-            Storage::Held { samples, mask } => {
+            Storage::Memory { samples, mask } => {
                 let mask = mask.as_ref().map_or(0, |mask| mask.len() / 8);
                 (samples.bytes() + mask, 0)
             }
@@ -119,7 +119,7 @@ impl OpenFile {
 
     fn stored(&self, level: u8, column: u32, row: u32) -> (Option<f64>, ReadStatus) {
         match &self.decoded.storage {
-            Storage::Held { samples, mask } => {
+            Storage::Memory { samples, mask } => {
                 let index = row as usize * self.decoded.columns as usize + column as usize;
                 let is_no_data = mask.as_ref().is_some_and(|mask| mask.contains(index));
                 let value = with_samples!(samples, values => {

@@ -14,5 +14,5 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Rast
 /// Reads the header of one file of many. Some formats decode the whole file for that.
 pub(super) fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let input = FileBytes::open(path, &options.fetcher)?;
-    one_file::decode(&input.in_outline(true), options)
+    one_file::decode(&input.with_outline(true), options)
 }

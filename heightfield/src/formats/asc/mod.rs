@@ -13,13 +13,13 @@ use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::numbers::beginning;
 use crate::{CellSize, RasterError, SampleType, beside};
-use header::{Header, looks_like_header};
+use header::{Header, is_header};
 use tokens::Tokens;
 
 /// Esri ASCII grids.
 pub(super) const FORMAT: Format = Format {
     name: "Esri ASCII",
-    begins: looks_like_header,
+    begins: is_header,
     extensions: &[("asc", Claim::Decides), ("txt", Claim::Suggests)],
     parts: Parts::One,
     decode: |input, _| decode(input),

@@ -8,7 +8,7 @@ use super::layout::{Interleave, Layout};
 use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
 use crate::numbers::{self, NoDataText};
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{Endian, RasterError, SampleType};
 
 /// Returns true if a text is such a header: it has the number of columns and rows.
@@ -139,7 +139,7 @@ impl Keys {
         &self,
         extension: &str,
         by_length: Option<u64>,
-    ) -> Result<(Stored, Option<String>), RasterError> {
+    ) -> Result<(StoredType, Option<String>), RasterError> {
         let by_name = self.text("numbertype").map(number_type).transpose()?;
         let stated = self.count("nbits")?;
         let (bits, is_guess) = match (stated, by_name, by_length) {
@@ -166,9 +166,9 @@ impl Keys {
             (false, true) => 's',
             (false, false) => 'u',
         });
-        let stored = Stored::Held(sample_type(kind, bits)?);
+        let stored = StoredType::Held(sample_type(kind, bits)?);
         let remark = (is_guess && extension != "flt").then(|| {
-            let name = stored.held().none().type_name();
+            let name = stored.memory_type().none().type_name();
             format!("its header states no type of samples: by the length of the data it is {name}")
         });
         Ok((stored, remark))

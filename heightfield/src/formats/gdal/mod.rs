@@ -29,7 +29,7 @@ use crate::geometry::{metres_in, unknown_unit};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::{OpenOptions, RasterError, ReferenceSystem, gdal};
-use blocks::{GdalBlocks, Source, Turned, held};
+use blocks::{GdalBlocks, Source, Transposed, memory_type};
 pub(crate) use names::by_beginning;
 use place::Place;
 
@@ -129,7 +129,7 @@ fn opened(
         return Err(refused);
     }
     let dataset = match open(library, path, options) {
-        Err(RasterError::UnknownFormat) => match label_beside(path) {
+        Err(RasterError::UnknownFormat) => match find_label(path) {
             Some(label) => {
                 let mut decoded = opened(library, place, &label, head, options)?;
                 let name = label.file_name().unwrap_or_default().display().to_string();
@@ -197,7 +197,7 @@ fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> 
 }
 
 /// Returns the label of a planetary image, a separate file beside it.
-fn label_beside(path: &Path) -> Option<PathBuf> {
+fn find_label(path: &Path) -> Option<PathBuf> {
     let labels = ["lbl", "LBL", "xml", "XML"].map(|end| path.with_extension(end));
     labels
         .into_iter()
@@ -216,20 +216,20 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
         let last = name.rsplit([':', '/']).next().unwrap_or(name);
         last.trim_start_matches("asset=").to_owned()
     };
-    let asked = options.variable.as_deref();
+    let requested = options.variable.as_deref();
     let parts = dataset.subdatasets();
     let names: Vec<_> = parts.iter().map(|part| short(&part.name)).collect();
     let exact = parts
         .iter()
-        .position(|part| Some(part.name.as_str()) == asked);
-    if dataset.bands() > 0 && (asked.is_none() || asked == netcdf::variable(dataset).as_deref()) {
+        .position(|part| Some(part.name.as_str()) == requested);
+    if dataset.bands() > 0 && (requested.is_none() || requested == netcdf::variable(dataset).as_deref()) {
         return Ok(None);
     }
     if parts.is_empty() {
-        return Err(match asked {
-            Some(asked) => RasterError::NoSuchPart {
-                asked: format!("variable {asked}"),
-                there: "the file holds one raster".into(),
+        return Err(match requested {
+            Some(requested) => RasterError::NoSuchPart {
+                requested: format!("variable {requested}"),
+                available: "the file holds one raster".into(),
             },
             None => no_raster(&format!("its driver {}", dataset.driver())),
         });
@@ -240,7 +240,7 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
             // These are cell limits, not heights.
             let is_height = |name: &&String| !name.ends_with("_bnds") && !name.ends_with("_bounds");
             let named: Vec<_> = names.iter().filter(is_height).map(String::as_str).collect();
-            let at = height_name::choose("raster", &named, netcdf::HEIGHT_NAMES, asked)?;
+            let at = height_name::choose("raster", &named, netcdf::HEIGHT_NAMES, requested)?;
             let is_it = |name: &String| name == named[at];
             names.iter().position(is_it).unwrap_or_default()
         }
@@ -280,7 +280,7 @@ fn decoded(
         name,
         options: options.open_options.clone(),
     };
-    let blocks = GdalBlocks::new(source, dataset, number, held(stored), has_codes)?;
+    let blocks = GdalBlocks::new(source, dataset, number, memory_type(stored), has_codes)?;
     let overviews = blocks.images().iter().skip(1);
     let file_layout = FileLayout {
         bands,
@@ -289,7 +289,7 @@ fn decoded(
         samples_are: None,
     };
     let mut decoded = match conventions.is_turned {
-        true => read(Turned::new(blocks), &driver, options)?,
+        true => read(Transposed::new(blocks), &driver, options)?,
         false => read(blocks, &driver, options)?,
     };
     decoded.file_layout = file_layout;
@@ -324,7 +324,7 @@ fn decoded(
         decoded.lay_out(map, None);
     }
     if let Some(encoding) = options.encoding {
-        decoded.take_codes(encoding);
+        decoded.decode_as_codes(encoding);
     }
     Ok(decoded)
 }
@@ -333,8 +333,8 @@ fn decoded(
 fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), RasterError> {
     match options.band {
         Some(band) => Err(RasterError::NoSuchPart {
-            asked: format!("band {band} with --input encoding=…"),
-            there: "three bands together are one height".into(),
+            requested: format!("band {band} with --input encoding=…"),
+            available: "three bands together are one height".into(),
         }),
         None if stored == Stored::U8 && COLOURS.contains(&bands) => Ok(()),
         None => Err(no_codes("the file has other bands")),
@@ -349,23 +349,23 @@ fn read(
 ) -> Result<Decoded, RasterError> {
     let full = blocks.images()[0];
     let size = sides(full.columns.into(), full.rows.into())?;
-    let held = blocks.sample_type();
-    let format = format!("{driver} by GDAL, {}", held.none().type_name());
+    let sample_type = blocks.sample_type();
+    let format = format!("{driver} by GDAL, {}", sample_type.none().type_name());
     let samples = u64::from(full.columns) * u64::from(full.rows);
-    if samples * held.bytes() > options.max_in_memory_bytes {
+    if samples * sample_type.bytes() > options.max_in_memory_bytes {
         // Fails now if GDAL cannot decompress the samples; later, they would be no-data.
         blocks.read(0, &full.part([0, 0]))?;
         return Ok(Decoded::new(format, size, blocks));
     }
     let all = blocks.read(0, &Part::whole(full.columns, full.rows))?;
     let mut decoded = Decoded::new(format, size, all.samples);
-    decoded.storage.set_no_data(all.holes);
+    decoded.storage.set_no_data(all.no_data_mask);
     Ok(decoded)
 }
 
 fn fault(error: Error) -> RasterError {
     match error {
-        Error::NoSuchPart { asked, there } => RasterError::NoSuchPart { asked, there },
+        Error::NoSuchPart { requested, available } => RasterError::NoSuchPart { requested, available },
         Error::Refused(words) if UNKNOWN.iter().any(|unknown| words.contains(unknown)) => {
             RasterError::UnknownFormat
         }

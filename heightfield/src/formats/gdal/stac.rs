@@ -27,7 +27,7 @@ struct Item {
     /// Names and files.
     assets: Vec<(String, String)>,
     /// Columns and rows, and x and y of a sample's corner, as stated.
-    stated: Option<([u32; 2], [f64; 6])>,
+    georeference: Option<([u32; 2], [f64; 6])>,
 }
 
 /// Returns the reason why a document of items cannot be read; `None` if the file is something else.
@@ -69,8 +69,8 @@ pub(super) fn check_places(
         }
         let is_found = full(Path::new(file)).is_some_and(|file| files.contains(&file));
         let dataset = library.open(Path::new(file), &[]);
-        let lies_there = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
-        if !(is_found && lies_there) {
+        let is_at_its_place = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
+        if !(is_found && is_at_its_place) {
             let why = format!(
                 "the item {} does not lie where its file {file} does",
                 item.id
@@ -127,10 +127,10 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
     let text = input.head(MAX_BYTES)?;
     let document: Value = serde_json::from_slice(&text)
         .map_err(|error| RasterError::Damaged(format!("it is no JSON: {error}")))?;
-    let asked = match &options.variable {
+    let requested = match &options.variable {
         Some(name) => Some(Pattern::new(name).map_err(|error| RasterError::NoSuchPart {
-            asked: format!("variable {name}"),
-            there: format!("it is no pattern: {error}"),
+            requested: format!("variable {name}"),
+            available: format!("it is no pattern: {error}"),
         })?),
         None => None,
     };
@@ -144,20 +144,20 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
     let folder = named.parent().unwrap_or(Path::new(""));
     let items = features
         .into_iter()
-        .map(|item| Item::of(item, asked.as_ref(), folder));
+        .map(|item| Item::of(item, requested.as_ref(), folder));
     Ok(Some(items.collect()))
 }
 
 impl Item {
-    fn of(item: &Value, asked: Option<&Pattern>, folder: &Path) -> Self {
+    fn of(item: &Value, requested: Option<&Pattern>, folder: &Path) -> Self {
         let empty = serde_json::Map::new();
         let assets = item["assets"].as_object().unwrap_or(&empty);
-        let is_asked = |(name, asset): &(&String, &Value)| match asked {
-            Some(asked) => asked.matches(name),
+        let is_requested = |(name, asset): &(&String, &Value)| match requested {
+            Some(requested) => requested.matches(name),
             None => is_raster(asset),
         };
         let of_item = |key: &str| {
-            let own = assets.iter().filter(|asset| is_asked(asset));
+            let own = assets.iter().filter(|asset| is_requested(asset));
             let mut values = own
                 .map(|(_, asset)| &asset[key])
                 .chain([&item["properties"][key]]);
@@ -181,14 +181,14 @@ impl Item {
                 [x, x_column, x_row, y, y_column, y_row],
             ))
         };
-        let named = assets.iter().filter(is_asked);
+        let named = assets.iter().filter(is_requested);
         let files = named.filter_map(|(name, asset)| {
             Some((name.clone(), file(asset["href"].as_str()?, folder)))
         });
         Self {
             id: item["id"].as_str().unwrap_or("without a name").to_owned(),
             assets: files.collect(),
-            stated: place(),
+            georeference: place(),
         }
     }
 }
@@ -196,7 +196,7 @@ impl Item {
 impl Item {
     /// Returns true if the file's place matches the item's, or the item states none.
     fn is_place_of(&self, file: &Dataset) -> bool {
-        let Some((size, stated)) = self.stated else {
+        let Some((size, georeference)) = self.georeference else {
             return true;
         };
         let has_size = file.band(1).is_ok_and(|band| band.size() == size);
@@ -212,7 +212,7 @@ impl Item {
                 let is_near = |column: f64, row: f64| {
                     let both = corner(found, column, row)
                         .into_iter()
-                        .zip(corner(stated, column, row));
+                        .zip(corner(georeference, column, row));
                     both.into_iter()
                         .all(|(a, b)| (a - b).abs() <= TOLERANCE * cell)
                 };

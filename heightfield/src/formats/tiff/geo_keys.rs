@@ -63,7 +63,7 @@ impl GeoKeys {
     }
 
     /// Returns a code if it is EPSG's.
-    pub(super) fn known(&self, key: u16) -> Option<u16> {
+    pub(super) fn epsg_code(&self, key: u16) -> Option<u16> {
         const USER_DEFINED: u16 = 32767;
         self.code(key).filter(|code| *code != USER_DEFINED)
     }

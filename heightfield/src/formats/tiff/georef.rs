@@ -33,7 +33,7 @@ pub(super) fn apply(
     let of_code = |key| keys.code(key);
     let both = [PROJECTED_CRS_TYPE, GEODETIC_CRS_TYPE];
     let beside = || {
-        let mut found = (both.iter()).filter_map(|key| crs::vertical_beside(of_code(*key)?));
+        let mut found = (both.iter()).filter_map(|key| crs::vertical_of_compound(of_code(*key)?));
         found.next()
     };
     let system = of_code(VERTICAL_CS_TYPE)
@@ -87,8 +87,8 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
 /// Returns the horizontal reference system, by its code or its name.
 fn reference_system(keys: &GeoKeys, by_gdal: Option<&FileBytes>) -> Option<ReferenceSystem> {
     let code = match keys.is_projected()? {
-        true => keys.known(PROJECTED_CRS_TYPE),
-        false => keys.known(GEODETIC_CRS_TYPE),
+        true => keys.epsg_code(PROJECTED_CRS_TYPE),
+        false => keys.epsg_code(GEODETIC_CRS_TYPE),
     };
     let known = code.and_then(ReferenceSystem::from_code);
     if let Some(system) = known.or_else(|| system_in_text(keys)) {

@@ -63,7 +63,7 @@ pub(super) struct Made {
     /// A tag with other values.
     pub(super) other: Option<(u16, &'static [u32])>,
     /// A chunk to leave out, as in a sparse file.
-    pub(super) left_out: Option<usize>,
+    pub(super) omitted: Option<usize>,
     pub(super) packing: Packing,
 }
 
@@ -89,7 +89,7 @@ pub(super) const ONE_STRIP: Made = Made {
     bands: 1,
     is_planar: false,
     other: None,
-    left_out: None,
+    omitted: None,
     packing: PLAIN,
 };
 
@@ -175,7 +175,7 @@ impl Made {
         let mut places = vec![];
         let mut data = vec![0; 8];
         for (number, chunk) in chunks.iter().enumerate() {
-            let is_there = self.left_out != Some(number);
+            let is_there = self.omitted != Some(number);
             places.push(if is_there { data.len() as u32 } else { 0 });
             if is_there {
                 data.extend(chunk);

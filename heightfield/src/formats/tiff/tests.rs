@@ -300,16 +300,16 @@ fn grey(size: [u16; 2], bands: u16) -> Vec<(u16, u16, u32, Vec<u8>)> {
 #[test]
 fn transparent_alpha_samples_are_no_data() {
     let samples = [1, 255, 2, 0, 3, 7, 4, 255];
-    for (kind, holes) in [(1, 1), (2, 1), (0, 0)] {
+    for (kind, no_data_count) in [(1, 1), (2, 1), (0, 0)] {
         let mut tags = grey([2, 2], 2);
         tags.push(shorts(338, &[kind]));
         let raster = open(by_hand(&tags, &samples)).expect("a band and its alpha");
         assert_eq!(
             raster.summary().no_data,
-            holes,
+            no_data_count,
             "extra samples of kind {kind}"
         );
-        assert_eq!(raster.height(1, 1).is_nan(), holes == 1);
+        assert_eq!(raster.height(1, 1).is_nan(), no_data_count == 1);
         assert_eq!(raster.height(0, 0), 3.0);
     }
 }

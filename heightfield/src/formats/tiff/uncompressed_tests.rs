@@ -40,7 +40,7 @@ fn strips_and_tiles_of_several_bands_are_what_was_written() {
 fn only_the_omitted_tile_is_no_data() {
     let made = Made {
         chunk: [1024, 640],
-        left_out: Some(1),
+        omitted: Some(1),
         ..ONE_STRIP
     };
     for max_in_memory_bytes in [0, 1 << 30] {

@@ -7,7 +7,7 @@ use flate2::write::ZlibEncoder;
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
 use super::super::images;
-use super::super::layout::{Layout, Wanted};
+use super::super::layout::{Layout, NumberKind};
 use super::super::test_files::{
     BAND, BANDS, KINDS, Made, ONE_STRIP, Packing, SIZE, check, open, value,
 };
@@ -55,8 +55,8 @@ fn layout(made: &Made, bytes: Vec<u8>, max_bytes: u64) -> (tempfile::TempDir, La
     let input = FileBytes::unpacked("test.tif", bytes);
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
-    let asked = (made.bands > 1).then_some(BAND);
-    let mut layout = Layout::read(&full, Wanted::Heights(asked)).expect("a layout");
+    let requested = (made.bands > 1).then_some(BAND);
+    let mut layout = Layout::read(&full, NumberKind::Heights(requested)).expect("a layout");
     unpack::into_file(&mut layout, &disk).expect("a file");
     (folder, layout)
 }
@@ -169,12 +169,12 @@ fn strips_and_tiles_under_a_row_of_blocks_stay_unpacked() {
         chunk: [SIZE[0], 400],
         ..TILES
     };
-    let apart = Made {
+    let planar = Made {
         bands: BANDS,
         is_planar: true,
         ..strips
     };
-    for made in [TILES, strips, apart] {
+    for made in [TILES, strips, planar] {
         let (folder, mut layout) = layout(&made, made.bytes(), 1);
         if made.is_planar {
             // Its third band is the transparency.
@@ -271,7 +271,7 @@ fn unpacking_by_rows_refuses_lerc() {
     let input = FileBytes::unpacked("test.tif", made.bytes());
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
-    let mut layout = Layout::read(&full, Wanted::Heights(None)).expect("a layout");
+    let mut layout = Layout::read(&full, NumberKind::Heights(None)).expect("a layout");
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1);
     let error = unpack::into_file(&mut layout, &disk).expect_err("it comes as a whole");

@@ -49,8 +49,8 @@ pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()>
     }
     let bands = layout.bands_read().count() as u64;
     let all = layout.chunks_of_band().saturating_mul(bands).max(1);
-    let least = all.min(2 * u64::from(layout.chunks_across()) * bands);
-    let file = Unpacked::new(layout.chunk_size(), least..=all, disk)?;
+    let min = all.min(2 * u64::from(layout.chunks_across()) * bands);
+    let file = Unpacked::new(layout.chunk_size(), min..=all, disk)?;
     layout.unpacked = Some(Arc::new(file));
     Ok(())
 }
@@ -145,7 +145,7 @@ pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
 pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, RasterError> {
     let all = Part::whole(layout.columns, layout.rows);
     let stored = layout.sample();
-    let apart = layout.texel_bytes() as usize;
+    let stride = layout.texel_bytes() as usize;
     let first = layout.bytes_before(band);
     let count = u64::from(layout.columns) * u64::from(layout.rows);
     let mut samples = stored.room(count)?;
@@ -160,7 +160,7 @@ pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, Raster
         }
         let mut rows = Rows::of(layout, &chunk)?;
         for _ in 0..covers.rows {
-            stored.append(&mut samples, &rows.next()?[first..], apart, ENDIAN);
+            stored.append(&mut samples, &rows.next()?[first..], stride, ENDIAN);
         }
     }
     match samples.len() as u64 == count {
