@@ -22,7 +22,7 @@ fn rows(recording: &str) -> Vec<&str> {
 }
 
 #[test]
-fn rule_of_the_paper_is_stated_recorded_and_replayed() {
+fn paper_rule_is_printed_recorded_and_replayed() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     terrain_file(&folder.join("hills.tif"), Kind::Fractal, 64, 1);

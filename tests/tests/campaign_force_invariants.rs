@@ -133,7 +133,7 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
         let sample = at(tick, height, Vec3::Z * spring_n * times);
         reported |= watch.look(&sample, is_calm).is_err();
     }
-    (reported, watch.max_given_mj)
+    (reported, watch.max_gained_mj)
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn energy_created_by_taps_in_the_ramp_is_reported() {
             };
             reported |= watch.look(&sample, true).is_err();
         }
-        (reported, watch.max_given_mj)
+        (reported, watch.max_gained_mj)
     };
     let (reported, given) = tapped(0.0);
     assert!(!reported, "{given}");

@@ -8,7 +8,7 @@ use hapterra::published::Line;
 
 use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 /// Largest number of facets that hold it at once.
 const PLANES: usize = 3;
@@ -20,7 +20,7 @@ pub struct GodObject<'g> {
     grid: &'g Grid,
     hip: Option<[f64; 3]>,
     god: [f64; 3],
-    answer: Answer,
+    result: ContactResult,
 }
 
 impl<'g> GodObject<'g> {
@@ -31,7 +31,7 @@ impl<'g> GodObject<'g> {
             grid,
             hip: None,
             god: [0.0; 3],
-            answer: Answer::FREE,
+            result: ContactResult::FREE,
         }
     }
 
@@ -94,20 +94,20 @@ impl<'g> GodObject<'g> {
 }
 
 impl Haptics for GodObject<'_> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.hip = None;
-        self.answer = Answer::FREE;
+        self.result = ContactResult::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         let hip = hip.wide;
         match self.hip.replace(hip) {
             None => {
                 self.god = hip;
-                return self.answer;
+                return self.result;
             }
-            Some(last) if last == hip && !self.answer.touching => return self.answer,
+            Some(last) if last == hip && !self.result.touching => return self.result,
             Some(_) => {}
         }
         let mut facets = [Facet {
@@ -127,12 +127,12 @@ impl Haptics for GodObject<'_> {
             goal = nearest_on(&planes[..held], &hip);
         }
         self.god = goal;
-        self.answer = if held == 0 {
-            Answer::FREE
+        self.result = if held == 0 {
+            ContactResult::FREE
         } else {
-            Answer::touching([0, 1, 2].map(|i| (goal[i] - hip[i]) as f32))
+            ContactResult::touching([0, 1, 2].map(|i| (goal[i] - hip[i]) as f32))
         };
-        self.answer
+        self.result
     }
 }
 

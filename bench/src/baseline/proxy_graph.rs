@@ -3,7 +3,7 @@
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 /// Most moves in one tick.
 const MOVES: u32 = 4096;
@@ -29,7 +29,7 @@ pub struct ProxyGraph<'g> {
     grid: &'g Grid,
     hip: Option<[f64; 3]>,
     node: Option<Node>,
-    answer: Answer,
+    result: ContactResult,
 }
 
 impl<'g> ProxyGraph<'g> {
@@ -40,7 +40,7 @@ impl<'g> ProxyGraph<'g> {
             grid,
             hip: None,
             node: None,
-            answer: Answer::FREE,
+            result: ContactResult::FREE,
         }
     }
 
@@ -124,31 +124,31 @@ impl<'g> ProxyGraph<'g> {
 }
 
 impl Haptics for ProxyGraph<'_> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.hip = None;
         self.node = None;
-        self.answer = Answer::FREE;
+        self.result = ContactResult::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         let hip = hip.wide;
         if self.hip.replace(hip) == Some(hip) {
-            return self.answer;
+            return self.result;
         }
         if self.depth(&hip).is_none_or(|depth| depth <= 0.0) {
             self.node = None;
-            self.answer = Answer::FREE;
-            return self.answer;
+            self.result = ContactResult::FREE;
+            return self.result;
         }
         let start = match &self.node {
             Some(node) => self.on_edge(node.post, node.to, &hip),
             None => self.on_edge([hip[0] as i32, hip[1] as i32], SPOKES[0], &hip),
         };
         self.node = start.map(|start| self.descend(start, &hip));
-        self.answer = self.node.map_or(Answer::FREE, |node| {
-            Answer::touching(node.displacement.map(|x| x as f32))
+        self.result = self.node.map_or(ContactResult::FREE, |node| {
+            ContactResult::touching(node.displacement.map(|x| x as f32))
         });
-        self.answer
+        self.result
     }
 }

@@ -40,8 +40,8 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
         max: Some(MAX),
         ..Target::default()
     };
-    let row = |name: &str, wanted: &dyn Fn(&CountedScene) -> bool| {
-        let own: Vec<&CountedScene> = counted.iter().filter(|scene| wanted(scene)).collect();
+    let row = |name: &str, requested: &dyn Fn(&CountedScene) -> bool| {
+        let own: Vec<&CountedScene> = counted.iter().filter(|scene| requested(scene)).collect();
         assert!(own.len() >= OF_EACH, "{name}: {} scenes", own.len());
         let ticks = own.iter().flat_map(|scene| scene.ticks.iter().copied());
         let row = Row::new(name, target, ticks.collect());
@@ -91,7 +91,7 @@ fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
 
 /// Replays the scenes on all cores, and those with the costliest known ticks.
 fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedScene> {
-    let [smooth, rough] = Table::kept_scenes();
+    let [smooth, rough] = Table::recorded_scenes();
     let mut costliest = match surface {
         Surface::Smooth => smooth,
         Surface::Rough => rough,

@@ -131,7 +131,7 @@ fn counted_work() -> u32 {
 
 /// Returns the most cycles of the stored table's rows whose names are in the list, or begin with an
 /// entry that ends in `*`.
-fn kept(names: &[&str], is_m7: bool) -> u32 {
+fn recorded(names: &[&str], is_m7: bool) -> u32 {
     let table = std::fs::read_to_string(repository().join("bench/cycles.csv")).expect("the table");
     let column = if is_m7 { 0 } else { 3 };
     let rows = table.lines().skip(1).map(|line| {
@@ -160,12 +160,12 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
         ("nucleo-h743zi2", true, 456_000_000, 0),
         ("nucleo-h743zi2-spi", true, 456_000_000, 15),
     ] {
-        let scene = kept(&["chain, sliding fast, rough, controller"], is_m7);
+        let scene = recorded(&["chain, sliding fast, rough, controller"], is_m7);
         let own = Row::read(board).cycles[1] - scene;
-        let around = kept(&["chain, sliding fast, all effects and materials"], is_m7)
-            - kept(&["sliding fast, rough"], is_m7);
-        let whole = kept(&["chain*"], is_m7);
-        let contact = kept(&["soak*", "compared scenes"], is_m7);
+        let around = recorded(&["chain, sliding fast, all effects and materials"], is_m7)
+            - recorded(&["sliding fast, rough"], is_m7);
+        let whole = recorded(&["chain*"], is_m7);
+        let contact = recorded(&["soak*", "compared scenes"], is_m7);
         let costliest = whole.max(contact + around);
         let us = (costliest + own).div_ceil(core_hz / 1_000_000) + frames_us;
         println!("{board}: {us} µs at most");
@@ -173,7 +173,7 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
         // to the scenes on materials.
         let slow = TickRate::new(1_000).expect("a rate");
         let more = u64::from(contact) * u64::from(work_per_tick(slow)) / u64::from(counted_work());
-        let materials = kept(&["compared scenes on materials"], is_m7);
+        let materials = recorded(&["compared scenes on materials"], is_m7);
         let costliest = u64::from(materials).max(more + u64::from(around));
         let cycles = costliest + u64::from(own + frames_us * (core_hz / 1_000_000));
         println!("{board}: {cycles} cycles at most at 1 kHz");

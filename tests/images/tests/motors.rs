@@ -113,14 +113,14 @@ fn a_reset_under_load_keeps_the_motors_temperatures() {
         let mut again = Device::open(device.reset(), terrain, scene);
         let after = again.ask_status().health.winding_c;
         println!("{board}: {before} °C before the reset, {after} after it");
-        let kept = after - before;
+        let recorded = after - before;
         // The start takes a moment, in which the windings cool a little.
         assert!(
-            kept.cmpgt(Vec3::splat(0.0)).all(),
+            recorded.cmpgt(Vec3::splat(0.0)).all(),
             "{board}: {before} {after}"
         );
         assert!(
-            kept.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
+            recorded.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
             "{board}: {before} {after}"
         );
         // Each axis has its own temperature: the one that pushed is the warmest.

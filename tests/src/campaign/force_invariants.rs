@@ -16,7 +16,7 @@ use super::limit_cycle::{MAX_TURNS, Swing};
 const LATE: f32 = 0.11;
 /// Energy that a contact may create with the controller on, mJ: a hundredth of a tap's without it
 /// (docs/explanation/effects.md).
-const GIVEN_MJ: f32 = 0.05;
+const GAINED_MJ: f32 = 0.05;
 /// Additional energy that shaded ground may create until its force is no longer turned
 /// (docs/explanation/effects.md), mJ: a constant, a fraction of the largest force times a cell and
 /// the depth, and the bound of both.
@@ -44,7 +44,7 @@ pub struct ForceWatch {
     /// The contact in progress, if all of it is known.
     contact: Option<Touched>,
     /// The most energy that a contact has given to the tip with the controller on, mJ.
-    pub max_given_mj: f32,
+    pub max_gained_mj: f32,
     /// Ticks of these contacts.
     pub watched_ticks: u64,
     /// Those of `watched_ticks` during the ramp.
@@ -63,7 +63,7 @@ pub struct ForceWatch {
 #[derive(Clone, Copy, Debug, Default)]
 struct Touched {
     /// The work of its force at the tip, mJ, less the energy due to a rising stiffness.
-    given_mj: f32,
+    gained_mj: f32,
     deepest_mm: f32,
 }
 
@@ -77,7 +77,7 @@ impl ForceWatch {
             last: None,
             before_n: Vec3::ZERO,
             contact: None,
-            max_given_mj: 0.0,
+            max_gained_mj: 0.0,
             watched_ticks: 0,
             ramp_ticks: 0,
             clutch_ticks: 0,
@@ -201,7 +201,7 @@ impl ForceWatch {
             false => self.contact,
         }
         .map(|so_far| Touched {
-            given_mj: so_far.given_mj + work_mj - meant_mj,
+            gained_mj: so_far.gained_mj + work_mj - meant_mj,
             deepest_mm: so_far.deepest_mm.max(depth_mm),
         });
         let along = sample.force_n.normalize_or_zero();
@@ -218,14 +218,14 @@ impl ForceWatch {
         self.watched_ticks += 1;
         self.ramp_ticks += u64::from(sample.limits.contains(Limits::RAMPING) && is_rendered);
         self.clutch_ticks += u64::from(sample.limits.contains(Limits::CLUTCH_MOVES) && is_rendered);
-        self.max_given_mj = self.max_given_mj.max(contact.given_mj);
+        self.max_gained_mj = self.max_gained_mj.max(contact.gained_mj);
         let [high_mm, _] = self.surfaces.relief();
         let textures = 2.0 * self.surfaces.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
         let shading = match self.surfaces.is_shaded() {
             true => self.shading_mj(contact.deepest_mm),
             false => 0.0,
         };
-        match contact.given_mj <= GIVEN_MJ + shading + textures {
+        match contact.gained_mj <= GAINED_MJ + shading + textures {
             true => Ok(()),
             false => Err(format!("the ground gave {contact:?}: {sample:?}")),
         }

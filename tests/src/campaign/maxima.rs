@@ -37,8 +37,8 @@ pub struct Maxima {
     /// Energy that the ticks have created, as reported by the device, mJ.
     pub created_mj: f32,
     /// The most energy that a contact has given to the tip with the controller on, mJ.
-    pub given_mj: f32,
-    /// Ticks in which `given_mj` was computed.
+    pub gained_mj: f32,
+    /// Ticks in which `gained_mj` was computed.
     pub watched_ticks: u64,
     /// Those of `watched_ticks` during the ramp.
     pub ramp_ticks: u64,
@@ -66,7 +66,7 @@ impl Maxima {
             slew_n: self.slew_n.max(other.slew_n),
             winding_c: self.winding_c.max(other.winding_c),
             created_mj: self.created_mj.max(other.created_mj),
-            given_mj: self.given_mj.max(other.given_mj),
+            gained_mj: self.gained_mj.max(other.gained_mj),
             watched_ticks: self.watched_ticks + other.watched_ticks,
             ramp_ticks: self.ramp_ticks + other.ramp_ticks,
             clutch_ticks: self.clutch_ticks + other.clutch_ticks,

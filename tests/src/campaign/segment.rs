@@ -83,7 +83,7 @@ pub fn run(
     let mut running = Segment::new(&terrain, effects, random);
     let played = running.play(stats);
     let forces = &running.forces;
-    running.watch.extremes.given_mj = forces.max_given_mj;
+    running.watch.extremes.gained_mj = forces.max_gained_mj;
     running.watch.extremes.watched_ticks = forces.watched_ticks;
     running.watch.extremes.ramp_ticks = forces.ramp_ticks;
     running.watch.extremes.clutch_ticks = forces.clutch_ticks;

@@ -81,7 +81,7 @@ pub(super) struct Plots {
     height_per_mm: f64,
     tick: Option<TickCost>,
     /// Energy transferred to the hand since the beginning, mJ.
-    given_mj: f64,
+    gained_mj: f64,
     /// Samples that are not plotted yet.
     waiting: Vec<Sample>,
     before: Option<Sample>,
@@ -93,7 +93,7 @@ impl Plots {
         Self {
             height_per_mm: scene.height_per_mm,
             tick: scene.tick.clone(),
-            given_mj: 0.0,
+            gained_mj: 0.0,
             waiting: Vec::new(),
             before: None,
             link: None,
@@ -175,9 +175,9 @@ impl Plots {
         if let Some(before) = self.before.replace(*sample) {
             let pairs = sample.hip_mm.iter().zip(before.hip_mm);
             let moved = pairs.map(|(now, before)| now - before);
-            self.given_mj += force.iter().zip(moved).map(|(f, d)| f * d).sum::<f64>();
+            self.gained_mj += force.iter().zip(moved).map(|(f, d)| f * d).sum::<f64>();
         }
-        vec![held, self.given_mj]
+        vec![held, self.gained_mj]
     }
 }
 
