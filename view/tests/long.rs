@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use common::browser::{Browser, Page, program};
-use common::{Running, emulated, folder, hapterra, memory_of, signal, started_by};
+use common::{Running, emulated, folder, hapterra, memory_of, signal, child_process};
 
 /// Memory bound of the viewer: the history is full after some minutes, and the rest is noise of the
 /// allocator.
@@ -76,7 +76,7 @@ fn harm(reported: &str) -> Vec<&str> {
 }
 
 #[test]
-fn each_bad_figure_is_reported_alone() {
+fn each_bad_figure_is_reported() {
     let good = "ticks          9 run, 0 late\n\
                 tiles          8 fetched (35044 bytes), 2 of them again\n\
                 telemetry      9 samples, 0 lost on the link, 0 dropped by the device\n";
@@ -95,7 +95,7 @@ fn each_bad_figure_is_reported_alone() {
 
 #[test]
 #[ignore = "takes ten minutes"]
-fn ten_minutes_of_history_stay_bounded() {
+fn history_of_ten_minutes_is_bounded() {
     let folder = folder("long");
     let Some(mut demo) = touching(&folder) else {
         println!("SKIPPED: HAPTERRA names no program");
@@ -106,9 +106,9 @@ fn ten_minutes_of_history_stay_bounded() {
     let is_alone = std::env::var_os("ALONE").is_some();
     let options = std::env::var("HAPTERRA_VIEW_OPTIONS").unwrap_or_default();
     let since = Instant::now();
-    let mut demo = Running::shown(&mut demo, &options);
+    let mut demo = Running::start_with_viewer(&mut demo, &options);
     let address = demo.address();
-    let viewer = started_by(demo.id(), "hapterra-view").expect("the viewer runs");
+    let viewer = child_process(demo.id(), "hapterra-view").expect("the viewer runs");
     let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
     let page = browser.open(&address);
     let mut second = None;
@@ -120,7 +120,7 @@ fn ten_minutes_of_history_stay_bounded() {
     for minute in 1..=minutes {
         let until = Duration::from_secs(60 * minute);
         std::thread::sleep(until.saturating_sub(began.elapsed()));
-        assert!(demo.goes_on(), "{}", demo.words());
+        assert!(demo.is_running(), "{}", demo.output());
         let of_page = of_page(&mut browser, &page);
         let figures = [memory_of(demo.id()), memory_of(viewer), of_page.bytes];
         for (most, now) in most.iter_mut().zip(figures) {
@@ -145,7 +145,7 @@ fn ten_minutes_of_history_stay_bounded() {
     drop(browser);
     demo.interrupt();
     let ended_well = demo.end();
-    let reported = demo.words();
+    let reported = demo.output();
     println!("{reported}\nmost, bytes: {most:?}");
     assert!(ended_well, "{reported}");
     assert_eq!(harm(&reported), Vec::<&str>::new(), "{reported}");

@@ -42,7 +42,7 @@ impl Shown {
             .args(["--commands", "-", "--out"])
             .arg(&folder)
             .stdin(Stdio::piped());
-        let mut demo = Running::shown(&mut demo, "");
+        let mut demo = Running::start_with_viewer(&mut demo, "");
         let address = demo.address();
         demo.type_lines(typed);
         let began = Instant::now();

@@ -72,7 +72,7 @@ fn page_receives_the_coarse_layer_before_finer_ones() {
     let mut messages = vec![greeting(), scene(true), Message::Layer(whole), finer];
     messages.extend(batch(0, 300, &mut vec![]));
     for message in &messages {
-        assert!(viewer.tell(message));
+        assert!(viewer.send(message));
     }
     let reported = reported(viewer.port());
     check(&reported, &["/terrain/layer1/", "/terrain/tiles/"]);
@@ -96,9 +96,9 @@ fn demo_page_receives_the_coarse_layer_first() {
         .arg("--out")
         .arg(&folder);
     let began = Instant::now();
-    let mut demo = Running::shown(&mut demo, "");
+    let mut demo = Running::start_with_viewer(&mut demo, "");
     // This line begins the session with the device.
-    demo.tells("device ");
+    demo.wait_for_line("device ");
     let (read, session) = (began.elapsed(), Instant::now());
     let port = demo.port();
     let stated = session.elapsed();
