@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::run::{output, say, shown};
+use crate::run::{output, report, command_line};
 
 /// Returns the nightly compiler's cargo, independent of the toolchain that runs this program.
 pub(crate) fn cargo(words: &[&str]) -> Command {
@@ -30,7 +30,7 @@ pub(crate) fn ready(words: &[&str], components: &str) -> Result<()> {
         install.args(["--component", components]);
     }
     let line = shown(&install);
-    say(format!("installing: {line}"));
+    report(format!("installing: {line}"));
     let installed = output(&mut install).is_some() && is_here();
     ensure!(
         installed,

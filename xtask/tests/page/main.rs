@@ -87,7 +87,7 @@ fn saved_path_replays_with_bit_identical_forces() {
     let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
     site.wait("hapterra.touch.surface.friction === 0.5 && hapterra.touch.surface.texture === 0.22");
     stroke(&mut site);
-    let colours = site.seen_near_the_ball();
+    let colours = site.pixels_near_the_ball();
     assert!(colours.count > 400, "{colours:?}");
     assert!(colours.near.iter().all(|pixels| *pixels > 5), "{colours:?}");
     let Some(line) = check_saved(&mut site, "changed", 1000) else {

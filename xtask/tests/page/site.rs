@@ -112,7 +112,7 @@ impl Site {
     }
 
     /// Counts colours of the ground seen from above the ball, near and with the hand at rest.
-    pub(crate) fn seen_near_the_ball(&mut self) -> Colours {
+    pub(crate) fn pixels_near_the_ball(&mut self) -> Colours {
         let _ = self.value(
             "(({ scene, pointer, touch }) => {
                 pointer.at = [];
