@@ -16,7 +16,7 @@ use crate::timeouts::pass;
 
 /// Bytes of one read, and the pause between two reads.
 const PAUSE: Duration = Duration::from_millis(100);
-const SIP: usize = 1_024;
+const CHUNK_BYTES: usize = 1_024;
 
 /// Starts a device that accepts every scene, repeats requests for the same tiles, and reads a few
 /// bytes from time to time.
@@ -37,7 +37,7 @@ pub fn start() -> SocketAddr {
 
 fn answer(mut host: TcpStream) {
     let mut reader = FrameReader::<MAX_FRAME>::new();
-    let mut chunk = [0; SIP];
+    let mut chunk = [0; CHUNK_BYTES];
     let mut epoch = None;
     while let Ok(read @ 1..) = host.read(&mut chunk) {
         let mut bytes = &chunk[..read];

@@ -191,7 +191,7 @@ mod tests {
     use crate::scene::terrain::Kind;
 
     #[test]
-    fn both_sides_of_a_ridge_and_the_bottom_of_a_valley() {
+    fn minima_are_found_on_ridges_and_in_valleys() {
         let ridge = Terrain::from_fn(Kind::Ridges, [8, 8], |x, _| -((x - 4).abs() as f32));
         let hip = [4.0, 3.5, -0.001];
         let all = around(&ridge, hip, [4.0, 3.5]);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_twist_has_more_than_one() {
+    fn twisted_patch_has_several_minima() {
         // z = 8·(u − ½)·(v − ½): seen from far below the middle, two corners are near.
         let saddle = Terrain::from_fn(
             Kind::Twisted,

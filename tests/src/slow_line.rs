@@ -172,7 +172,7 @@ impl OnBoard {
     }
 
     /// Counts the answers to heartbeats that end in these bytes.
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn receive(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.from_link.push(bytes);
             bytes = &bytes[taken..];
@@ -199,7 +199,7 @@ impl OnBoard {
         let mut stated = vec![];
         while self.unanswered > 0 {
             let more = self.read();
-            self.hear(&more);
+            self.receive(&more);
             stated.extend(more);
         }
         stated
@@ -223,7 +223,7 @@ impl Stepped for OnBoard {
     fn exchange(&mut self, frames: &[u8]) -> Vec<u8> {
         self.link.send(frames).expect("the board is there");
         let stated = self.read();
-        self.hear(&stated);
+        self.receive(&stated);
         stated
     }
 

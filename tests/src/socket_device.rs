@@ -35,8 +35,8 @@ struct Seen {
     /// Ticks of the device.
     ticks: AtomicU64,
     /// Messages to open and close a session that it missed while deaf.
-    unheard_hellos: AtomicU64,
-    unheard_byes: AtomicU64,
+    ignored_hellos: AtomicU64,
+    ignored_byes: AtomicU64,
 }
 
 impl SocketDevice {
@@ -75,26 +75,26 @@ impl SocketDevice {
     }
 
     /// Waits until a host has sent an open to the deaf device.
-    pub fn wait_for_unheard_hello(&self) {
-        let hellos = &self.seen.unheard_hellos;
+    pub fn wait_for_ignored_hello(&self) {
+        let hellos = &self.seen.ignored_hellos;
         wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
     }
 
     /// Waits until a host has sent a close to the deaf device.
-    pub fn wait_for_unheard_bye(&self) {
-        let byes = &self.seen.unheard_byes;
+    pub fn wait_for_ignored_bye(&self) {
+        let byes = &self.seen.ignored_byes;
         wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
     }
 
     /// Waits until a host or its guardian has sent the deaf device a message that ends a session.
-    pub fn wait_for_unheard_end(&self) {
+    pub fn wait_for_ignored_end(&self) {
         let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
         let Seen {
-            unheard_hellos,
-            unheard_byes,
+            ignored_hellos,
+            ignored_byes,
             ..
         } = &*self.seen;
-        wait_until("an end", || count(unheard_hellos) + count(unheard_byes) > 0);
+        wait_until("an end", || count(ignored_hellos) + count(ignored_byes) > 0);
     }
 
     /// Returns the end of the last session, as reported to the next host.
@@ -156,8 +156,8 @@ fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
         let (taken, content) = reader.push(bytes);
         bytes = &bytes[taken..];
         let count = match content.and_then(Result::ok).and_then(stated_by_host) {
-            Some(stated) if matches!(stated.message, ToDevice::Hello(_)) => &seen.unheard_hellos,
-            Some(stated) if stated.message == ToDevice::Bye => &seen.unheard_byes,
+            Some(stated) if matches!(stated.message, ToDevice::Hello(_)) => &seen.ignored_hellos,
+            Some(stated) if stated.message == ToDevice::Bye => &seen.ignored_byes,
             _ => continue,
         };
         count.fetch_add(1, Ordering::Relaxed);

@@ -7,7 +7,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::TickRecord;
 use hapterra_tests::campaign::hostile_calibrations;
 use hapterra_tests::campaign::maxima::OFF_COUNTS;
-use hapterra_tests::campaign::tick_invariants::{Truth, Watch};
+use hapterra_tests::campaign::tick_invariants::{Truth, TickChecks};
 use hapterra_tests::random::Random;
 
 const ZERO: [i32; 3] = [100, -200, 300];
@@ -46,9 +46,9 @@ impl Tick {
         }
     }
 
-    fn judged(&self) -> (Watch, Result<(), String>) {
-        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        let stated = watch.drive(&self.drive, &self.sense, ZERO, &self.truth);
+    fn judged(&self) -> (TickChecks, Result<(), String>) {
+        let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        let stated = watch.check_outputs(&self.drive, &self.sense, ZERO, &self.truth);
         (watch, stated)
     }
 
@@ -126,9 +126,9 @@ fn held_outputs_require_permission_and_disabled_amplifiers() {
             enabled,
             held,
         };
-        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
         watch.may_hold = may_hold;
-        watch.drive(&tick.drive, &tick.sense, ZERO, &tick.truth)
+        watch.check_outputs(&tick.drive, &tick.sense, ZERO, &tick.truth)
     };
     let half = Vec3::splat(0.5);
     assert_eq!(held(false, half, true), Ok(()));
@@ -188,8 +188,8 @@ fn a_singular_pose_is_counted_not_judged() {
 #[test]
 fn a_command_that_is_held_is_judged_by_what_is_true() {
     let held = |tick: &Tick| {
-        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        watch.held(&tick.drive, &tick.truth)
+        let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        watch.check_held(&tick.drive, &tick.truth)
     };
     let mut tick = Tick::pushing(up(7.6));
     tick.sense.dead_man = false;
@@ -206,10 +206,10 @@ fn a_command_that_is_held_is_judged_by_what_is_true() {
 
 #[test]
 fn underestimated_winding_temperature_is_reported() {
-    let watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+    let watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let mut tick = Tick::pushing(up(1.0));
     let reported =
-        |believed_c: f32, tick: &Tick| watch.warmth(Vec3::new(90.0, 90.0, believed_c), &tick.truth);
+        |believed_c: f32, tick: &Tick| watch.check_temperature(Vec3::new(90.0, 90.0, believed_c), &tick.truth);
     tick.truth.winding_c = [90.0, 30.0, 80.0];
     assert_eq!(reported(100.0, &tick), Ok(()));
     assert_eq!(reported(79.5, &tick), Ok(()));
@@ -255,12 +255,12 @@ fn sample(tick: u32, force_n: Vec3) -> TickRecord {
 
 /// Returns the result for the last of these samples; the others pass.
 fn reported(samples: &[TickRecord]) -> Result<(), String> {
-    let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+    let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let (last, before) = samples.split_last().expect("one");
     for sample in before {
-        assert_eq!(watch.sample(sample, 8.5), Ok(()));
+        assert_eq!(watch.check_sample(sample, 8.5), Ok(()));
     }
-    watch.sample(last, 8.5)
+    watch.check_sample(last, 8.5)
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn holds_the_exact_field(reader: Reader) {
         "float.flt",
         "envi.dat",
     ] {
-        if !reader.knows(name) {
+        if !reader.supports(name) {
             continue;
         }
         let raster = open_by(reader, name, &OpenOptions::default());
@@ -85,7 +85,7 @@ fn holds_the_exact_field(reader: Reader) {
             "{name}"
         );
     }
-    if !reader.knows("n34w119.dt0") {
+    if !reader.supports("n34w119.dt0") {
         return;
     }
     let dted = open_by(reader, "n34w119.dt0", &OpenOptions::default());

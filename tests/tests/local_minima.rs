@@ -47,7 +47,7 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     let seen = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
     for (tick, now) in seen.iter().enumerate() {
-        let reported = judge.all(now);
+        let reported = judge.violations(now);
         let reported = reported
             .iter()
             .any(|v| v.invariant == Invariant::LocalMinimum);

@@ -106,9 +106,9 @@ fn reports(terrain: &Terrain, ticks: &[ObservedTick]) -> Vec<Violation> {
 fn reports_of(mut judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Violation> {
     let (last, before) = ticks.split_last().expect("there are ticks");
     for seen in before {
-        assert_eq!(judge.all(seen), [], "before the forged one");
+        assert_eq!(judge.violations(seen), [], "before the forged one");
     }
-    judge.all(last)
+    judge.violations(last)
 }
 
 /// Returns the invariants that the last of these ticks breaks.
@@ -285,9 +285,9 @@ fn a_force_that_is_textured_otherwise_is_found() {
             .take(60 * usize::from(honest.is_some()))
         {
             // The fade-in is not checked here.
-            let _ = judge.all(seen);
+            let _ = judge.violations(seen);
         }
-        let reported = judge.all(&last);
+        let reported = judge.violations(&last);
         reported
             .iter()
             .map(|violation| violation.invariant)

@@ -12,22 +12,22 @@ fn thousand(surface: Surface) -> LinkStats {
     let [waiting, free, touching, _] = total.states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
     // Repeated, shifted, in another window, mirrored or turned.
-    let twins = total.twins;
+    let metamorphic = total.metamorphic;
     assert!(
-        twins
+        metamorphic
             .iter()
             .zip([150, 100, 50, 50])
             .all(|(n, least)| *n >= least),
-        "{twins:?}"
+        "{metamorphic:?}"
     );
     // In another window, shifted, mirrored or turned.
-    let (judged, twins) = (total.on_materials, total.twins_on_materials);
+    let (judged, metamorphic) = (total.on_materials, total.metamorphic_on_materials);
     assert!(
         judged.in_whole > 20_000 && judged.changing > 10_000,
         "{judged:?}"
     );
     assert!(100 * judged.open < judged.in_whole, "{judged:?}");
-    assert!(twins.iter().all(|n| *n >= 20), "{twins:?}");
+    assert!(metamorphic.iter().all(|n| *n >= 20), "{metamorphic:?}");
     stats
 }
 

@@ -112,7 +112,7 @@ fn every_variant_decodes_to_the_exact_samples() {
     for (name, description) in variants(&folder) {
         if let Some(truth) = expected(&folder, &name, &description) {
             let path = folder.join(&name);
-            for reader in Reader::all().iter().filter(|reader| reader.knows(&name)) {
+            for reader in Reader::all().iter().filter(|reader| reader.supports(&name)) {
                 let raster = reader.open(&path, &OpenOptions::default());
                 let raster = raster.unwrap_or_else(|error| panic!("{reader:?}: {error}"));
                 assert_heights(&raster, &truth, &format!("{name} by {reader:?}"));

@@ -9,7 +9,7 @@ use hapterra::terrain::Terrain;
 use crate::random::Random;
 
 /// Range of the hand around the home pose, east and north, mm.
-const REACH_MM: [f64; 2] = [55.0, 30.0];
+const MAX_OFFSET_MM: [f64; 2] = [55.0, 30.0];
 /// Vertical speed of the hand except during a yank, mm/s.
 const UP_AND_DOWN_MM_S: f64 = 100.0;
 /// Height above the terrain while the arm is being armed, mm.
@@ -118,18 +118,18 @@ impl<'t> Arm<'t> {
             libm::sin(TAU * turns * self.t_s + phase)
         };
         let [home_east, home_north, _] = self.placement.home_mm;
-        let east = home_east + REACH_MM[0] * (0.6 * wave(0) + 0.4 * wave(1));
-        let north = home_north + REACH_MM[1] * (0.6 * wave(2) + 0.4 * wave(3));
-        let wanted = match mood {
+        let east = home_east + MAX_OFFSET_MM[0] * (0.6 * wave(0) + 0.4 * wave(1));
+        let north = home_north + MAX_OFFSET_MM[1] * (0.6 * wave(2) + 0.4 * wave(3));
+        let expected = match mood {
             Mood::Lifted => LIFTED_MM,
             Mood::Presses => -70.0,
             Mood::Wanders | Mood::Yanked(_) => -5.0 + 7.0 * wave(4) + 5.0 * wave(5),
         };
-        let most = UP_AND_DOWN_MM_S * TICK_S;
-        self.above_mm += (wanted - self.above_mm).clamp(-most, most);
+        let max = UP_AND_DOWN_MM_S * TICK_S;
+        self.above_mm += (expected - self.above_mm).clamp(-max, max);
         // Over no-data the hand keeps its height.
         if let Some(ground) = self.terrain.height_mm(east, north) {
-            self.ground_mm += (ground - self.ground_mm).clamp(-2.0 * most, 2.0 * most);
+            self.ground_mm += (ground - self.ground_mm).clamp(-2.0 * max, 2.0 * max);
         }
         let mut target = [east, north, self.ground_mm + self.above_mm];
         for (at, turns) in target.iter_mut().zip(TREMOR_HZ) {

@@ -56,12 +56,12 @@ pub struct Maxima {
 impl Maxima {
     /// Returns the larger of each value, and the sum of the ticks.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         Self {
             force_n: self.force_n.max(other.force_n),
             read_force_n: self.read_force_n.max(other.read_force_n),
             tip_force_n: self.tip_force_n.max(other.tip_force_n),
-            misled: self.misled.or(other.misled),
+            misled: self.misled.max(other.misled),
             current_a: self.current_a.max(other.current_a),
             slew_n: self.slew_n.max(other.slew_n),
             winding_c: self.winding_c.max(other.winding_c),
@@ -80,7 +80,7 @@ impl Maxima {
 impl Misled {
     /// Returns the one with the larger force.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         if other.force_n > self.force_n {
             other
         } else {

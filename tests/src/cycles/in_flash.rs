@@ -7,7 +7,7 @@ const TO: &str = "_tick_in_flash_end = .;";
 
 /// Returns true if the function of this mangled name stays in flash.
 #[must_use]
-pub fn is_left(name: &str) -> bool {
+pub fn is_in_flash(name: &str) -> bool {
     patterns().any(|pattern| fits(name, pattern))
 }
 
@@ -42,12 +42,12 @@ mod tests {
                 "{pattern}"
             );
         }
-        assert!(is_left(
+        assert!(is_in_flash(
             "_ZN13hapterra_core7haptics16Haptics$LT$_$GT$10take_scene17h9bE"
         ));
-        assert!(!is_left(
+        assert!(!is_in_flash(
             "_ZN13hapterra_core4feel4Feel12with_effects17h8c6b8f46a38d6445E"
         ));
-        assert!(!is_left("memcpy"));
+        assert!(!is_in_flash("memcpy"));
     }
 }

@@ -294,8 +294,8 @@ pub fn look(outcome: &Outcome, params: &SurfaceParams) {
     let limit = f64::from(params.max_force_n.max(f32::MIN_POSITIVE)) * (1.0 + 1e-6);
     assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
     assert!(drive.currents_a.is_finite(), "{outcome:?}");
-    let most = Calibration::PREMIUM_1_5.peak_current_a;
-    assert!(drive.currents_a.abs().cmple(most).all(), "{outcome:?}");
+    let max = Calibration::PREMIUM_1_5.peak_current_a;
+    assert!(drive.currents_a.abs().cmple(max).all(), "{outcome:?}");
     let off = drive.currents_a == Vec3::ZERO;
     assert!(drive.enabled || off, "{outcome:?}");
     assert!(sample.fault.is_none() || !drive.enabled, "{outcome:?}");

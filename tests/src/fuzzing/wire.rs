@@ -61,11 +61,11 @@ impl Wire {
             bytes.0 = rest;
             match kind % 4 {
                 // Unchanged.
-                0 => self.hear(chunk),
+                0 => self.receive(chunk),
                 // In a frame with a correct checksum, so that its content is parsed.
-                1 => self.hear(&framed(chunk)),
+                1 => self.receive(&framed(chunk)),
                 // In a frame of the open session, so that the device acts on it.
-                2 => self.hear(&framed(&in_session(chunk))),
+                2 => self.receive(&framed(&in_session(chunk))),
                 _ => self.device.link.interrupted(),
             }
             let sense = GuardInputs {
@@ -83,7 +83,7 @@ impl Wire {
     /// Opens a new session, whatever the device received before.
     fn begin(&mut self) {
         self.device.link.interrupted();
-        self.hear(&[0]);
+        self.receive(&[0]);
         let hello = HostHello {
             protocol: PROTOCOL,
             number: 1,
@@ -91,24 +91,24 @@ impl Wire {
         };
         // The other sessions first, so that the device no longer stores this session's number.
         for session in (1..=OTHERS).map(SessionNumber::new) {
-            self.hear(&message_in(session, &ToDevice::Hello(hello)));
+            self.receive(&message_in(session, &ToDevice::Hello(hello)));
         }
         for stated in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
-            self.hear(&message(&stated));
+            self.receive(&message(&stated));
         }
         // Clears any latched fault. The last of these requests has the number 1.
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
         for (fault, number) in Fault::ALL.into_iter().zip(0..) {
             let number = first.wrapping_add(number);
             let request = Request::ClearFault { seen: Some(fault) };
-            self.hear(&message(&ToDevice::Request { number, request }));
+            self.receive(&message(&ToDevice::Request { number, request }));
         }
         let _ = self.device.tick(GuardInputs::default());
         self.listen();
     }
 
     /// Sends all bytes, with ticks in between while the device has no room.
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn receive(&mut self, mut bytes: &[u8]) {
         for _ in 0..10_000 {
             let taken = self.device.receive(bytes);
             bytes = &bytes[taken..];

@@ -25,7 +25,7 @@ pub fn first(terrain: &Terrain, from: [f64; 3], to: [f64; 3]) -> Option<Crossing
             continue;
         };
         let gap = Gap::new(&patch, along(from, to, t0), along(from, to, t1));
-        let deepest = gap.most();
+        let deepest = gap.max();
         if deepest < 0.0 {
             continue;
         }
@@ -81,7 +81,7 @@ impl Gap {
         }
     }
 
-    fn most(&self) -> f64 {
+    fn max(&self) -> f64 {
         self.at(self.top())
     }
 

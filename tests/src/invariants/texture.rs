@@ -11,7 +11,7 @@ const TICK_S: f64 = 1e-3;
 /// Rounding, as a fraction of the depth and of the amplitude.
 const ROUNDING: f64 = 1e-5;
 /// Tolerance against pulling, as a fraction of the depth.
-const PULL: f64 = 1e-6;
+const TANGENTIAL_ROUNDING: f64 = 1e-6;
 /// Error bounds of the product's sine and of its slope.
 const SINE: f64 = 5e-4;
 const SLOPE: f64 = 1e-2;
@@ -36,7 +36,7 @@ pub struct TextureOracle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Added {
     /// Addition to the displacement, cells.
-    pub(super) wanted: DVec3,
+    pub(super) expected: DVec3,
     /// Error bound of the displacement, cells.
     pub(super) allowed: f64,
 }
@@ -70,27 +70,27 @@ impl TextureOracle {
     ///
     /// # Errors
     /// The error of its force.
-    pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
-        let share = self.share(&seen.output.proxy);
-        let Some(textured) = seen.textured else {
+    pub fn check(&mut self, observed: &ObservedTick) -> Verdict {
+        let share = self.share(&observed.output.proxy);
+        let Some(textured) = observed.textured else {
             return Ok(());
         };
-        let shaded = seen.shaded.map(|shaded| shaded.displacement);
-        let plain = shaded.unwrap_or(seen.output.displacement).as_dvec3();
+        let shaded = observed.shaded.map(|shaded| shaded.displacement);
+        let plain = shaded.unwrap_or(observed.output.displacement).as_dvec3();
         let (textured, depth) = (textured.as_dvec3(), plain.length());
         if !(SHALLOW..DEEP).contains(&depth) {
             let same = (textured - plain).length() <= SHALLOW;
             return held(same || depth >= DEEP, || format!("{textured} of {plain}"));
         }
         let normal = plain / depth;
-        held(textured.dot(normal) >= -PULL * depth, || {
+        held(textured.dot(normal) >= -TANGENTIAL_ROUNDING * depth, || {
             format!("{textured} pulls, of {plain}")
         })?;
-        let Added { wanted, allowed } = self.adds(plain, &seen.output.proxy, share);
-        let off = (textured - plain - wanted * share).length();
+        let Added { expected, allowed } = self.adds(plain, &observed.output.proxy, share);
+        let off = (textured - plain - expected * share).length();
         let reported = || {
             format!(
-                "{textured} is {off:e} off {plain} and {share} of {wanted}, {allowed:e} may be: {seen:?}"
+                "{textured} is {off:e} off {plain} and {share} of {expected}, {allowed:e} may be: {observed:?}"
             )
         };
         // Exact, if the proxy is too fast for any texture.
@@ -108,7 +108,7 @@ impl TextureOracle {
         let slopes = slopes - normal * slopes.dot(normal);
         let deepest = wavelength * wavelength / (48.0 * amplitude);
         let output = depth.min(deepest);
-        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
+        let expected = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
         let (high, steep) = match self.texture.pattern {
             Pattern::Grain => (GRAIN, GRAIN),
             _ => (SINE, SLOPE),
@@ -119,7 +119,7 @@ impl TextureOracle {
             + output * steepest * (steep + 8.0 * misplaced)
             + SHARE * (amplitude.min(depth) + output * steepest) * f64::from(u8::from(share < 1.0))
             + ROUNDING * depth;
-        Added { wanted, allowed }
+        Added { expected, allowed }
     }
 
     /// Returns the height and slope of the whole texture at a point and depth, cells.

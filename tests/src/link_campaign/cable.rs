@@ -12,7 +12,7 @@ pub const A_TICK: usize = 1_024;
 
 /// Fault of one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Harm {
+pub struct LineFaults {
     /// Share of bytes in which a bit flips.
     pub flipped: f64,
     /// Share of transfers that lose a run of bytes.
@@ -27,7 +27,7 @@ pub struct Harm {
     pub cut: bool,
 }
 
-impl Harm {
+impl LineFaults {
     /// No fault.
     pub const NONE: Self = Self {
         flipped: 0.0,
@@ -41,15 +41,15 @@ impl Harm {
 
 /// One direction.
 #[derive(Default)]
-pub struct Way {
+pub struct Channel {
     transfers: VecDeque<(u64, Vec<u8>)>,
     held: usize,
-    harm: Harm,
+    harm: LineFaults,
 }
 
-impl Way {
+impl Channel {
     /// Sets its fault from now on.
-    pub fn harm(&mut self, harm: Harm) {
+    pub fn harm(&mut self, harm: LineFaults) {
         self.harm = harm;
         if harm.cut {
             self.transfers.clear();
@@ -146,24 +146,24 @@ mod tests {
     #[test]
     fn stalled_bytes_are_delayed_and_cut_bytes_are_lost() {
         let mut random = Random::new(2);
-        let mut way = Way::default();
-        let stalled = Harm {
+        let mut way = Channel::default();
+        let stalled = LineFaults {
             stalled: true,
-            ..Harm::NONE
+            ..LineFaults::NONE
         };
         way.harm(stalled);
         way.send(b"held", 1, &mut random);
         assert_eq!((way.receive(9), way.room()), (None, CAPACITY - 4));
-        way.harm(Harm::NONE);
+        way.harm(LineFaults::NONE);
         assert_eq!(way.receive(9), Some(b"held".to_vec()));
-        let cut = Harm {
+        let cut = LineFaults {
             cut: true,
-            ..Harm::NONE
+            ..LineFaults::NONE
         };
         way.send(b"gone", 10, &mut random);
         way.harm(cut);
         way.send(b"gone", 11, &mut random);
-        way.harm(Harm::NONE);
+        way.harm(LineFaults::NONE);
         assert_eq!((way.receive(99), way.room()), (None, CAPACITY));
     }
 }

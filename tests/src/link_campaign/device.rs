@@ -12,7 +12,7 @@ use hapterra_firmware::store::Stored;
 
 use super::cable::A_TICK;
 use crate::campaign::arm::{Arm, Mood};
-use crate::campaign::tick_invariants::{Truth, Watch};
+use crate::campaign::tick_invariants::{Truth, TickChecks};
 use crate::random::Random;
 
 /// Tiles along the side of the window, as on the smallest board.
@@ -23,7 +23,7 @@ pub struct Board<'t> {
     device: Device<StoppedClock, WINDOW>,
     arm: Arm<'t>,
     /// Checks every tick against its bounds.
-    pub watch: Watch,
+    pub tick_checks: TickChecks,
     /// True if the hand holds the dead-man switch.
     pub dead_man: bool,
     /// Behaviour of the hand.
@@ -43,7 +43,7 @@ impl<'t> Board<'t> {
         Self {
             device: start(),
             arm: Arm::new(terrain, random),
-            watch: Watch::new(record, PhantomModel::premium_1_5()),
+            tick_checks: TickChecks::new(record, PhantomModel::premium_1_5()),
             dead_man: false,
             mood: Mood::Lifted,
             drive: GuardOutputs::default(),
@@ -62,7 +62,7 @@ impl<'t> Board<'t> {
     pub fn restart(&mut self) {
         self.device = start();
         self.drive = GuardOutputs::default();
-        self.watch.forget();
+        self.tick_checks.reset();
     }
 
     /// Reports an interruption of the transport.
@@ -105,7 +105,7 @@ impl<'t> Board<'t> {
             counts: plant.counts(),
             winding_c: plant.winding_c(),
         };
-        self.watch.drive(&self.drive, &sense, [0; 3], &truth)?;
+        self.tick_checks.check_outputs(&self.drive, &sense, [0; 3], &truth)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
         self.arm.step(currents, self.mood);
         self.ticks[0] += 1;

@@ -1,6 +1,6 @@
 //! Faults of the link, and their durations.
 
-use super::cable::Harm;
+use super::cable::LineFaults;
 use crate::random::Random;
 
 /// Kind of a link fault.
@@ -96,33 +96,33 @@ impl Fault {
 
     /// Returns its faults for the directions to the device and to the host.
     #[must_use]
-    pub fn harms(&self) -> [Harm; 2] {
+    pub fn harms(&self) -> [LineFaults; 2] {
         let harm = match self.kind {
-            Kind::Flips => Harm {
+            Kind::Flips => LineFaults {
                 flipped: libm::pow(10.0, -6.0 + 4.0 * self.share),
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Drops => Harm {
+            Kind::Drops => LineFaults {
                 dropped: 0.001 + 0.4 * self.share * self.share,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Duplicates => Harm {
+            Kind::Duplicates => LineFaults {
                 twice: 0.02 + 0.98 * self.share,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Delays => Harm {
+            Kind::Delays => LineFaults {
                 late: 5 + (400.0 * self.share) as u32,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Stall => Harm {
+            Kind::Stall => LineFaults {
                 stalled: true,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::DeafHost | Kind::DeafDevice | Kind::Cut => Harm {
+            Kind::DeafHost | Kind::DeafDevice | Kind::Cut => LineFaults {
                 cut: true,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            _ => Harm::NONE,
+            _ => LineFaults::NONE,
         };
         let ways = match self.kind {
             Kind::DeafHost => [false, true],
@@ -130,6 +130,6 @@ impl Fault {
             Kind::Stall | Kind::Cut => [true, true],
             _ => self.ways,
         };
-        ways.map(|harmed| if harmed { harm } else { Harm::NONE })
+        ways.map(|harmed| if harmed { harm } else { LineFaults::NONE })
     }
 }

@@ -79,12 +79,12 @@ impl Tap {
     }
 
     /// Reads bytes from the device.
-    pub fn hear(&mut self, mut bytes: &[u8], when: &Moment) {
+    pub fn receive(&mut self, mut bytes: &[u8], when: &Moment) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
             // A frame cut short by an open is dropped.
-            let stated = frame.and_then(|frame| frames::said_by_device(frame.ok()?));
+            let stated = frame.and_then(|frame| frames::parse_device_frame(frame.ok()?));
             if let Some(stated) = stated.filter(|stated| Some(stated.session) == self.session) {
                 self.on_message(&stated.message, when);
             }

@@ -118,15 +118,15 @@ impl<'t> Host<'t> {
             return;
         }
         let was_leaving = self.client.state() == State::Leaving;
-        let gone_on = self.go_on(Duration::from_millis(now), bytes, out);
-        self.end = match gone_on {
+        let result = self.process(Duration::from_millis(now), bytes, out);
+        self.end = match result {
             Err(error) => Some(End::Reported(error)),
             Ok(()) if was_leaving && self.client.state() == State::Closed => Some(End::Agreed),
             Ok(()) => None,
         };
     }
 
-    fn go_on(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), LinkError> {
+    fn process(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), LinkError> {
         let Self {
             client,
             last_end,
@@ -158,13 +158,13 @@ impl<'t> Host<'t> {
 
     /// Returns true if its user sees that the arm waits for the dead-man switch.
     #[must_use]
-    pub fn waits_for_the_hand(&self) -> bool {
-        self.sees(&[Mode::Requested])
+    pub fn is_waiting_for_press(&self) -> bool {
+        self.is_in_mode(&[Mode::Requested])
     }
 
     /// Returns true if its user sees that the device is in one of these modes.
     #[must_use]
-    pub fn sees(&self, modes: &[Mode]) -> bool {
+    pub fn is_in_mode(&self, modes: &[Mode]) -> bool {
         self.view.is_some_and(|view| modes.contains(&view.mode))
     }
 }

@@ -191,9 +191,9 @@ pub enum Behaviour {
     /// It sends one byte every half second.
     Drips,
     /// It answers each open, and sends nothing else.
-    GreetsOnly,
+    OpensOnly,
     /// It accepts every scene, then requests non-existent tiles as fast as it can.
-    AsksForEverything,
+    RequestsEverything,
     /// It accepts every scene, then refuses the protocol that both use, and others.
     RefusesLate,
     /// It accepts every scene and sends samples with random numbers.
@@ -208,8 +208,8 @@ impl Behaviour {
         Self::Mute,
         Self::Noise,
         Self::Drips,
-        Self::GreetsOnly,
-        Self::AsksForEverything,
+        Self::OpensOnly,
+        Self::RequestsEverything,
         Self::RefusesLate,
         Self::CountsWildly,
         Self::RefusesScenes,
@@ -232,14 +232,14 @@ impl Behaviour {
             tell(ToHost::Hello(hello(number)));
         }
         let epoch = scene.epoch;
-        if greets && often && self != Self::GreetsOnly {
+        if greets && often && self != Self::OpensOnly {
             let accepted = self != Self::RefusesScenes;
             tell(ToHost::SceneAck { epoch, accepted });
         }
         match self {
             Self::Noise => return noise(random, A_MILLISECOND),
             Self::Drips if now.is_multiple_of(500) => return vec![random.bits() as u8],
-            Self::AsksForEverything => {
+            Self::RequestsEverything => {
                 for _ in 0..20 {
                     let (level, row) = (random.bits() as u8, random.bits() as i32);
                     let key = TileKey::new(level, i32::MAX, row);

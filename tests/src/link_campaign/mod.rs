@@ -87,7 +87,7 @@ pub fn segment(seed: u64, number: u64, stats: &mut LinkStats) -> Result<(), Viol
         .into_iter()
         .try_for_each(|kind| runs::run(&mut segment, kind, stats).map_err(|what| (kind, what)));
     let (board, off) = (&segment.board, segment.off_surface);
-    stats.add(board.ticks, segment.touching, off, &board.watch.extremes);
+    stats.add(board.ticks, segment.touching, off, &board.tick_checks.extremes);
     played.map_err(|(kind, what)| Violation {
         ground: crate::campaign::Ground::Ice,
         segment: number,

@@ -22,10 +22,10 @@ const REACTION: u64 = 150;
 /// Time that a host may be silent, as configured by these hosts, ms.
 const SILENCE: u64 = 1_000 * SILENCE_S as u64;
 /// Time that the force may then take to fade, ms.
-const LETS_GO: u64 = 300;
+const RELEASE_TICKS: u64 = 300;
 /// Largest time from the last message at the device to the loss of its host, ms: heartbeats are
 /// sent twice a second, and a faulty line may lose some.
-const AGO: u64 = 700;
+const MAX_AGE: u64 = 700;
 /// Tile requests that a device may repeat early in a session: those in transit when it began.
 const IN_FLIGHT: u32 = 4;
 
@@ -34,8 +34,8 @@ const IN_FLIGHT: u32 = 4;
 enum Step {
     Open,
     Arm,
-    Feel,
-    Leave,
+    Touch,
+    Close,
 }
 
 /// Injected faults of a run, with their steps.
@@ -53,7 +53,7 @@ struct Plan {
 /// The broken invariant.
 pub fn run(segment: &mut Segment<'_>, kind: Kind, stats: &mut LinkStats) -> Result<(), String> {
     if kind == Kind::HostileDevice {
-        let outcome = not_a_device::meet(segment)?;
+        let outcome = not_a_device::run_against_other_program(segment)?;
         stats.count(kind, outcome);
         return Ok(());
     }
@@ -69,10 +69,10 @@ pub fn run(segment: &mut Segment<'_>, kind: Kind, stats: &mut LinkStats) -> Resu
 
 /// Plays a run. Returns its outcome, if the planned fault happened.
 fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, String> {
-    let steps = [Step::Open, Step::Arm, Step::Feel, Step::Leave];
+    let steps = [Step::Open, Step::Arm, Step::Touch, Step::Close];
     let step = steps[segment.random.below(4)];
     // A host that leaves is gone when the force has faded, within a tenth of a second.
-    let within = if step == Step::Leave { 90 } else { 400 };
+    let within = if step == Step::Close { 90 } else { 400 };
     let plan = Plan {
         kind,
         step,
@@ -113,7 +113,7 @@ impl Run<'_, '_> {
 
     /// Runs all steps, or up to the end of the run.
     fn steps(&mut self) -> Result<Outcome, String> {
-        for step in [Step::Open, Step::Arm, Step::Feel, Step::Leave] {
+        for step in [Step::Open, Step::Arm, Step::Touch, Step::Close] {
             if let Some(outcome) = self.take(step)? {
                 return Ok(outcome);
             }
@@ -128,14 +128,14 @@ impl Run<'_, '_> {
         let mut pressed = None;
         match step {
             Step::Arm => self.segment.with_host(|host, _, _| host.arm()),
-            Step::Leave => self
+            Step::Close => self
                 .segment
                 .with_host(|host, now, out| host.leave(now, out)),
-            Step::Open | Step::Feel => {}
+            Step::Open | Step::Touch => {}
         }
         loop {
             let at = self.segment.now - began;
-            if let Some(outcome) = self.go_wrong(step, at)? {
+            if let Some(outcome) = self.inject_fault(step, at)? {
                 return Ok(Some(outcome));
             }
             self.segment.step()?;
@@ -148,10 +148,10 @@ impl Run<'_, '_> {
             let (is_done, most) = match step {
                 Step::Open => (host.opened, OPENS),
                 Step::Arm => (self.is_armed(&mut pressed), ANSWERS + ARMS),
-                Step::Feel => (at >= feels, u64::MAX),
-                Step::Leave => (false, LEAVES),
+                Step::Touch => (at >= feels, u64::MAX),
+                Step::Close => (false, LEAVES),
             };
-            if is_done && self.may_go_on(step) {
+            if is_done && self.can_continue(step) {
                 return Ok(None);
             }
             if at >= most && !is_done {
@@ -161,7 +161,7 @@ impl Run<'_, '_> {
     }
 
     /// Returns true if the fault planned for this step, if any, has been injected.
-    fn may_go_on(&self, step: Step) -> bool {
+    fn can_continue(&self, step: Step) -> bool {
         self.plan.done || self.plan.step != step
     }
 
@@ -172,7 +172,7 @@ impl Run<'_, '_> {
         let Some(host) = &self.segment.host else {
             return false;
         };
-        if host.waits_for_the_hand() {
+        if host.is_waiting_for_press() {
             let since = *pressed.get_or_insert(now);
             self.segment.board.dead_man = now >= since + REACTION;
         }
@@ -183,12 +183,12 @@ impl Run<'_, '_> {
         match host.reported {
             Reported::Nothing => false,
             Reported::No => true,
-            Reported::Accepted => settled || (pressed.is_some() && host.sees(&[Mode::Disarmed])),
+            Reported::Accepted => settled || (pressed.is_some() && host.is_in_mode(&[Mode::Disarmed])),
         }
     }
 
     /// Injects the planned fault when it is due.
-    fn go_wrong(&mut self, step: Step, at: u64) -> Result<Option<Outcome>, String> {
+    fn inject_fault(&mut self, step: Step, at: u64) -> Result<Option<Outcome>, String> {
         if self.plan.done || step != self.plan.step || at < self.plan.after {
             return Ok(None);
         }
@@ -246,9 +246,9 @@ impl Run<'_, '_> {
         let was_on = self.segment.board.drive.enabled;
         // A stopped clock does not reach the limit.
         let runs = !self.segment.board.lock_step;
-        self.wait_until(self.segment.now + SILENCE - LETS_GO)?;
+        self.wait_until(self.segment.now + SILENCE - RELEASE_TICKS)?;
         let still_on = self.segment.board.drive.enabled;
-        self.wait_until(self.segment.now + 2 * LETS_GO + AGO)?;
+        self.wait_until(self.segment.now + 2 * RELEASE_TICKS + MAX_AGE)?;
         let segment = &mut *self.segment;
         if runs && was_on && segment.board.drive.enabled {
             return Err("the arm is armed, and its host has vanished".into());

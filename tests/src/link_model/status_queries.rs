@@ -2,7 +2,7 @@
 
 use hapterra::link::{Event, HostRequest};
 
-use super::oracle::Wrong;
+use super::oracle::Violation;
 
 /// The query in progress, and the answers up to now.
 #[derive(Default)]
@@ -28,7 +28,7 @@ impl StatusQueries {
     }
 
     /// Drops the query of a killed host.
-    pub(super) const fn forget(&mut self) {
+    pub(super) const fn reset(&mut self) {
         self.asked = None;
     }
 
@@ -50,10 +50,10 @@ impl StatusQueries {
         }
     }
 
-    pub(super) fn judge(&self) -> Result<(), Wrong> {
+    pub(super) fn check(&self) -> Result<(), Violation> {
         match self.outdated {
             None => Ok(()),
-            Some((reported, asked)) => Err(Wrong::Outdated(reported, asked)),
+            Some((reported, asked)) => Err(Violation::Outdated(reported, asked)),
         }
     }
 }

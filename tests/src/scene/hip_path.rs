@@ -10,13 +10,13 @@ pub const GRAIN: f64 = 1.0 / (1 << 20) as f64;
 const COUNT: f64 = 0.03;
 
 /// Largest motion of the HIP along an axis in a tick, cells.
-pub const LEAP: f64 = 32.0;
+pub const JUMP_CELLS: f64 = 32.0;
 /// Most leaps towards a target.
-const LEAPS: usize = 12;
+const JUMPS: usize = 12;
 
 /// Motion of the HIP for some ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Habit {
+enum PathKind {
     /// Steps of one length near the surface.
     Wander,
     /// Jumps to any point in one tick.
@@ -37,16 +37,16 @@ enum Habit {
     Still,
 }
 
-const HABITS: [Habit; 9] = [
-    Habit::Wander,
-    Habit::Teleport,
-    Habit::Tremble,
-    Habit::Vertex,
-    Habit::Graze,
-    Habit::OnLines,
-    Habit::Tap,
-    Habit::Sweep,
-    Habit::Still,
+const PATH_KINDS: [PathKind; 9] = [
+    PathKind::Wander,
+    PathKind::Teleport,
+    PathKind::Tremble,
+    PathKind::Vertex,
+    PathKind::Graze,
+    PathKind::OnLines,
+    PathKind::Tap,
+    PathKind::Sweep,
+    PathKind::Still,
 ];
 
 /// Returns `ticks` positions in cells; the first is high above everything.
@@ -54,8 +54,8 @@ const HABITS: [Habit; 9] = [
 pub fn random(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
     walked(terrain, random, ticks, |walker| {
         let habit = match walker.random.below(20) {
-            n if n < HABITS.len() => HABITS[n],
-            _ => Habit::Wander,
+            n if n < PATH_KINDS.len() => PATH_KINDS[n],
+            _ => PathKind::Wander,
         };
         walker.go_on(habit);
     })
@@ -120,10 +120,10 @@ impl<'a> Walker<'a> {
 
     fn put(&mut self, x: f64, y: f64, z: f64) {
         self.at = [x, y];
-        for _ in 0..LEAPS {
+        for _ in 0..JUMPS {
             let to = [x, y, z];
             let last = self.path.last().copied().unwrap_or(to);
-            let way = |axis: usize| (to[axis] - last[axis]).clamp(-LEAP, LEAP);
+            let way = |axis: usize| (to[axis] - last[axis]).clamp(-JUMP_CELLS, JUMP_CELLS);
             let next = [0, 1, 2].map(|axis| ((last[axis] + way(axis)) / GRAIN).round() * GRAIN);
             self.path.push(next);
             if next
@@ -140,9 +140,9 @@ impl<'a> Walker<'a> {
         self.put(x, y, self.terrain.height_about(x, y) + height);
     }
 
-    /// Returns a length over many orders of magnitude, at most `most`.
-    fn length(&mut self, most: f64) -> f64 {
-        most * 10_f64.powf(self.random.between(-4.0, 0.0))
+    /// Returns a length over many orders of magnitude, at most `max`.
+    fn length(&mut self, max: f64) -> f64 {
+        max * 10_f64.powf(self.random.between(-4.0, 0.0))
     }
 
     fn anywhere(&mut self) -> [f64; 2] {
@@ -154,18 +154,18 @@ impl<'a> Walker<'a> {
         self.anywhere().map(f64::round)
     }
 
-    fn go_on(&mut self, habit: Habit) {
+    fn advance(&mut self, habit: PathKind) {
         let ticks = 1 + self.random.below(40);
         match habit {
-            Habit::Wander => self.wander(4 * ticks),
-            Habit::Teleport => self.teleport(ticks),
-            Habit::Tremble => self.tremble(ticks),
-            Habit::Vertex => self.press_vertex(ticks),
-            Habit::Graze => self.graze(ticks),
-            Habit::OnLines => self.on_lines(ticks),
-            Habit::Tap => self.tap(ticks),
-            Habit::Sweep => self.sweep(1 + ticks / 8),
-            Habit::Still => self.still(ticks),
+            PathKind::Wander => self.wander(4 * ticks),
+            PathKind::Teleport => self.teleport(ticks),
+            PathKind::Tremble => self.tremble(ticks),
+            PathKind::Vertex => self.press_vertex(ticks),
+            PathKind::Graze => self.graze(ticks),
+            PathKind::OnLines => self.on_lines(ticks),
+            PathKind::Tap => self.tap(ticks),
+            PathKind::Sweep => self.sweep(1 + ticks / 8),
+            PathKind::Still => self.still(ticks),
         }
     }
 

@@ -48,7 +48,7 @@ struct Device<'t, 'g, const D: usize> {
     materials: &'g Materials,
     replay: Replay,
     spare: Vec<&'t mut Tile>,
-    coming: Vec<(u32, TileKey)>,
+    requested: Vec<(u32, TileKey)>,
     now: u32,
     seq: u32,
     /// Tiles and points in their order of arrival, and each tick's report.
@@ -137,7 +137,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             materials,
             replay,
             spare: tiles.collect(),
-            coming: Vec::new(),
+            requested: Vec::new(),
             now: 0,
             seq: 0,
             events: Vec::new(),
@@ -241,11 +241,11 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             velocity: [0.0; 2],
         };
         while let Some(key) = self.requester.next_request(self.now, &demand) {
-            self.coming.push((self.now + latency, key));
+            self.requested.push((self.now + latency, key));
         }
         let is_here = |(due, _): &(u32, TileKey)| *due <= self.now;
-        let (here, coming) = self.coming.iter().partition(|one| is_here(one));
-        self.coming = coming;
+        let (here, requested) = self.requested.iter().partition(|one| is_here(one));
+        self.requested = requested;
         let here: Vec<(u32, TileKey)> = here;
         for (_, key) in here {
             self.requester.received(key);

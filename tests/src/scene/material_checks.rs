@@ -1,7 +1,7 @@
 //! The replay of a scene on materials under its oracle, and in metamorphic tests in which no force
 //! may change.
 
-use super::hip_path::LEAP;
+use super::hip_path::JUMP_CELLS;
 use super::loop_replay::{Replay, Replied, replay};
 use super::materials::Materials;
 use super::run::{Scene, is_alike};
@@ -32,13 +32,13 @@ pub fn run(
         Supply::Held => SIDE,
         Supply::Pulled { .. } => [2, 3, 4, SIDE][random.below(4)],
     };
-    let mut judge = MaterialOracle::new(scene, materials, [0; 3]);
+    let mut oracle = MaterialOracle::new(scene, materials, [0; 3]);
     let usual = Replay {
         shift: [0; 3],
         supply: scene.supply,
     };
     let replied = replay_in(side, scene, materials, buffers, usual, |replied| {
-        judge.look(replied)
+        oracle.check(replied)
     })
     .map_err(|violation| Violation {
         detail: format!(
@@ -47,7 +47,7 @@ pub fn run(
         ),
         ..violation
     })?;
-    measured.on_materials = judge.judged;
+    measured.on_materials = oracle.counts;
     let twin = random.below(6);
     match twin {
         0 if fits(&replied) => windowed(scene, materials, &replied, buffers, &mut random)?,
@@ -56,7 +56,7 @@ pub fn run(
         2 if scene.terrain.kind != Kind::Walls => turned(scene, materials, buffers, &mut random)?,
         _ => return Ok(()),
     }
-    measured.twins_on_materials[twin] = 1;
+    measured.metamorphic_on_materials[twin] = 1;
     Ok(())
 }
 
@@ -83,7 +83,7 @@ fn replay_in(
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
-        way(0).max(way(1)) <= 4.0 * LEAP
+        way(0).max(way(1)) <= 4.0 * JUMP_CELLS
     };
     let is_whole = |replied: &Replied| replied.sample.missing_tile.is_none();
     replied.iter().all(is_whole) && replied.windows(2).all(is_near)
@@ -127,10 +127,10 @@ fn shifted(
     let scene = &scene.with(scene.terrain.clone(), path);
     let mut at = |shift| {
         let supply = Supply::Pulled { latency: 0 };
-        let mut judge = MaterialOracle::new(scene, materials, shift);
+        let mut oracle = MaterialOracle::new(scene, materials, shift);
         let how = Replay { shift, supply };
         replay_in(4, scene, materials, buffers, how, |replied| {
-            judge.look(replied)
+            oracle.check(replied)
         })
     };
     // Both are away from the origin, so that the space beyond the field is alike.
@@ -155,14 +155,14 @@ fn turned(
     let path = scene.path.iter();
     let path = path.map(|p| symmetry.point(&scene.terrain, *p)).collect();
     let twin = scene.with(symmetry.terrain(&scene.terrain), path);
-    let materials = &materials.seen_by(symmetry);
-    let mut judge = MaterialOracle::new(&twin, materials, [0; 3]);
+    let materials = &materials.relative_to_(symmetry);
+    let mut oracle = MaterialOracle::new(&twin, materials, [0; 3]);
     let how = Replay {
         shift: [0; 3],
         supply: Supply::Pulled { latency: 0 },
     };
     replay_in(4, &twin, materials, buffers, how, |replied| {
-        judge.look(replied)
+        oracle.check(replied)
     })
     .map(drop)
 }

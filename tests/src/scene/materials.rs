@@ -164,13 +164,13 @@ impl Materials {
 
     /// Returns true if no material has friction.
     #[must_use]
-    pub fn is_like_ice(&self) -> bool {
+    pub fn is_frictionless(&self) -> bool {
         self.table.iter().all(|one| one.friction.is_none())
     }
 
     /// Returns the ground mirrored or turned.
     #[must_use]
-    pub fn seen_by(&self, symmetry: Symmetry) -> Self {
+    pub fn relative_to_(&self, symmetry: Symmetry) -> Self {
         let [columns, rows] = self.size;
         let mut turned = Self {
             size: match symmetry.transpose {

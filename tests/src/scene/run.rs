@@ -19,7 +19,7 @@ use crate::random::Random;
 use crate::whole_field::point;
 
 /// Work units of a tick at 10 kHz.
-pub(super) const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
+pub(super) const MIN_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
     Some(rate) => work_per_tick(rate),
     None => WORK_PER_TICK,
 };
@@ -53,7 +53,7 @@ pub struct Scene {
     /// Work units of a tick at 1 kHz or at 10 kHz.
     pub(super) work_per_tick: u32,
     /// The metamorphic tests that are run.
-    pub(super) twins: Twins,
+    pub(super) metamorphic: Metamorphic,
     /// Seed of the metamorphic tests' random choices.
     pub(super) seed: u64,
 }
@@ -79,7 +79,7 @@ impl Surface {
     }
 }
 
-/// The grating of a scene from [`Scene::given`].
+/// The grating of a scene from [`Scene::overridden`].
 const GRATING: Texture = Texture {
     pattern: Pattern::Grating,
     amplitude_mm: 0.05,
@@ -132,7 +132,7 @@ pub(super) fn texture(mixed: u64) -> Texture {
 
 /// Metamorphic tests of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Twins {
+pub(super) enum Metamorphic {
     /// One of them, or none, as a stress test has many scenes.
     One(usize),
     /// All of them.
@@ -180,9 +180,9 @@ impl Scene {
             texture: texture(mixed),
             materials,
             fast_paths: true,
-            twins: Twins::One(random.below(6)),
+            metamorphic: Metamorphic::One(random.below(6)),
             // By number, like the path.
-            work_per_tick: [WORK_PER_TICK, LEAST_WORK_PER_TICK][(number / 4 % 2) as usize],
+            work_per_tick: [WORK_PER_TICK, MIN_WORK_PER_TICK][(number / 4 % 2) as usize],
             seed: random.bits(),
         }
     }
@@ -202,7 +202,7 @@ impl Scene {
 
     /// Creates a scene with the work of a tick at 10 kHz and all metamorphic tests.
     #[must_use]
-    pub const fn given(
+    pub const fn overridden(
         terrain: Terrain,
         path: Vec<[f64; 3]>,
         execution: Execution,
@@ -218,8 +218,8 @@ impl Scene {
             texture: GRATING,
             materials: None,
             fast_paths: true,
-            twins: Twins::All,
-            work_per_tick: LEAST_WORK_PER_TICK,
+            metamorphic: Metamorphic::All,
+            work_per_tick: MIN_WORK_PER_TICK,
             seed: 1,
         }
     }
@@ -246,14 +246,14 @@ impl Scene {
         supply: Supply,
         look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
     ) -> Result<Vec<ObservedTick>, Violation> {
-        self.feel_in::<SIDE>(buffers, shift, supply, look)
+        self.render_in::<SIDE>(buffers, shift, supply, look)
     }
 
     /// Same as [`Self::step`] with a window of `D × D` tiles.
     ///
     /// # Errors
     /// Like [`Self::step`].
-    pub fn feel_in<const D: usize>(
+    pub fn render_in<const D: usize>(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
@@ -268,9 +268,9 @@ impl Scene {
                 tick,
                 detail: format!("never settles for {hip:?}"),
             })?;
-            let seen = player.seen(*hip, output);
-            look(&seen)?;
-            all.push(seen);
+            let observed = player.observed(*hip, output);
+            look(&observed)?;
+            all.push(observed);
         }
         Ok(all)
     }
@@ -393,7 +393,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 
     /// Returns the last HIP's result for the oracle.
     #[must_use]
-    pub fn seen(&self, hip: [f64; 3], output: ContactOutput) -> ObservedTick {
+    pub fn observed(&self, hip: [f64; 3], output: ContactOutput) -> ObservedTick {
         ObservedTick {
             shaded: self.shader.as_ref().map(|shader| Shaded {
                 displacement: self.shaded,

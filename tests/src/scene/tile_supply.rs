@@ -55,7 +55,7 @@ pub struct SuppliedWindow<'t, 'g, const D: usize> {
     supply: Supply,
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
-    coming: Vec<(u32, TileKey)>,
+    requested: Vec<(u32, TileKey)>,
     /// Tiles put into the window since this list was last emptied, in order.
     pub installed: Vec<TileKey>,
 }
@@ -87,7 +87,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
             supply,
             requester,
             spare: tiles.collect(),
-            coming: Vec::new(),
+            requested: Vec::new(),
             installed: Vec::new(),
         };
         if supply == Supply::Held {
@@ -137,10 +137,10 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
             velocity: [0.0; 2],
         };
         while let Some(key) = self.requester.next_request(now, &focus) {
-            self.coming.push((now + latency, key));
+            self.requested.push((now + latency, key));
         }
         let mut arrived = Vec::new();
-        self.coming.retain(|(due, key)| {
+        self.requested.retain(|(due, key)| {
             let here = *due <= now;
             if here {
                 arrived.push(*key);
