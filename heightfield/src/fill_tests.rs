@@ -206,7 +206,7 @@ fn distances_have_a_limit() {
 }
 
 #[test]
-fn a_file_without_data_is_refused_and_classes_are_not_filled() {
+fn file_without_data_is_refused_and_classes_are_unfilled() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("holes.asc");
     let head = "ncols 3\nnrows 2\ncellsize 1\nNODATA_value -1\n";
@@ -233,7 +233,7 @@ fn a_file_without_data_is_refused_and_classes_are_not_filled() {
 }
 
 #[test]
-fn files_that_are_filled_have_another_print() {
+fn filled_files_have_another_hash() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = write_npy(folder.path());
     let print = |within| {
@@ -294,7 +294,7 @@ impl BlockReader for Late {
 }
 
 #[test]
-fn a_height_is_pending_while_a_neighbour_is() {
+fn height_is_pending_while_a_neighbour_is() {
     let is_here = Arc::new(AtomicBool::new(false));
     let image = BlockImage {
         columns: 128,

@@ -88,7 +88,7 @@ mod tests {
     use crate::Encoding;
 
     #[test]
-    fn a_choice_that_a_format_does_not_have_is_refused() {
+    fn choice_that_a_format_does_not_have_is_refused() {
         let accepting = |options: &OpenOptions| {
             let formats = FORMATS.iter();
             let formats = formats.filter(|format| format.check_choice(options).is_ok());

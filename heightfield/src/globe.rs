@@ -100,7 +100,7 @@ mod tests {
 
     /// Against PROJ's `geod` with each body's axes.
     #[test]
-    fn a_degree_is_as_long_as_on_its_own_body() {
+    fn degree_has_the_length_of_its_own_body() {
         let moon = Globe::new(1_737_400.0, 0.0).expect("a sphere");
         let mars = Globe::from_axes(3_396_190.0, 3_376_200.0).expect("an ellipsoid");
         for (globe, latitude, expected) in [

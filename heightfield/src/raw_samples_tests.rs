@@ -48,7 +48,7 @@ fn part(column: u32, row: u32, columns: u32, rows: u32) -> Part {
 }
 
 #[test]
-fn a_part_of_every_image_has_its_own_samples_in_either_order() {
+fn parts_of_images_have_their_samples_in_either_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let (input, plain) = file(folder.path());
     for every in [1, 2, 64] {
@@ -86,7 +86,7 @@ fn a_part_of_every_image_has_its_own_samples_in_either_order() {
 }
 
 #[test]
-fn samples_that_lie_far_apart_are_read_where_they_are() {
+fn widely_spaced_samples_are_read_one_by_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let (input, plain) = file(folder.path());
     let bytes = std::fs::read(folder.path().join("samples.raw")).expect("there");

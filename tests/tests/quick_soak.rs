@@ -23,10 +23,10 @@ fn thousand(surface: Surface) -> LinkStats {
     // In another window, shifted, mirrored or turned.
     let (judged, metamorphic) = (total.on_materials, total.metamorphic_on_materials);
     assert!(
-        judged.in_whole > 20_000 && judged.changing > 10_000,
+        judged.compared_as_vectors > 20_000 && judged.changing > 10_000,
         "{judged:?}"
     );
-    assert!(100 * judged.open < judged.in_whole, "{judged:?}");
+    assert!(100 * judged.open < judged.compared_as_vectors, "{judged:?}");
     assert!(metamorphic.iter().all(|n| *n >= 20), "{metamorphic:?}");
     stats
 }
@@ -57,7 +57,7 @@ fn everything_holds_with_friction_too() {
     let stats = thousand(Surface::Rough);
     let judged = stats.total().on_materials;
     assert!(
-        judged.rubbed > 20_000 && judged.sliding > 1_000,
+        judged.with_friction > 20_000 && judged.sliding > 1_000,
         "{judged:?}"
     );
     none(Surface::Rough, stats.broken.iter());

@@ -56,7 +56,7 @@ fn longitudes_and_latitudes_are_those_of_wgs_84() {
 
 /// Esri's texts have no codes: the datum is found by its name.
 #[test]
-fn a_text_without_a_code_is_shifted_by_its_datum() {
+fn wkt_without_a_code_is_shifted_by_its_datum() {
     if !has_libgdal() {
         return;
     }
@@ -96,7 +96,7 @@ fn a_text_without_a_code_is_shifted_by_its_datum() {
 }
 
 #[test]
-fn another_meridian_and_grads_of_a_text_count_too() {
+fn wkt_meridian_and_grads_are_used() {
     if !has_libgdal() {
         return;
     }
@@ -112,7 +112,7 @@ fn another_meridian_and_grads_of_a_text_count_too() {
 }
 
 #[test]
-fn the_moon_has_its_own_longitudes() {
+fn moon_has_its_own_longitudes() {
     if !has_libgdal() {
         return;
     }
@@ -133,7 +133,7 @@ fn the_moon_has_its_own_longitudes() {
 
 /// At a pole, all longitudes are the same position.
 #[test]
-fn the_poles_of_polar_maps_are_places() {
+fn poles_of_polar_maps_are_valid_positions() {
     for (code, latitude, wanted) in [
         (3031, -90.0, (0.0, 0.0)),
         (3413, 90.0, (0.0, 0.0)),

@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_that_is_no_reference_system_is_none() {
+    fn invalid_wkt_is_no_reference_system() {
         for text in [
             "",
             "metres",
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn the_code_is_that_of_the_system_and_not_of_its_parts() {
+    fn code_is_that_of_the_system_not_of_its_parts() {
         let text = r#"PROJCS["mine",GEOGCS["b",AUTHORITY["EPSG","4326"]],UNIT["foot",0.3048]]"#;
         let node = Node::parse(text).expect("a tree");
         assert_eq!(

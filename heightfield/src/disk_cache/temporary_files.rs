@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unnamed_file_disappears_and_takes_half_the_free_space_at_most() {
+    fn unnamed_file_disappears_and_takes_half_the_free_space() {
         let folder = tempfile::tempdir().expect("a folder");
         let disk = DiskCache::at(folder.path(), 1);
         let mut first = disk.create_unnamed(1 << 20).expect("a file");

@@ -24,9 +24,9 @@ pub(super) fn choose(
             available,
         });
     }
-    let place = |usual: &str| {
+    let place = |word: &str| {
         let mut names = names.iter();
-        names.position(|name| name.eq_ignore_ascii_case(usual))
+        names.position(|name| name.eq_ignore_ascii_case(word))
     };
     match (usual.split_whitespace().find_map(place), names) {
         (Some(place), _) => Ok(place),

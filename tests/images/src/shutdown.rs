@@ -114,7 +114,7 @@ pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {
         modes & CHANNEL == PWM_1
     };
     match timer.get(CR1) & CEN != 0 && each(&makes_duty_cycles) {
-        true if timer.is_let() => Outputs::Pulses,
+        true if timer.is_gate_open() => Outputs::Pulses,
         true => Outputs::Standing,
         false => Outputs::Low,
     }

@@ -47,7 +47,7 @@ fn holds(memories: &[Range<u64>], start: u32, bytes: usize) -> bool {
 }
 
 #[test]
-fn every_segment_lies_in_the_chips_memory() {
+fn segments_lie_in_the_chips_memory() {
     for machine in machines() {
         let (chip, target) = (machine.chip, target(&machine));
         let (ram, flash) = (ram(&target), flash(&target));
@@ -96,7 +96,7 @@ fn stack_is_lowest_in_ram_and_overlaps_no_segment() {
 }
 
 #[test]
-fn the_emulated_chip_has_the_memories_of_the_real_one() {
+fn emulated_chip_has_the_memories_of_the_real_one() {
     for machine in machines() {
         let target = target(&machine);
         let real: Vec<_> = [flash(&target), ram(&target)].concat();

@@ -47,7 +47,7 @@ impl Row {
 }
 
 /// Returns the most cycles on a board's chip.
-fn most(chip: &Chip, each: &[Cycles]) -> u32 {
+fn max_cycles(chip: &Chip, each: &[Cycles]) -> u32 {
     let cycles = each
         .iter()
         .map(|cycles| if chip.is_m7 { cycles.h743 } else { cycles.g474 });
@@ -74,14 +74,14 @@ fn interrupt_cycles_stay_within_the_documented_maximum() {
             let stated = Row::read(chip.board);
             for (i, each) in [&found.to_output, &found.whole].into_iter().enumerate() {
                 assert!(each.len() > 30, "{}", each.len());
-                let (most, stated) = (most(chip, each), stated.cycles[i]);
+                let (max_cycles, stated) = (max_cycles(chip, each), stated.cycles[i]);
                 let instructions = each.iter().map(|cycles| cycles.instructions).max();
                 let instructions = instructions.expect("some ticks");
-                println!("{}: {most} cycles, {instructions} instructions", chip.board);
-                assert!(most <= stated, "{}: {most}, not {stated}", chip.board);
+                println!("{}: {max_cycles} cycles, {instructions} instructions", chip.board);
+                assert!(max_cycles <= stated, "{}: {max_cycles}, not {stated}", chip.board);
                 assert!(
-                    most > stated * 3 / 4,
-                    "{}: {most}, not {stated}",
+                    max_cycles > stated * 3 / 4,
+                    "{}: {max_cycles}, not {stated}",
                     chip.board
                 );
             }
@@ -103,7 +103,7 @@ fn interrupt_cycles_stay_within_the_documented_maximum() {
 }
 
 #[test]
-fn the_fastest_tick_that_the_build_takes_ends_in_time() {
+fn fastest_accepted_tick_ends_in_time() {
     for (board, fastest_hz) in tick_rate::FASTEST_HZ {
         let stated = Row::read(board);
         let (core_hz, timer_hz) = match board {
@@ -198,7 +198,7 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
 
 /// Compares the loop's data with the lines in the model of cycles for an H743's AXI SRAM.
 #[test]
-fn the_loops_data_are_within_the_lines_of_the_model() {
+fn loop_data_fit_the_cache_lines_of_the_model() {
     for machine in machines().into_iter().filter(|machine| machine.chip.is_m7) {
         let haptic_loop = machine.image.symbol_like(&["application", "LOOP"]);
         let bytes = haptic_loop.expect("the loop").size;

@@ -101,7 +101,7 @@ impl<'t> Segment<'t> {
         if other_scene {
             self.scene = scene(self.terrain, &self.board, &mut self.random);
         }
-        self.board.tick_checks.forget();
+        self.board.tick_checks.reset();
         self.owed = std::mem::take(&mut self.let_go);
         let mut out = Vec::new();
         let random = &mut self.random;
@@ -250,7 +250,7 @@ impl<'t> Segment<'t> {
         for sample in std::mem::take(&mut host.samples) {
             self.board
                 .tick_checks
-                .sample(&sample, self.scene.params.max_force_n)?;
+                .check_sample(&sample, self.scene.params.max_force_n)?;
             let off = proxy_oracle::check(self.terrain, &sample)?;
             self.off_surface = self.off_surface.max(off);
             self.touching += u64::from(off > 0.0);

@@ -101,15 +101,15 @@ impl Service for Google {
             return is_asked.then(|| token(TOKEN)).ok_or_else(|| denied("This"));
         }
         let file = Answer::File(path.to_owned());
-        let Some(stated) = request.headers.get(AUTHORIZATION) else {
+        let Some(authorization) = request.headers.get(AUTHORIZATION) else {
             return match bucket(path) {
                 PUBLIC => Ok(file),
                 _ => Err(denied("Anonymous caller")),
             };
         };
         // A token is checked even if none is needed.
-        let stated = stated.to_str().ok();
-        match stated.and_then(|stated| holder(stated.strip_prefix("Bearer ")?)) {
+        let authorization = authorization.to_str().ok();
+        match authorization.and_then(|authorization| holder(authorization.strip_prefix("Bearer ")?)) {
             Some(mail) if mail == SURVEYOR.mail => Ok(file),
             Some(mail) => Err(denied(mail)),
             None => Err(refusal(

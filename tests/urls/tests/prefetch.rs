@@ -33,7 +33,7 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
 }
 
 /// Returns true if all of a tile has arrived.
-fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
+fn is_loaded(terrain: &Terrain<'_>, key: TileKey) -> bool {
     let mut buffer = TileBuffer::default();
     let (_, status) = terrain.tile(key, &mut buffer).expect("there is one");
     status.is_complete()
@@ -47,7 +47,7 @@ fn terrain(raster: &Raster) -> Terrain<'_> {
 
 /// Returns the number of requests up to now.
 fn requests(server: &Server) -> usize {
-    server.seen().0.len()
+    server.log().0.len()
 }
 
 /// Returns the number of requests up to now, after time for unwanted ones.
@@ -69,7 +69,7 @@ fn tiles_read_ahead_need_no_request() {
     wait_until("requests ahead", || requests(&server) >= ahead);
     server.hold(false);
     for key in keys {
-        wait_until("a tile", || is_here(&terrain, key));
+        wait_until("a tile", || is_loaded(&terrain, key));
     }
     assert_eq!(requests(&server), ahead, "the tiles asked for nothing more");
     // The whole field, or an area outside it, is not prefetched.
@@ -82,7 +82,7 @@ fn tiles_read_ahead_need_no_request() {
 
 /// While the clutch is open, blocks of the next placement are fetched before any tile request.
 #[test]
-fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
+fn next_placement_is_prefetched_around_the_hip() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let at = |east| GridPoint::new([east, 640, 100], Vec3::ZERO);
@@ -101,7 +101,7 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     wait_until("requests around the HIP", || requests(&server) >= after);
     server.hold(false);
     wait_until("the tile at the HIP", || {
-        is_here(&terrain, TileKey::new(0, 3500 / 32, 20))
+        is_loaded(&terrain, TileKey::new(0, 3500 / 32, 20))
     });
     assert_eq!(
         requests_later(&server),
@@ -122,16 +122,16 @@ fn benchmark_counts_missing_tiles_at_100_ms_latency() {
             let terrain = terrain(&raster);
             server.set_latency(Duration::from_millis(100));
             let looks = 3000 * 100 / speed;
-            let cells = |look: i32| 40 + look * speed / 100;
-            let missing = (0..looks).filter(|look| {
+            let cells = |read_all: i32| 40 + read_all * speed / 100;
+            let missing = (0..looks).filter(|read_all| {
                 pass(Duration::from_millis(10));
-                let (at, ahead) = (cells(*look), cells(*look + 50));
+                let (at, ahead) = (cells(*read_all), cells(*read_all + 50));
                 if reads_ahead {
                     let edge = |cell: i32| cell / 32 * 32;
                     let to = [edge(ahead) + 32, 672];
                     terrain.grid().prefetch(0, [edge(at), 640], to);
                 }
-                !is_here(&terrain, TileKey::new(0, at / 32, 20))
+                !is_loaded(&terrain, TileKey::new(0, at / 32, 20))
             });
             (missing.count(), looks)
         });

@@ -8,7 +8,7 @@ use hapterra_url_tests::http::Server;
 use heightfield::disk_cache::DiskCache;
 use heightfield::{OpenOptions, Raster, Wait};
 
-/// Pages that [`Bed::look`] needs.
+/// Pages that [`Bed::read_all`] needs.
 const PAGES: usize = 50;
 
 fn height(column: u32, row: u32) -> f32 {
@@ -38,13 +38,13 @@ fn bed() -> Bed {
 
 impl Bed {
     /// Reads heights at fine and coarse levels. Returns them, and the number of requests.
-    fn look(&self, name: &str) -> (Vec<f64>, usize) {
+    fn read_all(&self, name: &str) -> (Vec<f64>, usize) {
         // Like another program: only the folder on disk is the same.
         let options = OpenOptions {
             disk_cache: DiskCache::at(self.kept.path(), 256 << 20),
             ..OpenOptions::default()
         };
-        let before = self.server.seen().0.len();
+        let before = self.server.log().0.len();
         let raster = Raster::open(self.server.url(name), &options).expect("opens");
         let mut heights = vec![0.0; 500];
         for (number, heights) in heights.chunks_exact_mut(50).enumerate() {
@@ -61,7 +61,7 @@ impl Bed {
                     .is_complete()
             );
         }
-        (heights, self.server.seen().0.len() - before)
+        (heights, self.server.log().0.len() - before)
     }
 
     /// Waits until the pages of the first run are written, each to a file.
@@ -90,11 +90,11 @@ fn files(folder: &Path) -> Vec<std::path::PathBuf> {
 #[test]
 fn second_run_requests_only_file_start_and_sidecars() {
     let bed = bed();
-    let (first, requests) = bed.look("hills.tif");
+    let (first, requests) = bed.read_all("hills.tif");
     assert!(requests > 10, "{requests}");
     bed.settle();
     // The file's beginning, and the four possible sidecars.
-    let (second, again) = bed.look("hills.tif");
+    let (second, again) = bed.read_all("hills.tif");
     assert_eq!(second, first);
     assert!(again <= 5, "{again} after {requests}");
     // Damaged pages are fetched again.
@@ -104,21 +104,21 @@ fn second_run_requests_only_file_start_and_sidecars() {
         bytes[middle] ^= 1;
         std::fs::write(file, bytes).expect("written");
     }
-    let (third, after_damage) = bed.look("hills.tif");
+    let (third, after_damage) = bed.read_all("hills.tif");
     assert_eq!(third, first);
     assert!(after_damage > again);
 }
 
 #[test]
-fn pages_of_a_file_that_was_changed_at_its_server_are_not_used() {
+fn pages_of_a_file_changed_on_its_server_are_not_used() {
     let bed = bed();
-    let (first, requests) = bed.look("hills.tif");
+    let (first, requests) = bed.read_all("hills.tif");
     bed.settle();
     // The same size, another tag.
     let path = bed.folder.path().join("hills.tif");
     std::fs::write(path, cog(2200, 1800, 2, other)).expect("written");
     bed.server.change();
-    let (second, again) = bed.look("hills.tif");
+    let (second, again) = bed.read_all("hills.tif");
     assert!(again + 5 >= requests, "{again} {requests}");
     for (one, other) in first.iter().zip(&second) {
         assert!((other - one - 5000.0).abs() < 0.01, "{one} {other}");
@@ -128,7 +128,7 @@ fn pages_of_a_file_that_was_changed_at_its_server_are_not_used() {
 #[test]
 fn cache_folder_contains_no_part_of_the_url() {
     let bed = bed();
-    bed.look("hills.tif?sig=VerySecretKey");
+    bed.read_all("hills.tif?sig=VerySecretKey");
     bed.settle();
     let all = files(bed.kept.path());
     assert!(!all.is_empty());
@@ -141,6 +141,6 @@ fn cache_folder_contains_no_part_of_the_url() {
         }
     }
     // With another key it may be another file.
-    let (_, requests) = bed.look("hills.tif?sig=Other");
+    let (_, requests) = bed.read_all("hills.tif?sig=Other");
     assert!(requests > 10, "{requests}");
 }

@@ -167,7 +167,7 @@ fn ball_rests_by_its_radius_and_is_drawn_in_its_size() {
 }
 
 #[test]
-fn tip_keeps_the_place_of_the_hand() {
+fn tip_change_keeps_the_position_of_the_hand() {
     let _one = one();
     let Some(mut site) = site_on_a_ramp() else { return };
     site.point([0.5, 0.5]);

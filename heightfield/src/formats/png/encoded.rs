@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grey_picture_encodes_nothing() {
+    fn grey_picture_encodes_no_heights() {
         let mut file = Vec::new();
         let mut encoder = ::png::Encoder::new(&mut file, 2, 2);
         encoder.set_color(ColorType::Grayscale);

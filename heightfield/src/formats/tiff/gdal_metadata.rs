@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn notes_that_are_no_xml_are_left_alone() {
+    fn notes_that_are_no_xml_are_ignored() {
         let read = Metadata::from_xml("<a", 0);
         assert_eq!(
             (read.scale, read.offset, read.remarks.len()),

@@ -187,7 +187,7 @@ impl Layout {
 
     /// Returns true if a part can be read without decompressing to disk first.
     #[cfg(test)]
-    pub(super) fn is_at_hand(&self, part: &Part) -> bool {
+    pub(super) fn is_available(&self, part: &Part) -> bool {
         self.unpacked.as_ref().is_none_or(|unpacked| {
             let bands = self.bands_read();
             let chunks = bands.flat_map(|band| self.chunks_of(band, part));

@@ -60,7 +60,7 @@ const FULL: Part<'_> = Part {
 };
 
 #[test]
-fn an_overview_before_the_full_image_is_passed_over() {
+fn overview_before_the_full_image_is_skipped() {
     let overview = Part {
         kind: 1,
         size: (2, 2),
@@ -109,7 +109,7 @@ fn with_palette() -> Vec<u8> {
 }
 
 #[test]
-fn the_numbers_of_a_palette_are_classes_and_no_heights() {
+fn palette_numbers_are_classes_and_no_heights() {
     assert!(matches!(
         open(with_palette()),
         Err(RasterError::NotAHeightField(what)) if what.contains("palette")
@@ -153,7 +153,7 @@ fn with_overview(size: (u32, u32), height: u8) -> Vec<u8> {
 }
 
 #[test]
-fn an_overview_serves_coarse_levels_if_it_shows_the_same_field() {
+fn overview_serves_coarse_levels_of_the_same_field() {
     for (size, is_used) in [((32, 24), true), ((31, 24), true), ((32, 10), false)] {
         let input = FileBytes::unpacked("test.tif", with_overview(size, 201));
         let decoded = decode(&input, &in_blocks()).expect("decoded");
@@ -398,7 +398,7 @@ fn coordinates_of_points_are_those_of_the_samples_centres() {
 }
 
 #[test]
-fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
+fn chosen_band_of_a_colour_image_is_a_height() {
     let mut tags = grey([2, 2], 3);
     tags[4] = shorts(262, &[2]);
     let bytes = by_hand(&tags, &[1, 20, 3, 4, 50, 6, 7, 80, 9, 10, 110, 12]);
@@ -439,7 +439,7 @@ fn in_tiles(side: u32, tile: u32, [offsets, sizes]: [&[u32]; 2]) -> Vec<(u16, u1
 
 /// One stored tile in six thousand, without compression, is a valid file.
 #[test]
-fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
+fn sparse_file_on_disk_has_its_whole_size() {
     let (side, tile) = (20_000_u32, 256_u32);
     let count = side.div_ceil(tile).pow(2) as usize;
     let at_the_last = |value: u32| {
@@ -469,7 +469,7 @@ fn sparse_file_beyond_memory_is_oversized_not_damaged() {
 }
 
 #[test]
-fn a_world_file_places_what_has_no_place_of_its_own() {
+fn world_file_places_a_file_without_own_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plain.tif");
     std::fs::write(&path, file(&[FULL])).expect("written");

@@ -4,7 +4,7 @@ use super::super::test_files::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open,
 use crate::RasterError;
 
 #[test]
-fn every_sample_type_decodes_in_both_byte_orders() {
+fn sample_types_decode_in_both_byte_orders() {
     for kind in KINDS {
         for is_big_endian in [false, true] {
             let made = Made {
@@ -20,7 +20,7 @@ fn every_sample_type_decodes_in_both_byte_orders() {
 }
 
 #[test]
-fn strips_and_tiles_of_several_bands_are_what_was_written() {
+fn strips_and_tiles_of_several_bands_round_trip() {
     for chunk in [SIZE, [SIZE[0], 640], [1024, 640], [2048, 2048]] {
         for (bands, is_planar) in [(1, false), (BANDS, false), (BANDS, true)] {
             let made = Made {

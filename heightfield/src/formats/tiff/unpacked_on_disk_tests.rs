@@ -87,7 +87,7 @@ fn check_parts(made: &Made, layout: &Layout) {
 }
 
 #[test]
-fn each_compression_and_predictor_decodes_to_written_samples() {
+fn compressions_and_predictors_decode_to_written_samples() {
     let mut all = vec![];
     for (code, pack) in [
         (5, lzw as fn(&[u8]) -> Vec<u8>),
@@ -118,7 +118,7 @@ fn each_compression_and_predictor_decodes_to_written_samples() {
 }
 
 #[test]
-fn strips_and_tiles_of_several_bands_are_what_was_written() {
+fn strips_and_tiles_of_several_bands_round_trip() {
     for chunk in [SIZE, [SIZE[0], 640], [1024, 640]] {
         for (bands, is_planar, predictor) in [(1, false, 2), (BANDS, false, 3), (BANDS, true, 2)] {
             let made = Made {
@@ -192,13 +192,13 @@ fn strips_and_tiles_under_a_row_of_blocks_stay_unpacked() {
                 uncompressed::read(&layout, *band, &part).expect("read");
             }
         }
-        assert!(layout.is_at_hand(&at_border), "{made:?}");
+        assert!(layout.is_available(&at_border), "{made:?}");
     }
 }
 
 /// A read that does not wait never decompresses a tile.
 #[test]
-fn a_tile_is_at_hand_once_it_is_unpacked() {
+fn tile_is_available_once_it_is_unpacked() {
     let made = Made {
         chunk: [1024, 640],
         packing: DEFLATE,
@@ -211,12 +211,12 @@ fn a_tile_is_at_hand_once_it_is_unpacked() {
         columns: 10,
         rows: 2,
     };
-    let is_at_hand = |column| layout.is_at_hand(&part(column));
-    assert!(!is_at_hand(0) && !is_at_hand(1020));
+    let is_available = |column| layout.is_available(&part(column));
+    assert!(!is_available(0) && !is_available(1020));
     uncompressed::read(&layout, 0, &part(0)).expect("read");
-    assert!(is_at_hand(0) && !is_at_hand(1020) && !is_at_hand(1100));
+    assert!(is_available(0) && !is_available(1020) && !is_available(1100));
     uncompressed::read(&layout, 0, &part(1020)).expect("read");
-    assert!(is_at_hand(1020) && is_at_hand(1100));
+    assert!(is_available(1020) && is_available(1100));
 }
 
 #[test]
@@ -232,7 +232,7 @@ fn least_recently_read_tile_is_evicted_first() {
     for tile in [0, 1, 2, 3, 0, 4] {
         uncompressed::read(&layout, 0, &part(tiles[tile])).expect("read");
     }
-    let kept = tiles.map(|tile| layout.is_at_hand(&part(tile)));
+    let kept = tiles.map(|tile| layout.is_available(&part(tile)));
     assert_eq!(kept, [true, false, true, true, true]);
 }
 

@@ -102,16 +102,16 @@ impl Machine {
         {
             stopwatch.end();
         }
-        let back = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
+        let return_address = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
         let masks = [RegisterARM::BASEPRI, RegisterARM::PRIMASK];
-        let kept = masks.map(|mask| self.register(mask));
+        let saved = masks.map(|mask| self.register(mask));
         self.core
             .context_restore(&active.context)
             .expect("restored");
-        for (mask, value) in masks.into_iter().zip(kept) {
+        for (mask, value) in masks.into_iter().zip(saved) {
             self.set_register(mask, value);
         }
-        self.set_register(RegisterARM::PC, u64::from(back) | 1);
+        self.set_register(RegisterARM::PC, u64::from(return_address) | 1);
     }
 
     pub(super) fn fault(&mut self, why: &str) -> Option<Stop> {
