@@ -66,7 +66,7 @@ fn answer(mut host: TcpStream) {
 type Taken = Option<(SessionNumber, u32)>;
 
 fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
-    let Some(received) = frames::stated_by_host(content) else {
+    let Some(received) = frames::parse_host_frame(content) else {
         return vec![];
     };
     let session = received.session;

@@ -14,7 +14,7 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use crate::link_campaign::frames::{from_host, stated_by_host};
+use crate::link_campaign::frames::{from_host, parse_host_frame};
 use crate::timeouts::HANG;
 
 /// Tiles along the side of the window, as on the emulated board.
@@ -187,7 +187,7 @@ impl OnBoard {
     fn send(&mut self, frame: &[u8]) {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let (_, content) = reader.push(frame);
-        let message = content.and_then(Result::ok).and_then(stated_by_host);
+        let message = content.and_then(Result::ok).and_then(parse_host_frame);
         self.unanswered +=
             i32::from(message.is_some_and(|stated| stated.message == ToDevice::Heartbeat));
         self.link.send(frame).expect("the board is there");

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::hapterra_binary;
-use crate::link_campaign::frames::stated_by_host;
+use crate::link_campaign::frames::parse_host_frame;
 use crate::terrain_file;
 use crate::timeouts::{HANG, wait_until};
 use hapterra::link::{ControlSession, Native, Tcp, Transport};
@@ -155,7 +155,7 @@ fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
     while !bytes.is_empty() {
         let (taken, content) = reader.push(bytes);
         bytes = &bytes[taken..];
-        let count = match content.and_then(Result::ok).and_then(stated_by_host) {
+        let count = match content.and_then(Result::ok).and_then(parse_host_frame) {
             Some(stated) if matches!(stated.message, ToDevice::Hello(_)) => &seen.ignored_hellos,
             Some(stated) if stated.message == ToDevice::Bye => &seen.ignored_byes,
             _ => continue,

@@ -226,11 +226,11 @@ fn underestimated_winding_temperature_is_reported() {
 fn hostile_calibrations_are_refused_and_most_exceed_limits() {
     assert_eq!(hostile_calibrations::harmless().validate(), Ok(()));
     assert_eq!(
-        hostile_calibrations::keeps_ceilings(&hostile_calibrations::harmless()),
+        hostile_calibrations::check_limits(&hostile_calibrations::harmless()),
         Ok(())
     );
     assert_eq!(
-        hostile_calibrations::keeps_ceilings(&Calibration::PREMIUM_1_5),
+        hostile_calibrations::check_limits(&Calibration::PREMIUM_1_5),
         Ok(())
     );
     let mut random = Random::new(7);
@@ -238,7 +238,7 @@ fn hostile_calibrations_are_refused_and_most_exceed_limits() {
     for _ in 0..2_000 {
         let record = hostile_calibrations::calibration(&mut random);
         assert!(record.validate().is_err(), "{record:?}");
-        above += u32::from(hostile_calibrations::keeps_ceilings(&record).is_err());
+        above += u32::from(hostile_calibrations::check_limits(&record).is_err());
     }
     // Only the device detects the others: a length that is NaN.
     assert!(above > 1_600, "{above}");

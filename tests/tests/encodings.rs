@@ -109,7 +109,7 @@ fn a_band_is_chosen_by_its_number() {
         ("ehdr.bil", 2),
         ("envi.dat", 2),
     ] {
-        for reader in Reader::all().into_iter().filter(|it| it.knows(name)) {
+        for reader in Reader::all().into_iter().filter(|it| it.supports(name)) {
             for band in 1..=bands {
                 let raster = open_by(reader, name, &of_band(band));
                 assert_field(&raster, (40, 30), band, name);

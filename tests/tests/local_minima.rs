@@ -44,7 +44,7 @@ impl Found {
 fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     let mut judge = TickOracle::new(&scene.terrain);
     let mut found = Found::default();
-    let seen = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()));
+    let seen = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
     for (tick, now) in seen.iter().enumerate() {
         let reported = judge.violations(now);
@@ -143,7 +143,7 @@ fn proxy_displaced_from_its_minimum_is_detected() {
         [20.5, 20.25, ground.height_about(20.5, 20.25) - 0.5],
     ];
     let scene = Scene::given(ground, path, Execution::LockStep, Supply::Held);
-    let seen = scene.step(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
+    let seen = scene.render(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
     let honest = seen.expect("it settles")[1];
     assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
     for axis in 0..2 {

@@ -593,7 +593,7 @@ fn played(supply: Supply) -> (Scene, Vec<ObservedTick>, Buffers) {
     let scene = Scene::given(ridge(), path.to_vec(), Execution::LockStep, supply);
     let mut buffers = Buffers::default();
     let seen = scene
-        .step(&mut buffers, [0; 3], supply, |_| Ok(()))
+        .render(&mut buffers, [0; 3], supply, |_| Ok(()))
         .expect("it settles");
     (scene, seen, buffers)
 }
@@ -650,7 +650,7 @@ fn other_bits_far_away_are_found() {
     let shift = [3200, 6400, -1_000_000];
     let (scene, seen, mut buffers) = played(Supply::Held);
     let pulled = Supply::Pulled { latency: 0 };
-    let away = scene.step(&mut buffers, shift, pulled, |_| Ok(()));
+    let away = scene.render(&mut buffers, shift, pulled, |_| Ok(()));
     let away = away.expect("it settles");
     let judge =
         |away: &[ObservedTick], by| metamorphic::same_bits(Invariant::Shift, &seen, away, by);
@@ -669,7 +669,7 @@ fn result_differing_under_a_symmetry_is_reported() {
         let path = scene.path.iter().map(|p| turned(*p)).collect();
         let twin = scene.with(symmetry.terrain(&scene.terrain), path);
         let other = twin
-            .step(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
+            .render(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
             .expect("it settles");
         let mut judge = |other: &[ObservedTick]| {
             metamorphic::same_way(&scene, symmetry, &seen, other, &mut buffers)

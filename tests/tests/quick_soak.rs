@@ -1,7 +1,7 @@
 //! A fixed number of scenes of the stress test; `cargo xtask soak MINUTES` runs more.
 
 use hapterra_tests::scene::run::Surface;
-use hapterra_tests::soak::{Broken, LinkStats, Until, soak};
+use hapterra_tests::soak::{FailedScene, LinkStats, Until, soak};
 
 const SEED: u64 = 2027;
 
@@ -31,7 +31,7 @@ fn thousand(surface: Surface) -> LinkStats {
     stats
 }
 
-fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
+fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b FailedScene>) {
     let rough = surface.option();
     let reported: Vec<String> = broken
         .map(|b| {

@@ -20,7 +20,7 @@ fn run(
     let scene = Scene::given(terrain, path.to_vec(), execution, supply);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers)?;
-    let seen = scene.step(&mut buffers, [0; 3], supply, |_| Ok(()))?;
+    let seen = scene.render(&mut buffers, [0; 3], supply, |_| Ok(()))?;
     Ok(seen.iter().map(|seen| seen.output.state).collect())
 }
 
@@ -203,7 +203,7 @@ fn hip_vertically_above_its_proxy_is_released() {
     let mut buffers = Buffers::default();
     for number in [9, 99, 186] {
         let scene = Scene::random(91, number);
-        let seen = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
+        let seen = scene.render(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
         for seen in seen.expect("it settles") {
             let [x, y, z] = [0, 1, 2].map(|axis| seen.hip[axis] - seen.proxy[axis]);
             let touching = seen.output.state == ContactState::Touching && seen.output.converged;
@@ -286,7 +286,7 @@ fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     let scene = Scene::given(slope, path.to_vec(), Execution::LockStep, Supply::Held);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers).expect("holds");
-    let seen = scene.step(&mut buffers, [0; 3], Supply::Held, |_| Ok(()));
+    let seen = scene.render(&mut buffers, [0; 3], Supply::Held, |_| Ok(()));
     let last = seen.expect("settles").pop().expect("ticks");
     assert_eq!(last.proxy[..2], [200.0, 3.0]);
 }

@@ -101,7 +101,7 @@ fn every_promised_kind_of_scene_is_touched_and_checked() {
     for number in 0..SCENES {
         let scene = Scene::random(SEED, number);
         let mut judge = TickOracle::new(&scene.terrain);
-        let Ok(seen) = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
+        let Ok(seen) = scene.render(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
             panic!("scene {number} does not settle");
         };
         for (i, now) in seen.iter().enumerate() {

@@ -29,7 +29,7 @@ pub(crate) fn ready(words: &[&str], components: &str) -> Result<()> {
     if !components.is_empty() {
         install.args(["--component", components]);
     }
-    let line = shown(&install);
+    let line = command_line(&install);
     report(format!("installing: {line}"));
     let installed = output(&mut install).is_some() && is_here();
     ensure!(

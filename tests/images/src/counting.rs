@@ -198,7 +198,7 @@ impl Run {
         };
         let block = Rc::new(Block {
             owner,
-            in_flash: in_flash::is_left(name),
+            in_flash: in_flash::is_in_flash(name),
             bytes,
             code: instructions,
         });

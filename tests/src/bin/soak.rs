@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::tile_supply::Buffers;
-use hapterra_tests::soak::{Found, LinkStats, Until, run, soak};
+use hapterra_tests::soak::{LinkStats, SceneOutcome, Until, run, soak};
 
 /// Violations of each invariant that are printed in full.
 const MAX_SHOWN: usize = 3;
@@ -65,11 +65,11 @@ fn parse_request() -> Result<Request, String> {
 /// Repeats one scene by its number.
 fn one(seed: u64, number: u64, surface: Surface) -> ExitCode {
     match run(seed, number, surface, &mut Buffers::default()) {
-        Found::Held(kind, measured) => {
+        SceneOutcome::Passed(kind, measured) => {
             println!("seed {seed}, scene {number}, {kind:?}: holds\n{measured:#?}");
             ExitCode::SUCCESS
         }
-        Found::Broke(kind, _, what) => {
+        SceneOutcome::Violated(kind, _, what) => {
             println!("seed {seed}, scene {number}, {kind:?}: {what}");
             ExitCode::FAILURE
         }

@@ -147,7 +147,7 @@ impl<'g> TickOracle<'g> {
     }
 
     /// Checks the proxy of the next tick and its motion, but not its force. If friction may hold it
-    /// (`is_rubbed`), [`Self::is_held_by`] checks that before.
+    /// (`is_rubbed`), [`Self::check_friction`] checks that before.
     ///
     /// # Errors
     /// The first invariant that it breaks.

@@ -15,7 +15,7 @@ impl Scene {
     /// The first violation.
     pub fn run(&self, buffers: &mut Buffers) -> Result<Measured, Violation> {
         let mut oracle = TickOracle::of(self);
-        let observed = self.step(buffers, [0; 3], self.supply, |observed| oracle.check(observed))?;
+        let observed = self.render(buffers, [0; 3], self.supply, |observed| oracle.check(observed))?;
         let mut random = Random::new(self.seed);
         let expected = |twin: usize| {
             matches!(self.metamorphic, Metamorphic::One(n) if n == twin) || self.metamorphic == Metamorphic::All

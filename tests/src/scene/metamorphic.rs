@@ -27,7 +27,7 @@ pub fn repeated(scene: &Scene, observed: &[ObservedTick], buffers: &mut Buffers)
         fast_paths: false,
         ..scene.clone()
     };
-    let again = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()))?;
+    let again = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()))?;
     same_bits(Invariant::Repeatable, observed, &again, [0; 3]).map(|()| true)
 }
 
@@ -67,7 +67,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
         // Grain and most gratings have another part there, so the oracle checks them as well.
         let mut oracle = TickOracle::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
-        let observed = scene.step(buffers, shift, pulled, |observed| oracle.check_texture(observed))?;
+        let observed = scene.render(buffers, shift, pulled, |observed| oracle.check_texture(observed))?;
         Ok(observed.into_iter().map(|observed| ObservedTick {
             textured: observed.textured.filter(|_| scene.is_textured_alike()),
             ..observed
@@ -104,7 +104,7 @@ pub fn windowed(
     let small = scene.render_in::<7>(buffers, [0; 3], pulled, |_| Ok(()))?;
     same_bits(Invariant::Window, observed, &small, [0; 3])?;
     if scene.supply != Supply::Held {
-        let whole = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+        let whole = scene.render(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
         same_bits(Invariant::Window, observed, &whole, [0; 3])?;
     }
     Ok(true)
@@ -175,12 +175,12 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     };
     let path: Vec<_> = scene.path.iter().map(inside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);
-    let observed = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let observed = scene.render(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
     let symmetries = symmetry::all();
     let symmetry = symmetries[random.below(symmetries.len())];
     let twin = transformed(scene, symmetry);
     let mut oracle = TickOracle::of(&twin);
-    let other = twin.step(buffers, [0; 3], Supply::Held, |observed| oracle.check(observed))?;
+    let other = twin.render(buffers, [0; 3], Supply::Held, |observed| oracle.check(observed))?;
     same_way(scene, symmetry, &observed, &other, buffers)
 }
 

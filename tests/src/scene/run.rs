@@ -239,7 +239,7 @@ impl Scene {
     ///
     /// # Errors
     /// The error of `look`, or a tick that does not converge.
-    pub fn step(
+    pub fn render(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
@@ -249,10 +249,10 @@ impl Scene {
         self.render_in::<SIDE>(buffers, shift, supply, look)
     }
 
-    /// Same as [`Self::step`] with a window of `D × D` tiles.
+    /// Same as [`Self::render`] with a window of `D × D` tiles.
     ///
     /// # Errors
-    /// Like [`Self::step`].
+    /// Like [`Self::render`].
     pub fn render_in<const D: usize>(
         &self,
         buffers: &mut Buffers,

@@ -96,7 +96,7 @@ fn received(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
             offline.resume = () => {{}};
             const sound = new Sound(() => offline);
             sound.toggle();
-            sound.hear({newtons}, {change});
+            sound.update({newtons}, {change});
             const data = (await offline.startRendering()).getChannelData(0).subarray(22050);
             const ups = data.filter((now, i) => i > 0 && data[i - 1] < 0 && now >= 0).length;
             return [2 * ups, Math.hypot(...data.filter((_, i) => i % 4 === 0)) / Math.sqrt(data.length / 4)];

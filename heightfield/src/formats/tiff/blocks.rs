@@ -177,7 +177,7 @@ impl Image {
 }
 
 impl TiffBlocks {
-    /// Returns the full image of a file, [left in it](Image::leave_in_file), and the overviews of
+    /// Returns the full image of a file, [left in it](Image::prepare_blocks), and the overviews of
     /// the same kind in the file and in the one beside it.
     pub(super) fn new(
         (file, remote): Opened,
