@@ -21,7 +21,7 @@ const ARRAYS: u32 = 0x10;
 const FINE: i32 = 0;
 
 /// Open options of all drivers.
-const OF_ALL: [&str; 1] = ["OVERVIEW_LEVEL"];
+const COMMON_OPEN_OPTIONS: [&str; 1] = ["OVERVIEW_LEVEL"];
 
 /// An open raster, closed on drop.
 pub struct Dataset {
@@ -88,7 +88,7 @@ impl Dataset {
             let option = option.to_string_lossy();
             let name = option.split('=').next().unwrap_or_default();
             let is_same = |available: &str| available.eq_ignore_ascii_case(name);
-            if !OF_ALL
+            if !COMMON_OPEN_OPTIONS
                 .into_iter()
                 .chain(available.iter().copied())
                 .any(is_same)

@@ -11,7 +11,7 @@ use crate::text::{from_c, to_c};
 /// `OGRERR_NONE`.
 const FINE: c_int = 0;
 /// Min confidence, percent, at which a match counts as the same system.
-const SURE: c_int = 90;
+const MIN_CONFIDENCE: c_int = 90;
 
 /// A horizontal reference system, as described by PROJ.
 #[derive(Clone, Debug, PartialEq)]
@@ -221,7 +221,7 @@ impl<'l> Owned<'l> {
             // SAFETY: both lists have `count` entries; the system belongs to the list and is not
             // dropped.
             unsafe {
-                if *sureness.add(at) >= SURE {
+                if *sureness.add(at) >= MIN_CONFIDENCE {
                     let handle = *found.add(at);
                     let one = std::mem::ManuallyDrop::new(Owned { handle, ..*self });
                     codes.extend(one.code_of(ptr::null()));

@@ -153,7 +153,7 @@ impl GroundMap {
     }
 
     /// Returns the cosine of the angle between a row and a northward column.
-    pub(super) fn lean(&self) -> f64 {
+    pub(super) fn shear(&self) -> f64 {
         let (map, (east, south)) = (&self.0, self.steps());
         let along = map.pixel_width * map.skew_x + map.skew_y * map.pixel_height;
         match self.is_straight() {

@@ -69,7 +69,7 @@ impl Outermost {
         if self.count == 0 {
             return remarks;
         }
-        let low = LOW.contains(&self.lowest) || (!is_declared && self.may_be_zero_for_none());
+        let low = LOW.contains(&self.lowest) || (!is_declared && self.zero_may_mean_no_data());
         let suspects = [
             ("lowest", self.lowest, low),
             ("highest", self.highest, HIGH.contains(&self.highest)),
@@ -83,7 +83,7 @@ impl Outermost {
     }
 
     /// Returns true if zeros lie far below all other values, as in the border of a warped image.
-    fn may_be_zero_for_none(&self) -> bool {
+    fn zero_may_mean_no_data(&self) -> bool {
         let others = self.highest - self.next;
         self.lowest == 0.0
             && self.lowest_count.saturating_mul(ONE_IN) >= self.count

@@ -194,7 +194,7 @@ impl OnBoard {
     }
 
     /// Waits until the board has processed everything. Returns its messages.
-    fn settle(&mut self, session: SessionNumber) -> Vec<u8> {
+    fn wait_until_processed(&mut self, session: SessionNumber) -> Vec<u8> {
         self.send(&from_host(session, &ToDevice::Heartbeat));
         let mut stated = vec![];
         while self.unanswered > 0 {
@@ -237,14 +237,14 @@ impl Stepped for OnBoard {
         let tick_s = f64::from(currents.tick_ns) / 1e9;
         self.arm.step(currents.currents_a.map(f64::from), tick_s);
         self.ticks += 1;
-        let mut stated = self.settle(session);
+        let mut stated = self.wait_until_processed(session);
         // One by one, so that the effect of a frame does not depend on the arrival of the next.
         for frame in frames.split_inclusive(|byte| *byte == 0) {
             self.send(frame);
-            stated.extend(self.settle(session));
+            stated.extend(self.wait_until_processed(session));
         }
         // Answers overtake waiting samples, which are sent before the next answer.
-        stated.extend(self.settle(session));
+        stated.extend(self.wait_until_processed(session));
         stated
     }
 }

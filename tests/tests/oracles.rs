@@ -672,7 +672,7 @@ fn result_differing_under_a_symmetry_is_reported() {
             .render(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
             .expect("it settles");
         let mut judge = |other: &[ObservedTick]| {
-            metamorphic::same_way(&scene, symmetry, &seen, other, &mut buffers)
+            metamorphic::same_forces(&scene, symmetry, &seen, other, &mut buffers)
         };
         assert_eq!(judge(&other), Ok(true), "{symmetry:?}");
         let mut elsewhere = other.clone();

@@ -26,7 +26,7 @@ const FORCE: [u8; 3] = [255, 230, 60];
 const MAP: [f64; 4] = [0.58, 0.05, 0.21, 0.4];
 const WHITE: [u8; 3] = [255, 255, 255];
 /// Minimum decrease of that square's pixels when its sides are a quarter as long.
-const SHORTER: usize = 80;
+const MIN_DECREASE: usize = 80;
 
 /// Software draws the pages: one test at a time.
 static ONE: Mutex<()> = Mutex::new(());
@@ -354,11 +354,11 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
             assert!(Instant::now() < until, "{count} pixels");
         }
     };
-    let whole = white(&|count| count > SHORTER);
+    let whole = white(&|count| count > MIN_DECREASE);
     demo.type_lines("zoom 2\nzoom 2\n");
-    let zoomed = white(&|count| count + SHORTER < whole);
+    let zoomed = white(&|count| count + MIN_DECREASE < whole);
     demo.type_lines("reset\n");
-    white(&|count| count > zoomed + SHORTER / 2);
+    white(&|count| count > zoomed + MIN_DECREASE / 2);
     drop(browser);
     demo.interrupt();
     assert!(demo.end());

@@ -17,7 +17,7 @@ use crate::remote::{is_missing, neighbour};
 pub(super) use pam::Notes;
 pub(super) use prj::reference_system;
 pub(super) use unused_files::remark_unread;
-pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
+pub(super) use world_file::{apply_world_file, remark_other_place};
 
 /// Max size of a neighbour that is text; a longer file is something else.
 const MAX_TEXT: u64 = 1 << 20;

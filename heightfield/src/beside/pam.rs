@@ -187,7 +187,7 @@ impl Decoded {
             None => self.place.filter(|_| has_system).map(|place| place.map),
         };
         if let Some(map) = map {
-            self.lay_out(map, unit.filter(|_| !has_system));
+            self.set_layout(map, unit.filter(|_| !has_system));
         }
     }
 }

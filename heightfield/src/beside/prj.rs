@@ -7,7 +7,7 @@ use crate::decoded::Decoded;
 use crate::input::FileBytes;
 
 /// Sets the reference system from a `.prj` beside the file, if there is one; call it before
-/// `lay_out`.
+/// `set_layout`.
 ///
 /// # Errors
 /// If it is remote and cannot be read at present.

@@ -124,7 +124,7 @@ impl Shift {
     pub(super) fn of_wgs84(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
         match self {
             Self::None => Some(lonlat),
-            Self::Parameters { transform, .. } => in_degrees(lonlat, |place| transform.back(place)),
+            Self::Parameters { transform, .. } => in_degrees(lonlat, |place| transform.inverse(place)),
         }
     }
 }

@@ -41,7 +41,7 @@ impl FileStamp {
     }
 
     /// Returns the stamp as text, unless the file was written a moment ago.
-    pub(crate) fn settled(&self) -> Option<&str> {
+    pub(crate) fn stable_text(&self) -> Option<&str> {
         let since = self.modified?.elapsed().ok()?;
         (since >= SETTLE_TIME).then_some(&*self.text)
     }

@@ -230,10 +230,10 @@ fn file_stamp_differs_between_files_and_after_a_change() {
     fs::write(&a, [1; 9]).expect("written");
     set_just_changed(&a);
     let first = FileStamp::at(&a).expect("there");
-    assert_eq!(first.settled(), None, "it was written a moment ago");
+    assert_eq!(first.stable_text(), None, "it was written a moment ago");
     set_age(&a, Duration::from_secs(100));
     let aged = FileStamp::at(&a).expect("there");
-    assert!(aged.settled().is_some() && aged != first);
+    assert!(aged.stable_text().is_some() && aged != first);
     assert_eq!(FileStamp::at(&a).as_ref(), Some(&aged));
     fs::copy(&a, &b).expect("copied");
     assert_ne!(FileStamp::at(&b).as_ref(), Some(&aged));

@@ -45,7 +45,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
         GroundMap::from_centre([west, east, 0.0], [south + 1.0, 0.0, -north])
     });
     if let Some(map) = map {
-        decoded.lay_out(map, Some(GroundUnit::DEGREE));
+        decoded.set_layout(map, Some(GroundUnit::DEGREE));
     } else {
         decoded.cell = Some(CellSize {
             certainty: Certainty::Assumed,

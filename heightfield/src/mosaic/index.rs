@@ -152,7 +152,7 @@ impl Index {
         let ([x, y], [east, north]) = (self.grid.corner_of(west, south), self.grid.step);
         let map = GroundMap::new([x, east, 0.0], [y, 0.0, north]);
         let map = map.ok_or_else(|| RasterError::damaged("its files lie nowhere"))?;
-        decoded.lay_out(map, first.ground_unit());
+        decoded.set_layout(map, first.ground_unit());
         Ok(decoded)
     }
 }

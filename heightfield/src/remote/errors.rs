@@ -34,7 +34,7 @@ pub(super) fn is_without_ranges(error: &StoreError) -> bool {
 }
 
 /// Returns the error for a wrong URL or a wrong environment variable.
-pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
+pub(super) fn configuration_error(error: &dyn std::error::Error) -> Error {
     let text = error.to_string();
     let why = match text.contains("Account must be specified") {
         true => "the environment names no storage account".into(),
@@ -46,28 +46,28 @@ pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
 /// Returns the error for a server's response at opening, where missing environment variables show
 /// first.
 pub(super) fn at_opening(error: &StoreError) -> Error {
-    let wrong = |why: String| Error::new(ErrorKind::InvalidInput, why);
+    let invalid = |why: String| Error::new(ErrorKind::InvalidInput, why);
     let text = match error {
         StoreError::Generic { store, .. } if *store != "HTTP" => error.to_string(),
         _ => return reported(error),
     };
     if METADATA_PATHS.iter().any(|part| text.contains(part)) {
-        return wrong("the environment holds no key, and this computer has none of its own".into());
+        return invalid("the environment holds no key, and this computer has none of its own".into());
     }
     let is_refused = ["400", "401", "403"]
         .iter()
         .any(|status| has_status(error, status));
     if text.contains("token request") && is_refused {
-        return wrong(format!(
+        return invalid(format!(
             "the key of the environment was refused: {}",
             in_short(&text)
         ));
     }
     if text.contains("builder error") {
-        return wrong(in_short(&with_cause(error)));
+        return invalid(in_short(&with_cause(error)));
     }
     if text.contains("incorrectly configured region") {
-        return wrong("the bucket is in another region".into());
+        return invalid("the bucket is in another region".into());
     }
     reported(error)
 }

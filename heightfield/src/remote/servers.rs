@@ -13,7 +13,7 @@ use object_store::http::HttpBuilder;
 use object_store::path::Path;
 use object_store::{ObjectStore, RetryConfig};
 
-use super::errors::wrong;
+use super::errors::configuration_error;
 use super::requests::Connector;
 use super::url::without_query;
 
@@ -57,7 +57,7 @@ fn parts(url: &str) -> Result<(String, Path)> {
         return Err(Error::new(ErrorKind::InvalidInput, why));
     }
     let (host, path) = named.split_at(named.find('/').unwrap_or(named.len()));
-    let path = Path::from_url_path(path).map_err(|error| wrong(&error))?;
+    let path = Path::from_url_path(path).map_err(|error| configuration_error(&error))?;
     let query = rest[named.len()..].split('#').next().unwrap_or_default();
     // For a bucket, the key is in the environment.
     let query = if scheme.starts_with("http") {
@@ -91,7 +91,7 @@ fn connect(url: &str) -> Result<Server> {
                     .with_config($key(ReadTimeout), READ_TIMEOUT)
                     .with_config($key(ConnectTimeout), CONNECT_TIMEOUT)
                     .build()
-                    .map_err(|error| wrong(&error))?,
+                    .map_err(|error| configuration_error(&error))?,
             )
         };
     }

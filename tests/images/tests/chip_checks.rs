@@ -9,7 +9,7 @@ use hapterra_image_tests::supply::Reset;
 use hapterra_tests::usb::Port;
 
 /// DBGMCU_IDC.REV_ID of an H743's revisions Z, Y, X and V.
-const TOO_OLD: [u16; 3] = [0x1001, 0x1003, 0x2001];
+const OLD_REVISIONS: [u16; 3] = [0x1001, 0x1003, 0x2001];
 const REVISION_V: u16 = 0x2003;
 /// FLASH_ACR of a G474, and its bit PRFTEN.
 const PREFETCH: (u32, u32) = (0x4002_2000, 1 << 8);
@@ -21,7 +21,7 @@ fn chip_before_revision_v_is_refused_with_a_pattern() {
             continue;
         }
         let board = machine.chip.board;
-        for revision in TOO_OLD {
+        for revision in OLD_REVISIONS {
             machine.reset(Reset::Software);
             machine.bus().set_revision(revision);
             assert_eq!(machine.run_ms(50), Stop::Time, "{board}");

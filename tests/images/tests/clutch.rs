@@ -8,7 +8,7 @@ use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::device::Device;
 
 /// Limits set by the clutch.
-const OF_CLUTCH: Limits = Limits::CLUTCH_INPUT
+const CLUTCH_LIMITS: Limits = Limits::CLUTCH_INPUT
     .union(Limits::CLUTCH_OPEN)
     .union(Limits::CLUTCH_MOVES);
 
@@ -26,7 +26,7 @@ fn latest(device: &Device<'_>) -> TickRecord {
 }
 
 fn limits(device: &Device<'_>) -> Limits {
-    latest(device).limits & OF_CLUTCH
+    latest(device).limits & CLUTCH_LIMITS
 }
 
 #[test]

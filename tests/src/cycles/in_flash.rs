@@ -2,8 +2,8 @@
 
 const SCRIPT: &str = include_str!("../../../firmware/memory/nucleo-h743zi2.x");
 /// Markers around the patterns.
-const FROM: &str = "_tick_in_flash_start = .;";
-const TO: &str = "_tick_in_flash_end = .;";
+const LIST_START: &str = "_tick_in_flash_start = .;";
+const LIST_END: &str = "_tick_in_flash_end = .;";
 
 /// Returns true if the function of this mangled name stays in flash.
 #[must_use]
@@ -13,7 +13,7 @@ pub fn is_in_flash(name: &str) -> bool {
 
 /// Returns the patterns without the prefix that all code sections share.
 fn patterns() -> impl Iterator<Item = &'static str> {
-    let list = SCRIPT.split(FROM).nth(1).and_then(|s| s.split(TO).next());
+    let list = SCRIPT.split(LIST_START).nth(1).and_then(|s| s.split(LIST_END).next());
     let lines = list.unwrap_or_default().lines();
     lines.filter_map(|line| line.trim().strip_prefix("*(.text.")?.strip_suffix(')'))
 }

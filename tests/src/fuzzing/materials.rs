@@ -39,7 +39,7 @@ fn material(bytes: &mut Bytes<'_>) -> Material {
 
 /// Fills a tile's materials: as many as its samples, or one less, of this table or beyond it. A
 /// refused tile stays vacant.
-pub(super) fn lay(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>) {
+pub(super) fn fill(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>) {
     let kind = bytes.byte();
     let count = match kind & 3 {
         0 => MaterialTable::MAX,

@@ -21,7 +21,7 @@ use hapterra_core::terrain::FieldSize;
 
 /// The session under test, and the number of sessions opened before it.
 const SESSION: SessionNumber = SessionNumber::new(0);
-const OTHERS: u32 = 16;
+const OTHER_SESSIONS: u32 = 16;
 
 /// A device that lives as long as the thread, as its memory is leaked.
 pub struct Wire {
@@ -90,7 +90,7 @@ impl Wire {
             silence_s: DEFAULT_SILENCE_S,
         };
         // The other sessions first, so that the device no longer stores this session's number.
-        for session in (1..=OTHERS).map(SessionNumber::new) {
+        for session in (1..=OTHER_SESSIONS).map(SessionNumber::new) {
             self.receive(&message_in(session, &ToDevice::Hello(hello)));
         }
         for stated in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {

@@ -20,8 +20,8 @@ const GRAIN: f64 = 1e-5;
 /// Additional tolerance, as a fraction of the texture's share, due to rounding of a speed.
 const SHARE: f64 = 1e-3;
 /// Depths whose squares are subnormal have no texture, cells.
-const SHALLOW: f64 = 2e-19;
-const DEEP: f64 = 1e18;
+const MIN_DEPTH: f64 = 2e-19;
+const MAX_DEPTH: f64 = 1e18;
 
 /// Checks the texture of one scene with cells of a millimetre, tick by tick.
 #[derive(Clone, Debug)]
@@ -78,9 +78,9 @@ impl TextureOracle {
         let shaded = observed.shaded.map(|shaded| shaded.displacement);
         let plain = shaded.unwrap_or(observed.output.displacement).as_dvec3();
         let (textured, depth) = (textured.as_dvec3(), plain.length());
-        if !(SHALLOW..DEEP).contains(&depth) {
-            let same = (textured - plain).length() <= SHALLOW;
-            return held(same || depth >= DEEP, || format!("{textured} of {plain}"));
+        if !(MIN_DEPTH..MAX_DEPTH).contains(&depth) {
+            let same = (textured - plain).length() <= MIN_DEPTH;
+            return held(same || depth >= MAX_DEPTH, || format!("{textured} of {plain}"));
         }
         let normal = plain / depth;
         held(textured.dot(normal) >= -TANGENTIAL_ROUNDING * depth, || {

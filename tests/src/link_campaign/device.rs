@@ -10,7 +10,7 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use super::cable::A_TICK;
+use super::cable::BYTES_PER_TICK;
 use crate::campaign::arm::{Arm, Mood};
 use crate::campaign::tick_invariants::{Truth, TickChecks};
 use crate::random::Random;
@@ -76,8 +76,8 @@ impl<'t> Board<'t> {
     }
 
     /// Returns the bytes that the device sends, up to `room`.
-    pub fn say<'b>(&mut self, into: &'b mut [u8; A_TICK], room: usize) -> &'b [u8] {
-        let room = room.min(A_TICK);
+    pub fn transmit<'b>(&mut self, into: &'b mut [u8; BYTES_PER_TICK], room: usize) -> &'b [u8] {
+        let room = room.min(BYTES_PER_TICK);
         let stated = self.device.link.transmit(&mut into[..room]);
         &into[..stated]
     }

@@ -96,8 +96,8 @@ impl Fault {
 
     /// Returns its faults for the directions to the device and to the host.
     #[must_use]
-    pub fn harms(&self) -> [LineFaults; 2] {
-        let harm = match self.kind {
+    pub fn line_faults(&self) -> [LineFaults; 2] {
+        let faults = match self.kind {
             Kind::Flips => LineFaults {
                 flipped: libm::pow(10.0, -6.0 + 4.0 * self.share),
                 ..LineFaults::NONE
@@ -130,6 +130,6 @@ impl Fault {
             Kind::Stall | Kind::Cut => [true, true],
             _ => self.ways,
         };
-        ways.map(|harmed| if harmed { harm } else { LineFaults::NONE })
+        ways.map(|harmed| if harmed { faults } else { LineFaults::NONE })
     }
 }

@@ -62,18 +62,18 @@ impl Tap {
     /// Returns the samples made between the first and the last one that left the device since
     /// [`Tap::begin`], by their ticks, with those that never left.
     #[must_use]
-    pub fn made(&self) -> u64 {
+    pub fn samples_made(&self) -> u64 {
         self.before + self.ticks.map_or(0, length)
     }
 
     /// Returns an upper bound of the samples made but not sent at this tick of the device: for each
     /// scene, the ticks since its last sample.
     #[must_use]
-    pub fn unseen(&self, ticks: u64) -> u64 {
-        self.replaced + self.made_since(ticks)
+    pub fn max_unsent(&self, ticks: u64) -> u64 {
+        self.replaced + self.samples_since(ticks)
     }
 
-    fn made_since(&self, ticks: u64) -> u64 {
+    fn samples_since(&self, ticks: u64) -> u64 {
         let last = self.ticks.map_or(0, |(_, last)| u64::from(last));
         ticks.saturating_sub(self.lead.saturating_add(last))
     }
@@ -117,7 +117,7 @@ impl Tap {
             // A lower tick belongs to a new scene, whose ticks begin with 1.
             Some(scene) => {
                 self.before += length(scene);
-                self.replaced += taken.map_or(0, |ticks| self.made_since(ticks));
+                self.replaced += taken.map_or(0, |ticks| self.samples_since(ticks));
                 self.lead = u64::MAX;
                 (1, tick)
             }
@@ -167,7 +167,7 @@ mod tests {
         say(20, taken());
         say(20, taken());
         say(29, samples(1));
-        assert_eq!((tap.made(), tap.unseen(29)), (24, 3));
-        assert_eq!(tap.unseen(31), 5);
+        assert_eq!((tap.samples_made(), tap.max_unsent(29)), (24, 3));
+        assert_eq!(tap.max_unsent(31), 5);
     }
 }

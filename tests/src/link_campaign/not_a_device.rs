@@ -44,7 +44,7 @@ fn run_session(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcom
         hellos.receive(&out);
         out.clear();
         let reported = (host.session(), hellos.last);
-        let received = behaviour.say(now, &segment.scene, reported, chance);
+        let received = behaviour.bytes_to_send(now, &segment.scene, reported, chance);
         host.step(now, &received, &mut out);
         host.samples.clear();
         let seconds = 1 + ((now - began) / 1_000) as usize;

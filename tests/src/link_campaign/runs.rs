@@ -87,7 +87,7 @@ fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, Str
         is_whole: true,
     };
     let outcome = run.play()?;
-    run.afterwards()?;
+    run.release_switch()?;
     Ok(run.plan.done.then_some(outcome))
 }
 
@@ -143,7 +143,7 @@ impl Run<'_, '_> {
                 return Ok(Some(Outcome::Killed));
             };
             if host.end.is_some() {
-                return self.ended().map(Some);
+                return self.check_end().map(Some);
             }
             let (is_done, most) = match step {
                 Step::Open => (host.opened, OPENS),
@@ -202,7 +202,7 @@ impl Run<'_, '_> {
             }
             Kind::HostVanishes => {
                 segment.kill_host();
-                self.vanished()?;
+                self.check_vanished_host()?;
                 return Ok(Some(Outcome::Killed));
             }
             Kind::HostileHost => {
@@ -242,7 +242,7 @@ impl Run<'_, '_> {
 
     /// Waits without a host for longer than the device's limit: it must release the force and
     /// disarm, but not earlier.
-    fn vanished(&mut self) -> Result<(), String> {
+    fn check_vanished_host(&mut self) -> Result<(), String> {
         let was_on = self.segment.board.drive.enabled;
         // A stopped clock does not reach the limit.
         let runs = !self.segment.board.lock_step;
@@ -258,7 +258,7 @@ impl Run<'_, '_> {
     }
 
     /// Checks the report of a host that ended against the truth.
-    fn ended(&mut self) -> Result<Outcome, String> {
+    fn check_end(&mut self) -> Result<Outcome, String> {
         let segment = &mut *self.segment;
         if let Some(End::Reported(error)) = segment.host.as_ref().and_then(|host| host.end.as_ref())
         {
@@ -267,20 +267,20 @@ impl Run<'_, '_> {
         if segment.board.drive.enabled {
             return Err("an end was agreed on, and the amplifiers are on".into());
         }
-        self.counts()?;
+        self.check_counts()?;
         Ok(Outcome::Agreed)
     }
 
-    fn counts(&self) -> Result<(), String> {
+    fn check_counts(&self) -> Result<(), String> {
         let Some(host) = &self.segment.host else {
             return Ok(());
         };
         let (stats, tap) = (host.stats(), &self.segment.tap);
-        let (reported, made) = (stats.samples + stats.lost + stats.dropped, tap.made());
+        let (reported, made) = (stats.samples + stats.lost + stats.dropped, tap.samples_made());
         // The tap does not see samples that are dropped at the end of a scene or of the session.
         let unseen = match stats.dropped {
             0 => 0,
-            _ => tap.unseen(self.segment.board.ticks[0]),
+            _ => tap.max_unsent(self.segment.board.ticks[0]),
         };
         if self.is_whole && !(made..=made + unseen).contains(&reported) {
             return Err(format!(
@@ -298,7 +298,7 @@ impl Run<'_, '_> {
     }
 
     /// The user releases the switch and waits a moment.
-    fn afterwards(&mut self) -> Result<(), String> {
+    fn release_switch(&mut self) -> Result<(), String> {
         self.segment.host = None;
         self.segment.board.dead_man = false;
         self.segment.board.mood = Mood::Lifted;

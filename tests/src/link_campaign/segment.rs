@@ -6,7 +6,7 @@ use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::session::SessionEnd;
 
-use super::cable::{A_TICK, Channel};
+use super::cable::{BYTES_PER_TICK, Channel};
 use super::device::Board;
 use super::fault::{Fault, Kind};
 use super::frame_tap::{Moment, Tap};
@@ -131,9 +131,9 @@ impl<'t> Segment<'t> {
         if fault.kind == Kind::HostileHost {
             (self.let_go, self.owed) = (false, false);
         }
-        let [to_device, to_host] = fault.harms();
-        self.to_device.harm(to_device);
-        self.to_host.harm(to_host);
+        let [to_device, to_host] = fault.line_faults();
+        self.to_device.set_faults(to_device);
+        self.to_host.set_faults(to_host);
         self.fault = Some(fault);
     }
 
@@ -166,9 +166,9 @@ impl<'t> Segment<'t> {
         self.send_hostile_bytes();
         self.deliver();
         self.board.tick()?;
-        let mut buffer = [0; A_TICK];
-        let stated = self.board.say(&mut buffer, self.to_host.room());
-        if self.to_host.room() < A_TICK {
+        let mut buffer = [0; BYTES_PER_TICK];
+        let stated = self.board.transmit(&mut buffer, self.to_host.room());
+        if self.to_host.room() < BYTES_PER_TICK {
             self.full = self.now;
         }
         let when = Moment {
@@ -195,8 +195,8 @@ impl<'t> Segment<'t> {
         self.troubled = self.now;
         self.fault = self.fault.filter(|fault| self.now < fault.end);
         if self.fault.is_none() {
-            self.to_device.harm(Default::default());
-            self.to_host.harm(Default::default());
+            self.to_device.set_faults(Default::default());
+            self.to_host.set_faults(Default::default());
         }
     }
 

@@ -202,7 +202,7 @@ impl<'t> Simulation<'t> {
         let ticks = self.now;
         if end == End::Agreed {
             self.oracle.count(self.client.stats(), &self.sessions)?;
-            self.oracle.agreed(self.now, self.enabled)?;
+            self.oracle.check_agreed_end(self.now, self.enabled)?;
         }
         for _ in 0..AFTER_TICKS {
             self.tick()?;
@@ -377,7 +377,7 @@ impl<'t> Simulation<'t> {
         let is_idle = matches!(self.step, Step::Touching | Step::Disarming(_));
         if self.queries_status
             && is_idle
-            && let Some(ask) = self.status_queries.ask(self.device_ticks)
+            && let Some(ask) = self.status_queries.query(self.device_ticks)
         {
             self.client.ask(ask);
         }

@@ -17,7 +17,7 @@ pub(super) struct StatusQueries {
 
 impl StatusQueries {
     /// Makes a query at this tick of the device, unless one is in progress.
-    pub(super) fn ask(&mut self, tick: u32) -> Option<HostRequest> {
+    pub(super) fn query(&mut self, tick: u32) -> Option<HostRequest> {
         match self.asked {
             Some(_) => None,
             None => {

@@ -53,11 +53,11 @@ const PATH_KINDS: [PathKind; 9] = [
 #[must_use]
 pub fn random(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
     walked(terrain, random, ticks, |walker| {
-        let habit = match walker.random.below(20) {
+        let kind = match walker.random.below(20) {
             n if n < PATH_KINDS.len() => PATH_KINDS[n],
             _ => PathKind::Wander,
         };
-        walker.go_on(habit);
+        walker.advance(kind);
     })
 }
 
@@ -145,18 +145,18 @@ impl<'a> Walker<'a> {
         max * 10_f64.powf(self.random.between(-4.0, 0.0))
     }
 
-    fn anywhere(&mut self) -> [f64; 2] {
+    fn random_position(&mut self) -> [f64; 2] {
         // Also off the field.
         [0, 1].map(|axis| self.random.between(-2.0, self.size[axis] + 2.0))
     }
 
     fn vertex(&mut self) -> [f64; 2] {
-        self.anywhere().map(f64::round)
+        self.random_position().map(f64::round)
     }
 
-    fn advance(&mut self, habit: PathKind) {
+    fn advance(&mut self, kind: PathKind) {
         let ticks = 1 + self.random.below(40);
-        match habit {
+        match kind {
             PathKind::Wander => self.wander(4 * ticks),
             PathKind::Teleport => self.teleport(ticks),
             PathKind::Tremble => self.tremble(ticks),
@@ -165,7 +165,7 @@ impl<'a> Walker<'a> {
             PathKind::OnLines => self.on_lines(ticks),
             PathKind::Tap => self.tap(ticks),
             PathKind::Sweep => self.sweep(1 + ticks / 8),
-            PathKind::Still => self.still(ticks),
+            PathKind::Still => self.hold_still(ticks),
         }
     }
 
@@ -199,7 +199,7 @@ impl<'a> Walker<'a> {
 
     fn teleport(&mut self, ticks: usize) {
         for _ in 0..ticks {
-            let [x, y] = self.anywhere();
+            let [x, y] = self.random_position();
             let height = self.length(10.0) * if self.random.below(2) == 0 { 1.0 } else { -1.0 };
             self.above(x, y, height);
         }
@@ -265,7 +265,7 @@ impl<'a> Walker<'a> {
     fn sweep(&mut self, times: usize) {
         let height = self.random.between(-0.5, 1.0);
         for _ in 0..times {
-            let [x, y] = self.anywhere();
+            let [x, y] = self.random_position();
             self.above(x, y, height);
             let (x, y) = (self.size[0] - x, self.size[1] - y);
             let z = self.path[self.path.len() - 1][2];
@@ -277,7 +277,7 @@ impl<'a> Walker<'a> {
         }
     }
 
-    fn still(&mut self, ticks: usize) {
+    fn hold_still(&mut self, ticks: usize) {
         let last = self.path[self.path.len() - 1];
         self.path.extend(std::iter::repeat_n(last, ticks));
     }

@@ -158,13 +158,13 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         assert!(cols.clone().count() <= D && rows.clone().count() <= D);
         for row in rows {
             for col in cols.clone() {
-                let _ = self.bring(TileKey::new(0, col, row));
+                let _ = self.send_tile(TileKey::new(0, col, row));
             }
         }
     }
 
     /// Sends a tile. Returns true if the loop accepted it.
-    fn bring(&mut self, key: TileKey) -> bool {
+    fn send_tile(&mut self, key: TileKey) -> bool {
         let tile = self.spare.pop().expect("as many spares as requests");
         let [dx, dy, dz] = self.replay.shift;
         let first = key.index.first_cell();
@@ -249,7 +249,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let here: Vec<(u32, TileKey)> = here;
         for (_, key) in here {
             self.requester.received(key);
-            if !self.bring(key) {
+            if !self.send_tile(key) {
                 self.requester.lost(key);
             }
         }

@@ -14,8 +14,8 @@ use crate::invariants::{Invariant, Violation};
 use crate::random::Random;
 
 /// Range of the HIP of a shifted scene beyond the field, and above or below it, cells.
-const BESIDE: f64 = 128.0;
-const DEEP: f64 = 4e6;
+const MAX_BESIDE: f64 = 128.0;
+const MAX_DEPTH: f64 = 4e6;
 
 /// Replays a scene on its materials under the oracle, and adds to its measurements.
 ///
@@ -120,8 +120,8 @@ fn shifted(
     let away = [pick(), pick(), pick() - 50_000_000];
     let beside = |p: &[f64; 3]| {
         let within =
-            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
-        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+            |axis: usize| p[axis].clamp(-MAX_BESIDE, f64::from(scene.terrain.size[axis]) + MAX_BESIDE);
+        [within(0), within(1), p[2].clamp(-MAX_DEPTH, MAX_DEPTH)]
     };
     let path = scene.path.iter().map(beside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);

@@ -100,7 +100,7 @@ impl Materials {
             seed: random.bits(),
         };
         let class_of = classes(layout, count, terrain.size, random);
-        materials.lay(class_of);
+        materials.assign(class_of);
         materials
     }
 
@@ -119,11 +119,11 @@ impl Materials {
             classes: Vec::new(),
             seed: 1,
         };
-        materials.lay(class);
+        materials.assign(class);
         materials
     }
 
-    fn lay(&mut self, class: impl Fn(i32, i32) -> u8) {
+    fn assign(&mut self, class: impl Fn(i32, i32) -> u8) {
         let [columns, rows] = self.size;
         let samples = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
         self.classes = samples.map(|(x, y)| class(x, y)).collect();
@@ -179,7 +179,7 @@ impl Materials {
             },
             ..self.clone()
         };
-        turned.lay(|x, y| {
+        turned.assign(|x, y| {
             let (x, y) = if symmetry.transpose { (y, x) } else { (x, y) };
             let x = if symmetry.mirror_x {
                 columns - 1 - x

@@ -32,9 +32,9 @@ pub fn repeated(scene: &Scene, observed: &[ObservedTick], buffers: &mut Buffers)
 }
 
 /// Range of a shifted scene's HIP beyond the field, cells.
-const BESIDE: f64 = 128.0;
+const MAX_BESIDE: f64 = 128.0;
 /// Range above or below, cells: farther down than any spike is high.
-const DEEP: f64 = 4e6;
+const MAX_DEPTH: f64 = 4e6;
 
 /// Runs a scene up to 10⁸ cells away: the same bits, except for textures that differ there.
 ///
@@ -56,8 +56,8 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
     // requested.
     let beside = |p: &[f64; 3]| {
         let within =
-            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
-        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+            |axis: usize| p[axis].clamp(-MAX_BESIDE, f64::from(scene.terrain.size[axis]) + MAX_BESIDE);
+        [within(0), within(1), p[2].clamp(-MAX_DEPTH, MAX_DEPTH)]
     };
     let scene = &scene.with(
         scene.terrain.clone(),
@@ -181,7 +181,7 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     let twin = transformed(scene, symmetry);
     let mut oracle = TickOracle::of(&twin);
     let other = twin.render(buffers, [0; 3], Supply::Held, |observed| oracle.check(observed))?;
-    same_way(scene, symmetry, &observed, &other, buffers)
+    same_forces(scene, symmetry, &observed, &other, buffers)
 }
 
 /// Returns the scene, mirrored or turned.
@@ -195,7 +195,7 @@ fn transformed(scene: &Scene, symmetry: Symmetry) -> Scene {
 ///
 /// # Errors
 /// A difference that rounding does not explain.
-pub fn same_way(
+pub fn same_forces(
     scene: &Scene,
     symmetry: Symmetry,
     observed: &[ObservedTick],

@@ -43,7 +43,7 @@ pub const SURVEYOR: Account = Account {
     pem: include_str!("keys/surveyor.pem"),
 };
 /// A valid account that may read none.
-pub const STRANGER: Account = Account {
+pub const UNPRIVILEGED: Account = Account {
     mail: "stranger@hills.iam.gserviceaccount.com",
     key_id: "08a7",
     pem: include_str!("keys/stranger.pem"),
@@ -157,7 +157,7 @@ fn holder(token: &str) -> Option<&'static str> {
     let (head, claims) = signed.split_once('.')?;
     let [head, claims] = [head, claims].map(decoded);
     let (head, claims) = (head?, claims?);
-    let account = [SURVEYOR, STRANGER]
+    let account = [SURVEYOR, UNPRIVILEGED]
         .into_iter()
         .find(|account| head["kid"] == account.key_id && claims["iss"] == account.mail)?;
     let signature = BASE64_URL_SAFE_NO_PAD.decode(signature).ok()?;

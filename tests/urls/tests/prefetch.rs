@@ -16,8 +16,8 @@ use heightfield::{OpenOptions, Raster};
 
 /// Requests for two adjacent tiles, and for the surroundings of a HIP: runs of pages, by the layout
 /// of the file.
-const OF_TWO_TILES: usize = 1;
-const OF_A_VIEW: usize = 1;
+const TWO_TILES_REQUESTS: usize = 1;
+const VIEW_REQUESTS: usize = 1;
 
 fn height(column: u32, row: u32) -> f32 {
     (column % 100) as f32 + 0.5 * (row % 64) as f32
@@ -65,7 +65,7 @@ fn tiles_read_ahead_need_no_request() {
     // It must not wait: the server holds its answers back forever.
     server.hold(true);
     terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
-    let ahead = opened + OF_TWO_TILES;
+    let ahead = opened + TWO_TILES_REQUESTS;
     wait_until("requests ahead", || requests(&server) >= ahead);
     server.hold(false);
     for key in keys {
@@ -97,7 +97,7 @@ fn next_placement_is_prefetched_around_the_hip() {
         keeps_tiles: true,
     };
     client.put_view(Duration::ZERO, view, terrain.clone(), &mut vec![]);
-    let after = before + OF_A_VIEW;
+    let after = before + VIEW_REQUESTS;
     wait_until("requests around the HIP", || requests(&server) >= after);
     server.hold(false);
     wait_until("the tile at the HIP", || {

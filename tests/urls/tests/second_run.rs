@@ -65,7 +65,7 @@ impl Bed {
     }
 
     /// Waits until the pages of the first run are written, each to a file.
-    fn settle(&self) {
+    fn wait_for_pages(&self) {
         let is_whole = |path: &PathBuf| {
             let name = path.file_name().expect("a name").to_string_lossy();
             !name.starts_with('.')
@@ -92,7 +92,7 @@ fn second_run_requests_only_file_start_and_sidecars() {
     let bed = bed();
     let (first, requests) = bed.read_all("hills.tif");
     assert!(requests > 10, "{requests}");
-    bed.settle();
+    bed.wait_for_pages();
     // The file's beginning, and the four possible sidecars.
     let (second, again) = bed.read_all("hills.tif");
     assert_eq!(second, first);
@@ -113,7 +113,7 @@ fn second_run_requests_only_file_start_and_sidecars() {
 fn pages_of_a_file_changed_on_its_server_are_not_used() {
     let bed = bed();
     let (first, requests) = bed.read_all("hills.tif");
-    bed.settle();
+    bed.wait_for_pages();
     // The same size, another tag.
     let path = bed.folder.path().join("hills.tif");
     std::fs::write(path, cog(2200, 1800, 2, other)).expect("written");
@@ -129,7 +129,7 @@ fn pages_of_a_file_changed_on_its_server_are_not_used() {
 fn cache_folder_contains_no_part_of_the_url() {
     let bed = bed();
     bed.read_all("hills.tif?sig=VerySecretKey");
-    bed.settle();
+    bed.wait_for_pages();
     let all = files(bed.kept.path());
     assert!(!all.is_empty());
     let holds = |bytes: &[u8], word: &[u8]| bytes.windows(word.len()).any(|some| some == word);

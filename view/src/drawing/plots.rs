@@ -74,7 +74,7 @@ pub(super) fn style_entries(log: &Log) -> Result<Vec<Entry>> {
 }
 
 /// Number of samples that are plotted at once.
-const AT_A_TIME: usize = 200;
+const BATCH_SAMPLES: usize = 200;
 
 /// Last plotted values.
 pub(super) struct Plots {
@@ -115,7 +115,7 @@ impl Plots {
     /// Plots every sample, several at a time: one entry costs a page as much as a hundred samples.
     pub(super) fn take(&mut self, log: &Log, samples: &[Sample]) -> Result<Vec<Entry>> {
         self.waiting.extend(samples);
-        match self.waiting.len() < AT_A_TIME {
+        match self.waiting.len() < BATCH_SAMPLES {
             true => Ok(Vec::new()),
             false => self.finish(log),
         }

@@ -121,8 +121,8 @@ fn violations_of(calls: &Calls, board: &Board, found: &Reached, i: usize) -> Vec
 
 /// Returns a name without the long parts of generic ones.
 fn short(name: &str) -> String {
-    const SHOWN: usize = 120;
-    match name.char_indices().nth(SHOWN) {
+    const MAX_CHARS: usize = 120;
+    match name.char_indices().nth(MAX_CHARS) {
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_string(),
     }

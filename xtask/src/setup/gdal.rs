@@ -9,7 +9,7 @@ use super::packages::{self, found_or_installed};
 use crate::run::report;
 
 /// Extensions of files that are read without GDAL.
-const OWN: [&str; 12] = [
+const OWN_EXTENSIONS: [&str; 12] = [
     "tif", "tiff", "hgt", "npy", "asc", "png", "flt", "bil", "bip", "bsq", "hdr", "raw",
 ];
 
@@ -28,7 +28,7 @@ pub(crate) fn is_needed_for(file: &Path) -> bool {
     let extension = file
         .extension()
         .map(|end| end.to_string_lossy().to_lowercase());
-    extension.is_some_and(|end| !OWN.contains(&end.as_str()))
+    extension.is_some_and(|end| !OWN_EXTENSIONS.contains(&end.as_str()))
 }
 
 fn find() -> Result<Library> {

@@ -14,7 +14,7 @@ pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 /// The target of browsers.
 pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 
-const BY_HAND: &str = "\
+const MANUAL_STEPS: &str = "\
 type: rustup target add thumbv7em-none-eabihf
       (rustup itself is on https://rustup.rs)";
 
@@ -83,7 +83,7 @@ fn short_paths() -> String {
 pub(crate) fn ready() -> Result<Toolchain> {
     match std::env::var("HAPTERRA_TOOLCHAIN").as_deref() {
         Err(_) | Ok("" | "auto") => either(),
-        Ok("rustup") => own().context(BY_HAND),
+        Ok("rustup") => own().context(MANUAL_STEPS),
         Ok("distribution") => from_distribution(),
         Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: say rustup, distribution or auto"),
     }
@@ -96,7 +96,7 @@ fn either() -> Result<Toolchain> {
     }
     own().or_else(|why| {
         report(format!("rustup cannot: {why:#}"));
-        from_distribution().context(BY_HAND)
+        from_distribution().context(MANUAL_STEPS)
     })
 }
 

@@ -118,7 +118,7 @@ impl Header {
 
     fn count(&self, key: &str) -> Result<u32, RasterError> {
         match self.get(key).ok_or_else(|| missing(key))? {
-            value if value.fract() != 0.0 || value < 1.0 => Err(wrong(key, value)),
+            value if value.fract() != 0.0 || value < 1.0 => Err(invalid(key, value)),
             value if value > f64::from(i32::MAX) => {
                 Err(RasterError::AbsurdSize(format!("{key} is {value}")))
             }
@@ -135,7 +135,7 @@ impl Header {
             .ok_or_else(|| missing(both))?
         {
             value if value.is_finite() && value > 0.0 => Ok(value),
-            value => Err(wrong(both, value)),
+            value => Err(invalid(both, value)),
         }
     }
 }
@@ -144,6 +144,6 @@ fn missing(key: &str) -> RasterError {
     RasterError::damaged(format!("the header has no {key}"))
 }
 
-fn wrong(key: &str, value: f64) -> RasterError {
+fn invalid(key: &str, value: f64) -> RasterError {
     RasterError::damaged(format!("header: {key} is {value}"))
 }

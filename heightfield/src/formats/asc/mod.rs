@@ -53,7 +53,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, RasterError> {
         Some(corner) => {
             let map = GroundMap::from_south_west(corner, (east, north), rows);
             let map = map.ok_or_else(|| RasterError::damaged("its header places it nowhere"))?;
-            decoded.lay_out(map, None);
+            decoded.set_layout(map, None);
         }
         None => {
             let extent = (east * f64::from(columns), north * f64::from(rows));

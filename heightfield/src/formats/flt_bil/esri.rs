@@ -78,7 +78,7 @@ pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, Ra
             decoded.remarks.extend(remark);
             decoded.set_unit(unit.as_deref());
             if let Some(map) = map {
-                decoded.lay_out(map, None);
+                decoded.set_layout(map, None);
             }
             Ok(())
         }),

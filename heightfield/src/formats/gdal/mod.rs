@@ -38,7 +38,7 @@ const NAME: &str = "GDAL";
 /// Drivers that read any file with a header beside it as samples.
 const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
 /// Drivers that combine many files.
-const OF_FILES: [&str; 2] = ["VRT", "STACIT"];
+const COMBINING_DRIVERS: [&str; 2] = ["VRT", "STACIT"];
 /// Enough bytes to recognise a file's kind.
 const HEAD_BYTES: u64 = 1024;
 /// Number of bands of a colour picture, of bytes.
@@ -60,7 +60,7 @@ pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Rast
     let place = Place::of(&library, path, &head, &options.fetcher)?;
     let packing = packed::Packing::of(&head);
     let place = Arc::new(match packing {
-        Some(_) => place.under_a_new_name()?,
+        Some(_) => place.with_new_name()?,
         None => place,
     });
     let decoded = match packing {
@@ -301,7 +301,7 @@ fn decoded(
             "it has {bands} bands: the first is taken for the height (--input band=N)"
         ));
     }
-    if OF_FILES.contains(&driver.as_str()) && no_data.is_none() {
+    if COMBINING_DRIVERS.contains(&driver.as_str()) && no_data.is_none() {
         decoded.remarks.push(
             "it is read by GDAL, which has height 0 where none of its files is: to mark no data, build it with a no-data value (gdalbuildvrt -vrtnodata)"
                 .into(),
@@ -321,7 +321,7 @@ fn decoded(
     if let Some([x, x_column, x_row, y, y_column, y_row]) = map
         && let Some(map) = GroundMap::new([x, x_column, x_row], [y, y_column, y_row])
     {
-        decoded.lay_out(map, None);
+        decoded.set_layout(map, None);
     }
     if let Some(encoding) = options.encoding {
         decoded.decode_as_codes(encoding);

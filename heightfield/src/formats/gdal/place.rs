@@ -60,7 +60,7 @@ impl Place {
     /// Links the archive under a new name. GDAL caches the files of an archive by name, and reads
     /// beyond their end if another archive has replaced it (3.6 crashes).
     #[cfg(unix)]
-    pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
+    pub(super) fn with_new_name(self) -> Result<Self, RasterError> {
         if self.served.is_some() || self._folder.is_some() {
             return Ok(self);
         }
@@ -80,7 +80,7 @@ impl Place {
 
     /// Returns the archive under its own name, because links need a privilege on this system.
     #[cfg(not(unix))]
-    pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
+    pub(super) fn with_new_name(self) -> Result<Self, RasterError> {
         Ok(self)
     }
 

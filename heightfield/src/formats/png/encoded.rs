@@ -19,7 +19,7 @@ pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, R
 }
 
 /// Converts the fault of ambiguous channels if the picture looks like encoded heights.
-pub(super) fn suspected(fault: RasterError, input: &FileBytes) -> RasterError {
+pub(super) fn suspect_encoded_heights(fault: RasterError, input: &FileBytes) -> RasterError {
     if !matches!(fault, RasterError::AmbiguousChannels(_)) {
         return fault;
     }

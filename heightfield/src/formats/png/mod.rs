@@ -6,7 +6,7 @@ use std::io::{BufRead, Seek};
 
 use ::png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Reader, Transformations};
 
-use crate::beside::lay_out_by_world_file;
+use crate::beside::apply_world_file;
 use crate::decoded::Decoded;
 use crate::format::{Claim, Format, Parts};
 use crate::input::{FileBytes, ReadSeek};
@@ -24,7 +24,7 @@ pub(super) const FORMAT: Format = Format {
             Some(encoding) => encoded::decode(input, encoding)?,
             None => decode(input, options.png_channel)?,
         };
-        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
+        apply_world_file(input, &WORLD_FILES, &mut decoded)?;
         Ok(decoded)
     },
 };
@@ -62,7 +62,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
     input.check_size(size.0, size.1, pixel_bytes as u64)?;
     let transparent = transparent_grey(info);
     let chosen = Choice::new(color, channel).map_err(|fault| match channel {
-        None => encoded::suspected(fault, input),
+        None => encoded::suspect_encoded_heights(fault, input),
         Some(_) => fault,
     })?;
     let count = size.0 as usize * size.1 as usize;
@@ -81,7 +81,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
     };
     pixels.read(&mut reader)?;
     if channel.is_none() && chosen.height == PngChannel::Alpha {
-        refuse_opaque(&pixels.samples).map_err(|fault| encoded::suspected(fault, input))?;
+        refuse_opaque(&pixels.samples).map_err(|fault| encoded::suspect_encoded_heights(fault, input))?;
     }
     let what = chosen.described(color);
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);

@@ -30,7 +30,7 @@ const MAX_ROW: u32 = 32_768;
 
 /// Returns true if single blocks of an image can be read: its rows can, or a strip or tile is small
 /// enough.
-fn suit(layout: &Layout) -> bool {
+fn can_read_blocks(layout: &Layout) -> bool {
     layout.is_read_by_rows() || is_small(layout, chunks(layout))
 }
 
@@ -140,7 +140,7 @@ impl Image {
 
     /// Returns true if parts of it can be read without decompressing it to disk.
     pub(super) fn has_parts(&self) -> bool {
-        suit(&self.layout)
+        can_read_blocks(&self.layout)
     }
 
     /// Prepares reading the image in blocks.
@@ -149,7 +149,7 @@ impl Image {
     /// The reason why that is impossible.
     pub(super) fn prepare_blocks(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let chunks = self.layout.chunks_name();
-        if !suit(&self.layout) {
+        if !can_read_blocks(&self.layout) {
             let unpacked = match disk {
                 Ok(disk) => {
                     unpack::into_file(&mut self.layout, disk).map_err(|error| error.to_string())
@@ -400,7 +400,7 @@ impl Image {
         const TRANSFORM: u16 = 34264;
         const GEO_KEYS: u16 = 34735;
         // Max difference, in cells of the overview.
-        const OF_A_CELL: f64 = 0.5;
+        const MAX_DIFFERENCE: f64 = 0.5;
         let keys = |image: &Self| Some(image.tag(GEO_KEYS)?.as_u16_slice()?.to_vec());
         if keys(self).is_some_and(|own| keys(full) != Some(own)) {
             return false;
@@ -431,7 +431,7 @@ impl Image {
                 Some(at(tie, axis + 3)? - at(tie, axis)? * along)
             };
             let corners = corner(&tie, own).zip(corner(&full_tie, of_full));
-            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= OF_A_CELL * own.abs())
+            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= MAX_DIFFERENCE * own.abs())
         })
     }
 }

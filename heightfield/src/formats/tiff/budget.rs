@@ -21,7 +21,7 @@ const MAX_CHUNK: u64 = 1 << 30;
 pub(super) fn check_memory(layout: &Layout) -> Result<(), RasterError> {
     let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
     let all = Part::whole(layout.columns, layout.rows);
-    let is_in_parts = layout.is_plain || unpack::suits_whole(layout, &all);
+    let is_in_parts = layout.is_plain || unpack::suits_whole_band(layout, &all);
     let is_large = bytes > MAX_BYTES || (layout.chunk_size() > MAX_CHUNK && !is_in_parts);
     let bytes = bytes.max(layout.chunk_size());
     match is_large && layout.of_band().is_some() {

@@ -7,7 +7,7 @@ use tiff_reader::{Ifd, TiffFile};
 use super::gdal_metadata::Metadata;
 use super::layout::NumberKind;
 use super::{georef, images};
-use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
+use crate::beside::{find_appended, apply_world_file, remark_other_place};
 use crate::decoded::Decoded;
 use crate::input::{Data, FileBytes};
 use crate::{OpenOptions, RasterError};
@@ -31,7 +31,7 @@ pub(super) fn describe(
     let by_gdal = options.gdal.then_some(input);
     georef::apply(image, decoded, metadata.metres_per_vertical_unit, by_gdal);
     match decoded.place {
-        None => lay_out_by_world_file(input, &WORLD_FILES, decoded)?,
+        None => apply_world_file(input, &WORLD_FILES, decoded)?,
         Some(_) if input.is_outline() => {}
         Some(_) => remark_other_place(input, &WORLD_FILES, decoded),
     }

@@ -45,7 +45,7 @@ pub(super) fn apply(
     decoded.file_layout.samples_are = keys.samples_are();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
-        decoded.lay_out(map, keys.unit());
+        decoded.set_layout(map, keys.unit());
         if !has_place(image) {
             decoded.place = None;
         }

@@ -385,9 +385,9 @@ impl Layout {
 
 /// Checks the predictor: floats support only predictor 3.
 fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError> {
-    const OF_FLOATS: u16 = 3;
+    const FLOAT_PREDICTOR: u16 = 3;
     match (image.predictor(), format) {
-        (OF_FLOATS, SampleFormat::Signed | SampleFormat::Unsigned) => Err(RasterError::damaged(
+        (FLOAT_PREDICTOR, SampleFormat::Signed | SampleFormat::Unsigned) => Err(RasterError::damaged(
             "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
         )),
         _ => Ok(()),

@@ -77,7 +77,7 @@ impl Mask {
     ) -> Result<(), RasterError> {
         match &self.layout {
             Some(mask) if mask.is_read_by_rows() => by_rows(mask, part, set),
-            Some(mask) if unpack::suits_whole(mask, part) => whole(mask, part, set),
+            Some(mask) if unpack::suits_whole_band(mask, part) => whole(mask, part, set),
             _ => {
                 let band = Band::new(&self.directory, 0);
                 let has_data = band.read(part, |value: u8| value != 0)?;

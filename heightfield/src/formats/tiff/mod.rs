@@ -205,7 +205,7 @@ fn stored(
 /// Returns a remark on the peak memory, if reading needs more than the samples themselves.
 fn peak_memory_remark(layout: &Layout) -> &'static str {
     let all = Part::whole(layout.columns, layout.rows);
-    match layout.is_plain || unpack::suits_whole(layout, &all) {
+    match layout.is_plain || unpack::suits_whole_band(layout, &all) {
         true => "",
         false => "; while it is opened it takes more than that",
     }

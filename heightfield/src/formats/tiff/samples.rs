@@ -30,7 +30,7 @@ fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterErro
     if layout.is_read_by_rows() {
         return uncompressed::read(layout, band, part);
     }
-    if unpack::suits_whole(layout, part) {
+    if unpack::suits_whole_band(layout, part) {
         return unpack::read_whole(layout, band);
     }
     let band = Band::new(&layout.directory, band);

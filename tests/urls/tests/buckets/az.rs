@@ -11,7 +11,7 @@ use crate::opened::{
 const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
 /// Times before which a signature is valid.
 const ONE_DAY: &str = "2100-01-31T00:00:00Z";
-const LONG_AGO: &str = "2020-01-31T00:00:00Z";
+const EXPIRED: &str = "2020-01-31T00:00:00Z";
 
 /// A server of the containers of an account.
 struct Microsoft {
@@ -90,7 +90,7 @@ fn file_opens_with_a_valid_shared_access_signature() {
         assert!(output.contains("read GeoTIFF"), "{output}");
     }
     for other in [
-        SURVEYORS.sas("hills", LONG_AGO),
+        SURVEYORS.sas("hills", EXPIRED),
         SURVEYORS.sas(PUBLIC, ONE_DAY),
         EMULATOR.sas("hills", ONE_DAY),
     ] {

@@ -1,7 +1,7 @@
 //! `gs://`
 
 use hapterra_url_tests::bucket::{PUBLIC, Server};
-use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
+use hapterra_url_tests::gcs::{UNPRIVILEGED, SURVEYOR, TOKEN, served};
 
 use crate::opened::{
     Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
@@ -87,9 +87,9 @@ fn missing_file_error_names_its_url() {
 #[test]
 fn rejected_key_error_names_the_server_code() {
     let google = Google::start();
-    let stranger = google.output_with_key(&url(), &STRANGER.file());
+    let stranger = google.output_with_key(&url(), &UNPRIVILEGED.file());
     assert_refused(&stranger, "AccessDenied", HINT);
-    let forged = SURVEYOR.file_with_key_of(&STRANGER);
+    let forged = SURVEYOR.file_with_key_of(&UNPRIVILEGED);
     let forged = google.output_with_key(&url(), &forged);
     assert_refused(&forged, "AuthenticationRequired", HINT);
     let log = google.server.take_log();

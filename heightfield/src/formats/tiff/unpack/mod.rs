@@ -135,7 +135,7 @@ fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> R
 }
 
 /// Returns true if a whole band is best read by rows: its strips are large.
-pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
+pub(super) fn suits_whole_band(layout: &Layout, part: &Part) -> bool {
     let is_whole = *part == Part::whole(layout.columns, layout.rows);
     is_whole && layout.has_strips() && layout.chunk_size() > MAX_DECODED && suits(layout)
 }
