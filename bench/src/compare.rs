@@ -130,7 +130,7 @@ pub(crate) type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
 pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> Vec<Row> {
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(grid, &mut buffers);
-    let mut entries = ours(&window);
+    let mut entries = entries_of(&window);
     entries.extend(opponents(grid));
     let mut rows = Vec::new();
     for path in path::all(grid, effort.ticks) {
@@ -149,7 +149,7 @@ pub const DEFAULT_VARIANT: Label = Label {
 };
 
 /// Returns the product's variants on a stored field.
-pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
+pub(crate) fn entries_of<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
     vec![(DEFAULT_VARIANT, Box::new(Product::new(window)))]
 }
 
@@ -208,7 +208,12 @@ pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
     labelled.into()
 }
 
-fn compare_on_path(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) -> Vec<Row> {
+fn compare_on_path(
+    grid: &Grid,
+    path: &Path,
+    entries: &mut [Entry<'_>],
+    effort: Effort,
+) -> Vec<Row> {
     let is_bound = |label: &Label| label.family == Family::Bound && path.name != "unmoved";
     let times = interleave(entries.len(), effort.rounds, |index| {
         let elapsed = entries[index].1.time(&path.hips);

@@ -113,7 +113,10 @@ mod tests {
                 let (x, y) = (exact[0] + 1e-5 * turn.cos(), exact[1] + 1e-5 * turn.sin());
                 if grid.has([x.floor() as i32, y.floor() as i32]) {
                     let near = [x, y, grid.height(x, y)];
-                    assert!(distance(&near) > distance(&exact) - 1e-12, "{hip:?} {exact:?}");
+                    assert!(
+                        distance(&near) > distance(&exact) - 1e-12,
+                        "{hip:?} {exact:?}"
+                    );
                 }
             }
         }
@@ -131,7 +134,8 @@ mod tests {
                 angle: 0.0
             })
         );
-        let off = deviation(&flat, &hip, &ContactResult::touching([0.25, 0.0, 0.25])).expect("inside");
+        let off =
+            deviation(&flat, &hip, &ContactResult::touching([0.25, 0.0, 0.25])).expect("inside");
         assert!((off.error - 0.25).abs() < 1e-9 && (off.angle - 45.0).abs() < 1e-6);
     }
 }

@@ -53,7 +53,7 @@ impl Case {
         }
     }
 
-    fn ours(&self, start: (f32, f32)) -> (f64, f64) {
+    fn converge(&self, start: (f32, f32)) -> (f64, f64) {
         let z = self.hip[2] as f32;
         let patch = Patch::new(self.corners.map(|h| h - z));
         let hip = (self.hip[0] as f32, self.hip[1] as f32);
@@ -112,10 +112,10 @@ const SOLVERS: [Solver<Case, (f64, f64)>; 11] = [
         case.newton_double(50)
     }),
     ("hapterra, from the centre", Family::Ours, |case| {
-        case.ours((0.5, 0.5))
+        case.converge((0.5, 0.5))
     }),
     ("hapterra, from the last", Family::Ours, |case| {
-        case.ours(case.last)
+        case.converge(case.last)
     }),
 ];
 
@@ -159,7 +159,9 @@ fn measure<Case, Found>(
         .iter()
         .zip(&times)
         .map(|((name, family, solve), own)| {
-            let deviations = compared.iter().filter_map(|case| deviation(case, solve(case)));
+            let deviations = compared
+                .iter()
+                .filter_map(|case| deviation(case, solve(case)));
             let (ns, ratio) = timing(own, &times[0]);
             Row {
                 terrain: terrain.to_owned(),

@@ -33,6 +33,6 @@ fn tick_instruction_counts_do_not_exceed_the_stored_table() {
     if requested == "write" {
         return Table::write(&rows);
     }
-    let worse = Table::recorded().regressions(&rows);
-    assert!(worse.is_empty(), "{}", worse.join("\n"));
+    let regressions = Table::recorded().regressions(&rows);
+    assert!(regressions.is_empty(), "{}", regressions.join("\n"));
 }

@@ -32,7 +32,10 @@ fn check(page: &str, text: &str) {
         std::fs::write(&path, text).expect("written");
     }
     let recorded = read(page);
-    let first = recorded.lines().zip(text.lines()).find(|(old, new)| old != new);
+    let first = recorded
+        .lines()
+        .zip(text.lines())
+        .find(|(old, new)| old != new);
     assert!(
         recorded == text,
         "docs/reference/{page} is old: type cargo xtask docs --write. First: {first:#?}"

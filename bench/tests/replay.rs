@@ -43,8 +43,8 @@ fn paper_rule_is_printed_recorded_and_replayed() {
     assert_ne!(rows(&swept), rows(&paper));
     assert!(paper.contains("paper") && !swept.contains("paper"));
     // A recording has its own rule, and a stated one has priority.
-    let again = replay(folder, "paper.csv", "again.csv", &[]);
-    assert_eq!(rows(&again), rows(&paper));
+    let repeated = replay(folder, "paper.csv", "again.csv", &[]);
+    assert_eq!(rows(&repeated), rows(&paper));
     let other = replay(folder, "paper.csv", "other.csv", &["--contact", "swept"]);
     assert_eq!(rows(&other), rows(&swept));
 }

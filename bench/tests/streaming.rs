@@ -67,8 +67,8 @@ fn streaming_cost_is_independent_of_terrain_size() {
         // A fallback avoids no-data at any speed, and a slow hand never needs it.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.coarse();
-            let seen = [straight, turning, row.no_data_over_fallback];
-            assert_eq!(seen, [Some(0); 3], "{row:?}");
+            let shares = [straight, turning, row.no_data_over_fallback];
+            assert_eq!(shares, [Some(0); 3], "{row:?}");
         }
         let held = |row: &Row| [row.held_straight, row.held_turning];
         assert_eq!(held(small), held(large));

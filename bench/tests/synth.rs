@@ -35,11 +35,11 @@ fn terrain_too_large_for_the_disk_is_refused_before_writing() {
     let folder = tempfile::tempdir().expect("a folder");
     let huge = ["plane", "--size", "4000000000x4000000000"];
     let refused = synth(&huge, &folder.path().join("huge.tif"));
-    let stated = output_text(&refused);
-    assert_eq!(refused.status.code(), Some(1), "{stated}");
+    let output = output_text(&refused);
+    assert_eq!(refused.status.code(), Some(1), "{output}");
     assert!(
-        stated.contains("GB are free") && stated.contains("hint:"),
-        "{stated}"
+        output.contains("GB are free") && output.contains("hint:"),
+        "{output}"
     );
     assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
 }
@@ -50,13 +50,13 @@ fn file_name_reaches_the_terminal_without_control_characters() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("x\u{1b}]0;owned\u{7}\u{202e}.tif");
     let made = synth(&["plane", "--size", "8"], &file);
-    let stated = output_text(&made);
+    let output = output_text(&made);
     assert!(
-        made.status.success() && stated.contains("wrote"),
-        "{stated}"
+        made.status.success() && output.contains("wrote"),
+        "{output}"
     );
     let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-    assert!(!stated.contains(controls), "{stated:?}");
+    assert!(!output.contains(controls), "{output:?}");
 }
 
 #[cfg(unix)]

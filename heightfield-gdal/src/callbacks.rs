@@ -184,7 +184,8 @@ unsafe extern "C" fn read(
         let file = unsafe { opened(file)? };
         let requested = size.checked_mul(count).filter(|requested| *requested > 0)?;
         let remaining = file.file.bytes().saturating_sub(file.at);
-        let bytes = usize::try_from(remaining).map_or(requested, |remaining| requested.min(remaining));
+        let bytes =
+            usize::try_from(remaining).map_or(requested, |remaining| requested.min(remaining));
         let read = file.mounted.read_at(&*file.file, file.at, bytes)?;
         // SAFETY: GDAL's buffer has space for all requested bytes, and `read` has no more.
         unsafe { ptr::copy_nonoverlapping(read.as_ptr(), buffer.cast(), bytes) };

@@ -83,7 +83,9 @@ impl Dataset {
         };
         let list = list.unwrap_or_default().replace('"', "'");
         let available = list.split("name='").skip(1);
-        let available: Vec<_> = available.filter_map(|rest| rest.split('\'').next()).collect();
+        let available: Vec<_> = available
+            .filter_map(|rest| rest.split('\'').next())
+            .collect();
         for option in options {
             let option = option.to_string_lossy();
             let name = option.split('=').next().unwrap_or_default();

@@ -33,7 +33,7 @@ struct State {
     depths: HashMap<String, u32>,
     /// Number of threads that are waiting for a file, and the start of the first wait.
     waiting: u32,
-    begun: Option<Instant>,
+    wait_start: Option<Instant>,
     /// Total time in which GDAL has waited for files.
     waited: Duration,
 }
@@ -108,21 +108,24 @@ impl Mounted {
     /// Returns the total time in which GDAL has waited for files, including current waits.
     pub(crate) fn waited(&self) -> Duration {
         let state = self.state();
-        state.waited + state.begun.map_or(Duration::ZERO, |begun| begun.elapsed())
+        state.waited
+            + state
+                .wait_start
+                .map_or(Duration::ZERO, |wait_start| wait_start.elapsed())
     }
 
     /// Runs a read, and records its time and its error.
     fn read<T>(&self, read: impl FnOnce() -> io::Result<T>) -> Option<T> {
         let mut state = self.state();
         state.waiting += 1;
-        state.begun.get_or_insert_with(Instant::now);
+        state.wait_start.get_or_insert_with(Instant::now);
         drop(state);
         let read = read();
         let mut state = self.state();
         state.waiting -= 1;
         if state.waiting == 0 {
-            let begun = state.begun.take();
-            state.waited += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
+            let wait_start = state.wait_start.take();
+            state.waited += wait_start.map_or(Duration::ZERO, |wait_start| wait_start.elapsed());
         }
         match read {
             Ok(read) => return Some(read),
@@ -181,10 +184,12 @@ impl Mounted {
         let mut inner = Vec::new();
         for named in &named {
             let neighbour = named.at_server(&root).map_err(refused)?;
-            inner.extend(neighbour.and_then(|neighbour| match neighbour.strip_prefix(&root) {
-                Some(absolute) => plain(absolute),
-                None => plain(&format!("{folder}/{beside}")),
-            }));
+            inner.extend(
+                neighbour.and_then(|neighbour| match neighbour.strip_prefix(&root) {
+                    Some(absolute) => plain(absolute),
+                    None => plain(&format!("{folder}/{beside}")),
+                }),
+            );
         }
         let mut state = self.state();
         for name in inner.into_iter().take(vrt::MAX_FILES) {

@@ -72,7 +72,13 @@ mod tests {
         let [zero, second] = [0, 1].map(Duration::from_secs);
         assert_eq!(remaining(zero, zero), OPEN_TIMEOUT);
         assert_eq!(remaining(OPEN_TIMEOUT, zero), zero);
-        assert_eq!(remaining(60 * second, 58 * second), OPEN_TIMEOUT - 2 * second);
-        assert_eq!(remaining(OPEN_TIMEOUT + MAX_SERVER_WAIT, 2 * MAX_SERVER_WAIT), zero);
+        assert_eq!(
+            remaining(60 * second, 58 * second),
+            OPEN_TIMEOUT - 2 * second
+        );
+        assert_eq!(
+            remaining(OPEN_TIMEOUT + MAX_SERVER_WAIT, 2 * MAX_SERVER_WAIT),
+            zero
+        );
     }
 }

@@ -300,7 +300,10 @@ fn unreadable_file_is_a_fault_but_missing_file_is_not() {
     }
     let unmounted = mount.path("a/west.dat");
     drop(mount);
-    assert!(last(&gdal, &unmounted).is_err(), "nothing is mounted any more");
+    assert!(
+        last(&gdal, &unmounted).is_err(),
+        "nothing is mounted any more"
+    );
 }
 
 #[test]

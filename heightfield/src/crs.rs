@@ -137,7 +137,9 @@ mod tests {
             let (by_text, _) = ReferenceSystem::from_wkt(wkt);
             assert_eq!(Some(&by_code), by_text.as_ref(), "the text names its code");
             let found = by_code.own_degrees(place).expect("in reach");
-            let error = (found.0 - expected.0).abs().max((found.1 - expected.1).abs());
+            let error = (found.0 - expected.0)
+                .abs()
+                .max((found.1 - expected.1).abs());
             assert!(error < 1e-7, "{code}: {found:?} for {expected:?}");
             let found = by_code.to_lonlat(place).expect("in reach");
             let back = by_code.from_lonlat(found).expect("in reach");
@@ -243,9 +245,9 @@ mod tests {
             (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9,
             "{a:?} {b:?}"
         );
-        let stated = feet.other_unit().expect("said");
+        let remark = feet.other_unit().expect("said");
         assert!(
-            stated.contains("0.3048006") && metres.other_unit().is_none(),
+            remark.contains("0.3048006") && metres.other_unit().is_none(),
             "{stated}"
         );
         assert!(!metres.has_unit_of(&feet));

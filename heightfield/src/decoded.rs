@@ -106,18 +106,18 @@ impl Decoded {
 impl Decoded {
     /// Sets unit, datum and direction from a vertical reference system; `stated` is the number of
     /// metres in a unit, if the file states it.
-    pub(super) fn set_vertical(&mut self, system: Option<Vertical>, stated: Option<f64>) {
-        self.metres_per_vertical_unit = stated.or(system.as_ref().map(|system| system.metres));
+    pub(super) fn set_vertical(&mut self, system: Option<Vertical>, declared: Option<f64>) {
+        self.metres_per_vertical_unit = declared.or(system.as_ref().map(|system| system.metres));
         if let Some(system) = system {
-            if let Some(stated) =
-                stated.filter(|stated| (stated / system.metres - 1.0).abs() > 1e-9)
+            if let Some(declared) =
+                declared.filter(|declared| (declared / system.metres - 1.0).abs() > 1e-9)
             {
                 self.remarks.push(format!(
                     "unit of heights: the file states units of {stated} m, and {}, which counts in units of {} m; the former is taken (--input height-unit=…)",
                     system.name, system.metres
                 ));
             }
-            if stated.is_none() && system.code.is_some() {
+            if declared.is_none() && system.code.is_some() {
                 self.vertical_unit_from = Certainty::FromCode;
             }
             if system.is_depth {
@@ -218,7 +218,8 @@ impl Decoded {
         let survey = match &self.storage {
             Storage::Memory { .. } => Survey::of_all(self.summarise(outermost.get_mut())),
             Storage::Blocks(blocks) => {
-                let survey = blocks.survey(|stored| self.counted(stored, &mut outermost.borrow_mut()));
+                let survey =
+                    blocks.survey(|stored| self.counted(stored, &mut outermost.borrow_mut()));
                 if let Some(outage) = blocks.take_outage() {
                     return Err(outage);
                 }

@@ -128,11 +128,11 @@ fn check(raster: &Raster, within: u32) {
         for (index, found) in (0..).zip(heights) {
             let (column, row) = (column + index % columns, row + index / columns);
             let from_north = (SIZE[1] - 1 - row) as usize;
-            let wanted = reference(&all, column as usize, from_north, within as usize);
-            match wanted {
-                Some(wanted) => {
-                    let off = (f64::from(found) - wanted).abs();
-                    assert!(off < 1e-4, "{within}: {column} {row}: {found} {wanted}");
+            let expected = reference(&all, column as usize, from_north, within as usize);
+            match expected {
+                Some(expected) => {
+                    let off = (f64::from(found) - expected).abs();
+                    assert!(off < 1e-4, "{within}: {column} {row}: {found} {expected}");
                 }
                 None => assert!(found.is_nan(), "{within}: {column} {row}: {found}"),
             }
@@ -188,10 +188,10 @@ fn coarse_levels_are_filled_from_their_own_samples() {
         let read = raster.read_row(level, row as u32, 0, &mut heights, Wait::UntilRead);
         assert!(read.is_complete());
         for (column, found) in heights.iter().enumerate() {
-            let wanted = reference(&all, column, row, 3).unwrap_or(f64::NAN);
-            let is_same = (found - wanted).abs() < 1e-9 || found.is_nan() && wanted.is_nan();
-            assert!(is_same, "{column} {row}: {found} {wanted}");
-            filled += u32::from(all[row][column].is_none() && !wanted.is_nan());
+            let expected = reference(&all, column, row, 3).unwrap_or(f64::NAN);
+            let is_same = (found - expected).abs() < 1e-9 || found.is_nan() && expected.is_nan();
+            assert!(is_same, "{column} {row}: {found} {expected}");
+            filled += u32::from(all[row][column].is_none() && !expected.is_nan());
         }
     }
     assert!(filled > 500, "{filled}");

@@ -56,7 +56,10 @@ impl Format {
                 Parts::Bands => "bands, chosen by number",
             };
             let available = format!("{} has {has}", self.name);
-            Err(RasterError::NoSuchPart { requested, available })
+            Err(RasterError::NoSuchPart {
+                requested,
+                available,
+            })
         };
         match (&options.variable, options.band) {
             (Some(variable), _) => refused(format!("variable {variable}")),

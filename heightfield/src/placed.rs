@@ -126,7 +126,9 @@ impl Decoded {
             .filter(|cell| cell.certainty != Certainty::Assumed)
         {
             let (east, north) = cell.ground_metres();
-            return Err(RasterError::CellSizeStated(format!("{east:.3} × {north:.3} m")));
+            return Err(RasterError::CellSizeStated(format!(
+                "{east:.3} × {north:.3} m"
+            )));
         }
         let metre = CellUnit::Length { metres: 1.0 };
         let sides = match self.cell {

@@ -8,7 +8,7 @@ use std::hash::Hasher;
 
 use twox_hash::XxHash64;
 
-use super::blocks::{Block, BlockImage, BlockReader, SurveyParts, Part};
+use super::blocks::{Block, BlockImage, BlockReader, Part, SurveyParts};
 use super::input::FileBytes;
 use super::read::StoredType;
 use super::samples::{Endian, SampleType, Samples, with_samples};
@@ -106,7 +106,12 @@ impl RawSamples {
     }
 
     /// Reads a part of the image with the samples of `subsampling`.
-    fn read(&self, input: &FileBytes, part: &Part, subsampling: Subsampling) -> Result<Samples, RasterError> {
+    fn read(
+        &self,
+        input: &FileBytes,
+        part: &Part,
+        subsampling: Subsampling,
+    ) -> Result<Samples, RasterError> {
         if self.sample > self.row {
             let part = turned(part);
             let samples = self.turned().read(input, &part, subsampling.turned())?;
@@ -145,8 +150,10 @@ impl RawSamples {
     }
 
     fn place(&self, column: u32, row: u32, subsampling: Subsampling) -> u64 {
-        let [column, row] = [(column, subsampling.first[0]), (row, subsampling.first[1])]
-            .map(|(index, first)| u64::from(index) * u64::from(subsampling.every) + u64::from(first));
+        let [column, row] =
+            [(column, subsampling.first[0]), (row, subsampling.first[1])].map(|(index, first)| {
+                u64::from(index) * u64::from(subsampling.every) + u64::from(first)
+            });
         self.first + row * self.row + column * self.sample
     }
 
@@ -274,14 +281,20 @@ impl BlockReader for PlainBlocks {
     fn prefetch(&self, image: usize, parts: &[Part]) {
         if let Some(remote) = self.input.remote() {
             let subsampling = self.subsampling(image);
-            remote.prefetch(parts.iter().flat_map(|part| self.plain.ranges(part, subsampling)));
+            remote.prefetch(
+                parts
+                    .iter()
+                    .flat_map(|part| self.plain.ranges(part, subsampling)),
+            );
         }
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         self.prefetch(image, std::slice::from_ref(part));
         Ok(Block {
-            samples: self.plain.read(&self.input, part, self.subsampling(image))?,
+            samples: self
+                .plain
+                .read(&self.input, part, self.subsampling(image))?,
             no_data_mask: None,
             is_incomplete: false,
         })

@@ -90,7 +90,7 @@ fn widely_spaced_samples_are_read_one_by_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let (input, plain) = file(folder.path());
     let bytes = std::fs::read(folder.path().join("samples.raw")).expect("there");
-    let far = RawSamples {
+    let spaced = RawSamples {
         columns: 5,
         rows: 4,
         row: 90_000,
@@ -98,7 +98,7 @@ fn widely_spaced_samples_are_read_one_by_one() {
         ..plain
     };
     let at = |column: u64, row: u64| {
-        let at = (37 + row * far.row + column * far.sample) as usize;
+        let at = (37 + row * spaced.row + column * spaced.sample) as usize;
         i16::from_be_bytes([bytes[at], bytes[at + 1]])
     };
     // Every second sample, over more rows than one read covers.
@@ -109,7 +109,7 @@ fn widely_spaced_samples_are_read_one_by_one() {
     let places = [1, 3].into_iter();
     let places = places.flat_map(|row| [0, 2, 4].map(|column| (column, row)));
     let expected: Vec<i16> = places.map(|(column, row)| at(column, row)).collect();
-    let read = far.read(&input, &part(0, 0, 3, 2), subsampling);
+    let read = spaced.read(&input, &part(0, 0, 3, 2), subsampling);
     assert_eq!(read.expect("inside"), Samples::from(expected));
 }
 
@@ -144,7 +144,8 @@ fn blockwise_and_in_memory_heights_match_on_all_levels() {
         let mut rows = [vec![0.0; count as usize], vec![0.0; count as usize]];
         for row in (0..SIZE[1] >> level).step_by(7) {
             assert!(
-                in_memory.read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
+                in_memory
+                    .read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
                     .is_complete()
             );
             assert!(
@@ -191,7 +192,8 @@ fn levels_count_from_south_west_in_any_file_order() {
         let mut rows = [[0.0; 60], [0.0; 60]];
         for (level, row) in [(0, 3), (1, 200), (2, 100), (4, 30)] {
             assert!(
-                in_memory.read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
+                in_memory
+                    .read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
                     .is_complete()
             );
             assert!(

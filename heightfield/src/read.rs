@@ -62,10 +62,14 @@ impl StoredType {
                     }));
             }
             (Self::I64, Samples::F64(values)) => {
-                values.extend(each().map(|bytes| i64::from_le_bytes(to_little_endian(bytes, endian)) as f64));
+                values.extend(
+                    each().map(|bytes| i64::from_le_bytes(to_little_endian(bytes, endian)) as f64),
+                );
             }
             (Self::U64, Samples::F64(values)) => {
-                values.extend(each().map(|bytes| u64::from_le_bytes(to_little_endian(bytes, endian)) as f64));
+                values.extend(
+                    each().map(|bytes| u64::from_le_bytes(to_little_endian(bytes, endian)) as f64),
+                );
             }
             (_, samples) => with_samples!(samples, values => extend(values, each(), endian)),
         }

@@ -1,6 +1,6 @@
 //! Images with every 2ᵏ-th sample of a field, for files without overviews.
 
-use super::blocks::{BlockImage, SurveyParts, Part};
+use super::blocks::{BlockImage, Part, SurveyParts};
 
 /// Side, in samples, of the parts that are read at opening, if a file is not read whole.
 const PART_SIDE: u32 = 64;

@@ -105,10 +105,10 @@ mod tests {
     #[test]
     fn common_no_data_values_are_reported() {
         for value in LOW.into_iter().chain(HIGH) {
-            let stated = remarks(&[367.0, value, 400.0], false);
+            let reported = remarks(&[367.0, value, 400.0], false);
             assert!(
-                stated.contains(&format!("--input no-data={value}")),
-                "{stated}"
+                reported.contains(&format!("--input no-data={value}")),
+                "{reported}"
             );
         }
         assert!(remarks(&[0.0, 367.0, 960.0], false).contains("--input no-data=0"));

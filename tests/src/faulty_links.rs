@@ -74,8 +74,8 @@ impl<T: Transport> Transport for Faulty<T> {
         if self.incoming.is_empty() {
             let mut chunk = [0; 4096];
             let n = self.inner.receive(&mut chunk, wait)?;
-            let harmed = self.corrupt(&chunk[..n]);
-            self.incoming.extend(harmed);
+            let corrupted = self.corrupt(&chunk[..n]);
+            self.incoming.extend(corrupted);
         }
         io::Read::read(&mut self.incoming, into)
     }

@@ -41,15 +41,15 @@ fn answer(mut host: TcpStream) {
     let mut epoch = None;
     while let Ok(read @ 1..) = host.read(&mut chunk) {
         let mut bytes = &chunk[..read];
-        let mut stated = vec![];
+        let mut sent = vec![];
         while !bytes.is_empty() {
             let (taken, content) = reader.push(bytes);
             bytes = &bytes[taken..];
             if let Some(Ok(content)) = content {
-                stated.extend(answer_to(content, &mut epoch));
+                sent.extend(answer_to(content, &mut epoch));
             }
         }
-        if host.write_all(&stated).is_err() {
+        if host.write_all(&sent).is_err() {
             return;
         }
         if let Some((session, epoch)) = epoch {

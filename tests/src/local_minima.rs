@@ -164,25 +164,25 @@ fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2])
         let local = at[axis] - f64::from(own.cell[axis]);
         i32::from(local == 1.0) - i32::from(local == 0.0)
     };
-    let ways = [side(0), side(1)];
-    let others = [[ways[0], 0], [0, ways[1]], ways];
+    let steps = [side(0), side(1)];
+    let others = [[steps[0], 0], [0, steps[1]], steps];
     others
         .into_iter()
-        .filter(|way| *way != [0, 0])
-        .filter_map(|way| {
-            let cell = [own.cell[0] + way[0], own.cell[1] + way[1]];
-            Some((way, Patch::at(terrain, cell)?))
+        .filter(|step| *step != [0, 0])
+        .filter_map(|step| {
+            let cell = [own.cell[0] + step[0], own.cell[1] + step[1]];
+            Some((step, Patch::at(terrain, cell)?))
         })
-        .all(|(way, patch)| !leads_down(&patch, hip, at, way))
+        .all(|(step, patch)| !leads_down(&patch, hip, at, step))
 }
 
 /// Returns true if the distance falls from a point on a patch's border into the patch.
-fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
+fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], step: [i32; 2]) -> bool {
     let rise = patch.height(x, y) - hip[2];
     let [east, north] = patch.slopes(x, y);
     let slopes = [(x - hip[0]) + rise * east, (y - hip[1]) + rise * north];
     let steep = [east, north].map(|m| LEVEL * (1.0 + m.abs()) * (1.0 + rise.abs()));
-    (0..2).any(|axis| way[axis] != 0 && slopes[axis] * f64::from(way[axis]) < -steep[axis])
+    (0..2).any(|axis| step[axis] != 0 && slopes[axis] * f64::from(step[axis]) < -steep[axis])
 }
 
 #[cfg(test)]

@@ -22,14 +22,14 @@ pub const HANG: Duration = Duration::from_secs(600);
 /// Interval between two checks of a condition.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Waits until `look` returns a value.
+/// Waits until `poll` returns a value.
 ///
 /// # Panics
 /// After [`HANG`], with `what` in the message.
-pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+pub fn wait_for<T>(what: &str, mut poll: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
     loop {
-        if let Some(found) = look() {
+        if let Some(found) = poll() {
             return found;
         }
         assert!(began.elapsed() < HANG, "in vain for {HANG:?}: {what}");

@@ -7,7 +7,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::TickRecord;
 use hapterra_tests::campaign::hostile_calibrations;
 use hapterra_tests::campaign::maxima::OFF_COUNTS;
-use hapterra_tests::campaign::tick_invariants::{Truth, TickChecks};
+use hapterra_tests::campaign::tick_invariants::{TickChecks, Truth};
 use hapterra_tests::random::Random;
 
 const ZERO: [i32; 3] = [100, -200, 300];
@@ -208,8 +208,9 @@ fn a_command_that_is_held_is_judged_by_what_is_true() {
 fn underestimated_winding_temperature_is_reported() {
     let watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let mut tick = Tick::pushing(up(1.0));
-    let reported =
-        |believed_c: f32, tick: &Tick| watch.check_temperature(Vec3::new(90.0, 90.0, believed_c), &tick.truth);
+    let reported = |believed_c: f32, tick: &Tick| {
+        watch.check_temperature(Vec3::new(90.0, 90.0, believed_c), &tick.truth)
+    };
     tick.truth.winding_c = [90.0, 30.0, 80.0];
     assert_eq!(reported(100.0, &tick), Ok(()));
     assert_eq!(reported(79.5, &tick), Ok(()));

@@ -2,7 +2,9 @@
 //! moment: the end is confirmed or reported, no force acts that no host wanted, every sample is
 //! counted once.
 
-use hapterra_tests::link_model::{Direction, End, FrameFault, Interruption, Plan, Report, check, frames};
+use hapterra_tests::link_model::{
+    Direction, End, FrameFault, Interruption, Plan, Report, check, frames,
+};
 
 /// Damage to a frame.
 const HARMS: [FrameFault; 5] = [
@@ -62,7 +64,11 @@ fn session_survives_any_two_frame_faults_while_opening() {
     let opening: Vec<_> = single_harms()
         .into_iter()
         .filter(|(_, number, frame_fault)| {
-            *number < 9 && matches!(frame_fault, FrameFault::Lose | FrameFault::Repeat(900) | FrameFault::Delay(30))
+            *number < 9
+                && matches!(
+                    frame_fault,
+                    FrameFault::Lose | FrameFault::Repeat(900) | FrameFault::Delay(30)
+                )
         })
         .collect();
     for (i, first) in opening.iter().enumerate() {
@@ -86,7 +92,11 @@ fn session_survives_any_two_frame_faults_while_closing() {
                 Direction::ToDevice => to_device,
                 Direction::ToHost => to_host,
             };
-            number + 8 > count && matches!(frame_fault, FrameFault::Lose | FrameFault::Repeat(900) | FrameFault::Delay(30))
+            number + 8 > count
+                && matches!(
+                    frame_fault,
+                    FrameFault::Lose | FrameFault::Repeat(900) | FrameFault::Delay(30)
+                )
         })
         .collect();
     for (i, first) in last.iter().enumerate() {
@@ -284,7 +294,11 @@ fn every_request_is_done_or_refused_once_under_lost_frames() {
     let ways = [Direction::ToDevice, Direction::ToHost];
     for (way, count) in ways.into_iter().zip(whole.frames) {
         for number in 0..count {
-            for frame_fault in [FrameFault::Lose, FrameFault::Repeat(900), FrameFault::Delay(900)] {
+            for frame_fault in [
+                FrameFault::Lose,
+                FrameFault::Repeat(900),
+                FrameFault::Delay(900),
+            ] {
                 let plan = with_errands(vec![(way, number, frame_fault)]);
                 let report = agree(&plan);
                 assert_eq!(report.outcomes, whole.outcomes, "{plan:?}");

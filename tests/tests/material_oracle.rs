@@ -220,7 +220,10 @@ fn another_damping_is_found() {
 fn shaded_force_is_checked_by_magnitude() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::Smooth);
     let counts = way.honest();
-    assert_eq!((counts.compared_as_vectors, counts.compared_by_size), (0, 300));
+    assert_eq!(
+        (counts.compared_as_vectors, counts.compared_by_size),
+        (0, 300)
+    );
     let wrong = Some(Invariant::Material);
     assert_eq!(way.force(BORDER + 50, |f| f * 1.001), wrong);
     assert_eq!(way.force(BORDER + 50, |f| f * 0.999), wrong);

@@ -105,7 +105,8 @@ fn linger(history: &History, linger: Option<Duration>, has_hapterra_ended: &Atom
         // Pages that received everything are not counted any more, so only the time since they
         // connected remains as a criterion.
         let timeout = linger.unwrap_or(LINGER);
-        let may_end = linger.is_some() || stats.connected > 0 || has_hapterra_ended.load(Ordering::Acquire);
+        let may_end =
+            linger.is_some() || stats.connected > 0 || has_hapterra_ended.load(Ordering::Acquire);
         if may_end && stats.pages == 0 && no_page_since.elapsed() >= timeout {
             return;
         }

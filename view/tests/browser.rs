@@ -12,7 +12,7 @@ use hapterra_view_stream::Message;
 use common::browser::{Browser, Colours, Page, program};
 use common::recorded::{Csv, check, entities};
 use common::scene::{batch, greeting, layer, resting, scene, tiles_around, zoomed_scene};
-use common::{HANG, Running, Viewer, emulated, folder, hapterra, memory_of, signal, child_process};
+use common::{HANG, Running, Viewer, child_process, emulated, folder, hapterra, memory_of, signal};
 
 /// The areas of the terrain and of the plots in the page.
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
@@ -184,7 +184,7 @@ fn oversized_page_reloads_and_continues() {
     };
     let (mut session, address) = Session::start("--linger 0 --page-mb 64");
     let page = browser.open(&address);
-    let mut until = |wanted: &dyn Fn(f64, f64) -> bool| {
+    let mut until = |condition: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + HANG;
         loop {
             session.feed_samples(500);
@@ -192,7 +192,7 @@ fn oversized_page_reloads_and_continues() {
             let began = browser.number(&page, "performance.timeOrigin");
             let bytes = browser.number(&page, "window.hapterra.bytes");
             if let (Some(began), Some(bytes)) = (began, bytes)
-                && wanted(began, bytes)
+                && condition(began, bytes)
             {
                 return began;
             }
@@ -201,9 +201,13 @@ fn oversized_page_reloads_and_continues() {
     };
     let first = until(&|_, bytes| bytes > 0.0);
     // It receives the earlier entries again, and the new ones.
-    let again = until(&|began, bytes| began != first && bytes > 0.0);
+    let reconnected = until(&|began, bytes| began != first && bytes > 0.0);
     // Not at once: its first entries may already be larger.
-    assert!(again - first > 20_000.0, "after {} ms", again - first);
+    assert!(
+        reconnected - first > 20_000.0,
+        "after {} ms",
+        reconnected - first
+    );
     drop(browser);
     assert!(session.viewer.end());
     remove(&folder);
@@ -308,11 +312,11 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
         rest(&mut viewer, scale, east_mm);
         let is_first = (scale, east_mm) == (1.0, 0.0);
         settled(&|browser, picture| {
-            let apart = browser.difference(&page, [&first, picture], TERRAIN);
+            let difference = browser.difference(&page, [&first, picture], TERRAIN);
             if is_first {
-                apart < SAME
+                difference < SAME
             } else {
-                apart > OTHER
+                difference > OTHER
             }
         });
     }
@@ -402,7 +406,7 @@ fn killed(who: Killed, says: &str) {
     let until = Instant::now() + HANG;
     while !{ browser.value(&page, "document.getElementById('said').textContent") }
         .as_str()
-        .is_some_and(|stated| stated.contains(says))
+        .is_some_and(|text| text.contains(says))
     {
         assert!(Instant::now() < until, "the page does not say so");
         std::thread::sleep(Duration::from_millis(200));

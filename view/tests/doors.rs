@@ -71,7 +71,11 @@ fn foreign_hosts_origins_and_write_methods_are_refused() {
         let request = format!(
             "{method} {path} HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
         );
-        assert_eq!(status(&send_request(port, &request)), 405, "{method} {path}");
+        assert_eq!(
+            status(&send_request(port, &request)),
+            405,
+            "{method} {path}"
+        );
     }
 }
 

@@ -34,7 +34,7 @@ fn browser_shows_the_terrain_within_its_time() {
     demo.wait_for_line("device ");
     let session = Instant::now();
     let address = demo.address();
-    let stated = session.elapsed();
+    let elapsed = session.elapsed();
     let page = browser.open(&address);
     let (mut started, mut reported) = (None, None);
     loop {
@@ -55,7 +55,7 @@ fn browser_shows_the_terrain_within_its_time() {
     }
     let shown = session.elapsed();
     println!(
-        "from the session's begin: address {stated:?}, viewer started {started:?}, first piece {reported:?}, terrain seen {shown:?}"
+        "from the session's begin: address {elapsed:?}, viewer started {started:?}, first piece {reported:?}, terrain seen {shown:?}"
     );
     drop(browser);
     demo.interrupt();

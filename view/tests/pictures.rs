@@ -61,12 +61,12 @@ impl Shown {
     fn keep(&mut self, path: &Path, is_right: impl Fn(&Colours) -> bool) {
         loop {
             std::thread::sleep(Duration::from_millis(500));
-            let kept = self.browser.photograph(&self.page);
+            let photo = self.browser.photograph(&self.page);
             // Colours of exactly the stored picture: a browser decodes both formats.
-            let picture = BASE64_STANDARD.encode(&kept);
+            let picture = BASE64_STANDARD.encode(&photo);
             let colours = { &mut self.browser }.colours(&self.page, &picture, TERRAIN, &MARKS);
             if is_right(&colours) {
-                return std::fs::write(path, kept).expect("written");
+                return std::fs::write(path, photo).expect("written");
             }
             assert!(self.began.elapsed() < HANG, "{colours:?}");
         }

@@ -101,10 +101,10 @@ fn demo_page_receives_the_coarse_layer_first() {
     demo.wait_for_line("device ");
     let (read, session) = (began.elapsed(), Instant::now());
     let port = demo.port();
-    let stated = session.elapsed();
+    let elapsed = session.elapsed();
     let after = check(&reported(port), &[]);
     println!(
-        "terrain read after {read:?}; then the page's address after {stated:?}, and the coarse whole {after:?} after it was asked for"
+        "terrain read after {read:?}; then the page's address after {elapsed:?}, and the coarse whole {after:?} after it was asked for"
     );
     assert!(demo.end());
     std::fs::remove_dir_all(folder).expect("it goes");

@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
 use crate::image;
-use crate::run::{hapterra, root, report, command_line, timed};
+use crate::run::{command_line, hapterra, report, root, timed};
 use crate::setup::{gdal, qemu, toolchain};
 use crate::view;
 

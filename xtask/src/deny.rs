@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::run::{cargo, on_path, root, run, run_quietly, report, target_dir};
+use crate::run::{cargo, on_path, report, root, run, run_quietly, target_dir};
 
 /// The workspaces, each with a lock file.
 const WORKSPACES: [&str; 4] = [

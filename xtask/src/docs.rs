@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::run::{TEST_VARIABLES, cargo, on_path, root, run, report, timed};
+use crate::run::{TEST_VARIABLES, cargo, on_path, report, root, run, timed};
 
 /// Programs that test the pages.
 const TESTS: [&str; 4] = ["--test", "reference_pages", "--test", "docs"];

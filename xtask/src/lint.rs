@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 
 use crate::board::{BOARDS, EMULATED};
 use crate::image::{COUNTS, package_words};
-use crate::run::{cargo, run, report, timed};
+use crate::run::{cargo, report, run, timed};
 use crate::setup::{emulator, toolchain};
 
 /// Runs all of them; the first failure ends it.

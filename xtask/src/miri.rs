@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::nightly;
-use crate::run::{root, run, report, target_dir, timed};
+use crate::run::{report, root, run, target_dir, timed};
 
 /// Parts of the names of tests that simulate an arm for seconds to hours, tick by tick. The other
 /// tests use fewer cases under Miri (core's `cases`).

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::run::{output, report, command_line};
+use crate::run::{command_line, output, report};
 
 /// Returns the nightly compiler's cargo, independent of the toolchain that runs this program.
 pub(crate) fn cargo(words: &[&str]) -> Command {

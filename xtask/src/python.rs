@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
 use crate::run::{
-    cargo, output, root, run, run_quietly, report, target_dir, tested_programs, timed,
+    cargo, output, report, root, run, run_quietly, target_dir, tested_programs, timed,
     without_own_variables,
 };
 use crate::{demo, deny};
@@ -55,8 +55,8 @@ pub(crate) fn test() -> Result<()> {
     deny::check("python/Cargo.toml")?.report();
     install(&python, &[&format!("{}[test]", wheel.display())])?;
     // The version does not change during development.
-    let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
-    install(&python, &again)?;
+    let reinstall = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
+    install(&python, &reinstall)?;
     let [_, lab] = tested_programs()?;
     let mut tests = Command::new(&python);
     tests

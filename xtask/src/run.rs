@@ -112,9 +112,9 @@ pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
         .output()
         .with_context(|| format!("cannot start `{line}`"))?;
     if !done.status.success() {
-        let stated = [done.stdout, done.stderr].concat();
-        let stated = String::from_utf8_lossy(&stated);
-        bail!("`{line}` failed ({})\n{}", done.status, stated.trim());
+        let output = [done.stdout, done.stderr].concat();
+        let output = String::from_utf8_lossy(&output);
+        bail!("`{line}` failed ({})\n{}", done.status, output.trim());
     }
     Ok(())
 }

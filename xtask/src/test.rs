@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
 use crate::deny::Advisories;
-use crate::run::{TEST_VARIABLES, cargo, run, report, command_line, timed};
+use crate::run::{TEST_VARIABLES, cargo, command_line, report, run, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, page, panics, python, size};
 
@@ -70,7 +70,11 @@ pub(crate) fn test(request: &Request) -> Result<()> {
         let mut command = cargo();
         command
             .args(["test", "--no-fail-fast"])
-            .args(if request.quick { &QUICK[..] } else { &TEST_VARIABLES })
+            .args(if request.quick {
+                &QUICK[..]
+            } else {
+                &TEST_VARIABLES
+            })
             .env("HAPTERRA_QEMU", &qemu)
             .env(image::COUNTS_VARIABLE, &counts);
         for (board, path) in &images {
@@ -99,7 +103,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
             }
         }
     }
-    notes.iter().for_each(say);
+    notes.iter().for_each(report);
     if failures.is_empty() {
         return Ok(());
     }
@@ -173,11 +177,11 @@ fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Ve
     drop(command);
     let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
     let mut failed = vec![];
-    for stated in BufReader::new(from).split(b'\n') {
-        let stated = stated?;
-        let stated = String::from_utf8_lossy(&stated);
-        show(&stated);
-        failed.extend(listed_target(&stated).map(str::to_owned));
+    for line in BufReader::new(from).split(b'\n') {
+        let line = line?;
+        let line = String::from_utf8_lossy(&line);
+        show(&line);
+        failed.extend(listed_target(&line).map(str::to_owned));
     }
     let status = child.wait()?;
     if !status.success() && failed.is_empty() {
@@ -241,14 +245,14 @@ mod tests {
 
     #[test]
     fn failed_target_is_repeated_by_its_kind() {
-        let stated = [
+        let lines = [
             "     Running tests/fallback.rs (target/debug/deps/fallback-1)",
             "error: test failed, to rerun pass `-p hapterra-tests --test fallback`",
             "error: 2 targets failed:",
             "    `-p hapterra-tests --test fallback`",
             "    `-p hapterra-core --doc`",
         ];
-        let failed = stated.iter().filter_map(|line| listed_target(line));
+        let failed = lines.iter().filter_map(|line| listed_target(line));
         let commands: Vec<_> = failed.map(|target| repeat(target, false)).collect();
         let expected = [
             "cargo xtask test -- --test fallback    # hapterra-tests",

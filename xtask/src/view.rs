@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::board::EMULATED;
 use crate::demo::emulation;
 use crate::deny;
-use crate::run::{built, cargo, on_path, root, run, report, tested_programs, timed};
+use crate::run::{built, cargo, on_path, report, root, run, tested_programs, timed};
 use crate::setup::packages::{self, found_or_installed};
 
 /// Variable with the browser for the page's tests.

@@ -43,20 +43,24 @@ impl<'g> GodObject<'g> {
         to: &[f64; 3],
         known: &[Facet],
     ) -> Option<([f64; 3], Facet, Plane)> {
-        let way = [0, 1, 2].map(|i| to[i] - from[i]);
-        let at = |t: f64| [0, 1, 2].map(|i| from[i] + t * way[i]);
+        let displacement = [0, 1, 2].map(|i| to[i] - from[i]);
+        let at = |t: f64| [0, 1, 2].map(|i| from[i] + t * displacement[i]);
         // On the diagonal, x + y is one more than at the cell's corner.
-        let (sum, rise) = (from[0] + from[1], way[0] + way[1]);
+        let (sum, rise) = (from[0] + from[1], displacement[0] + displacement[1]);
         let mut entered = 0.0;
         let line = Line::new([from[0], from[1]], [to[0], to[1]]);
         for cell in line.filter(|cell| self.grid.has(*cell)) {
             let [x, y] = cell.map(f64::from);
             let leaves = |i: usize, low: f64| {
-                let border = if way[i] > 0.0 { low + 1.0 } else { low };
-                if way[i] == 0.0 {
+                let border = if displacement[i] > 0.0 {
+                    low + 1.0
+                } else {
+                    low
+                };
+                if displacement[i] == 0.0 {
                     1.0
                 } else {
-                    ((border - from[i]) / way[i]).min(1.0)
+                    ((border - from[i]) / displacement[i]).min(1.0)
                 }
             };
             let left = leaves(0, x).min(leaves(1, y)).max(entered);

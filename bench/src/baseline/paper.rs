@@ -43,8 +43,9 @@ impl<R: OfHip> Haptics for Paper<&Grid, R> {
 
     #[inline]
     fn tick(&mut self, hip: &Hip) -> ContactResult {
-        self.step(R::hip(hip)).map_or(ContactResult::FREE, |displacement| {
-            ContactResult::touching(displacement.map(R::single))
-        })
+        self.step(R::hip(hip))
+            .map_or(ContactResult::FREE, |displacement| {
+                ContactResult::touching(displacement.map(R::single))
+            })
     }
 }

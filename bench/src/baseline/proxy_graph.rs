@@ -79,7 +79,7 @@ impl<'g> ProxyGraph<'g> {
     #[inline]
     fn nearer(&self, node: &Node, hip: &[f64; 3]) -> Option<Node> {
         let mut best = *node;
-        let mut look = |post: [i32; 2], to: [i32; 2]| {
+        let mut visit = |post: [i32; 2], to: [i32; 2]| {
             if let Some(there) = self.on_edge(post, to, hip)
                 && there.squared < best.squared * (1.0 - 1e-12)
             {
@@ -90,14 +90,14 @@ impl<'g> ProxyGraph<'g> {
         if node.t == 0.0 || node.t == 1.0 {
             let vertex = if node.t == 0.0 { node.post } else { end };
             for spoke in SPOKES {
-                look(vertex, spoke);
+                visit(vertex, spoke);
             }
         } else {
             let turn = SPOKES.iter().position(|s| *s == node.to).unwrap_or(0);
             for side in [1, 5] {
                 let third = SPOKES[(turn + side) % 6];
-                look(node.post, third);
-                look(end, [third[0] - node.to[0], third[1] - node.to[1]]);
+                visit(node.post, third);
+                visit(end, [third[0] - node.to[0], third[1] - node.to[1]]);
             }
         }
         (best.squared < node.squared).then_some(best)
@@ -118,8 +118,8 @@ impl<'g> ProxyGraph<'g> {
     #[inline]
     fn depth(&self, hip: &[f64; 3]) -> Option<f64> {
         let facet = Facet::under(hip[0], hip[1]);
-        let held = self.grid.has(facet.cell);
-        held.then(|| facet.plane(self.grid).above(hip))
+        let has_data = self.grid.has(facet.cell);
+        has_data.then(|| facet.plane(self.grid).above(hip))
     }
 }
 

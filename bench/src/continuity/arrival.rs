@@ -32,11 +32,25 @@ pub(super) fn measure() -> Vec<Row> {
         ("tile 0.2 cell late", late(0.2), None),
         ("tile 0.45 cell late", late(0.45), None),
         ("tile 1 cell late", late(1.0), None),
-        ("0.2 cell late over a coarse fallback", late(0.2), fallback_tile),
-        ("0.45 cell late over a coarse fallback", late(0.45), fallback_tile),
-        ("1 cell late over a coarse fallback", late(1.0), fallback_tile),
+        (
+            "0.2 cell late over a coarse fallback",
+            late(0.2),
+            fallback_tile,
+        ),
+        (
+            "0.45 cell late over a coarse fallback",
+            late(0.45),
+            fallback_tile,
+        ),
+        (
+            "1 cell late over a coarse fallback",
+            late(1.0),
+            fallback_tile,
+        ),
     ]
-    .map(|(name, delay_ticks, fallback)| Row::of(name, DEFAULT_VARIANT, &[&output(delay_ticks, fallback)]))
+    .map(|(name, delay_ticks, fallback)| {
+        Row::of(name, DEFAULT_VARIANT, &[&output(delay_ticks, fallback)])
+    })
     .to_vec()
 }
 

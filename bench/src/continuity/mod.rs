@@ -8,7 +8,7 @@ mod arrival;
 mod ground;
 mod row;
 
-use crate::compare::{Label, opponents, ours};
+use crate::compare::{Label, entries_of, opponents};
 use crate::path::{Random, approach_hips, over};
 use crate::product;
 use crate::variant::{ContactResult, Haptics, Hip};
@@ -43,7 +43,7 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
     let paths = paths(ground);
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(&grid, &mut buffers);
-    let mut entries = ours(&window);
+    let mut entries = entries_of(&window);
     entries.extend(opponents(&grid));
     // The best of the paper's and of parry's settings, without the copy, which is not a contact.
     entries.retain(|(label, _)| COMPARED_VARIANTS.contains(&label.name));
@@ -83,7 +83,10 @@ fn paths(ground: &Ground) -> Vec<StraightPath> {
             let (north, east) = heading.sin_cos();
             let at = |tick: f64| {
                 let distance = STEP * (tick - TICKS as f64 / 2.0);
-                let displacement = [east * distance - north * offset, north * distance + east * offset];
+                let displacement = [
+                    east * distance - north * offset,
+                    north * distance + east * offset,
+                ];
                 [middle[0] + displacement[0], middle[1] + displacement[1]]
             };
             let mut hips = approach_hips(&grid, at(0.0), -DEPTH);
@@ -97,7 +100,7 @@ fn paths(ground: &Ground) -> Vec<StraightPath> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::{Family, DEFAULT_VARIANT};
+    use crate::compare::{DEFAULT_VARIANT, Family};
 
     fn max_change(rows: &[Row], ground: &str, name: &str) -> f64 {
         let is = |row: &&Row| row.ground == ground && row.label.name == name;
@@ -109,10 +112,10 @@ mod tests {
     #[test]
     fn force_is_as_continuous_as_the_surface() {
         let rows = measure();
-        let ours = |ground| max_change(&rows, ground, DEFAULT_VARIANT.name);
+        let default_change = |ground| max_change(&rows, ground, DEFAULT_VARIANT.name);
         for ground in &GROUNDS {
             let exact = max_change(&rows, ground.name, "paper f64");
-            let own = ours(ground.name);
+            let own = default_change(ground.name);
             assert!(own < 1.01 * exact + 1e-6, "{}: {own} {exact}", ground.name);
         }
         let bounds = [
@@ -131,7 +134,11 @@ mod tests {
             ("1 cell late over a coarse fallback", 0.0531),
         ];
         for (ground, bound) in bounds {
-            assert!(ours(ground) < bound, "{ground}: {}", ours(ground));
+            assert!(
+                default_change(ground) < bound,
+                "{ground}: {}",
+                default_change(ground)
+            );
         }
     }
 
@@ -152,7 +159,11 @@ mod tests {
             family: Family::Ours,
             extra_bytes: 0.0,
         };
-        let row = Row::of("", label, &[&[still, still, jumped], &[ContactResult::FREE]]);
+        let row = Row::of(
+            "",
+            label,
+            &[&[still, still, jumped], &[ContactResult::FREE]],
+        );
         assert!((row.max_change - 0.05).abs() < 1e-6 && row.missed == 0.25);
     }
 }

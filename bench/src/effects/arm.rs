@@ -105,7 +105,10 @@ impl<'g> Arm<'g> {
             if f64::hypot(offset[0], offset[1]) > reach - 1.0 {
                 heading = f64::atan2(-offset[1], -offset[0]);
             }
-            offset = [offset[0] + step * heading.cos(), offset[1] + step * heading.sin()];
+            offset = [
+                offset[0] + step * heading.cos(),
+                offset[1] + step * heading.sin(),
+            ];
         }
         let begin = height(0);
         let descent = (0..DESCENT_TICKS).map(|i| {
@@ -116,7 +119,11 @@ impl<'g> Arm<'g> {
         over_ground.extend_from_within(..);
         let half = over_ground.len() / 2;
         over_ground[half..].reverse();
-        Ok(TipPath { name, descent, over_ground })
+        Ok(TipPath {
+            name,
+            descent,
+            over_ground,
+        })
     }
 
     /// Returns the position at a height above the surface, `offset` mm from home.

@@ -72,7 +72,10 @@ mod tests {
         };
         let checked = |force_n| {
             let rendered = [rendered(force_n)];
-            (deviation_degrees(&rendered)[0], shares(&params, &rendered)[0])
+            (
+                deviation_degrees(&rendered)[0],
+                shares(&params, &rendered)[0],
+            )
         };
         let (turn, share) = checked([0.1, 0.0, 0.5]);
         assert!(turn < MAX_ANGLE_DEG && share < MAX_SHARE);

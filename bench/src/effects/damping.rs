@@ -4,7 +4,7 @@
 use hapterra::phantom::{ArmFrame, kinematics};
 use hapterra_core::force::SurfaceParams;
 
-use super::arm::{Arm, MeasureError, TipPosition, TipPath};
+use super::arm::{Arm, MeasureError, TipPath, TipPosition};
 use super::effect::Effect;
 use super::effect_tick::EffectTick;
 use super::foaw;
@@ -27,10 +27,17 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, Measure
     for path in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
         let rendered = arm.render(params, &path)?;
         let origin = row::Origin(&grid.name, path.name, Effect::Damping.name());
-        let own = deviation_mn(&params, &rendered, |tick| foaw_velocities(&arm, &path, tick));
-        let against_path = deviation_mn(&params, &rendered, |tick| vec![path_velocity(&path, tick)]);
+        let own = deviation_mn(&params, &rendered, |tick| {
+            foaw_velocities(&arm, &path, tick)
+        });
+        let against_path =
+            deviation_mn(&params, &rendered, |tick| vec![path_velocity(&path, tick)]);
         errors.extend(origin.error(("force off that by FOAW in f64", "mN"), ROUNDING_MN, own));
-        errors.extend(origin.error(("force off that by the path's velocity", "mN"), None, against_path));
+        errors.extend(origin.error(
+            ("force off that by the path's velocity", "mN"),
+            None,
+            against_path,
+        ));
         errors.extend(origin.error(("pull of the surface", "mN"), 0.0, pulling_mn(&rendered)));
     }
     Ok(errors)
@@ -125,7 +132,9 @@ mod tests {
         let params = Effect::Damping.params();
         let rendered = arm.render(params, &path).expect("rendered");
         let deviation = |params: &SurfaceParams, rendered: &[EffectTick]| {
-            worst(deviation_mn(params, rendered, |tick| foaw_velocities(&arm, &path, tick)))
+            worst(deviation_mn(params, rendered, |tick| {
+                foaw_velocities(&arm, &path, tick)
+            }))
         };
         assert!(deviation(&params, &rendered) < ROUNDING_MN && worst(pulling_mn(&rendered)) == 0.0);
         // Five percent more damping.
@@ -133,7 +142,9 @@ mod tests {
         more.damping.ns_per_m *= 1.05;
         assert!(deviation(&more, &rendered) > 10.0 * ROUNDING_MN);
         // The velocity of the previous tick.
-        let late = deviation_mn(&params, &rendered, |tick| foaw_velocities(&arm, &path, tick - 1));
+        let late = deviation_mn(&params, &rendered, |tick| {
+            foaw_velocities(&arm, &path, tick - 1)
+        });
         assert!(worst(late) > 10.0 * ROUNDING_MN);
         // A damper without the spring's force as its limit.
         let mut pulling = rendered.clone();

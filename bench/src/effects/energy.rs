@@ -31,7 +31,10 @@ const DELAY_S: f64 = 0.08e-3;
 
 pub(super) fn measure(grid: &Grid) -> Result<Vec<Error>, MeasureError> {
     let mut rows = Vec::new();
-    for (effect, bound) in [(Effect::None, None), (Effect::Controller, Some(MAX_GAIN_MJ))] {
+    for (effect, bound) in [
+        (Effect::None, None),
+        (Effect::Controller, Some(MAX_GAIN_MJ)),
+    ] {
         let params = SurfaceParams {
             stiffness_n_per_mm: STIFFNESS,
             ..effect.params()
@@ -94,7 +97,9 @@ fn run_taps(
         arm.placement,
         script.wait(0.2),
     );
-    let mut arm_and_hand = arm_and_hand.map_err(|why| MeasureError(why.to_string()))?.arming();
+    let mut arm_and_hand = arm_and_hand
+        .map_err(|why| MeasureError(why.to_string()))?
+        .arming();
     let mut tiles = replay::tiles();
     let mut haptics = arm.open(params, &mut tiles)?;
     let ticks = ((HeldPhantom::ARMED_S + arm_and_hand.script_s()) / TICK_S) as usize;
@@ -106,7 +111,10 @@ fn run_taps(
     for _ in 0..ticks {
         let outcome = haptics.tick(&arm_and_hand.sense(), true);
         let to_f64 = |v: hapterra_core::Vec3| v.to_array().map(f64::from);
-        let now = (to_f64(outcome.drive.currents_a), to_f64(outcome.sample.force_n));
+        let now = (
+            to_f64(outcome.drive.currents_a),
+            to_f64(outcome.sample.force_n),
+        );
         for ((currents_a, force_n), duration_s) in [(before, DELAY_S), (now, TICK_S - DELAY_S)] {
             let from = tip(&arm_and_hand);
             arm_and_hand.step(currents_a, duration_s);
@@ -149,7 +157,11 @@ mod tests {
 
     #[test]
     fn surface_that_adds_energy_is_detected() {
-        let max = |more: f64| gained_mj(&spring(more)).into_iter().fold(f64::MIN, f64::max);
+        let max = |more: f64| {
+            gained_mj(&spring(more))
+                .into_iter()
+                .fold(f64::MIN, f64::max)
+        };
         assert!(max(0.0).abs() < 0.005, "{}", max(0.0));
         // 72 mJ are stored; a two-thousandth more is returned.
         assert!(max(0.0005) > MAX_GAIN_MJ, "{}", max(0.0005));

@@ -36,7 +36,12 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
         f64::from(FRICTION.dynamic_mu),
         &slid[slide.approach..],
     );
-    let part = |sign: f64| deviation.iter().map(|deviation| (sign * deviation).max(0.0)).collect();
+    let part = |sign: f64| {
+        deviation
+            .iter()
+            .map(|deviation| (sign * deviation).max(0.0))
+            .collect()
+    };
     let (hips, from) = held_points(grid);
     let stuck = render(grid, params, &hips);
     let drifts = from
@@ -148,10 +153,16 @@ mod tests {
             let rendered = render(&grid, params, &slide.hips);
             let deviation = deviation_percent(&grid, 0.3, &rendered[slide.approach..]);
             let above = deviation.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            (above, -deviation.iter().copied().fold(f64::INFINITY, f64::min))
+            (
+                above,
+                -deviation.iter().copied().fold(f64::INFINITY, f64::min),
+            )
         };
         let (above, below) = worst(0.3);
-        assert!(above < MAX_ABOVE_PERCENT && below < MAX_BELOW_PERCENT, "{above} {below}");
+        assert!(
+            above < MAX_ABOVE_PERCENT && below < MAX_BELOW_PERCENT,
+            "{above} {below}"
+        );
         assert!(worst(0.3 * 1.05).0 > MAX_ABOVE_PERCENT);
         assert!(worst(0.3 * 0.95).1 > MAX_BELOW_PERCENT);
     }

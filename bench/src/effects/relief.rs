@@ -29,7 +29,12 @@ fn grain(texture: &Texture, place: [f64; 2]) -> (f64, [f64; 2]) {
         (counted.floor() as i64, counted - counted.floor())
     });
     let random_height = |east: i64, north: i64| corner(texture.seed, column + east, row + north);
-    let [sw, se, nw, ne] = [random_height(0, 0), random_height(1, 0), random_height(0, 1), random_height(1, 1)];
+    let [sw, se, nw, ne] = [
+        random_height(0, 0),
+        random_height(1, 0),
+        random_height(0, 1),
+        random_height(1, 1),
+    ];
     let eased = |s: f64| s * s * (3.0 - 2.0 * s);
     let steepness = |s: f64| 6.0 * s * (1.0 - s) * grains;
     let mixed = |a: f64, b: f64, s: f64| a + (b - a) * eased(s);

@@ -130,7 +130,8 @@ mod tests {
     fn shading_error_of_one_degree_or_no_shading_is_detected() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
-        let worst = |rendered: &[EffectTick]| deviation(&grid, rendered).into_iter().fold(0.0, f64::max);
+        let worst =
+            |rendered: &[EffectTick]| deviation(&grid, rendered).into_iter().fold(0.0, f64::max);
         let shaded = render(&grid, Effect::Shading.params(), &slide.hips);
         assert!(worst(&shaded) < ROUNDING);
         let (sin, cos) = 1_f64.to_radians().sin_cos();
@@ -140,7 +141,9 @@ mod tests {
             rendered.force_n = [x * cos + z * sin, y, z * cos - x * sin];
         }
         // A force along the axis of the turn does not change.
-        let min = deviation(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
+        let min = deviation(&grid, &wrong)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
         assert!(worst(&wrong) > 0.9 && min > ROUNDING, "{min}");
         let plain = render(&grid, Effect::None.params(), &slide.hips);
         assert!(worst(&plain) > 1.0);

@@ -33,8 +33,13 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
             let params = effect.params();
             let deviation = deviation_percent(&params, &render(grid, params, &slide.hips));
             let origin = Origin(&grid.name, name, effect.name());
-            let [high, along] = [0, 1].map(|i| deviation.iter().map(|deviation| deviation[i]).collect());
-            errors.extend(origin.error(("rendered height off", "% of A"), MAX_HEIGHT_PERCENT, high));
+            let [high, along] =
+                [0, 1].map(|i| deviation.iter().map(|deviation| deviation[i]).collect());
+            errors.extend(origin.error(
+                ("rendered height off", "% of A"),
+                MAX_HEIGHT_PERCENT,
+                high,
+            ));
             let what = ("force along the surface off", "% of the steepest");
             errors.extend(origin.error(what, MAX_TANGENTIAL_PERCENT, along));
         }
@@ -60,11 +65,15 @@ fn deviation_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f6
         let spring = rendered.spring();
         let depth = length(spring);
         let added = minus(rendered.force_n.map(|x| x / stiffness), spring);
-        let deviation = minus(added, expected_addition(texture, rendered.proxy, spring, share));
+        let deviation = minus(
+            added,
+            expected_addition(texture, rendered.proxy, spring, share),
+        );
         let normal = spring.map(|x| x / depth);
         let high = dot(deviation, normal);
         let steepest = TAU * amplitude / f64::from(texture.wavelength_mm);
-        let along = length(plus(deviation, normal, -high)) / (steepest * depth.min(max_depth_mm(texture)));
+        let along =
+            length(plus(deviation, normal, -high)) / (steepest * depth.min(max_depth_mm(texture)));
         [high.abs() / amplitude, along].map(|part| 100.0 * part)
     });
     deviation.collect()
@@ -128,7 +137,12 @@ mod tests {
 
     fn worst(params: &SurfaceParams, rendered: &[EffectTick]) -> [f64; 2] {
         let deviation = deviation_percent(params, rendered);
-        [0, 1].map(|i| deviation.iter().map(|deviation| deviation[i]).fold(0.0, f64::max))
+        [0, 1].map(|i| {
+            deviation
+                .iter()
+                .map(|deviation| deviation[i])
+                .fold(0.0, f64::max)
+        })
     }
 
     #[test]
@@ -139,7 +153,10 @@ mod tests {
             let params = effect.params();
             let rendered = render(&grid, params, &slide.hips);
             let [high, along] = worst(&params, &rendered);
-            assert!(high < MAX_HEIGHT_PERCENT && along < MAX_TANGENTIAL_PERCENT, "{high} {along}");
+            assert!(
+                high < MAX_HEIGHT_PERCENT && along < MAX_TANGENTIAL_PERCENT,
+                "{high} {along}"
+            );
             let wrong: [fn(&mut Texture); 3] = [
                 |texture| texture.seed += 1,
                 |texture| texture.amplitude_mm *= 1.01,

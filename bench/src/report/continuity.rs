@@ -14,7 +14,10 @@ pub fn continuity(rows: &[Row]) -> String {
         if !grounds.contains(&row.ground) {
             grounds.push(row.ground);
         }
-        if !variants.iter().any(|variant| variant.name == row.label.name) {
+        if !variants
+            .iter()
+            .any(|variant| variant.name == row.label.name)
+        {
             variants.push(&row.label);
         }
     }

@@ -42,8 +42,9 @@ pub fn summary(rows: &[Row]) -> String {
         }
     }
     let worst = |is_sweep: bool| {
-        let ours = rows.iter().filter(|row| row.label.name == DEFAULT_LABEL);
-        ours.filter(|row| row.path.starts_with("sweep") == is_sweep)
+        let default_rows = rows.iter().filter(|row| row.label.name == DEFAULT_LABEL);
+        default_rows
+            .filter(|row| row.path.starts_with("sweep") == is_sweep)
             .filter_map(|row| row.error)
             .fold(0.0, |worst: f64, error| worst.max(error.max))
     };
@@ -77,13 +78,13 @@ pub fn summary(rows: &[Row]) -> String {
 
 /// Returns the terrains in the order of measurement.
 fn terrains(rows: &[Row]) -> impl Iterator<Item = &str> {
-    let mut seen: Vec<&str> = Vec::new();
+    let mut names: Vec<&str> = Vec::new();
     for row in rows {
-        if !seen.contains(&row.terrain.as_str()) {
-            seen.push(&row.terrain);
+        if !names.contains(&row.terrain.as_str()) {
+            names.push(&row.terrain);
         }
     }
-    seen.into_iter()
+    names.into_iter()
 }
 
 fn median(rows: &[Row], terrain: &str, path: &str, name: &str) -> Option<f64> {

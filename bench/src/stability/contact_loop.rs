@@ -175,11 +175,17 @@ impl CommandDelay {
         self.commands.push_back(commands);
         let before = self.commands.pop_front().unwrap_or(commands);
         let now = self.commands.front().copied().unwrap_or(commands);
-        let parts = [(before, self.partial_delay_s), (now, self.tick_s - self.partial_delay_s)];
+        let parts = [
+            (before, self.partial_delay_s),
+            (now, self.tick_s - self.partial_delay_s),
+        ];
         let gained_mj = parts.map(|(commands, duration_s)| match duration_s > 0.0 {
-            true => self
-                .work
-                .step(commands.currents_a, commands.surface_currents_a, duration_s, arm),
+            true => self.work.step(
+                commands.currents_a,
+                commands.surface_currents_a,
+                duration_s,
+                arm,
+            ),
             false => 0.0,
         });
         gained_mj.iter().sum()

@@ -91,7 +91,9 @@ impl Plan {
                     return done;
                 };
                 done.push((at, setting.run_trial()));
-                let mut is_continued = is_continued.lock().unwrap_or_else(|broken| broken.into_inner());
+                let mut is_continued = is_continued
+                    .lock()
+                    .unwrap_or_else(|broken| broken.into_inner());
                 *is_continued = *is_continued && on_trial(settings.len());
                 if !*is_continued {
                     return done;
@@ -159,7 +161,8 @@ impl Map {
     /// Returns the highest stiffness up to which every ramp of the force was good, N/mm.
     #[must_use]
     pub fn max_entry_stiffness(&self, column: Column, grasp: Grasp) -> Option<f64> {
-        let is_good = |entered: &Option<EntryOutcome>| entered.is_some_and(|entered| entered.is_good());
+        let is_good =
+            |entered: &Option<EntryOutcome>| entered.is_some_and(|entered| entered.is_good());
         self.last_while(column, grasp, |trial| trial.entries.iter().all(is_good))
     }
 
@@ -218,7 +221,10 @@ impl Map {
                 taps.map_or_else(|| ",,".to_owned(), row)
             });
             let entries = trial.entries.map(|entered| {
-                let row = |EntryOutcome { swing_mm, gained_mj }| format!("{swing_mm:.6},{gained_mj:.6}");
+                let row = |EntryOutcome {
+                               swing_mm,
+                               gained_mj,
+                           }| format!("{swing_mm:.6},{gained_mj:.6}");
                 entered.map_or_else(|| ",".to_owned(), row)
             });
             writeln!(

@@ -66,7 +66,13 @@ fn run_textured_trial(
     setting.run_trial().expect("in reach")
 }
 
-fn setting_for(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64, damping: Damping) -> Setting {
+fn setting_for(
+    hz: u32,
+    stiffness_n_per_mm: f64,
+    grasp: Grasp,
+    delay_s: f64,
+    damping: Damping,
+) -> Setting {
     Setting {
         rate: TickRate::new(hz).expect("a rate"),
         stiffness_n_per_mm,
@@ -139,7 +145,9 @@ fn tap_touches_the_surface_at_its_nominal_speed() {
         for (hz, stiffness) in [(1000, 0.5), (1000, 2.0), (10_000, 1.0)] {
             for speed_m_s in TAP_SPEEDS_M_S {
                 let setting = setting_for(hz, stiffness, grasp, 80e-6, CONTROLLED);
-                let Taps { contact_speed_m_s, .. } = run_taps(setting, speed_m_s);
+                let Taps {
+                    contact_speed_m_s, ..
+                } = run_taps(setting, speed_m_s);
                 assert!(
                     contact_speed_m_s
                         .iter()
@@ -159,7 +167,8 @@ fn tap_energy_is_proportional_to_age_of_the_force() {
     // large on the way out.
     let gained = |hz: u32, delay_s| {
         let age_s = 0.5 / f64::from(hz) + delay_s + LAG_S;
-        let gained_mj = run_taps(setting_for(hz, 1.0, Grasp::Normal, delay_s, UNDAMPED), 0.2).gained_mj;
+        let gained_mj =
+            run_taps(setting_for(hz, 1.0, Grasp::Normal, delay_s, UNDAMPED), 0.2).gained_mj;
         assert!(gained_mj > 0.05, "{gained_mj} mJ");
         gained_mj / age_s
     };
@@ -275,7 +284,8 @@ fn damping_reduces_the_energy_gained_in_a_tap() {
         ns_per_m: 2.0,
         ..UNDAMPED
     };
-    let gained = |damping| run_taps(setting_for(1000, 1.0, Grasp::Normal, 80e-6, damping), 0.2).gained_mj;
+    let gained =
+        |damping| run_taps(setting_for(1000, 1.0, Grasp::Normal, 80e-6, damping), 0.2).gained_mj;
     let (with, without) = (gained(damped), gained(UNDAMPED));
     assert!(with < without, "{with} and {without} mJ");
 }
@@ -330,7 +340,10 @@ fn check_entry_limits(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 
                     arm_friction,
                     ..setting_for(hz, stiffness, Grasp::Light, delay_s, CONTROLLED)
                 };
-                let entered = setting.run_entry(entry).expect("in reach").expect("no fault");
+                let entered = setting
+                    .run_entry(entry)
+                    .expect("in reach")
+                    .expect("no fault");
                 assert_eq!(
                     entered.is_good(),
                     stiffness <= max_stiffness,
@@ -369,8 +382,8 @@ fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
         (10_000, 1.0, 0.5),
     ];
     check_entry_limits(0.1, LONG_S, late);
-    for (table, stated) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
-        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(stated) {
+    for (table, expected) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
+        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(expected) {
             assert_eq!((hz, ramp.min(clutch)), (of_hz, f64::from(n_per_mm)));
         }
     }
@@ -385,7 +398,10 @@ fn swings_are_small_with_little_arm_friction() {
                 arm_friction: 0.1,
                 ..setting_for(hz, 4.0, Grasp::Light, SHORT_S, CONTROLLED)
             };
-            let entered = setting.run_entry(entry).expect("in reach").expect("no fault");
+            let entered = setting
+                .run_entry(entry)
+                .expect("in reach")
+                .expect("no fault");
             assert!(entered.swing_mm < 0.16, "{hz} Hz, {entry:?}: {entered:?}");
         }
     }
@@ -398,7 +414,10 @@ fn tip_swings_during_ramp_up_without_passivity_controller() {
         ..setting_for(1000, 3.0, Grasp::Light, 0.1e-3, UNDAMPED)
     };
     for entry in [Entry::Ramp, Entry::Clutch] {
-        let entered = setting.run_entry(entry).expect("in reach").expect("no fault");
+        let entered = setting
+            .run_entry(entry)
+            .expect("in reach")
+            .expect("no fault");
         assert!(
             entered.swing_mm > 3.0 && entered.gained_mj > 100.0,
             "{entered:?}"

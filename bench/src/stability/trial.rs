@@ -5,7 +5,7 @@ use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
 use super::contact_loop::{self, HOME, LoopSettings, PLANE_MM};
-use super::entry::{EntryOutcome, Entry};
+use super::entry::{Entry, EntryOutcome};
 use super::grasp::Grasp;
 use super::map::Column;
 use super::tap::{TAP_SPEEDS_M_S, Taps};

@@ -15,7 +15,7 @@ use super::measurement::{Reading, Row};
 use super::meter::{Meter, Traffic, peak_bytes};
 use super::run::{self, fastest};
 use super::tick_counts::TickCounts;
-use super::{CELL_MM, MeasureError, RATES, SPEEDS, DEFAULT_SPEED};
+use super::{CELL_MM, DEFAULT_SPEED, MeasureError, RATES, SPEEDS};
 
 /// Case of a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -164,9 +164,12 @@ impl Bench<'_> {
         row.turning_cells = Some(turning.cells() as u32);
         let top = self.motion(straight, run::SPEEDS[1], LateTile::NoData, false)?;
         let motion_ticks = top.motion_ticks;
-        let is_in_motion = |tile: &&SentTile| (motion_ticks[0]..motion_ticks[1]).contains(&tile.tick);
+        let is_in_motion =
+            |tile: &&SentTile| (motion_ticks[0]..motion_ticks[1]).contains(&tile.tick);
         let tiles = top.tiles.iter().filter(is_in_motion).count() as f64;
-        row.tiles_per_s = Some(round(1e3 * tiles / (motion_ticks[1] - motion_ticks[0]) as f64));
+        row.tiles_per_s = Some(round(
+            1e3 * tiles / (motion_ticks[1] - motion_ticks[0]) as f64,
+        ));
         let missing = |path, speed: u32| {
             let motion = self.motion(path, speed.into(), LateTile::NoData, false)?;
             Ok::<_, MeasureError>(Some(motion.counts.missing))
@@ -178,8 +181,13 @@ impl Bench<'_> {
         row.missing_turning_2000 = missing(turning, SPEEDS[1])?;
         row.missing_turning_5000 = missing(turning, SPEEDS[2])?;
         let max_speed = |path| {
-            let is_complete =
-                |speed| Ok(self.motion(path, speed, LateTile::NoData, true)?.counts.missing == 0);
+            let is_complete = |speed| {
+                Ok(self
+                    .motion(path, speed, LateTile::NoData, true)?
+                    .counts
+                    .missing
+                    == 0)
+            };
             Ok::<_, MeasureError>(Some(fastest(self.case.halvings, is_complete)?.round()))
         };
         row.held_straight = max_speed(straight)?;
@@ -229,7 +237,8 @@ impl Bench<'_> {
         let pace = self.case.pace(Pace::Virtual);
         let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, path)?;
-        let (counts, motion_ticks) = run::travel(&mut chain, self.hand, path, speed, stop_at_no_data)?;
+        let (counts, motion_ticks) =
+            run::travel(&mut chain, self.hand, path, speed, stop_at_no_data)?;
         Ok(Motion::of(chain, counts, motion_ticks))
     }
 }

@@ -50,7 +50,11 @@ impl Hand {
     ///
     /// # Errors
     /// If the home is beyond the range of positions.
-    pub(super) fn scene(&self, terrain: &Terrain<'_>, late_tile: LateTile) -> Result<Scene, MeasureError> {
+    pub(super) fn scene(
+        &self,
+        terrain: &Terrain<'_>,
+        late_tile: LateTile,
+    ) -> Result<Scene, MeasureError> {
         let home = terrain.scale().to_grid(self.placement.home_mm);
         let home = home.ok_or_else(|| MeasureError("it is farther than positions reach".into()))?;
         let scene = Scene {
@@ -83,7 +87,11 @@ impl Hand {
         self.inputs(place, ABOVE)
     }
 
-    fn inputs(&self, [east, north, height]: [f64; 3], up: f64) -> Result<GuardInputs, MeasureError> {
+    fn inputs(
+        &self,
+        [east, north, height]: [f64; 3],
+        up: f64,
+    ) -> Result<GuardInputs, MeasureError> {
         let at_mm = [east, north, height + up].map(|cells| cells * CELL_MM);
         let joints = self.placement.joints_at(&self.model, at_mm);
         let joints = joints.map_err(|error| MeasureError(error.to_string()))?;

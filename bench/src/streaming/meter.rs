@@ -47,8 +47,8 @@ fn query_server() -> Result<Traffic, MeasureError> {
         io::stdin().lock().read_line(&mut line)?;
         Ok(line)
     };
-    let line =
-        send_query().map_err(|error| MeasureError(format!("the counter does not answer: {error}")))?;
+    let line = send_query()
+        .map_err(|error| MeasureError(format!("the counter does not answer: {error}")))?;
     let mut numbers = line.split_whitespace().map(str::parse);
     match (numbers.next(), numbers.next()) {
         (Some(Ok(requests)), Some(Ok(bytes))) => Ok(Traffic { requests, bytes }),

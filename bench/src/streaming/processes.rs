@@ -115,7 +115,8 @@ impl Subject<'_> {
             std::path::absolute(&self.path).map_err(|error| MeasureError(error.to_string()))?;
         let (paths, samples, is_whole) = self.paths()?;
         let file = folder.join("ways");
-        paths.write(&file)
+        paths
+            .write(&file)
             .map_err(|error| MeasureError(format!("{}: {error}", file.display())))?;
         let case = |reading, latency_ms, source: String| Case {
             terrain: self.name.clone(),

@@ -24,7 +24,11 @@ pub(super) const SPEEDS: [f64; 2] = [100.0, 20_000.0];
 ///
 /// # Errors
 /// If there is none, or the session ends.
-pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, path: &HipPath) -> Result<(), MeasureError> {
+pub(super) fn touch(
+    chain: &mut Chain<'_>,
+    hand: &Hand,
+    path: &HipPath,
+) -> Result<(), MeasureError> {
     let (above, below) = (hand.above(path.at(0.0))?, hand.below(path.at(0.0))?);
     let mut is_touching = false;
     while !is_touching {
@@ -149,7 +153,11 @@ mod tests {
                 assert!((distance(ticks, speed) - cells).abs() < 1e-9 * cells.max(1.0));
             }
             let at = |ticks| distance(ticks, speed);
-            for ticks in [ACCELERATION_TICKS, ACCELERATION_TICKS + 1.0, ACCELERATION_TICKS + 500.0] {
+            for ticks in [
+                ACCELERATION_TICKS,
+                ACCELERATION_TICKS + 1.0,
+                ACCELERATION_TICKS + 500.0,
+            ] {
                 let step = at(ticks) - at(ticks - 1.0);
                 assert!((step / speed - 1.0).abs() < 0.01, "{ticks}: {step}");
             }

@@ -240,7 +240,9 @@ impl Table {
     /// Returns a message for each count above the table's allowance, or above a target that the
     /// table meets.
     pub(crate) fn regressions(&self, rows: &[Row]) -> Vec<String> {
-        rows.iter().flat_map(|row| self.row_regressions(row)).collect()
+        rows.iter()
+            .flat_map(|row| self.row_regressions(row))
+            .collect()
     }
 
     fn row_regressions(&self, row: &Row) -> Vec<String> {

@@ -91,7 +91,9 @@ pub(super) fn find_appended(
 
 /// Returns the extension if it is in `NEIGHBOUR_EXTENSIONS`.
 fn known_extension(extension: &str) -> Option<&'static str> {
-    let known = NEIGHBOUR_EXTENSIONS.iter().find(|known| **known == extension);
+    let known = NEIGHBOUR_EXTENSIONS
+        .iter()
+        .find(|known| **known == extension);
     known.copied()
 }
 

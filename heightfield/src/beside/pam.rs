@@ -76,9 +76,9 @@ impl Notes {
     fn set(&mut self, key: &str, text: &str) {
         match key {
             "NoDataValue" => {
-                let stated = no_data(text, 0, 1);
-                self.no_data = stated.value;
-                self.remarks.extend(stated.remark);
+                let parsed = no_data(text, 0, 1);
+                self.no_data = parsed.value;
+                self.remarks.extend(parsed.remark);
             }
             "Scale" => self.scale = number(text),
             "Offset" => self.offset = number(text),

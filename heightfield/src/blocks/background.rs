@@ -45,7 +45,8 @@ impl Queue {
     /// Adds a job at the front of the queue. Returns true if it is new.
     pub(super) fn push_front(&self, job: Job) -> bool {
         let mut state = self.state();
-        let is_new = !state.is_closed && state.waiting.len() < MAX_JOBS && state.unfinished.insert(job);
+        let is_new =
+            !state.is_closed && state.waiting.len() < MAX_JOBS && state.unfinished.insert(job);
         if is_new {
             state.waiting.push_front(job);
             drop(state);
@@ -119,7 +120,10 @@ impl Queue {
         self.wake.notify_all();
         let is_busy = |state: &mut State| !state.unfinished.is_empty();
         let drained = self.wake.wait_timeout_while(state, within, is_busy);
-        !drained.unwrap_or_else(PoisonError::into_inner).1.timed_out()
+        !drained
+            .unwrap_or_else(PoisonError::into_inner)
+            .1
+            .timed_out()
     }
 }
 

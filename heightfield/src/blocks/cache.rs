@@ -70,7 +70,11 @@ impl Cache {
 
 fn bytes(block: Option<&Block>) -> usize {
     let samples = block.map_or(0, |block| {
-        block.samples.bytes() + block.no_data_mask.as_ref().map_or(0, |no_data_mask| no_data_mask.len() / 8)
+        block.samples.bytes()
+            + block
+                .no_data_mask
+                .as_ref()
+                .map_or(0, |no_data_mask| no_data_mask.len() / 8)
     });
     ENTRY_BYTES + samples
 }

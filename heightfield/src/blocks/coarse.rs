@@ -248,5 +248,8 @@ pub(super) fn locate(image: usize, [column, row]: [u32; 2]) -> (Key, usize) {
         image,
         at: [column / PIECE_SIDE, row / PIECE_SIDE],
     };
-    (key, (row % PIECE_SIDE * PIECE_SIDE + column % PIECE_SIDE) as usize)
+    (
+        key,
+        (row % PIECE_SIDE * PIECE_SIDE + column % PIECE_SIDE) as usize,
+    )
 }

@@ -116,7 +116,11 @@ impl BlockReader for Full {
     }
 }
 
-fn raster(reader_state: &ReaderState, disk: &DiskCache, [south_up, east_first]: [bool; 2]) -> Raster {
+fn raster(
+    reader_state: &ReaderState,
+    disk: &DiskCache,
+    [south_up, east_first]: [bool; 2],
+) -> Raster {
     let full = BlockImage {
         columns: SIZE[0],
         rows: SIZE[1],
@@ -181,7 +185,11 @@ fn coarse_levels_have_the_files_own_samples_in_any_order() {
         let reader_state = ReaderState::new("");
         for level in [2, 3, 5, 6, 8, 9, 10] {
             // Each level in a new raster, then all in the same one.
-            check(&raster(&reader_state, &DiskCache::is_off(), order), level, order);
+            check(
+                &raster(&reader_state, &DiskCache::is_off(), order),
+                level,
+                order,
+            );
         }
         let all = raster(&reader_state, &DiskCache::is_off(), order);
         for level in [9, 6, 3, 4, 5, 7, 8, 10, 2] {
@@ -251,7 +259,12 @@ fn same(one: &[f64], other: &[f64]) {
 #[test]
 fn nonblocking_read_loads_coarse_level_in_background() {
     let reader_state = ReaderState::new("");
-    let waited = read_tile(&raster(&reader_state, &DiskCache::is_off(), USUAL), 8, Wait::UntilRead).expect("here");
+    let waited = read_tile(
+        &raster(&reader_state, &DiskCache::is_off(), USUAL),
+        8,
+        Wait::UntilRead,
+    )
+    .expect("here");
     let raster = raster(&reader_state, &DiskCache::is_off(), USUAL);
     reader_state.threads.lock().expect("alone").clear();
     assert_eq!(
@@ -318,7 +331,11 @@ fn late_block_is_pending_and_damaged_block_is_not_cached() {
     }
     // It was damaged in that run only.
     reader_state.is_damaged.store(false, Ordering::Relaxed);
-    check(&raster(&reader_state, &disk, [true, false]), 3, [true, false]);
+    check(
+        &raster(&reader_state, &disk, [true, false]),
+        3,
+        [true, false],
+    );
 }
 
 #[test]
@@ -336,7 +353,11 @@ fn disk_cache_serves_next_run_only_for_the_same_file_stamp() {
         (Some("two"), false, true),
     ] {
         *reader_state.stamp.lock().expect("alone") = stamp.map(Into::into);
-        let disk = if is_off { DiskCache::is_off() } else { disk.clone() };
+        let disk = if is_off {
+            DiskCache::is_off()
+        } else {
+            disk.clone()
+        };
         let raster = raster(&reader_state, &disk, USUAL);
         for level in [8, 5, 9] {
             check(&raster, level, USUAL);

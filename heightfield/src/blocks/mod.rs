@@ -42,7 +42,7 @@ use block_state::BlockState;
 use cache::Key;
 use coarse::{Coarse, SampleState};
 pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
-pub(super) use survey::{SurveyParts, Survey, stored_parts};
+pub(super) use survey::{Survey, SurveyParts, stored_parts};
 
 /// Max size of a block that can be read alone, bytes.
 pub(super) const MAX_BLOCK_BYTES: u64 = 32 << 20;
@@ -198,7 +198,8 @@ impl Deref for Blocks {
 impl Drop for Blocks {
     fn drop(&mut self) {
         // A thread that waits for a server ends when the server answers.
-        let are_drained = [&self.shared.coarse_queue, &self.shared.fine_queue].map(|queue| queue.close(CLOSE_TIMEOUT));
+        let are_drained = [&self.shared.coarse_queue, &self.shared.fine_queue]
+            .map(|queue| queue.close(CLOSE_TIMEOUT));
         let threads = self.threads.take().flatten().into_iter().flatten();
         for (thread, is_drained) in threads.zip(are_drained) {
             if is_drained {

@@ -241,7 +241,10 @@ fn block_is_read_once_for_all_threads() {
     let overview = samples / 16;
     let cached_bytes = blocks.cache_use().0 as u64;
     assert!(cached_bytes >= 8 * (samples + overview), "{cached_bytes}");
-    assert!(cached_bytes < 9 * (samples + overview), "{cached_bytes}: kept once");
+    assert!(
+        cached_bytes < 9 * (samples + overview),
+        "{cached_bytes}: kept once"
+    );
 }
 
 /// A field of blocks of one row each; reading the second one waits for the test.

@@ -55,7 +55,10 @@ impl Shift {
     fn by(words: &str, within_m: f64) -> Option<Self> {
         let from = format!("+proj=longlat {words}");
         let transform = Transform::new(from, "+proj=longlat +datum=WGS84".into())?;
-        Some(Self::Parameters { transform, within_m })
+        Some(Self::Parameters {
+            transform,
+            within_m,
+        })
     }
 
     /// Returns the shift of the system with an EPSG code.
@@ -124,7 +127,9 @@ impl Shift {
     pub(super) fn of_wgs84(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
         match self {
             Self::None => Some(lonlat),
-            Self::Parameters { transform, .. } => in_degrees(lonlat, |place| transform.inverse(place)),
+            Self::Parameters { transform, .. } => {
+                in_degrees(lonlat, |place| transform.inverse(place))
+            }
         }
     }
 }

@@ -38,7 +38,7 @@ pub(super) struct Node {
 
 /// A parser that consumes a text.
 struct Reader<'t> {
-    rest: &'t str,
+    remaining: &'t str,
     /// Number of nodes that may still be read.
     nodes: usize,
 }
@@ -57,13 +57,13 @@ impl<'t> Reader<'t> {
             children: Vec::new(),
         };
         loop {
-            let before = self.rest;
+            let before = self.remaining;
             if self.skip(&['"']) {
                 node.values.push(self.quoted()?);
             } else {
                 let word = self.word();
-                if self.rest.starts_with(['[', '(']) {
-                    self.rest = before;
+                if self.remaining.starts_with(['[', '(']) {
+                    self.remaining = before;
                     node.children.push(self.node(levels.checked_sub(1)?)?);
                 } else if !word.is_empty() {
                     node.values.push(word.to_owned());
@@ -81,18 +81,18 @@ impl<'t> Reader<'t> {
 
     /// Consumes one of some characters, after spaces.
     fn skip(&mut self, characters: &[char]) -> bool {
-        let left = self.rest.trim_start();
-        let rest = left.strip_prefix(characters);
-        self.rest = rest.unwrap_or(left);
-        rest.is_some()
+        let left = self.remaining.trim_start();
+        let remaining = left.strip_prefix(characters);
+        self.remaining = remaining.unwrap_or(left);
+        remaining.is_some()
     }
 
     /// Consumes a keyword or a number.
     fn word(&mut self) -> &'t str {
-        let left = self.rest.trim_start();
+        let left = self.remaining.trim_start();
         let end = left.find(['[', ']', '(', ')', ',', '"']);
-        let (word, rest) = left.split_at(end.unwrap_or(left.len()));
-        self.rest = rest;
+        let (word, remaining) = left.split_at(end.unwrap_or(left.len()));
+        self.remaining = remaining;
         word.trim_end()
     }
 
@@ -100,11 +100,11 @@ impl<'t> Reader<'t> {
     fn quoted(&mut self) -> Option<String> {
         let mut text = String::new();
         loop {
-            let (part, rest) = self.rest.split_once('"')?;
+            let (part, remaining) = self.remaining.split_once('"')?;
             text += part;
-            self.rest = rest;
-            match rest.strip_prefix('"') {
-                Some(rest) => self.rest = rest,
+            self.remaining = remaining;
+            match remaining.strip_prefix('"') {
+                Some(remaining) => self.remaining = remaining,
                 None => return Some(text),
             }
             text.push('"');
@@ -122,7 +122,7 @@ impl Node {
     /// one, after a comma.
     pub(super) fn parse_both(text: &str) -> Option<(Self, Option<Self>)> {
         let mut reader = Reader {
-            rest: text,
+            remaining: text,
             nodes: MAX_NODES,
         };
         if text.len() > MAX_BYTES {

@@ -120,7 +120,10 @@ impl DiskCache {
             return;
         };
         // No code that panics runs while the lock is held.
-        let mut size_limit = folder.size_limit.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut size_limit = folder
+            .size_limit
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         let Some(open) = size_limit.as_mut() else {
             return;
         };

@@ -29,6 +29,7 @@ pub(super) fn decode(name: &Name, mut record: Vec<u8>) -> Option<Vec<u8>> {
     let head = record.get(..HEADER_BYTES)?;
     let length = (record.len() - HEADER_BYTES) as u64;
     let expected = [SIGNATURE, &name.bytes()[..], &length.to_le_bytes()].concat();
-    let is_whole = head[..32] == expected && head[32..] == sum(&record[HEADER_BYTES..]).to_le_bytes();
+    let is_whole =
+        head[..32] == expected && head[32..] == sum(&record[HEADER_BYTES..]).to_le_bytes();
     is_whole.then(|| record.split_off(HEADER_BYTES))
 }

@@ -104,6 +104,8 @@ fn records(folder: &Path) -> Vec<Record> {
 
 fn is_abandoned(entry: &DirEntry, written: SystemTime) -> bool {
     let name = entry.file_name();
-    let begins = name.as_encoded_bytes().starts_with(INCOMPLETE_PREFIX.as_bytes());
+    let begins = name
+        .as_encoded_bytes()
+        .starts_with(INCOMPLETE_PREFIX.as_bytes());
     begins && written.elapsed().is_ok_and(|since| since > ABANDONED_AFTER)
 }

@@ -113,7 +113,9 @@ fn without(path: &Path, words: &[String], omitted: usize) -> (PathBuf, String) {
 /// Returns the positions of a list's words in a name.
 fn places(words: &[String], list: &[&str]) -> Vec<usize> {
     let is_listed = |word: &String| list.contains(&word.as_str());
-    (0..words.len()).filter(|at| is_listed(&words[*at])).collect()
+    (0..words.len())
+        .filter(|at| is_listed(&words[*at]))
+        .collect()
 }
 
 /// Splits files by name into heights, and layers beside them.

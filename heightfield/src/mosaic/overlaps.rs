@@ -117,7 +117,11 @@ impl Mosaic {
 fn places(overlap: &Part) -> Vec<(u32, u32)> {
     let is_small = u64::from(overlap.columns) * u64::from(overlap.rows) <= FEW_SAMPLES;
     let along = |first: u32, count: u32| -> Vec<u32> {
-        let chosen = if is_small { count } else { count.min(MAX_PLACES_PER_AXIS) };
+        let chosen = if is_small {
+            count
+        } else {
+            count.min(MAX_PLACES_PER_AXIS)
+        };
         let steps = u64::from(chosen.max(2) - 1);
         let at = |index: u32| (u64::from(index) * u64::from(count - 1) / steps) as u32;
         (0..chosen).map(|index| first + at(index)).collect()

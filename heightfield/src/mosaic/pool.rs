@@ -74,7 +74,9 @@ impl Pool {
                 self.open.push(number, opened.clone());
                 Ok(Some(opened))
             }
-            Err(fault) if fault.is_connection_error() => Err(RasterError::in_tile(&source.path, fault)),
+            Err(fault) if fault.is_connection_error() => {
+                Err(RasterError::in_tile(&source.path, fault))
+            }
             Err(fault) => {
                 self.failed.insert(number);
                 // A file without heights is acceptable among others.

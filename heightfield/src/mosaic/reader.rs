@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
 
-use super::super::blocks::{Block, BlockImage, BlockReader, SurveyParts, Part};
+use super::super::blocks::{Block, BlockImage, BlockReader, Part, SurveyParts};
 use super::super::{OpenOptions, RasterError, SampleType};
 use super::pool::Pool;
 use super::source::{OpenFile, Source};

@@ -180,9 +180,9 @@ fn changed_files_are_another_terrain() {
             1 => std::fs::write(path, text.replace(" 500 ", " 501 ")).expect("written"),
             _ => std::fs::remove_file(path).expect("removed"),
         }
-        let again = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+        let reopened = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
         let first = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
-        assert_eq!(again.print_in_file(), first.print_in_file());
+        assert_eq!(reopened.print_in_file(), first.print_in_file());
         first.print_in_file()
     });
     assert!(prints[0].is_some() && prints[0] != prints[1] && prints[0] != prints[2]);
@@ -205,10 +205,10 @@ fn layers_beside_heights_are_ignored_and_named() {
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
     let summary = raster.summary();
     assert_eq!((summary.lowest, summary.highest), (500.0, 500.0));
-    let stated = raster.remarks().join(" ");
+    let remarks = raster.remarks().join(" ");
     assert!(
-        stated.contains("n38_num.asc") && stated.contains("n38_aux.asc"),
-        "{stated}"
+        remarks.contains("n38_num.asc") && remarks.contains("n38_aux.asc"),
+        "{remarks}"
     );
 }
 
@@ -236,10 +236,10 @@ fn tiles_that_differ_where_they_overlap_are_reported() {
     flat(folder.path(), "a.asc", 0, 500);
     flat(folder.path(), "b.asc", 3, 510);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
-    let stated = raster.remarks().join(" ");
+    let remarks = raster.remarks().join(" ");
     assert!(
-        stated.contains("a.asc and b.asc overlap") && stated.contains("up to 10"),
-        "{stated}"
+        remarks.contains("a.asc and b.asc overlap") && remarks.contains("up to 10"),
+        "{remarks}"
     );
     assert_eq!(raster.height(3, 0), 510.0);
 }

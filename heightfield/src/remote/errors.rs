@@ -6,7 +6,7 @@ use object_store::Error as StoreError;
 
 use super::OUTAGE;
 use super::redirects::RedirectError;
-use super::url::{without_credentials, is_url};
+use super::url::{is_url, without_credentials};
 use crate::printable_text::printable;
 
 /// Max characters of a server's response in a message.
@@ -52,7 +52,9 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
         _ => return reported(error),
     };
     if METADATA_PATHS.iter().any(|part| text.contains(part)) {
-        return invalid("the environment holds no key, and this computer has none of its own".into());
+        return invalid(
+            "the environment holds no key, and this computer has none of its own".into(),
+        );
     }
     let is_refused = ["400", "401", "403"]
         .iter()
@@ -178,7 +180,10 @@ fn in_short(text: &str) -> String {
         false => word.to_owned(),
     };
     let words: Vec<String> = text.split_whitespace().map(word).collect();
-    printable(&words.join(" ")).chars().take(MAX_SHOWN).collect()
+    printable(&words.join(" "))
+        .chars()
+        .take(MAX_SHOWN)
+        .collect()
 }
 
 #[cfg(test)]

@@ -109,7 +109,12 @@ impl RemoteFetcher {
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn start_opening(&self, background: &'static Runtime, files: &mut LruCache<String, FileState>, url: &str) {
+    fn start_opening(
+        &self,
+        background: &'static Runtime,
+        files: &mut LruCache<String, FileState>,
+        url: &str,
+    ) {
         files.put(url.to_owned(), FileState::Opening);
         let (shared_pages, target) = (self.0.shared_pages.clone(), url.to_owned());
         let work = async move {
@@ -125,7 +130,12 @@ impl RemoteFetcher {
     fn on_opened(&self, background: &'static Runtime, url: String, opened: Result<Opened>) {
         let state = match opened {
             Ok(opened) => {
-                let file = RemoteFile::new(&without_credentials(&url), &self.0.shared_pages, background, opened);
+                let file = RemoteFile::new(
+                    &without_credentials(&url),
+                    &self.0.shared_pages,
+                    background,
+                    opened,
+                );
                 FileState::Open(Arc::new(file))
             }
             Err(error) => FileState::Failed(Instant::now(), error.kind(), error.to_string()),

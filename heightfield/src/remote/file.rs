@@ -11,7 +11,7 @@ use tokio::runtime::Runtime;
 
 use super::pages;
 use super::pages_on_disk::{PagesOnDisk, joined, missing};
-use super::shared_pages::{PageState, SharedPages, FileFault, spawn};
+use super::shared_pages::{FileFault, PageState, SharedPages, spawn};
 use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
 use crate::disk_cache::FileStamp;
@@ -45,10 +45,14 @@ impl RemoteFile {
         let number = shared_pages.number();
         let whole = opened.is_whole;
         if !whole {
-            shared_pages.state().pages.insert(number, 0..1, &opened.first);
+            shared_pages
+                .state()
+                .pages
+                .insert(number, 0..1, &opened.first);
         }
         let disk_pages = shared_pages.disk().zip(opened.object.stamp());
-        let disk_pages = disk_pages.map(|(disk, stamp)| PagesOnDisk::new(disk, stamp, opened.object.len()));
+        let disk_pages =
+            disk_pages.map(|(disk, stamp)| PagesOnDisk::new(disk, stamp, opened.object.len()));
         Self {
             disk_pages: disk_pages.filter(|_| !whole),
             name: name.to_owned(),
@@ -88,7 +92,9 @@ impl RemoteFile {
             let (file, needed) = (self.clone(), run.clone());
             let work = async move { file.load(needed).await };
             let file = self.clone();
-            spawn(self.background, work, move |result| file.on_received(run, result));
+            spawn(self.background, work, move |result| {
+                file.on_received(run, result)
+            });
         }
     }
 
@@ -190,7 +196,11 @@ impl RemoteFile {
             }
             has_waited |= state.pages.is_fetching(key);
             if state.pages.get(key).is_none() {
-                drop(self.shared_pages.received.wait_timeout(state, PAGE_RETRY_INTERVAL));
+                drop(
+                    self.shared_pages
+                        .received
+                        .wait_timeout(state, PAGE_RETRY_INTERVAL),
+                );
             }
         }
     }

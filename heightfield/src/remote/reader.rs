@@ -38,7 +38,8 @@ impl Read for RemoteReader {
         }
         // The caller may need only the first bytes.
         if self.at > 0 {
-            self.file.prefetch(once(self.at..self.at.saturating_add(READ_AHEAD)));
+            self.file
+                .prefetch(once(self.at..self.at.saturating_add(READ_AHEAD)));
         }
         let bytes = self.file.read_at(self.at, count)?;
         into[..count].copy_from_slice(&bytes);

@@ -97,7 +97,12 @@ impl Object {
         let metadata = &self.metadata;
         let is_identified = metadata.e_tag.is_some() || metadata.last_modified.timestamp() > 0;
         let time = metadata.last_modified.timestamp_micros();
-        is_identified.then(|| format!("{:?} {} {:?} {time}", self.url, metadata.size, metadata.e_tag))
+        is_identified.then(|| {
+            format!(
+                "{:?} {} {:?} {time}",
+                self.url, metadata.size, metadata.e_tag
+            )
+        })
     }
 
     /// Fetches a byte range inside the file.

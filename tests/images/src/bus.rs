@@ -362,7 +362,9 @@ impl Bus {
             return;
         };
         for (axis, channel) in channels.into_iter().enumerate() {
-            let overridden = self.command_held_at.filter(|(overridden, _)| *overridden == axis);
+            let overridden = self
+                .command_held_at
+                .filter(|(overridden, _)| *overridden == axis);
             self.read_back.levels[channel] =
                 overridden.map_or(self.plain(at[axis]) as u16, |(_, reading)| reading);
         }

@@ -26,9 +26,9 @@ fn after_reset(cause: Reset, mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(M
     on_each(|machine, terrain, scene| {
         let mut device = Device::open(machine, terrain, scene);
         disturb(&mut device);
-        let mut again = Device::open(device.reset_by(cause), terrain, scene);
-        let status = again.query_status();
-        all.push((again.reset(), status));
+        let mut restarted = Device::open(device.reset_by(cause), terrain, scene);
+        let status = restarted.query_status();
+        all.push((restarted.reset(), status));
     });
     all
 }
@@ -183,12 +183,12 @@ fn full_memory_is_erased_at_the_next_start() {
         let full = device.machine.borrow().bytes(areas[0], PLACE);
         assert_eq!(full, record, "{board}: nothing was erased");
         // The start takes as long as the erase, and succeeds.
-        let mut again = Device::open(device.reset(), terrain, scene);
-        let status = again.query_status();
+        let mut restarted = Device::open(device.reset(), terrain, scene);
+        let status = restarted.query_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
-        let blank = again.machine.borrow().bytes(areas[0], bytes as usize);
+        let blank = restarted.machine.borrow().bytes(areas[0], bytes as usize);
         assert!(blank.iter().all(|byte| *byte == 0xFF), "{board}: no room");
-        assert_eq!(store(&mut again), Ok(()), "{board}");
+        assert_eq!(store(&mut restarted), Ok(()), "{board}");
     });
 }
 
@@ -212,17 +212,20 @@ fn interrupted_calibration_write_keeps_previous_record() {
         // Half of a word, and nothing after it.
         device.machine.borrow_mut().patch(cut, &[0x5A]);
         device.machine.borrow_mut().make_unreadable(cut);
-        let mut again = Device::open(device.reset(), terrain, scene);
-        let status = again.query_status();
+        let mut restarted = Device::open(device.reset(), terrain, scene);
+        let status = restarted.query_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
         assert_eq!(status.health.report.fault, Some(Fault::WatchdogReset));
         assert_eq!(status.boot.crash, None, "{board}");
-        let forbidden_access = |vector| again.machine.borrow().taken.contains(&vector);
-        assert!(forbidden_access(NMI) || forbidden_access(BUS_FAULT), "{board}: it was not read");
-        let reported = again.machine.borrow().bus().reports_unreadable();
+        let forbidden_access = |vector| restarted.machine.borrow().taken.contains(&vector);
+        assert!(
+            forbidden_access(NMI) || forbidden_access(BUS_FAULT),
+            "{board}: it was not read"
+        );
+        let reported = restarted.machine.borrow().bus().reports_unreadable();
         assert!(!reported, "{board}: left for the next write to fail by");
-        assert_eq!(store(&mut again), Ok(()), "{board}: no room beside it");
-        assert_eq!(again.machine.borrow().hard_faults, 0, "{board}");
+        assert_eq!(store(&mut restarted), Ok(()), "{board}: no room beside it");
+        assert_eq!(restarted.machine.borrow().hard_faults, 0, "{board}");
     });
 }
 
@@ -263,7 +266,10 @@ fn unreadable_program_word_stops_the_program() {
         });
         assert_eq!(stop, Stop::Software, "{board}");
         let forbidden_access = |vector| machine.taken.contains(&vector);
-        assert!(forbidden_access(NMI) || forbidden_access(BUS_FAULT), "{board}: it was not read");
+        assert!(
+            forbidden_access(NMI) || forbidden_access(BUS_FAULT),
+            "{board}: it was not read"
+        );
     });
 }
 

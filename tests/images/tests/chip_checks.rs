@@ -68,7 +68,11 @@ fn status_reports_whether_usb_clock_follows_the_host() {
         assert_eq!(device.query_status().usb_clock, UsbClock::Locked, "{board}");
         device.machine.borrow().bus().usb_clock_follows = false;
         device.run_ms(1_100);
-        assert_eq!(device.query_status().usb_clock, UsbClock::Unlocked, "{board}");
+        assert_eq!(
+            device.query_status().usb_clock,
+            UsbClock::Unlocked,
+            "{board}"
+        );
     });
 }
 

@@ -121,8 +121,8 @@ fn board_pages_state_the_size_of_the_tiles() {
             .symbol_like(&["TILES"])
             .expect("the tiles")
             .size;
-        let stated = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
-        assert!(page.contains(&stated), "{board}: {stated}");
+        let statement = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
+        assert!(page.contains(&statement), "{board}: {statement}");
     }
 }
 
@@ -131,8 +131,8 @@ fn images_contain_no_build_paths() {
     for machine in machines() {
         for segment in &machine.image.segments {
             let text = String::from_utf8_lossy(&segment.bytes);
-            let way = text.find("/registry/src/");
-            assert_eq!(way, None, "{}", machine.chip.board);
+            let registry_path = text.find("/registry/src/");
+            assert_eq!(registry_path, None, "{}", machine.chip.board);
         }
     }
 }

@@ -88,8 +88,8 @@ fn tick_states_do_not_exceed_recorded_cycles() {
     let board = board.following(follow);
     let mut rows = chain::rows(&board);
     rows.extend(contact::rows(&board));
-    let wanted = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
-    let scenes = if wanted == "all" {
+    let requested = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
+    let scenes = if requested == "all" {
         soak::ALL
     } else {
         soak::PART
@@ -99,11 +99,11 @@ fn tick_states_do_not_exceed_recorded_cycles() {
     println!("{}", TITLES.join(", "));
     rows.iter()
         .for_each(|row| println!("{}", record(row).join(", ")));
-    if wanted == "write" {
+    if requested == "write" {
         return write(&rows);
     }
     // The table's rows of the stress test cover a part of the scenes.
-    let is_bound = |i: &usize| wanted != "all" || TITLES[*i].contains("max");
+    let is_bound = |i: &usize| requested != "all" || TITLES[*i].contains("max");
     let columns: Vec<usize> = (1..TITLES.len()).filter(is_bound).collect();
     let regressions = regressions(&rows, &columns);
     assert!(regressions.is_empty(), "{}", regressions.join("\n"));

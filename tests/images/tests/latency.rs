@@ -71,17 +71,24 @@ fn interrupt_cycles_stay_within_the_documented_maximum() {
             device.move_to(plane.counts_at([118.0, 91.0], 1.5));
             device.run_ms(5);
             let found = stopwatch.take();
-            let stated = Row::read(chip.board);
+            let documented = Row::read(chip.board);
             for (i, each) in [&found.to_output, &found.whole].into_iter().enumerate() {
                 assert!(each.len() > 30, "{}", each.len());
-                let (max_cycles, stated) = (max_cycles(chip, each), stated.cycles[i]);
+                let (max_cycles, documented) = (max_cycles(chip, each), documented.cycles[i]);
                 let instructions = each.iter().map(|cycles| cycles.instructions).max();
                 let instructions = instructions.expect("some ticks");
-                println!("{}: {max_cycles} cycles, {instructions} instructions", chip.board);
-                assert!(max_cycles <= stated, "{}: {max_cycles}, not {stated}", chip.board);
+                println!(
+                    "{}: {max_cycles} cycles, {instructions} instructions",
+                    chip.board
+                );
                 assert!(
-                    max_cycles > stated * 3 / 4,
-                    "{}: {max_cycles}, not {stated}",
+                    max_cycles <= documented,
+                    "{}: {max_cycles}, not {documented}",
+                    chip.board
+                );
+                assert!(
+                    max_cycles > documented * 3 / 4,
+                    "{}: {max_cycles}, not {documented}",
                     chip.board
                 );
             }
@@ -91,7 +98,7 @@ fn interrupt_cycles_stay_within_the_documented_maximum() {
                 "nucleo-h743zi2" => (2_000_000 / DUTY_HZ) as u16,
                 _ => 15 + 10,
             };
-            let states_us = stated.us[0] as u16 + behind_us + CURRENT_LOOP_US;
+            let states_us = documented.us[0] as u16 + behind_us + CURRENT_LOOP_US;
             assert_eq!(latency_us, states_us, "{board}");
             let tried_us = match board {
                 "nucleo-h743zi2" => stability::LONG_US,
@@ -105,22 +112,22 @@ fn interrupt_cycles_stay_within_the_documented_maximum() {
 #[test]
 fn fastest_accepted_tick_ends_in_time() {
     for (board, fastest_hz) in tick_rate::FASTEST_HZ {
-        let stated = Row::read(board);
+        let documented = Row::read(board);
         let (core_hz, timer_hz) = match board {
             "nucleo-g474re" => (168_000_000, 42_000_000),
             _ => (456_000_000, 57_000_000),
         };
-        let us = stated
+        let us = documented
             .cycles
             .map(|cycles| cycles.div_ceil(core_hz / 1_000_000));
-        assert_eq!(stated.us, us, "{board}");
+        assert_eq!(documented.us, us, "{board}");
         // The converter on SPI adds its frames' time to the core's.
         let frames_us = if board == "nucleo-h743zi2-spi" { 15 } else { 0 };
         let in_time = |hz: u32| (us[1] + frames_us) * hz <= 1_000_000;
         let rates = (1..=10).map(|khz| 1_000 * khz);
         let rates = rates.filter(|hz| timer_hz % hz == 0 && in_time(*hz));
         assert_eq!(rates.max(), Some(fastest_hz), "{board}");
-        assert_eq!(stated.fastest_hz, fastest_hz, "{board}");
+        assert_eq!(documented.fastest_hz, fastest_hz, "{board}");
     }
 }
 
@@ -142,11 +149,11 @@ fn recorded(names: &[&str], is_m7: bool) -> u32 {
             cycles.expect("a number"),
         )
     });
-    let fits = |name: &str, wanted: &str| match wanted.strip_suffix('*') {
+    let fits = |name: &str, requested: &str| match requested.strip_suffix('*') {
         Some(begin) => name.starts_with(begin),
-        None => name == wanted,
+        None => name == requested,
     };
-    let rows = rows.filter(|(name, _)| names.iter().any(|wanted| fits(name, wanted)));
+    let rows = rows.filter(|(name, _)| names.iter().any(|requested| fits(name, requested)));
     rows.map(|(_, cycles)| cycles).max().expect("a row")
 }
 

@@ -50,8 +50,11 @@ fn mark_raises_the_pin_for_ten_ticks() {
         assert!(before < first && third <= latest, "{board}");
         for (ticks, ups) in [(second - first, 0), (third - second, 2)] {
             assert!(ticks >= MARK_PULSE_MS + MARK_GAP_MS, "{board}: {ticks}");
-            let apart = from_to(edges[ups], edges[ups + 2]);
-            assert!(apart.contains(&ticks.into()), "{board}: {apart:?} {ticks}");
+            let period = from_to(edges[ups], edges[ups + 2]);
+            assert!(
+                period.contains(&ticks.into()),
+                "{board}: {period:?} {ticks}"
+            );
         }
     });
 }

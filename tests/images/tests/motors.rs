@@ -91,10 +91,10 @@ fn motor_temperatures_survive_a_reset_under_load() {
         // It has run for long, and its motors are cold.
         reset_with(&mut machine, &cold(), Reset::Watchdog);
         let mut device = Device::arm(machine, terrain, scene);
-        let begun = device.query_status().health.winding_c;
+        let initial_c = device.query_status().health.winding_c;
         assert!(
-            begun.max_element() < 25.0 + UNSEEN_K + 0.1,
-            "{board}: {begun}"
+            initial_c.max_element() < 25.0 + UNSEEN_K + 0.1,
+            "{board}: {initial_c}"
         );
         device.move_to(plane.counts_at([100.0, 100.0], -3.0));
         device.wait_for_full_force();
@@ -110,8 +110,8 @@ fn motor_temperatures_survive_a_reset_under_load() {
             assert_eq!(machine.run_ms(200), Stop::Watchdog, "{board}");
             machine.restore(tick);
         }
-        let mut again = Device::open(device.reset(), terrain, scene);
-        let after = again.query_status().health.winding_c;
+        let mut restarted = Device::open(device.reset(), terrain, scene);
+        let after = restarted.query_status().health.winding_c;
         println!("{board}: {before} °C before the reset, {after} after it");
         let recorded = after - before;
         // The start takes a moment, in which the windings cool a little.

@@ -28,20 +28,20 @@ fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
     on_each_board(&raster, home_mm, then);
 }
 
-/// Arms every board, calls `disturb`, resets the board, and passes its status to `asked`.
+/// Arms every board, calls `disturb`, resets the board, and passes its status to `check`.
 fn after(
     cause: Reset,
     mut disturb: impl FnMut(&mut Device<'_>, Scene),
-    mut asked: impl FnMut(&str, &Status),
+    mut check: impl FnMut(&str, &Status),
 ) {
     on_each(|machine, terrain, scene| {
         let mut device = Device::arm(machine, terrain, scene);
         let _ = device.machine.borrow_mut().take_effects();
         disturb(&mut device, scene);
-        let mut again = Device::open(device.reset_by(cause), terrain, scene);
-        let status = again.query_status();
-        let board = again.machine.borrow().chip.board;
-        asked(board, &status);
+        let mut restarted = Device::open(device.reset_by(cause), terrain, scene);
+        let status = restarted.query_status();
+        let board = restarted.machine.borrow().chip.board;
+        check(board, &status);
     });
 }
 

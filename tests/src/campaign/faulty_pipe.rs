@@ -27,7 +27,13 @@ pub struct Pipe {
 
 impl Pipe {
     /// Sends bytes at a tick.
-    pub fn send(&mut self, bytes: &[u8], now: u64, disturbance: &LinkDisturbance, random: &mut Random) {
+    pub fn send(
+        &mut self,
+        bytes: &[u8],
+        now: u64,
+        disturbance: &LinkDisturbance,
+        random: &mut Random,
+    ) {
         if disturbance.cut {
             self.pieces.clear();
             return;

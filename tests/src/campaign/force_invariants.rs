@@ -108,7 +108,9 @@ impl ForceChecks {
             check_fade(last, sample)?;
         }
         let is_full_force = !sample.limits.intersects(FORCE_REDUCED);
-        if let Some(share) = share.filter(|_| is_full_force && sample.state == ContactState::Touching) {
+        if let Some(share) =
+            share.filter(|_| is_full_force && sample.state == ContactState::Touching)
+        {
             let displacement_mm = sample.hip.to(&sample.proxy) * self.cell_mm;
             self.check_size(sample, displacement_mm, share.product())?;
             self.check_no_pull(sample, displacement_mm)?;
@@ -117,7 +119,12 @@ impl ForceChecks {
     }
 
     /// Checks that no force exceeds the stiffest material's at this depth.
-    fn check_size(&self, sample: &TickRecord, displacement_mm: Vec3, share: f32) -> Result<(), String> {
+    fn check_size(
+        &self,
+        sample: &TickRecord,
+        displacement_mm: Vec3,
+        share: f32,
+    ) -> Result<(), String> {
         let depth_mm = displacement_mm.length();
         let [high_mm, steep] = self.surfaces.relief();
         let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
@@ -144,7 +151,9 @@ impl ForceChecks {
         let min = -ROUNDING * (displacement_mm.length() + 1e-3) * (sample.force_n.length() + 1e-3);
         match along >= min {
             true => Ok(()),
-            false => Err(format!("the force pulls along {displacement_mm}: {sample:?}")),
+            false => Err(format!(
+                "the force pulls along {displacement_mm}: {sample:?}"
+            )),
         }
     }
 
@@ -160,7 +169,8 @@ impl ForceChecks {
 
     fn shading_mj(&self, max_depth_mm: f32) -> f32 {
         let displacement_mm = self.cell_mm + max_depth_mm;
-        let max_gain_mj = SHADED_MJ + SHADED_PART * self.surfaces.max_n(max_depth_mm) * displacement_mm;
+        let max_gain_mj =
+            SHADED_MJ + SHADED_PART * self.surfaces.max_n(max_depth_mm) * displacement_mm;
         max_gain_mj.min(MAX_SHADED_MJ)
     }
 

@@ -14,7 +14,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
-use super::faulty_pipe::{Pipe, LinkDisturbance};
+use super::faulty_pipe::{LinkDisturbance, Pipe};
 use crate::random::Random;
 
 /// Bytes of a tile's samples.
@@ -79,7 +79,8 @@ impl<'t> Host<'t> {
     pub fn greet(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.greet(time(now), &mut out);
-        self.to_device.send(&out, now, &LinkDisturbance::default(), random);
+        self.to_device
+            .send(&out, now, &LinkDisturbance::default(), random);
     }
 
     /// Opens a session if none is open.
@@ -93,7 +94,8 @@ impl<'t> Host<'t> {
     pub fn leave(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.leave(time(now), &mut out);
-        self.to_device.send(&out, now, &LinkDisturbance::default(), random);
+        self.to_device
+            .send(&out, now, &LinkDisturbance::default(), random);
     }
 
     /// Queries the status.
@@ -107,7 +109,13 @@ impl<'t> Host<'t> {
     }
 
     /// Sends a message that the real client would not send.
-    pub fn send(&mut self, message: &ToDevice<'_>, now: u64, disturbance: &LinkDisturbance, random: &mut Random) {
+    pub fn send(
+        &mut self,
+        message: &ToDevice<'_>,
+        now: u64,
+        disturbance: &LinkDisturbance,
+        random: &mut Random,
+    ) {
         let bytes = framed(self.client.session(), message);
         self.to_device.send(&bytes, now, disturbance, random);
     }

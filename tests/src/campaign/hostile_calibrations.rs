@@ -52,11 +52,7 @@ pub fn check_limits(record: &Calibration) -> Result<(), String> {
     let max = |values: Vec3| values.max_element();
     let numbers = [
         ("peak current", max(record.peak_current_a), 5.5),
-        (
-            "continuous current",
-            max(record.continuous_current_a),
-            1.24,
-        ),
+        ("continuous current", max(record.continuous_current_a), 1.24),
         ("1 / Ω", 1.0 / thermal.resistance_ohm, 1.0 / 2.82),
         ("W/K of a winding", 1.0 / thermal.winding_k_per_w, 1.0 / 3.1),
         (

@@ -27,7 +27,7 @@ use super::force_invariants::ForceChecks;
 use super::ground::{Effects, Ground, SceneSurfaces};
 use super::host::{Host, Tiles};
 use super::hostile_calibrations;
-use super::tick_invariants::{Truth, TickChecks};
+use super::tick_invariants::{TickChecks, Truth};
 use crate::random::Random;
 
 /// Samples along the side of the terrain, and the side of a cell, mm.
@@ -104,7 +104,10 @@ fn terrain(random: &mut Random) -> Raster {
     let synth = Synth::new(kinds[random.below(4)], random.bits(), amplitude_mm);
     let no_data_center = [150.0, 350.0].map(|at| at + random.between(-40.0, 40.0));
     let raster = Raster::from_fn(SAMPLES, SAMPLES, |column, row| {
-        let [east, north] = [f64::from(column) - no_data_center[0], f64::from(row) - no_data_center[1]];
+        let [east, north] = [
+            f64::from(column) - no_data_center[0],
+            f64::from(row) - no_data_center[1],
+        ];
         match libm::hypot(east, north) < 25.0 {
             true => f32::NAN,
             false => synth.height(column, row),
@@ -325,7 +328,8 @@ impl<'t> Segment<'t> {
             }
             self.tick(None)?;
             if let Some(status) = self.host.status.take() {
-                self.tick_checks.check_created_energy(status.health.created_mj)?;
+                self.tick_checks
+                    .check_created_energy(status.health.created_mj)?;
                 return Ok(status);
             }
         }
@@ -387,7 +391,11 @@ impl<'t> Segment<'t> {
     }
 
     /// Advances everything by one tick.
-    fn tick_with(&mut self, mood: Mood, injected: Option<&mut InjectedFault>) -> Result<(), String> {
+    fn tick_with(
+        &mut self,
+        mood: Mood,
+        injected: Option<&mut InjectedFault>,
+    ) -> Result<(), String> {
         self.arm
             .break_amplifier(injected.as_ref().and_then(|injected| injected.amplifier()));
         let mut inputs = GuardInputs {
@@ -411,7 +419,12 @@ impl<'t> Segment<'t> {
             if injected.kind != Kind::Clutch {
                 self.calm_from = injected.ticks.end + SETTLING_TICKS;
             }
-            injected.apply_to_inputs(&mut inputs, &mut self.count_offset, self.now, &mut self.random);
+            injected.apply_to_inputs(
+                &mut inputs,
+                &mut self.count_offset,
+                self.now,
+                &mut self.random,
+            );
             (disturbance, tiles) = (injected.disturbance(), injected.tiles());
             (reading, stalls) = (injected.reading(self.now), injected.stalls());
             self.poisoned |= tiles == Tiles::Poisoned;
@@ -420,7 +433,8 @@ impl<'t> Segment<'t> {
                 self.device.link.interrupted();
             }
             if let Some(message) = injected.misplaced(&mut self.random, self.scene.epoch) {
-                self.host.send(&message, self.now, &disturbance, &mut self.random);
+                self.host
+                    .send(&message, self.now, &disturbance, &mut self.random);
             }
         }
         self.clock.set(reading);
@@ -478,7 +492,8 @@ impl<'t> Segment<'t> {
         if core == Core::Halted {
             self.tick_checks.check_held(&self.outputs, &truth)?;
         } else {
-            self.tick_checks.check_outputs(&self.outputs, inputs, self.zero, &truth)?;
+            self.tick_checks
+                .check_outputs(&self.outputs, inputs, self.zero, &truth)?;
         }
         if core == Core::Runs {
             let believed_c = self.device.temperatures().winding_c();
@@ -488,7 +503,8 @@ impl<'t> Segment<'t> {
                 .map_or(Ok(()), hostile_calibrations::check_limits)?;
         }
         for sample in std::mem::take(&mut self.host.samples) {
-            self.tick_checks.check_sample(&sample, self.scene.params.max_force_n)?;
+            self.tick_checks
+                .check_sample(&sample, self.scene.params.max_force_n)?;
             let is_calm = self.now >= self.calm_from && !self.poisoned;
             self.forces.check(&sample, is_calm)?;
         }

@@ -13,7 +13,10 @@ pub fn is_in_flash(name: &str) -> bool {
 
 /// Returns the patterns without the prefix that all code sections share.
 fn patterns() -> impl Iterator<Item = &'static str> {
-    let list = SCRIPT.split(LIST_START).nth(1).and_then(|s| s.split(LIST_END).next());
+    let list = SCRIPT
+        .split(LIST_START)
+        .nth(1)
+        .and_then(|s| s.split(LIST_END).next());
     let lines = list.unwrap_or_default().lines();
     lines.filter_map(|line| line.trim().strip_prefix("*(.text.")?.strip_suffix(')'))
 }

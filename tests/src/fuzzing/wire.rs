@@ -93,8 +93,8 @@ impl Wire {
         for session in (1..=OTHER_SESSIONS).map(SessionNumber::new) {
             self.receive(&message_in(session, &ToDevice::Hello(hello)));
         }
-        for stated in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
-            self.receive(&message(&stated));
+        for message_to_device in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
+            self.receive(&message(&message_to_device));
         }
         // Clears any latched fault. The last of these requests has the number 1.
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
@@ -129,10 +129,10 @@ impl Wire {
             if n == 0 {
                 return;
             }
-            let mut stated = &chunk[..n];
-            while !stated.is_empty() {
-                let (taken, frame) = self.host.push(stated);
-                stated = &stated[taken..];
+            let mut message = &chunk[..n];
+            while !message.is_empty() {
+                let (taken, frame) = self.host.push(message);
+                message = &message[taken..];
                 if let Some(frame) = frame {
                     let frame = frame.expect("the device sends whole frames");
                     if VersionCheck::is_in(frame) {

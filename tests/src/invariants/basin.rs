@@ -34,8 +34,8 @@ impl TickOracle<'_> {
         let [from, to] = [before.proxy, observed.proxy].map(|at| [at[0], at[1]]);
         let is_open = |at| self.is_open(at, observed.hip, reach + SLACK);
         const MAX_SAMPLES: u32 = 64;
-        let is_straight = (0..=MAX_SAMPLES).all(|look| {
-            let share = f64::from(look) / f64::from(MAX_SAMPLES);
+        let is_straight = (0..=MAX_SAMPLES).all(|sample| {
+            let share = f64::from(sample) / f64::from(MAX_SAMPLES);
             is_open([0, 1].map(|i| from[i] + share * (to[i] - from[i])))
         });
         let columns = (COLUMNS / reach).clamp(64.0, 1_024.0).round();

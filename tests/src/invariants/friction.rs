@@ -24,8 +24,8 @@ const STEEP: f64 = 1e3;
 /// rest.
 #[derive(Clone, Copy, Debug)]
 struct Pull {
-    along: f64,
-    rest: f64,
+    tangential: f64,
+    normal: f64,
     /// Slope of the ground there.
     slope: f64,
     /// Tolerance of the height, from rounding of the position, and of the corner heights in a patch
@@ -47,7 +47,7 @@ impl TickOracle<'_> {
         });
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
         let place = observed.allowed() + min.rounding;
-        let gone = match (slid, self.before) {
+        let travelled = match (slid, self.before) {
             (Some(start), _) => distance(start, observed.proxy),
             // A proxy that landed may have done so at any point nearer to the HIP than it was.
             (None, Some(before)) => {
@@ -56,9 +56,9 @@ impl TickOracle<'_> {
             (None, None) if viscous > 0.0 => return Ok(()),
             (None, None) => 0.0,
         };
-        let trail = viscous * (gone + 4.0 * observed.allowed() * (1.0 + min.slope));
-        let holds = mu * min.rest + trail;
-        if min.along <= holds * (1.0 + SLACK) + 4.0 * place * (1.0 + mu) {
+        let trail = viscous * (travelled + 4.0 * observed.allowed() * (1.0 + min.slope));
+        let holds = mu * min.normal + trail;
+        if min.tangential <= holds * (1.0 + SLACK) + 4.0 * place * (1.0 + mu) {
             return Ok(());
         }
         let detail = format!("{min:?} where {holds:.3e} is held: {observed:?}");
@@ -75,19 +75,21 @@ impl TickOracle<'_> {
         }
         let mu = f64::from(self.friction.dynamic_mu);
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
-        let gone = distance(start, observed.proxy);
+        let travelled = distance(start, observed.proxy);
         // On an edge it may have come from any of the patches that meet there.
         let falls_short = |(start, patch): &([f64; 2], Patch)| {
-            let way = [0, 1, 2].map(|i| observed.hip[i] - observed.proxy[i]);
+            let displacement = [0, 1, 2].map(|i| observed.hip[i] - observed.proxy[i]);
             let [east, north] = patch.slopes(start[0], start[1]);
             let norm = (1.0 + east * east + north * north).sqrt();
-            let rest = (way[2] - east * way[0] - north * way[1]).abs() / norm;
-            let whole: f64 = way.iter().map(|c| c * c).sum();
-            let along = (whole - rest * rest).max(0.0).sqrt();
+            let normal =
+                (displacement[2] - east * displacement[0] - north * displacement[1]).abs() / norm;
+            let whole: f64 = displacement.iter().map(|c| c * c).sum();
+            let tangential = (whole - normal * normal).max(0.0).sqrt();
             let place = observed.allowed() + self.rounding(patch, *start, observed.hip[2]);
-            let trail = viscous * (gone - 4.0 * observed.allowed() * (1.0 + east.hypot(north)));
-            let holds = mu * rest + trail.max(0.0);
-            along < holds * (1.0 - SLACK) - 4.0 * place * (1.0 + mu)
+            let trail =
+                viscous * (travelled - 4.0 * observed.allowed() * (1.0 + east.hypot(north)));
+            let holds = mu * normal + trail.max(0.0);
+            tangential < holds * (1.0 - SLACK) - 4.0 * place * (1.0 + mu)
         };
         if !self.nearby(observed.proxy).all(|at| falls_short(&at)) {
             return Ok(());
@@ -114,15 +116,15 @@ impl TickOracle<'_> {
         let before = self.before?;
         let start = self.slip_start(&before, observed);
         let touches = before.is_touching() && observed.is_touching() && observed.output.converged;
-        let way = [0, 1].map(|i| observed.proxy[i] - start[i]);
-        let is_near = way[0].hypot(way[1]) < SLIDES;
+        let displacement = [0, 1].map(|i| observed.proxy[i] - start[i]);
+        let is_near = displacement[0].hypot(displacement[1]) < SLIDES;
         if !touches || !is_near || before.output.proxy == observed.output.proxy {
             return None;
         }
-        let at = |axis: usize, look: u32| {
+        let at = |axis: usize, sample: u32| {
             let (from, to) = (start[axis], observed.proxy[axis]);
             let (min, max) = (from.min(to) - OFFSET, from.max(to) + OFFSET);
-            min + (max - min) * f64::from(look) / f64::from(SAMPLES)
+            min + (max - min) * f64::from(sample) / f64::from(SAMPLES)
         };
         let is_pressed = (0..=SAMPLES).all(|column| {
             (0..=SAMPLES).all(|row| self.is_pressed_at([at(0, column), at(1, row)], observed.hip))
@@ -149,7 +151,11 @@ impl TickOracle<'_> {
 
     /// Checks that a proxy inside the cone does not move. A proxy that was in the air slides first,
     /// even if it returns to its old position.
-    pub(super) fn check_sticks(&mut self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_sticks(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
         let touches = |observed: &ObservedTick| {
             observed.output.state == ContactState::Touching && observed.output.converged
         };
@@ -167,9 +173,9 @@ impl TickOracle<'_> {
             false => self.friction.dynamic_mu,
         };
         let place = observed.allowed() + max.rounding;
-        let held = f64::from(mu) * max.rest * (1.0 - 1e-3) - 4.0 * place;
-        if max.along < held {
-            let detail = format!("{max:?} of {held:.3e}: {before:?} then {observed:?}");
+        let max_held = f64::from(mu) * max.normal * (1.0 - 1e-3) - 4.0 * place;
+        if max.tangential < max_held {
+            let detail = format!("{max:?} of {max_held:.3e}: {before:?} then {observed:?}");
             return self.fail(Invariant::Stuck, detail);
         }
         Ok(())
@@ -182,31 +188,31 @@ impl TickOracle<'_> {
         if !(NEAR..FAR).contains(&distance(proxy, hip)) {
             return None;
         }
-        let way = [0, 1, 2].map(|i| hip[i] - proxy[i]);
+        let displacement = [0, 1, 2].map(|i| hip[i] - proxy[i]);
         let mut places: Vec<([f64; 2], Pull)> = Vec::new();
         for (start, patch) in self.nearby(proxy) {
             let [east, north] = patch.slopes(start[0], start[1]);
-            let above = way[2] - east * way[0] - north * way[1];
+            let above = displacement[2] - east * displacement[0] - north * displacement[1];
             if above > -NEAR || patch.slope(start[0], start[1]) > STEEP {
                 return None;
             }
-            let along = max_along(&patch, start, way);
-            let whole: f64 = way.iter().map(|c| c * c).sum();
-            let rest = (whole - along * along).max(0.0).sqrt();
+            let tangential = max_tangential(&patch, start, displacement);
+            let whole: f64 = displacement.iter().map(|c| c * c).sum();
+            let normal = (whole - tangential * tangential).max(0.0).sqrt();
             let slope = patch.slope(start[0], start[1]);
             let pull = Pull {
-                along,
-                rest,
+                tangential,
+                normal,
                 slope,
                 rounding: self.rounding(&patch, start, hip[2]),
             };
             match places.iter_mut().find(|(at, _)| *at == start) {
-                Some((_, max)) if along > max.along => *max = pull,
+                Some((_, max)) if tangential > max.tangential => *max = pull,
                 Some(_) => {}
                 None => places.push((start, pull)),
             }
         }
-        let by = |a: &Pull, b: &Pull| a.along.total_cmp(&b.along);
+        let by = |a: &Pull, b: &Pull| a.tangential.total_cmp(&b.tangential);
         let min = places.iter().map(|(_, pull)| *pull).min_by(by)?;
         let max = places.iter().map(|(_, pull)| *pull).max_by(by)?;
         Some((min, max))
@@ -214,10 +220,10 @@ impl TickOracle<'_> {
 }
 
 /// Returns the largest component of a vector along the surface, over all directions into a patch.
-fn max_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
+fn max_tangential(patch: &Patch, start: [f64; 2], displacement: [f64; 3]) -> f64 {
     const MAX_TRIED: u32 = 720;
     let [east, north] = patch.slopes(start[0], start[1]);
-    let along = |angle: f64| {
+    let tangential = |angle: f64| {
         let (y, x) = angle.sin_cos();
         let snap = |c: f64| if c.abs() < 1e-12 { 0.0 } else { c };
         let (x, y) = (snap(x), snap(y));
@@ -227,11 +233,11 @@ fn max_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
         });
         let z = east * x + north * y;
         let length = (1.0 + z * z).sqrt();
-        leads_in.then(|| (way[0] * x + way[1] * y + way[2] * z) / length)
+        leads_in.then(|| (displacement[0] * x + displacement[1] * y + displacement[2] * z) / length)
     };
     let step = std::f64::consts::TAU / f64::from(MAX_TRIED);
     let Some((best, angle)) = (0..MAX_TRIED)
-        .filter_map(|n| along(f64::from(n) * step).map(|max| (max, f64::from(n) * step)))
+        .filter_map(|n| tangential(f64::from(n) * step).map(|max| (max, f64::from(n) * step)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
     else {
         return 0.0;
@@ -239,8 +245,11 @@ fn max_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
     let (mut low, mut high) = (angle - step, angle + step);
     for _ in 0..60 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        let [at_a, at_b] = [a, b].map(|angle| along(angle).unwrap_or(f64::NEG_INFINITY));
+        let [at_a, at_b] = [a, b].map(|angle| tangential(angle).unwrap_or(f64::NEG_INFINITY));
         if at_a < at_b { low = a } else { high = b }
     }
-    along(0.5 * (low + high)).unwrap_or(best).max(best).max(0.0)
+    tangential(0.5 * (low + high))
+        .unwrap_or(best)
+        .max(best)
+        .max(0.0)
 }

@@ -143,7 +143,10 @@ impl<'g> TickOracle<'g> {
     /// # Errors
     /// The first invariant that it breaks.
     pub fn check(&mut self, observed: &ObservedTick) -> Verdict {
-        self.violations(observed).into_iter().next().map_or(Ok(()), Err)
+        self.violations(observed)
+            .into_iter()
+            .next()
+            .map_or(Ok(()), Err)
     }
 
     /// Checks the proxy of the next tick and its motion, but not its force. If friction may hold it
@@ -191,7 +194,11 @@ impl<'g> TickOracle<'g> {
     ///
     /// # Errors
     /// [`Invariant::Cone`] and [`Invariant::Stuck`].
-    pub fn check_friction(&mut self, [min, max]: [Friction; 2], observed: &ObservedTick) -> Verdict {
+    pub fn check_friction(
+        &mut self,
+        [min, max]: [Friction; 2],
+        observed: &ObservedTick,
+    ) -> Verdict {
         self.friction = max;
         if observed.is_touching() {
             self.check_cone(observed)?;
@@ -260,7 +267,12 @@ impl<'g> TickOracle<'g> {
         }
     }
 
-    fn check_against_previous(&mut self, before: &ObservedTick, observed: &ObservedTick, reported: &mut Vec<Violation>) {
+    fn check_against_previous(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+        reported: &mut Vec<Violation>,
+    ) {
         reported.extend(self.check_seen_from_above(before, observed).err());
         reported.extend(self.check_fade(before, observed).err());
         reported.extend(self.check_release(before, observed).err());

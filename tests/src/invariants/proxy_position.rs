@@ -110,17 +110,17 @@ impl TickOracle<'_> {
     /// Returns the height of the HIP above the tangent plane of the patch into which the straight
     /// line from a point to it leads, or `None` if it leads into none.
     fn height_along(&self, observed: &ObservedTick, start: [f64; 2]) -> Option<f64> {
-        let way = [0, 1, 2].map(|i| observed.hip[i] - observed.proxy[i]);
-        let level = way[0].hypot(way[1]);
+        let displacement = [0, 1, 2].map(|i| observed.hip[i] - observed.proxy[i]);
+        let level = displacement[0].hypot(displacement[1]);
         let patches = patches_at(self.terrain, start[0], start[1]);
-        let above = patches.filter(|patch| leads_into(start, way, patch));
+        let above = patches.filter(|patch| leads_into(start, displacement, patch));
         let above = above.map(|patch| {
             let [east, north] = patch.slopes(start[0], start[1]);
             // Rounding of the corner heights, and of the slope at a rounded position.
             let heights = patch.mixed_size(start[0], start[1], observed.hip[2]);
             let rounding = 4.0 * f64::from(f32::EPSILON) * heights;
             let unsure = rounding + 4.0 * ERROR * patch.twist().abs() * level;
-            let above = way[2] - east * way[0] - north * way[1];
+            let above = displacement[2] - east * displacement[0] - north * displacement[1];
             (above - unsure) / east.hypot(north).hypot(1.0)
         });
         above.reduce(f64::min)
@@ -151,7 +151,11 @@ impl TickOracle<'_> {
         minima
     }
 
-    pub(super) fn check_above(&self, observed: &ObservedTick, before: Option<&ObservedTick>) -> Verdict {
+    pub(super) fn check_above(
+        &self,
+        observed: &ObservedTick,
+        before: Option<&ObservedTick>,
+    ) -> Verdict {
         let [x, y, z] = observed.hip;
         // On a grid line the HIP is over the patch to the north-east.
         let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
@@ -161,17 +165,20 @@ impl TickOracle<'_> {
         let before = before.map_or(z, |before| before.hip[2]);
         let fall = z.abs().max((z - before).abs());
         if below > ERROR.max(4.0 * f64::from(f32::EPSILON) * fall) {
-            return self.fail(Invariant::AboveSurface, format!("by {below:.3e}: {observed:?}"));
+            return self.fail(
+                Invariant::AboveSurface,
+                format!("by {below:.3e}: {observed:?}"),
+            );
         }
         Ok(())
     }
 }
 
 /// Returns true if a direction at a point of a patch leads into the patch, or along its border.
-fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
+fn leads_into(start: [f64; 2], displacement: [f64; 3], patch: &Patch) -> bool {
     (0..2).all(|axis| {
         let place = start[axis] - f64::from(patch.cell[axis]);
-        (place > 0.0 || way[axis] >= 0.0) && (place < 1.0 || way[axis] <= 0.0)
+        (place > 0.0 || displacement[axis] >= 0.0) && (place < 1.0 || displacement[axis] <= 0.0)
     })
 }
 

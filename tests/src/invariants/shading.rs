@@ -40,8 +40,10 @@ impl TickOracle<'_> {
         }
         let [x, y, _] = observed.proxy;
         let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
-        let is_reported =
-            is_whole && observed.is_touching() && observed.output.converged && plain.length() > SHORT;
+        let is_reported = is_whole
+            && observed.is_touching()
+            && observed.output.converged
+            && plain.length() > SHORT;
         if !is_reported || !inside(x) || !inside(y) || !self.friction.is_none() {
             return Ok(());
         }
@@ -59,7 +61,8 @@ impl TickOracle<'_> {
         let left = (angle(normal, smoothed) - expected).max(0.0);
         let off = angle(shaded, smoothed);
         if (off - left).abs() > allowed || shaded.dot(normal) < 0.0 {
-            let detail = format!("{shaded} is {off} rad from {smoothed}, {left} wanted: {observed:?}");
+            let detail =
+                format!("{shaded} is {off} rad from {smoothed}, {left} wanted: {observed:?}");
             return self.fail(Invariant::Shading, detail);
         }
         Ok(())

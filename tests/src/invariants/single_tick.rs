@@ -74,13 +74,13 @@ fn length(v: [f64; 3]) -> f64 {
 /// Returns true if the displacement is the vector from the HIP to the proxy, times an edge fade in
 /// `[0, 1]`.
 fn is_shortened(observed: &ObservedTick) -> bool {
-    let way = [0, 1, 2].map(|i| observed.proxy[i] - observed.hip[i]);
+    let displacement = [0, 1, 2].map(|i| observed.proxy[i] - observed.hip[i]);
     let output = observed.output.displacement.as_dvec3().to_array();
-    let whole = length(way);
+    let whole = length(displacement);
     let part = if whole > 0.0 {
         (length(output) / whole).min(1.0)
     } else {
         0.0
     };
-    distance(output, way.map(|c| c * part)) <= observed.allowed()
+    distance(output, displacement.map(|c| c * part)) <= observed.allowed()
 }

@@ -80,7 +80,9 @@ impl TextureOracle {
         let (textured, depth) = (textured.as_dvec3(), plain.length());
         if !(MIN_DEPTH..MAX_DEPTH).contains(&depth) {
             let same = (textured - plain).length() <= MIN_DEPTH;
-            return held(same || depth >= MAX_DEPTH, || format!("{textured} of {plain}"));
+            return held(same || depth >= MAX_DEPTH, || {
+                format!("{textured} of {plain}")
+            });
         }
         let normal = plain / depth;
         held(textured.dot(normal) >= -TANGENTIAL_ROUNDING * depth, || {
@@ -108,7 +110,8 @@ impl TextureOracle {
         let slopes = slopes - normal * slopes.dot(normal);
         let deepest = wavelength * wavelength / (48.0 * amplitude);
         let output = depth.min(deepest);
-        let expected = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
+        let expected =
+            normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
         let (high, steep) = match self.texture.pattern {
             Pattern::Grain => (GRAIN, GRAIN),
             _ => (SINE, SLOPE),
@@ -159,8 +162,8 @@ impl TextureOracle {
     /// a tick.
     pub(super) fn share(&mut self, proxy: &GridPoint) -> f64 {
         let now = self.before.map_or(1.0, |before| {
-            let way = before.to(proxy).as_dvec3();
-            (way.x.hypot(way.y) / self.sizes().1).min(1.0)
+            let displacement = before.to(proxy).as_dvec3();
+            (displacement.x.hypot(displacement.y) / self.sizes().1).min(1.0)
         });
         self.before = Some(*proxy);
         self.speed = now + (self.speed - now).max(0.0) * (1.0 - 100.0 * TICK_S);
@@ -194,14 +197,14 @@ fn height_and_slopes(texture: &Texture, at: &GridPoint) -> (f64, DVec3) {
         return (height, DVec3::new(east, north, 0.0) * per_cell);
     }
     let angle = f64::from(texture.direction_deg).to_radians();
-    let way = DVec3::new(angle.cos(), angle.sin(), 0.0);
+    let direction = DVec3::new(angle.cos(), angle.sin(), 0.0);
     // Rounded once, as in the product.
-    let [east, north] = [way.x, way.y].map(|part| (part as f32) * waves);
+    let [east, north] = [direction.x, direction.y].map(|part| (part as f32) * waves);
     let seed = f64::from(scrambled(texture.seed)) / 2_f64.powi(32);
     let turns = counted(east, cell[0], frac.x).1 + counted(north, cell[1], frac.y).1 + seed;
     let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
     let steepness = amplitude * std::f64::consts::TAU * f64::from(waves) * cos;
-    (sin, way * steepness)
+    (sin, direction * steepness)
 }
 
 /// Returns the integer and fractional part of a coordinate times a number per cell.

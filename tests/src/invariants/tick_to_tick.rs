@@ -21,9 +21,16 @@ const AHEAD: f64 = 0.25;
 const STALLED: u32 = 4;
 
 impl TickOracle<'_> {
-    pub(super) fn check_seen_from_above(&self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_seen_from_above(
+        &self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
         if before.output.state == ContactState::Unseeded && observed.is_touching() {
-            return self.fail(Invariant::SeenAbove, format!("{before:?} then {observed:?}"));
+            return self.fail(
+                Invariant::SeenAbove,
+                format!("{before:?} then {observed:?}"),
+            );
         }
         Ok(())
     }
@@ -53,7 +60,11 @@ impl TickOracle<'_> {
     }
 
     /// Checks that a releasing force fades to zero in equal steps.
-    pub(super) fn check_release(&mut self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_release(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
         let output = |observed: &ObservedTick| observed.output.displacement.as_dvec3().length();
         let lets_go = |observed: &ObservedTick| observed.output.state == ContactState::Releasing;
         if lets_go(observed) && !lets_go(before) {
@@ -94,7 +105,11 @@ impl TickOracle<'_> {
     }
 
     /// Only in real time: [`Invariant::Settles`] covers repeated ticks.
-    pub(super) fn check_advance(&mut self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_advance(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
         let flies = |observed: &ObservedTick| {
             let output = &observed.output;
             output.state == ContactState::Free && !output.converged && output.missing_tile.is_none()
@@ -111,39 +126,48 @@ impl TickOracle<'_> {
         Ok(())
     }
 
-    pub(super) fn check_first_crossing(&mut self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_first_crossing(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
         // Lowered by the rounding, the path meets the surface no later.
         let slope = patches_at(self.terrain, observed.proxy[0], observed.proxy[1])
             .map(|patch| patch.slope(observed.proxy[0], observed.proxy[1]))
             .fold(0.0, f64::max);
         let margin = 2.0 * (observed.allowed() + before.allowed()) * (1.0 + slope);
         let lowered = |[x, y, z]: [f64; 3]| [x, y, z - margin];
-        let met = crossing::first(self.terrain, lowered(before.hip), lowered(observed.hip));
-        match (met, observed.is_touching()) {
+        let crossing = crossing::first(self.terrain, lowered(before.hip), lowered(observed.hip));
+        match (crossing, observed.is_touching()) {
             (None, true) => {
                 let detail = format!("nothing was crossed: {before:?} then {observed:?}");
                 self.fail(Invariant::Freedom, detail)
             }
-            (Some(met), true) => {
+            (Some(crossing), true) => {
                 let (from, is) = (
-                    distance(met.at, lowered(observed.hip)),
+                    distance(crossing.at, lowered(observed.hip)),
                     distance(observed.proxy, observed.hip),
                 );
                 if is > from * (1.0 + TIE) + 2.0 * margin {
-                    let detail = format!("{is} after {from} at {met:?}: {before:?} then {observed:?}");
+                    let detail =
+                        format!("{is} after {from} at {crossing:?}: {before:?} then {observed:?}");
                     return self.fail(Invariant::FirstCrossing, detail);
                 }
                 Ok(())
             }
-            (Some(met), false) => {
-                self.measured.around += u64::from(observed.is_free() && met.depth > 1e-3);
+            (Some(crossing), false) => {
+                self.measured.around += u64::from(observed.is_free() && crossing.depth > 1e-3);
                 Ok(())
             }
             (None, false) => Ok(()),
         }
     }
 
-    pub(super) fn check_no_wall_crossed(&self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_no_wall_crossed(
+        &self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
         let inside = |p: [f64; 3]| {
             (0..2).all(|axis| (0.0..f64::from(self.terrain.size[axis])).contains(&p[axis]))
         };

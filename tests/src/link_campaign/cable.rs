@@ -146,24 +146,24 @@ mod tests {
     #[test]
     fn stalled_bytes_are_delayed_and_cut_bytes_are_lost() {
         let mut random = Random::new(2);
-        let mut way = Channel::default();
+        let mut channel = Channel::default();
         let stalled = LineFaults {
             stalled: true,
             ..LineFaults::NONE
         };
-        way.set_faults(stalled);
-        way.send(b"held", 1, &mut random);
-        assert_eq!((way.receive(9), way.room()), (None, CAPACITY - 4));
-        way.set_faults(LineFaults::NONE);
-        assert_eq!(way.receive(9), Some(b"held".to_vec()));
+        channel.set_faults(stalled);
+        channel.send(b"held", 1, &mut random);
+        assert_eq!((channel.receive(9), channel.room()), (None, CAPACITY - 4));
+        channel.set_faults(LineFaults::NONE);
+        assert_eq!(channel.receive(9), Some(b"held".to_vec()));
         let cut = LineFaults {
             cut: true,
             ..LineFaults::NONE
         };
-        way.send(b"gone", 10, &mut random);
-        way.set_faults(cut);
-        way.send(b"gone", 11, &mut random);
-        way.set_faults(LineFaults::NONE);
-        assert_eq!((way.receive(99), way.room()), (None, CAPACITY));
+        channel.send(b"gone", 10, &mut random);
+        channel.set_faults(cut);
+        channel.send(b"gone", 11, &mut random);
+        channel.set_faults(LineFaults::NONE);
+        assert_eq!((channel.receive(99), channel.room()), (None, CAPACITY));
     }
 }

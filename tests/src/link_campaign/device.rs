@@ -12,7 +12,7 @@ use hapterra_firmware::store::Stored;
 
 use super::cable::BYTES_PER_TICK;
 use crate::campaign::arm::{Arm, Mood};
-use crate::campaign::tick_invariants::{Truth, TickChecks};
+use crate::campaign::tick_invariants::{TickChecks, Truth};
 use crate::random::Random;
 
 /// Tiles along the side of the window, as on the smallest board.
@@ -78,8 +78,8 @@ impl<'t> Board<'t> {
     /// Returns the bytes that the device sends, up to `room`.
     pub fn transmit<'b>(&mut self, into: &'b mut [u8; BYTES_PER_TICK], room: usize) -> &'b [u8] {
         let room = room.min(BYTES_PER_TICK);
-        let stated = self.device.link.transmit(&mut into[..room]);
-        &into[..stated]
+        let sent = self.device.link.transmit(&mut into[..room]);
+        &into[..sent]
     }
 
     /// Runs one tick of device and arm.
@@ -105,7 +105,8 @@ impl<'t> Board<'t> {
             counts: plant.counts(),
             winding_c: plant.winding_c(),
         };
-        self.tick_checks.check_outputs(&self.drive, &sense, [0; 3], &truth)?;
+        self.tick_checks
+            .check_outputs(&self.drive, &sense, [0; 3], &truth)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
         self.arm.step(currents, self.mood);
         self.ticks[0] += 1;

@@ -75,7 +75,7 @@ pub struct Fault {
     pub end: u64,
     share: f64,
     /// Directions that a fault of the bytes affects: to the device, to the host.
-    ways: [bool; 2],
+    directions: [bool; 2],
 }
 
 impl Fault {
@@ -90,7 +90,7 @@ impl Fault {
             kind,
             end: now + shortest as u64 + length as u64,
             share: random.between(0.0, 1.0),
-            ways: [[true, true], [true, false], [false, true]][random.below(3)],
+            directions: [[true, true], [true, false], [false, true]][random.below(3)],
         }
     }
 
@@ -124,12 +124,12 @@ impl Fault {
             },
             _ => LineFaults::NONE,
         };
-        let ways = match self.kind {
+        let directions = match self.kind {
             Kind::DeafHost => [false, true],
             Kind::DeafDevice => [true, false],
             Kind::Stall | Kind::Cut => [true, true],
-            _ => self.ways,
+            _ => self.directions,
         };
-        ways.map(|harmed| if harmed { faults } else { LineFaults::NONE })
+        directions.map(|is_faulty| if is_faulty { faults } else { LineFaults::NONE })
     }
 }

@@ -84,9 +84,9 @@ impl Tap {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
             // A frame cut short by an open is dropped.
-            let stated = frame.and_then(|frame| frames::parse_device_frame(frame.ok()?));
-            if let Some(stated) = stated.filter(|stated| Some(stated.session) == self.session) {
-                self.on_message(&stated.message, when);
+            let framed = frame.and_then(|frame| frames::parse_device_frame(frame.ok()?));
+            if let Some(framed) = framed.filter(|framed| Some(framed.session) == self.session) {
+                self.on_message(&framed.message, when);
             }
         }
     }
@@ -141,7 +141,7 @@ mod tests {
     fn samples_dropped_by_a_new_scene_count_as_unseen() {
         let mut tap = Tap::default();
         tap.begin(None);
-        let mut say = |ticks: u64, message: ToHost| {
+        let mut send = |ticks: u64, message: ToHost| {
             let (now, flows) = (ticks, true);
             tap.on_message(&message, &Moment { now, ticks, flows });
         };
@@ -160,13 +160,13 @@ mod tests {
             accepted: true,
         };
         // The first scene runs for 19 ticks; its acknowledgement is repeated in between.
-        say(0, taken());
-        say(9, samples(1));
-        say(12, taken());
-        say(17, samples(9));
-        say(20, taken());
-        say(20, taken());
-        say(29, samples(1));
+        send(0, taken());
+        send(9, samples(1));
+        send(12, taken());
+        send(17, samples(9));
+        send(20, taken());
+        send(20, taken());
+        send(29, samples(1));
         assert_eq!((tap.samples_made(), tap.max_unsent(29)), (24, 3));
         assert_eq!(tap.max_unsent(31), 5);
     }

@@ -49,7 +49,7 @@ pub struct Host<'t> {
     /// True if the scene is active.
     pub opened: bool,
     /// True if it has requested arming.
-    pub asked: bool,
+    pub requested_arming: bool,
     /// The report to its user on that request.
     pub reported: Reported,
     /// State of the device's guard, as shown to its user.
@@ -76,7 +76,7 @@ impl<'t> Host<'t> {
             client,
             last_end: None,
             opened: false,
-            asked: false,
+            requested_arming: false,
             reported: Reported::Nothing,
             view: None,
             samples: Vec::new(),
@@ -98,7 +98,7 @@ impl<'t> Host<'t> {
 
     /// Requests to clear a fault, to zero the arm and to arm it.
     pub fn arm(&mut self) {
-        self.asked = true;
+        self.requested_arming = true;
         let zero = Request::Zero { counts: [0; 3] };
         let seen = self.view.and_then(|view| view.fault);
         let clear = Request::ClearFault { seen };

@@ -38,18 +38,18 @@ pub fn host(random: &mut Random) -> Vec<u8> {
             part.to_vec()
         }
         _ => {
-            let mut stated = Vec::new();
+            let mut bytes = Vec::new();
             for _ in 0..1 + random.below(8) {
-                stated.extend(host_frame(random));
+                bytes.extend(host_frame(random));
             }
-            stated.truncate(BYTES_PER_MS);
-            stated
+            bytes.truncate(BYTES_PER_MS);
+            bytes
         }
     }
 }
 
-fn noise(random: &mut Random, most: usize) -> Vec<u8> {
-    let length = random.below(most);
+fn noise(random: &mut Random, max_bytes: usize) -> Vec<u8> {
+    let length = random.below(max_bytes);
     (0..length).map(|_| random.bits() as u8).collect()
 }
 
@@ -225,8 +225,8 @@ impl Behaviour {
         random: &mut Random,
     ) -> Vec<u8> {
         let often = now.is_multiple_of(10);
-        let mut stated = Vec::new();
-        let mut send = |message: ToHost| stated.extend(frames::from_device(session, &message));
+        let mut bytes = Vec::new();
+        let mut send = |message: ToHost| bytes.extend(frames::from_device(session, &message));
         let greets = !matches!(self, Self::Mute | Self::Noise | Self::Drips);
         if greets && often {
             send(ToHost::Hello(hello(number)));
@@ -248,7 +248,7 @@ impl Behaviour {
             }
             Self::RefusesLate if now.is_multiple_of(100) => {
                 let protocol = [PROTOCOL, PROTOCOL + 1][random.below(2)];
-                stated.extend(frames::version_check(VersionCheck::Refused { protocol }));
+                bytes.extend(frames::version_check(VersionCheck::Refused { protocol }));
             }
             Self::CountsWildly => {
                 send(ToHost::Telemetry(Telemetry {
@@ -264,7 +264,7 @@ impl Behaviour {
             }
             _ => {}
         }
-        stated
+        bytes
     }
 }
 

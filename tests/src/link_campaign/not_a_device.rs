@@ -35,12 +35,12 @@ fn run_session(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcom
     let mut out = Vec::new();
     let mut host = Host::start(segment.terrain, segment.scene, began, chance, &mut out);
     let mut hellos = Hellos::default();
-    let mut stated = 0;
+    let mut sent = 0;
     for now in began..=began + SESSION_TICKS + LEAVES {
         if now == began + SESSION_TICKS {
             host.leave(now, &mut out);
         }
-        stated += out.len();
+        sent += out.len();
         hellos.receive(&out);
         out.clear();
         let reported = (host.session(), hellos.last);
@@ -48,8 +48,8 @@ fn run_session(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcom
         host.step(now, &received, &mut out);
         host.samples.clear();
         let seconds = 1 + ((now - began) / 1_000) as usize;
-        if stated > seconds * MAX_BYTES_PER_SECOND {
-            return Err(format!("the host said {stated} bytes in {seconds} s"));
+        if sent > seconds * MAX_BYTES_PER_SECOND {
+            return Err(format!("the host said {sent} bytes in {seconds} s"));
         }
         match &host.end {
             Some(End::Agreed) => return Err("the end was agreed on with no device".into()),
@@ -76,8 +76,8 @@ impl Hellos {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
-            let stated = frame.and_then(|frame| frames::parse_host_frame(frame.ok()?));
-            if let Some(ToDevice::Hello(hello)) = stated.map(|stated| stated.message) {
+            let message = frame.and_then(|frame| frames::parse_host_frame(frame.ok()?));
+            if let Some(ToDevice::Hello(hello)) = message.map(|message| message.message) {
                 self.last = hello.number;
             }
         }

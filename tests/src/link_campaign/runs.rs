@@ -145,7 +145,7 @@ impl Run<'_, '_> {
             if host.end.is_some() {
                 return self.check_end().map(Some);
             }
-            let (is_done, most) = match step {
+            let (is_done, max_ms) = match step {
                 Step::Open => (host.opened, OPENS),
                 Step::Arm => (self.is_armed(&mut pressed), ANSWERS + ARMS),
                 Step::Touch => (at >= feels, u64::MAX),
@@ -154,7 +154,7 @@ impl Run<'_, '_> {
             if is_done && self.can_continue(step) {
                 return Ok(None);
             }
-            if at >= most && !is_done {
+            if at >= max_ms && !is_done {
                 return Err(format!("{step:?} hangs: nothing for {at} ms"));
             }
         }
@@ -183,7 +183,9 @@ impl Run<'_, '_> {
         match host.reported {
             Reported::Nothing => false,
             Reported::No => true,
-            Reported::Accepted => settled || (pressed.is_some() && host.is_in_mode(&[Mode::Disarmed])),
+            Reported::Accepted => {
+                settled || (pressed.is_some() && host.is_in_mode(&[Mode::Disarmed]))
+            }
         }
     }
 
@@ -227,9 +229,9 @@ impl Run<'_, '_> {
         Ok(None)
     }
 
-    /// Waits up to `most` milliseconds without a host.
-    fn wait(&mut self, most: usize) -> Result<(), String> {
-        let end = self.segment.now + self.segment.random.below(most) as u64;
+    /// Waits up to `max_ms` milliseconds without a host.
+    fn wait(&mut self, max_ms: usize) -> Result<(), String> {
+        let end = self.segment.now + self.segment.random.below(max_ms) as u64;
         self.wait_until(end)
     }
 
@@ -276,7 +278,10 @@ impl Run<'_, '_> {
             return Ok(());
         };
         let (stats, tap) = (host.stats(), &self.segment.tap);
-        let (reported, made) = (stats.samples + stats.lost + stats.dropped, tap.samples_made());
+        let (reported, made) = (
+            stats.samples + stats.lost + stats.dropped,
+            tap.samples_made(),
+        );
         // The tap does not see samples that are dropped at the end of a scene or of the session.
         let unseen = match stats.dropped {
             0 => 0,

@@ -167,7 +167,7 @@ impl<'t> Segment<'t> {
         self.deliver();
         self.board.tick()?;
         let mut buffer = [0; BYTES_PER_TICK];
-        let stated = self.board.transmit(&mut buffer, self.to_host.room());
+        let sent = self.board.transmit(&mut buffer, self.to_host.room());
         if self.to_host.room() < BYTES_PER_TICK {
             self.full = self.now;
         }
@@ -176,8 +176,8 @@ impl<'t> Segment<'t> {
             ticks: self.board.ticks[0],
             flows: self.now > self.full + DRAINS,
         };
-        self.tap.receive(stated, &when);
-        self.to_host.send(stated, self.now, &mut self.random);
+        self.tap.receive(sent, &when);
+        self.to_host.send(sent, self.now, &mut self.random);
         let mut received = Vec::new();
         while let Some(transfer) = self.to_host.receive(self.now) {
             received.extend(transfer);
@@ -206,8 +206,8 @@ impl<'t> Segment<'t> {
             .fault
             .is_some_and(|fault| fault.kind == Kind::HostileHost);
         if hostile && self.to_device.room() > 0 {
-            let stated = hostile_programs::host(&mut self.random);
-            self.send(&stated);
+            let bytes = hostile_programs::host(&mut self.random);
+            self.send(&bytes);
         }
     }
 
@@ -260,8 +260,8 @@ impl<'t> Segment<'t> {
 
     /// Checks that the amplifiers are switched on only if a live host has requested it.
     fn check_force_request(&mut self) -> Result<(), String> {
-        let wishes = |host: &Host<'_>| host.asked && host.end.is_none();
-        if self.host.as_ref().is_some_and(wishes) {
+        let requests_arming = |host: &Host<'_>| host.requested_arming && host.end.is_none();
+        if self.host.as_ref().is_some_and(requests_arming) {
             self.wished = self.now + LATE_ARM;
         }
         let (was, is) = (self.was_on, self.board.drive.enabled);

@@ -37,7 +37,10 @@ pub(super) struct LossyLine {
 }
 
 impl LossyLine {
-    pub(super) fn new(frame_faults: Vec<(usize, FrameFault)>, random: Option<(u64, usize)>) -> Self {
+    pub(super) fn new(
+        frame_faults: Vec<(usize, FrameFault)>,
+        random: Option<(u64, usize)>,
+    ) -> Self {
         Self {
             frames: vec![],
             partial: vec![],
@@ -54,8 +57,8 @@ impl LossyLine {
 
     /// Repeats all earlier frames in order, like a store-and-forward node.
     pub(super) fn echo(&mut self, now: u64) {
-        let again = self.sent.iter().map(|frame| (now + 1, frame.clone()));
-        self.frames.extend(again);
+        let duplicates = self.sent.iter().map(|frame| (now + 1, frame.clone()));
+        self.frames.extend(duplicates);
     }
 
     /// Inserts a frame of another program.
@@ -93,7 +96,9 @@ impl LossyLine {
             return;
         }
         let planned = self.frame_faults.iter().find(|(at, _)| *at == number);
-        let frame_fault = planned.map(|(_, frame_fault)| *frame_fault).or_else(|| self.random_fault());
+        let frame_fault = planned
+            .map(|(_, frame_fault)| *frame_fault)
+            .or_else(|| self.random_fault());
         let due = now + 1;
         match frame_fault {
             None => self.frames.push((due, frame)),

@@ -120,7 +120,11 @@ impl RunOracle {
     }
 
     /// Checks that the device is disarmed, as the host concluded, and must stay so.
-    pub(super) const fn check_agreed_end(&mut self, now: u64, enabled: bool) -> Result<(), Violation> {
+    pub(super) const fn check_agreed_end(
+        &mut self,
+        now: u64,
+        enabled: bool,
+    ) -> Result<(), Violation> {
         self.forbidden_from = Some(0);
         match enabled {
             true => Err(Violation::NotDisarmed(now)),

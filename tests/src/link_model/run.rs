@@ -154,9 +154,17 @@ fn device() -> Device<StoppedClock, 2> {
 impl<'t> Simulation<'t> {
     fn new(terrain: &'t Terrain<'t>, scene: Scene, plan: &Plan) -> Self {
         let line = |direction, salt| {
-            let frame_faults = plan.frame_faults.iter().filter(|(fault_direction, _, _)| *fault_direction == direction);
+            let frame_faults = plan
+                .frame_faults
+                .iter()
+                .filter(|(fault_direction, _, _)| *fault_direction == direction);
             let random = plan.random.map(|(seed, share)| (seed ^ salt, share));
-            LossyLine::new(frame_faults.map(|(_, at, frame_fault)| (*at, *frame_fault)).collect(), random)
+            LossyLine::new(
+                frame_faults
+                    .map(|(_, at, frame_fault)| (*at, *frame_fault))
+                    .collect(),
+                random,
+            )
         };
         Self {
             terrain,

@@ -8,7 +8,7 @@ use super::oracle::Violation;
 #[derive(Default)]
 pub(super) struct StatusQueries {
     /// The device's tick at the query.
-    asked: Option<u32>,
+    queried_at: Option<u32>,
     /// Number of answers.
     pub(super) answers: u32,
     /// The tick of the first status that is older than its query, and the query's tick.
@@ -18,10 +18,10 @@ pub(super) struct StatusQueries {
 impl StatusQueries {
     /// Makes a query at this tick of the device, unless one is in progress.
     pub(super) fn query(&mut self, tick: u32) -> Option<HostRequest> {
-        match self.asked {
+        match self.queried_at {
             Some(_) => None,
             None => {
-                self.asked = Some(tick);
+                self.queried_at = Some(tick);
                 Some(HostRequest::Status)
             }
         }
@@ -29,12 +29,12 @@ impl StatusQueries {
 
     /// Drops the query of a killed host.
     pub(super) const fn reset(&mut self) {
-        self.asked = None;
+        self.queried_at = None;
     }
 
     /// Drops the query if the device restarts, as its ticks count from zero again.
     pub(super) fn device_restarted(&mut self) {
-        self.asked = self.asked.and(Some(0));
+        self.queried_at = self.queried_at.and(Some(0));
     }
 
     pub(super) fn take(&mut self, event: &Event<'_>) {
@@ -42,10 +42,15 @@ impl StatusQueries {
             Event::Status(status) => {
                 self.answers += 1;
                 let reported = status.ticks.run;
-                let asked = self.asked.take().filter(|asked| reported < *asked);
-                self.outdated = self.outdated.or(asked.map(|asked| (reported, asked)));
+                let queried_at = self
+                    .queried_at
+                    .take()
+                    .filter(|queried_at| reported < *queried_at);
+                self.outdated = self
+                    .outdated
+                    .or(queried_at.map(|queried_at| (reported, queried_at)));
             }
-            Event::Unanswered(HostRequest::Status) => self.asked = None,
+            Event::Unanswered(HostRequest::Status) => self.queried_at = None,
             _ => {}
         }
     }
@@ -53,7 +58,7 @@ impl StatusQueries {
     pub(super) fn check(&self) -> Result<(), Violation> {
         match self.outdated {
             None => Ok(()),
-            Some((reported, asked)) => Err(Violation::Outdated(reported, asked)),
+            Some((reported, queried_at)) => Err(Violation::Outdated(reported, queried_at)),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::material_checks;
 use super::metamorphic;
-use super::run::{Scene, Metamorphic};
+use super::run::{Metamorphic, Scene};
 use super::tile_supply::Buffers;
 use crate::invariants::Violation;
 use crate::invariants::oracle::{Measured, TickOracle};
@@ -15,10 +15,13 @@ impl Scene {
     /// The first violation.
     pub fn run(&self, buffers: &mut Buffers) -> Result<Measured, Violation> {
         let mut oracle = TickOracle::of(self);
-        let observed = self.render(buffers, [0; 3], self.supply, |observed| oracle.check(observed))?;
+        let observed = self.render(buffers, [0; 3], self.supply, |observed| {
+            oracle.check(observed)
+        })?;
         let mut random = Random::new(self.seed);
         let expected = |twin: usize| {
-            matches!(self.metamorphic, Metamorphic::One(n) if n == twin) || self.metamorphic == Metamorphic::All
+            matches!(self.metamorphic, Metamorphic::One(n) if n == twin)
+                || self.metamorphic == Metamorphic::All
         };
         let mut metamorphic = [false; 4];
         if expected(0) {

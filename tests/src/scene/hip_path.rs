@@ -123,8 +123,8 @@ impl<'a> Walker<'a> {
         for _ in 0..JUMPS {
             let to = [x, y, z];
             let last = self.path.last().copied().unwrap_or(to);
-            let way = |axis: usize| (to[axis] - last[axis]).clamp(-JUMP_CELLS, JUMP_CELLS);
-            let next = [0, 1, 2].map(|axis| ((last[axis] + way(axis)) / GRAIN).round() * GRAIN);
+            let step = |axis: usize| (to[axis] - last[axis]).clamp(-JUMP_CELLS, JUMP_CELLS);
+            let next = [0, 1, 2].map(|axis| ((last[axis] + step(axis)) / GRAIN).round() * GRAIN);
             self.path.push(next);
             if next
                 .iter()

@@ -56,11 +56,11 @@ struct Device<'t, 'g, const D: usize> {
     ticks: Vec<Counted>,
 }
 
-/// Replays the path of a scene on materials in a window of `D × D` tiles, and calls `look` for the
+/// Replays the path of a scene on materials in a window of `D × D` tiles, and calls `check` for the
 /// result of each point.
 ///
 /// # Errors
-/// The error of `look`, or a point without an answer.
+/// The error of `check`, or a point without an answer.
 ///
 /// # Panics
 /// If the loop refuses the scene, or a terrain to be stored whole does not fit.
@@ -69,7 +69,7 @@ pub fn replay<const D: usize>(
     materials: &Materials,
     buffers: &mut Buffers,
     replay: Replay,
-    mut look: impl FnMut(&Replied) -> Result<(), Violation>,
+    mut check: impl FnMut(&Replied) -> Result<(), Violation>,
 ) -> Result<Vec<Replied>, Violation> {
     let mut device = Device::<D>::new(scene, materials, buffers, replay);
     let mut all = Vec::with_capacity(scene.path.len());
@@ -87,7 +87,7 @@ pub fn replay<const D: usize>(
             proxy: here(&sample.proxy),
             sample,
         };
-        look(&replied)?;
+        check(&replied)?;
         all.push(replied);
     }
     Ok(all)

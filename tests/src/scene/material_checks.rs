@@ -67,14 +67,14 @@ fn replay_in(
     materials: &Materials,
     buffers: &mut Buffers,
     how: Replay,
-    look: impl FnMut(&Replied) -> Result<(), Violation>,
+    check: impl FnMut(&Replied) -> Result<(), Violation>,
 ) -> Result<Vec<Replied>, Violation> {
     match side {
-        2 => replay::<2>(scene, materials, buffers, how, look),
-        3 => replay::<3>(scene, materials, buffers, how, look),
-        4 => replay::<4>(scene, materials, buffers, how, look),
-        6 => replay::<6>(scene, materials, buffers, how, look),
-        _ => replay::<SIDE>(scene, materials, buffers, how, look),
+        2 => replay::<2>(scene, materials, buffers, how, check),
+        3 => replay::<3>(scene, materials, buffers, how, check),
+        4 => replay::<4>(scene, materials, buffers, how, check),
+        6 => replay::<6>(scene, materials, buffers, how, check),
+        _ => replay::<SIDE>(scene, materials, buffers, how, check),
     }
 }
 
@@ -82,8 +82,8 @@ fn replay_in(
 /// point lacked terrain, as one does that needs more tiles than its window has.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
-        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
-        way(0).max(way(1)) <= 4.0 * JUMP_CELLS
+        let distance = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        distance(0).max(distance(1)) <= 4.0 * JUMP_CELLS
     };
     let is_whole = |replied: &Replied| replied.sample.missing_tile.is_none();
     replied.iter().all(is_whole) && replied.windows(2).all(is_near)
@@ -115,12 +115,16 @@ fn shifted(
     buffers: &mut Buffers,
     random: &mut Random,
 ) -> Result<(), Violation> {
-    let far = [1_024, 30_016, 1_000_000, 99_999_968];
-    let mut pick = || far[random.below(far.len())] / 32 * 32;
+    let distances = [1_024, 30_016, 1_000_000, 99_999_968];
+    let mut pick = || distances[random.below(distances.len())] / 32 * 32;
     let away = [pick(), pick(), pick() - 50_000_000];
     let beside = |p: &[f64; 3]| {
-        let within =
-            |axis: usize| p[axis].clamp(-MAX_BESIDE, f64::from(scene.terrain.size[axis]) + MAX_BESIDE);
+        let within = |axis: usize| {
+            p[axis].clamp(
+                -MAX_BESIDE,
+                f64::from(scene.terrain.size[axis]) + MAX_BESIDE,
+            )
+        };
         [within(0), within(1), p[2].clamp(-MAX_DEPTH, MAX_DEPTH)]
     };
     let path = scene.path.iter().map(beside).collect();

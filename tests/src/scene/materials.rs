@@ -259,13 +259,13 @@ fn blob(seed: u64, side: i32, [x, y]: [i32; 2]) -> Random {
     let (col, row) = (x.div_euclid(side), y.div_euclid(side));
     let squares = (-1..=1).flat_map(|north| (-1..=1).map(move |east| (col + east, row + north)));
     let nearest = squares.min_by(|a, b| {
-        let far = |(col, row): &(i32, i32)| {
+        let distance = |(col, row): &(i32, i32)| {
             let mut random = random_at(seed, *col, *row);
             let mut middle = |at: i32| f64::from(side) * (f64::from(at) + random.between(0.0, 1.0));
             let (east, north) = (middle(*col), middle(*row));
             (east - f64::from(x)).hypot(north - f64::from(y))
         };
-        far(a).total_cmp(&far(b))
+        distance(a).total_cmp(&distance(b))
     });
     let (col, row) = nearest.unwrap_or((col, row));
     random_at(!seed, col, row)

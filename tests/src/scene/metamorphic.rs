@@ -27,8 +27,8 @@ pub fn repeated(scene: &Scene, observed: &[ObservedTick], buffers: &mut Buffers)
         fast_paths: false,
         ..scene.clone()
     };
-    let again = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()))?;
-    same_bits(Invariant::Repeatable, observed, &again, [0; 3]).map(|()| true)
+    let repeated = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()))?;
+    same_bits(Invariant::Repeatable, observed, &repeated, [0; 3]).map(|()| true)
 }
 
 /// Range of a shifted scene's HIP beyond the field, cells.
@@ -49,14 +49,18 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
         Execution::RealTime => 256,
         Execution::LockStep => 32,
     };
-    let far = [1_000, 30_000, 1_000_000, 100_000_000];
-    let mut pick = || far[random.below(far.len())] / whole * whole;
+    let distances = [1_000, 30_000, 1_000_000, 100_000_000];
+    let mut pick = || distances[random.below(distances.len())] / whole * whole;
     let shift = [pick(), pick(), pick() - 50_000_000];
     // No farther beyond the field than the nearer run is from the origin: each tile there is
     // requested.
     let beside = |p: &[f64; 3]| {
-        let within =
-            |axis: usize| p[axis].clamp(-MAX_BESIDE, f64::from(scene.terrain.size[axis]) + MAX_BESIDE);
+        let within = |axis: usize| {
+            p[axis].clamp(
+                -MAX_BESIDE,
+                f64::from(scene.terrain.size[axis]) + MAX_BESIDE,
+            )
+        };
         [within(0), within(1), p[2].clamp(-MAX_DEPTH, MAX_DEPTH)]
     };
     let scene = &scene.with(
@@ -67,7 +71,9 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
         // Grain and most gratings have another part there, so the oracle checks them as well.
         let mut oracle = TickOracle::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
-        let observed = scene.render(buffers, shift, pulled, |observed| oracle.check_texture(observed))?;
+        let observed = scene.render(buffers, shift, pulled, |observed| {
+            oracle.check_texture(observed)
+        })?;
         Ok(observed.into_iter().map(|observed| ObservedTick {
             textured: observed.textured.filter(|_| scene.is_textured_alike()),
             ..observed
@@ -93,8 +99,8 @@ pub fn windowed(
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
     // The path from the proxy to the HIP fits into the small window.
     let is_near = |ticks: &[ObservedTick]| {
-        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
-        way(0).max(way(1)) <= 5.0 * JUMP_CELLS
+        let distance = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        distance(0).max(distance(1)) <= 5.0 * JUMP_CELLS
     };
     if scene.execution != Execution::LockStep || !fits || !observed.windows(2).all(is_near) {
         return Ok(false);
@@ -126,9 +132,11 @@ pub fn same_bits(
             (
                 observed.output.state,
                 observed.output.displacement.to_array().map(f32::to_bits),
-                observed.shaded
+                observed
+                    .shaded
                     .map(|shaded| shaded.displacement.to_array().map(f32::to_bits)),
-                observed.textured
+                observed
+                    .textured
                     .map(|textured| textured.to_array().map(f32::to_bits)),
                 [0, 1, 2].map(|i| cell[i] - shift[i]),
                 frac.to_array().map(f32::to_bits),
@@ -180,7 +188,9 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     let symmetry = symmetries[random.below(symmetries.len())];
     let twin = transformed(scene, symmetry);
     let mut oracle = TickOracle::of(&twin);
-    let other = twin.render(buffers, [0; 3], Supply::Held, |observed| oracle.check(observed))?;
+    let other = twin.render(buffers, [0; 3], Supply::Held, |observed| {
+        oracle.check(observed)
+    })?;
     same_forces(scene, symmetry, &observed, &other, buffers)
 }
 
@@ -331,10 +341,10 @@ fn is_undecided(
     buffers: &mut Buffers,
 ) -> bool {
     const OFFSETS: [f64; 3] = [1.0, 16.0, 256.0];
-    let ways = [0, tick]
+    let starts = [0, tick]
         .into_iter()
         .flat_map(|first| OFFSETS.map(|hair| (first, GRAIN * hair)));
-    for (first, hair) in ways {
+    for (first, hair) in starts {
         for corner in 0..8 {
             let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
             let moved = |now| if now < first { [0.0; 3] } else { off };

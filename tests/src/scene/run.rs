@@ -235,18 +235,18 @@ impl Scene {
         }
     }
 
-    /// Runs it over the terrain shifted by `shift` cells, and calls `look` for each tick.
+    /// Runs it over the terrain shifted by `shift` cells, and calls `check` for each tick.
     ///
     /// # Errors
-    /// The error of `look`, or a tick that does not converge.
+    /// The error of `check`, or a tick that does not converge.
     pub fn render(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
-        look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
+        check: impl FnMut(&ObservedTick) -> Result<(), Violation>,
     ) -> Result<Vec<ObservedTick>, Violation> {
-        self.render_in::<SIDE>(buffers, shift, supply, look)
+        self.render_in::<SIDE>(buffers, shift, supply, check)
     }
 
     /// Same as [`Self::render`] with a window of `D × D` tiles.
@@ -258,7 +258,7 @@ impl Scene {
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
-        mut look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
+        mut check: impl FnMut(&ObservedTick) -> Result<(), Violation>,
     ) -> Result<Vec<ObservedTick>, Violation> {
         let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
@@ -269,7 +269,7 @@ impl Scene {
                 detail: format!("never settles for {hip:?}"),
             })?;
             let observed = player.observed(*hip, output);
-            look(&observed)?;
+            check(&observed)?;
             all.push(observed);
         }
         Ok(all)

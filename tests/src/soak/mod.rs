@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use soak_counts::{FailedScene, SceneOutcome, LinkStats, MaxWork};
+pub use soak_counts::{FailedScene, LinkStats, MaxWork, SceneOutcome};
 
 use crate::scene::run::{Scene, Surface};
 use crate::scene::tile_supply::Buffers;
@@ -81,9 +81,9 @@ pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> S
         Err(panic) => {
             // A tile may be partly filled.
             *buffers = Buffers::default();
-            let stated = panic.downcast_ref::<String>().cloned();
-            let stated = stated.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
-            SceneOutcome::Violated(kind, "Panic".to_owned(), stated.unwrap_or_default())
+            let message = panic.downcast_ref::<String>().cloned();
+            let message = message.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+            SceneOutcome::Violated(kind, "Panic".to_owned(), message.unwrap_or_default())
         }
     }
 }

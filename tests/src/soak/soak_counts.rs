@@ -119,7 +119,7 @@ impl fmt::Display for LinkStats {
                 "largest work of a tick: {units} of {WORK_PER_TICK} units, in scene {number}"
             )?;
         }
-        let [again, shifted, window, turned] = self.total().metamorphic;
+        let [repeated, shifted, window, turned] = self.total().metamorphic;
         writeln!(
             f,
             "twins compared: {again} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"

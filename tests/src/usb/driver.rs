@@ -183,9 +183,9 @@ impl Bus for ScriptedDriver {
 }
 
 impl End {
-    /// Waits until `look` returns a value.
-    async fn until<T>(&self, mut look: impl FnMut(&mut Wire) -> Option<T>) -> T {
-        poll_fn(|_| match look(&mut self.wire.borrow_mut()) {
+    /// Waits until `poll` returns a value.
+    async fn until<T>(&self, mut poll: impl FnMut(&mut Wire) -> Option<T>) -> T {
+        poll_fn(|_| match poll(&mut self.wire.borrow_mut()) {
             Some(found) => Poll::Ready(found),
             None => Poll::Pending,
         })

@@ -132,7 +132,8 @@ async fn answered<S: Service>(
         Err(refusal) => (refused(&shared.service, &refusal), 0),
     };
     let mut log = lock(&shared.log);
-    log.requests.push(format!("{request_line} {}", response.status()));
+    log.requests
+        .push(format!("{request_line} {}", response.status()));
     log.bytes += bytes;
     response
 }

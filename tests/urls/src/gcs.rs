@@ -109,7 +109,8 @@ impl Service for Google {
         };
         // A token is checked even if none is needed.
         let authorization = authorization.to_str().ok();
-        match authorization.and_then(|authorization| holder(authorization.strip_prefix("Bearer ")?)) {
+        match authorization.and_then(|authorization| holder(authorization.strip_prefix("Bearer ")?))
+        {
             Some(mail) if mail == SURVEYOR.mail => Ok(file),
             Some(mail) => Err(denied(mail)),
             None => Err(refusal(

@@ -211,7 +211,9 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
     let (fault, latency, version) = shared.next(&request);
     tokio::time::sleep(latency).await;
     let path = request.uri().path().to_lowercase();
-    let is_held = |held_endings: &[String]| held_endings.is_empty() || held_endings.iter().any(|end| path.ends_with(end));
+    let is_held = |held_endings: &[String]| {
+        held_endings.is_empty() || held_endings.iter().any(|end| path.ends_with(end))
+    };
     let is_held = is_held(&shared.state().held_endings);
     if is_held {
         let mut gate = shared.is_open.subscribe();

@@ -149,8 +149,8 @@ fn notes_beside_a_url_are_read_like_those_of_a_file() {
     assert_eq!(remote.height(column, row), 0.5 * expected(column, row));
     assert!(remote.height(0, SIZE[1] - 1).is_nan() && here.height(0, SIZE[1] - 1).is_nan());
     let (requests, _) = server.log();
-    let asked = requests.iter().filter(|line| line.ends_with(".aux.xml"));
-    assert_eq!(asked.count(), 1, "{requests:?}");
+    let sidecar_requests = requests.iter().filter(|line| line.ends_with(".aux.xml"));
+    assert_eq!(sidecar_requests.count(), 1, "{requests:?}");
     server.fail_at(".aux.xml", Fault::Error500, usize::MAX);
     let reported = open(&server, "hills.tif").expect_err("who knows what is no data");
     assert!(reported.contains("500"), "{reported}");
@@ -208,10 +208,10 @@ fn check_complete_reports_failed_reads_once() {
     for column in (0..SIZE[0]).step_by(100) {
         assert!(raster.height(column, 700).is_nan());
     }
-    let asked = server.log().0.len() - requests.len();
+    let later_requests = server.log().0.len() - requests.len();
     assert!(
-        asked < 40,
-        "{asked} requests to a server that does not answer"
+        later_requests < 40,
+        "{later_requests} requests to a server that does not answer"
     );
     let reported = raster.check_complete().expect_err("it did not come");
     assert!(

@@ -121,9 +121,9 @@ fn benchmark_counts_missing_tiles_at_100_ms_latency() {
             let (_folder, raster, server) = hills();
             let terrain = terrain(&raster);
             server.set_latency(Duration::from_millis(100));
-            let looks = 3000 * 100 / speed;
+            let reads = 3000 * 100 / speed;
             let cells = |read_all: i32| 40 + read_all * speed / 100;
-            let missing = (0..looks).filter(|read_all| {
+            let missing = (0..reads).filter(|read_all| {
                 pass(Duration::from_millis(10));
                 let (at, ahead) = (cells(*read_all), cells(*read_all + 50));
                 if reads_ahead {
@@ -133,9 +133,9 @@ fn benchmark_counts_missing_tiles_at_100_ms_latency() {
                 }
                 !is_loaded(&terrain, TileKey::new(0, at / 32, 20))
             });
-            (missing.count(), looks)
+            (missing.count(), reads)
         });
-        let [(without, looks), (ahead, _)] = counts;
-        println!("{speed:7}  {without:7}  {ahead:5}  {looks:8}");
+        let [(without, reads), (ahead, _)] = counts;
+        println!("{speed:7}  {without:7}  {ahead:5}  {reads:8}");
     }
 }

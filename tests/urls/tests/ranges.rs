@@ -72,9 +72,9 @@ fn remote_cog_matches_local_file_and_opens_with_few_bytes() {
             f64::from(height(column, 1999 - row))
         );
     }
-    let (again, _) = server.log();
+    let (before, _) = server.log();
     assert_eq!(remote.height(1500, 3), here.height(1500, 3));
-    assert_eq!(server.log().0, again, "what is here is not fetched again");
+    assert_eq!(server.log().0, before, "what is here is not fetched again");
 }
 
 #[test]

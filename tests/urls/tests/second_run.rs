@@ -21,7 +21,7 @@ fn other(column: u32, row: u32) -> f32 {
 
 struct Bed {
     folder: tempfile::TempDir,
-    kept: tempfile::TempDir,
+    cache_folder: tempfile::TempDir,
     server: Server,
 }
 
@@ -31,7 +31,7 @@ fn bed() -> Bed {
     std::fs::write(path, cog(2200, 1800, 2, height)).expect("written");
     Bed {
         server: Server::of(folder.path()),
-        kept: tempfile::tempdir().expect("a folder"),
+        cache_folder: tempfile::tempdir().expect("a folder"),
         folder,
     }
 }
@@ -41,7 +41,7 @@ impl Bed {
     fn read_all(&self, name: &str) -> (Vec<f64>, usize) {
         // Like another program: only the folder on disk is the same.
         let options = OpenOptions {
-            disk_cache: DiskCache::at(self.kept.path(), 256 << 20),
+            disk_cache: DiskCache::at(self.cache_folder.path(), 256 << 20),
             ..OpenOptions::default()
         };
         let before = self.server.log().0.len();
@@ -71,7 +71,7 @@ impl Bed {
             !name.starts_with('.')
         };
         wait_until("all pages on disk", || {
-            let files = files(self.kept.path());
+            let files = files(self.cache_folder.path());
             files.iter().filter(|path| is_whole(path)).count() >= PAGES
         });
     }
@@ -94,11 +94,11 @@ fn second_run_requests_only_file_start_and_sidecars() {
     assert!(requests > 10, "{requests}");
     bed.wait_for_pages();
     // The file's beginning, and the four possible sidecars.
-    let (second, again) = bed.read_all("hills.tif");
+    let (second, second_requests) = bed.read_all("hills.tif");
     assert_eq!(second, first);
-    assert!(again <= 5, "{again} after {requests}");
+    assert!(second_requests <= 5, "{second_requests} after {requests}");
     // Damaged pages are fetched again.
-    for file in files(bed.kept.path()) {
+    for file in files(bed.cache_folder.path()) {
         let mut bytes = std::fs::read(&file).expect("there");
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
@@ -106,7 +106,7 @@ fn second_run_requests_only_file_start_and_sidecars() {
     }
     let (third, after_damage) = bed.read_all("hills.tif");
     assert_eq!(third, first);
-    assert!(after_damage > again);
+    assert!(after_damage > second_requests);
 }
 
 #[test]
@@ -118,8 +118,11 @@ fn pages_of_a_file_changed_on_its_server_are_not_used() {
     let path = bed.folder.path().join("hills.tif");
     std::fs::write(path, cog(2200, 1800, 2, other)).expect("written");
     bed.server.change();
-    let (second, again) = bed.read_all("hills.tif");
-    assert!(again + 5 >= requests, "{again} {requests}");
+    let (second, second_requests) = bed.read_all("hills.tif");
+    assert!(
+        second_requests + 5 >= requests,
+        "{second_requests} {requests}"
+    );
     for (one, other) in first.iter().zip(&second) {
         assert!((other - one - 5000.0).abs() < 0.01, "{one} {other}");
     }
@@ -130,7 +133,7 @@ fn cache_folder_contains_no_part_of_the_url() {
     let bed = bed();
     bed.read_all("hills.tif?sig=VerySecretKey");
     bed.wait_for_pages();
-    let all = files(bed.kept.path());
+    let all = files(bed.cache_folder.path());
     assert!(!all.is_empty());
     let holds = |bytes: &[u8], word: &[u8]| bytes.windows(word.len()).any(|some| some == word);
     for file in all {

@@ -143,7 +143,12 @@ impl Drawing {
     }
 
     /// Draws the terrain as it is rendered from now on, and sets the eye's distance by its size.
-    fn draw_placement(&mut self, scene: &Scene, ground: &Ground, entries: &mut Vec<Entry>) -> Result<()> {
+    fn draw_placement(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        entries: &mut Vec<Entry>,
+    ) -> Result<()> {
         let log = &self.log;
         if !scene.keeps_tiles {
             // First the layers under the tiles, so that there is no gap.

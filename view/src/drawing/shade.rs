@@ -83,7 +83,9 @@ impl Shade {
     /// that one spike does not reduce the rest to one colour.
     pub(super) fn of(heights: &Heights<'_>) -> Self {
         let known_heights = || heights.up.iter().copied().filter(|h| h.is_finite());
-        let mut sorted: Vec<f32> = known_heights().step_by(1 + heights.up.len() / 200_000).collect();
+        let mut sorted: Vec<f32> = known_heights()
+            .step_by(1 + heights.up.len() / 200_000)
+            .collect();
         sorted.sort_by(f32::total_cmp);
         let (low, high) = (quantile(&sorted, 0.002), quantile(&sorted, 0.998));
         let (low, high) = (low.unwrap_or(0.0), high.unwrap_or(1.0));

@@ -166,9 +166,12 @@ impl Tiles {
         reported: &Reported,
     ) -> Result<Vec<Entry>> {
         let mut entries = Vec::new();
-        let held: BTreeSet<_> = reported.held.iter().copied().collect();
+        let held_keys: BTreeSet<_> = reported.held.iter().copied().collect();
         for (slot, index) in &self.slots {
-            let lines = self.outlines.get(index).filter(|_| held.contains(index));
+            let lines = self
+                .outlines
+                .get(index)
+                .filter(|_| held_keys.contains(index));
             let before = self.outlined.get(slot);
             match lines {
                 Some(_) if before == Some(index) => {}
@@ -183,7 +186,7 @@ impl Tiles {
                 }
             }
         }
-        let unknown = held
+        let unknown = held_keys
             .iter()
             .filter(|index| !self.outlines.contains_key(*index));
         let squares = unknown.map(|index| flat(ground, *index)).collect();

@@ -20,8 +20,8 @@ use re_log_encoding::{Encoder, EncodingOptions};
 use re_log_types::LogMsg;
 
 use crate::drawing::Entry;
-use gather::{Batcher, Batch};
-pub use page::{Next, Page, Batching};
+use gather::{Batch, Batcher};
+pub use page::{Batching, Next, Page};
 
 /// A piece of a page's stream: a complete small `.rrd`.
 pub type Blob = Arc<Vec<u8>>;
@@ -174,7 +174,8 @@ impl History {
     pub fn add_page(&self, batching: Batching) -> Arc<Page> {
         let mut state = locked(&self.state);
         let static_entries = state.static_entries.iter();
-        let static_entries = static_entries.map(|(key, blob)| (Some(key.clone()), Arc::clone(blob)));
+        let static_entries =
+            static_entries.map(|(key, blob)| (Some(key.clone()), Arc::clone(blob)));
         let latest = state.latest.batches().iter();
         let latest = latest.filter(|_| batching == Batching::Fine);
         let events = { state.events.iter() }
@@ -313,7 +314,10 @@ mod tests {
     fn only_a_page_that_does_not_read_is_dropped() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let (slow, quick) = (history.add_page(Batching::Fine), history.add_page(Batching::Fine));
+        let (slow, quick) = (
+            history.add_page(Batching::Fine),
+            history.add_page(Batching::Fine),
+        );
         let big = |page: &Arc<Page>| {
             page.offer(None, &Arc::new(vec![0; QUEUE_BYTES / 2 + 1]));
         };
@@ -356,7 +360,10 @@ mod tests {
     fn joined_entries_are_bounded_if_time_stands_still() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let (gathered, fine) = (history.add_page(Batching::Joined), history.add_page(Batching::Fine));
+        let (gathered, fine) = (
+            history.add_page(Batching::Joined),
+            history.add_page(Batching::Fine),
+        );
         for _ in 0..2500 {
             history.put(vec![at(1.0)]).expect("encodes");
         }

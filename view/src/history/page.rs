@@ -88,8 +88,9 @@ impl Page {
     #[must_use]
     pub fn next(&self, wait: std::time::Duration) -> Next {
         let queue = locked(&self.queue);
-        let idle =
-            |queue: &mut Queue| queue.blobs.is_empty() && queue.ended.is_none() && !queue.is_dropped;
+        let idle = |queue: &mut Queue| {
+            queue.blobs.is_empty() && queue.ended.is_none() && !queue.is_dropped
+        };
         let waited = self.wake.wait_timeout_while(queue, wait, idle);
         let (mut queue, _) = waited.unwrap_or_else(PoisonError::into_inner);
         if queue.is_dropped {

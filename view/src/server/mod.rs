@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, Result, anyhow};
 use tiny_http::{Header, Request, Response};
 
-use crate::history::{History, Batching};
+use crate::history::{Batching, History};
 use access_check::RequestHead;
 use files::Files;
 

@@ -7,7 +7,7 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use crate::history::{End, Next, Page, Batching};
+use crate::history::{Batching, End, Next, Page};
 
 /// Time without a piece after which the page receives a sign of life, a length that no piece has.
 const SIGN_EVERY: Duration = Duration::from_secs(2);

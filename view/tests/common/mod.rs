@@ -33,7 +33,10 @@ impl Running {
     /// Starts a program with options for its viewer, separated by spaces.
     pub fn start(command: &mut Command, options: &str) -> Self {
         let mut child = command
-            .env("HAPTERRA_VIEW_OPTIONS", format!("{HEADLESS_OPTIONS} {options}"))
+            .env(
+                "HAPTERRA_VIEW_OPTIONS",
+                format!("{HEADLESS_OPTIONS} {options}"),
+            )
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -70,8 +73,7 @@ impl Running {
 
     /// Waits for a line on standard output with this beginning.
     pub fn wait_for_line(&self, beginning: &str) {
-        while !{ self.stdout.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning)
-        {
+        while !{ self.stdout.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {
         }
     }
 

@@ -98,8 +98,9 @@ pub(super) fn import_cycles(source: &Path) -> Result<Vec<Vec<String>>> {
     };
     let mut import_cycles: Vec<Vec<String>> = vec![];
     for name in edges.keys().copied().filter(|name| reaches(name, name)) {
-        let together =
-            |import_cycle: &&mut Vec<String>| reaches(name, &import_cycle[0]) && reaches(&import_cycle[0], name);
+        let together = |import_cycle: &&mut Vec<String>| {
+            reaches(name, &import_cycle[0]) && reaches(&import_cycle[0], name)
+        };
         match import_cycles.iter_mut().find(together) {
             Some(import_cycle) => import_cycle.push(name.to_owned()),
             None => import_cycles.push(vec![name.to_owned()]),

@@ -82,8 +82,8 @@ pub(crate) fn census(write: bool) -> Result<()> {
     faults.extend(broken(&measures));
     let mut text = "measure,before,now\n".to_owned();
     for (name, now) in &measures {
-        let [before, old] =
-            { recorded.iter().find(|row| row[0] == *name) }.map_or(["", ""], |row| [&row[1], &row[2]]);
+        let [before, old] = { recorded.iter().find(|row| row[0] == *name) }
+            .map_or(["", ""], |row| [&row[1], &row[2]]);
         println!("{before:>8} -> {now:<8} {name}");
         text += &format!("\"{name}\",{before},{now}\n");
         let is_old = old
@@ -143,7 +143,10 @@ fn measures(root: &Path, pages: &[(PathBuf, prose::Page)]) -> Result<Measures> {
     for library in LIBRARIES {
         let folder = root.join(library);
         let import_cycles = code::import_cycles(&folder.join("src"))?.len();
-        measures.push((format!("circles of files in {library}"), import_cycles as f64));
+        measures.push((
+            format!("circles of files in {library}"),
+            import_cycles as f64,
+        ));
         let public = code::code(&folder)?.public;
         measures.push((format!("public items of {library}"), public as f64));
     }

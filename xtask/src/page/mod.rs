@@ -11,8 +11,8 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::run::{
-    TEST_VARIABLES, cargo, hapterra, on_path, root, run, run_quietly, report, target_dir, tested_programs,
-    timed,
+    TEST_VARIABLES, cargo, hapterra, on_path, report, root, run, run_quietly, target_dir,
+    tested_programs, timed,
 };
 use crate::setup::{packages, toolchain};
 use crate::view;

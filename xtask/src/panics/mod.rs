@@ -76,9 +76,11 @@ fn reached(calls: &Calls, board: &Board, root: usize) -> Reached {
         if panics(&caller.name) {
             return vec![];
         }
-        let unknown = |c: &usize| find_exception(board.allowed_calls, caller, &functions[*c].name).is_none();
+        let unknown =
+            |c: &usize| find_exception(board.allowed_calls, caller, &functions[*c].name).is_none();
         let direct = caller.callees.iter().copied().filter(unknown);
-        let targets = find_exception(board.allowed_indirect, caller, "").map_or(&[][..], |e| e.targets);
+        let targets =
+            find_exception(board.allowed_indirect, caller, "").map_or(&[][..], |e| e.targets);
         let is_target = |i: &usize| targets.iter().any(|to| functions[*i].name.contains(to));
         let through_register = (0..functions.len()).filter(|i| caller.has_indirect && is_target(i));
         direct.chain(through_register).collect()
@@ -129,7 +131,11 @@ fn short(name: &str) -> String {
 }
 
 /// Returns the entry for this caller and callee in a table of exceptions, each by part of its name.
-fn find_exception<'t>(table: &'t [Exception], caller: &Function, callee: &str) -> Option<&'t Exception> {
+fn find_exception<'t>(
+    table: &'t [Exception],
+    caller: &Function,
+    callee: &str,
+) -> Option<&'t Exception> {
     let is_caller = |parts: &[&str]| {
         let mut names = caller.aliases.iter().chain([&caller.name]);
         names.any(|name| parts.iter().all(|part| name.contains(part)))

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::run::{on_path, output, run_quietly, report, command_line};
+use crate::run::{command_line, on_path, output, report, run_quietly};
 
 /// Name of a package for each of the [`MANAGERS`]; empty where it has no package.
 pub(crate) type Packages = [&'static str; MANAGERS.len()];
@@ -56,11 +56,11 @@ pub(crate) fn found_or_installed<T>(
     })
 }
 
-/// Installs `wanted` with the first package manager found.
+/// Installs `packages` with the first package manager found.
 ///
 /// The error contains the command to type, if there is one.
-fn install(wanted: &Packages) -> Result<()> {
-    let mut managers = MANAGERS.iter().zip(wanted);
+fn install(packages: &Packages) -> Result<()> {
+    let mut managers = MANAGERS.iter().zip(packages);
     let here = managers.find(|((install, _), _)| on_path(program(install)).is_some());
     let Some(((install, unattended), names)) = here else {
         bail!("no package manager known to this program (apt-get, dnf, pacman, brew) is here");

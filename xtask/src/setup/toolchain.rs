@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use super::distribution;
-use crate::run::{cargo, on_path, output, run_quietly, report, target_dir};
+use crate::run::{cargo, on_path, output, report, run_quietly, target_dir};
 
 /// The boards' target: Cortex-M4F and M7 with single-precision FPU.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";

@@ -141,8 +141,8 @@ impl Keys {
         by_length: Option<u64>,
     ) -> Result<(StoredType, Option<String>), RasterError> {
         let by_name = self.text("numbertype").map(number_type).transpose()?;
-        let stated = self.count("nbits")?;
-        let (bits, is_guess) = match (stated, by_name, by_length) {
+        let declared = self.count("nbits")?;
+        let (bits, is_guess) = match (declared, by_name, by_length) {
             (Some(bits), Some((other, _)), _) if bits != other => {
                 return Err(RasterError::damaged(format!(
                     "nbits is {bits} and numbertype is {}",

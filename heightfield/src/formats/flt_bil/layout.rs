@@ -51,7 +51,10 @@ impl Layout {
                 bands => format!("the file has bands 1 to {bands}"),
             };
             let requested = format!("band {band}");
-            return Err(RasterError::NoSuchPart { requested, available });
+            return Err(RasterError::NoSuchPart {
+                requested,
+                available,
+            });
         }
         let (columns, rows) = (self.columns, self.rows);
         let end = self.end(band).ok_or_else(|| {

@@ -105,7 +105,9 @@ pub(super) fn fault(error: io::Error) -> RasterError {
 
 /// Returns true if a file with these first bytes is downloaded whole.
 pub(super) fn needs_download(head: &[u8]) -> bool {
-    DOWNLOADED_FORMATS.iter().any(|bytes| head.starts_with(bytes))
+    DOWNLOADED_FORMATS
+        .iter()
+        .any(|bytes| head.starts_with(bytes))
 }
 
 /// Downloads a file and GDAL's notes beside it into a folder, which is deleted on drop.

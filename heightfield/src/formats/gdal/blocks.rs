@@ -8,7 +8,9 @@ use twox_hash::XxHash64;
 
 use super::place::Place;
 use super::{NAME, at_url, fault};
-use crate::blocks::{Block, BlockImage, BlockReader, SurveyParts, MAX_BLOCK_BYTES, Part, usual_block};
+use crate::blocks::{
+    Block, BlockImage, BlockReader, MAX_BLOCK_BYTES, Part, SurveyParts, usual_block,
+};
 use crate::encoding::codes;
 use crate::raw_samples::{transposed, turned};
 use crate::samples::{NoDataMask, SampleType, with_samples};

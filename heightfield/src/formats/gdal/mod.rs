@@ -222,7 +222,9 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
     let exact = parts
         .iter()
         .position(|part| Some(part.name.as_str()) == requested);
-    if dataset.bands() > 0 && (requested.is_none() || requested == netcdf::variable(dataset).as_deref()) {
+    if dataset.bands() > 0
+        && (requested.is_none() || requested == netcdf::variable(dataset).as_deref())
+    {
         return Ok(None);
     }
     if parts.is_empty() {
@@ -365,7 +367,13 @@ fn read(
 
 fn fault(error: Error) -> RasterError {
     match error {
-        Error::NoSuchPart { requested, available } => RasterError::NoSuchPart { requested, available },
+        Error::NoSuchPart {
+            requested,
+            available,
+        } => RasterError::NoSuchPart {
+            requested,
+            available,
+        },
         Error::Refused(words) if UNKNOWN.iter().any(|unknown| words.contains(unknown)) => {
             RasterError::UnknownFormat
         }

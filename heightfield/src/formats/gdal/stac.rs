@@ -210,9 +210,11 @@ impl Item {
                     [0, 3].map(|at| of[at] + of[at + 1] * column + of[at + 2] * row)
                 };
                 let is_near = |column: f64, row: f64| {
-                    let both = corner(found, column, row)
-                        .into_iter()
-                        .zip(corner(georeference, column, row));
+                    let both = corner(found, column, row).into_iter().zip(corner(
+                        georeference,
+                        column,
+                        row,
+                    ));
                     both.into_iter()
                         .all(|(a, b)| (a - b).abs() <= TOLERANCE * cell)
                 };

@@ -109,7 +109,10 @@ impl Array {
             true => packed((rows, columns)).turned(),
             false => packed((columns, rows)),
         };
-        let format = format!("NumPy array, {}", self.stored.memory_type().none().type_name());
+        let format = format!(
+            "NumPy array, {}",
+            self.stored.memory_type().none().type_name()
+        );
         let storage = plain.storage(input, options)?;
         Ok(Decoded::new(format, (columns, rows), storage))
     }

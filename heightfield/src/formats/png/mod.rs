@@ -81,7 +81,8 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
     };
     pixels.read(&mut reader)?;
     if channel.is_none() && chosen.height == PngChannel::Alpha {
-        refuse_opaque(&pixels.samples).map_err(|fault| encoded::suspect_encoded_heights(fault, input))?;
+        refuse_opaque(&pixels.samples)
+            .map_err(|fault| encoded::suspect_encoded_heights(fault, input))?;
     }
     let what = chosen.described(color);
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);
@@ -196,7 +197,9 @@ impl Pixels {
         }
         if let Some((mask, alpha)) = self.mask.as_mut().zip(self.chosen.no_data_index) {
             let transparent = channel(alpha).map(|bytes| bytes.iter().all(|&byte| byte == 0));
-            let no_data = (first..).zip(transparent).filter(|&(_, is_no_data)| is_no_data);
+            let no_data = (first..)
+                .zip(transparent)
+                .filter(|&(_, is_no_data)| is_no_data);
             no_data.for_each(|(index, _)| mask.insert(index));
         }
     }

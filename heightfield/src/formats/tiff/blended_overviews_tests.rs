@@ -44,10 +44,10 @@ fn overviews_mixed_with_no_data_are_not_used() {
         let summary = raster.summary();
         assert_eq!((summary.lowest, summary.highest), (1000.0, 1000.0));
         assert_eq!(raster.surface(1, [33.0, 10.0]), 1000.0);
-        let stated = raster.remarks().join(" ");
+        let remarks = raster.remarks().join(" ");
         assert!(
-            stated.contains(&rim.to_string()) && stated.contains("gdaladdo"),
-            "{stated}"
+            remarks.contains(&rim.to_string()) && remarks.contains("gdaladdo"),
+            "{remarks}"
         );
     }
 }

@@ -14,7 +14,9 @@ use super::masks::Mask;
 use super::samples::{heights, no_data_mask};
 use super::uncompressed::rows;
 use super::{budget, images, unpack};
-use crate::blocks::{Block, BlockImage, BlockReader, SurveyParts, MAX_BLOCK_BYTES, Part, stored_parts};
+use crate::blocks::{
+    Block, BlockImage, BlockReader, MAX_BLOCK_BYTES, Part, SurveyParts, stored_parts,
+};
 use crate::decoder_panic::guarded;
 use crate::disk_cache::{DiskCache, FileStamp};
 use crate::input::FileBytes;
@@ -130,7 +132,10 @@ pub(super) struct Image {
 
 impl Image {
     /// Returns an image of the main file.
-    pub(super) fn of(directory: &Directory, context: &FileContext<'_>) -> Result<Self, RasterError> {
+    pub(super) fn of(
+        directory: &Directory,
+        context: &FileContext<'_>,
+    ) -> Result<Self, RasterError> {
         Ok(Self {
             file: MAIN,
             layout: Layout::read(directory, context.kind)?,
@@ -370,18 +375,18 @@ fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>,
 impl Image {
     /// Returns true if it covers the other image with fewer samples of the same type and layout.
     fn is_overview_of(&self, full: &Self) -> bool {
-        let (ours, theirs) = (&self.layout, &full.layout);
+        let (own, theirs) = (&self.layout, &full.layout);
         let times = [
-            f64::from(theirs.columns) / f64::from(ours.columns),
-            f64::from(theirs.rows) / f64::from(ours.rows),
+            f64::from(theirs.columns) / f64::from(own.columns),
+            f64::from(theirs.rows) / f64::from(own.rows),
         ];
         // Half of an odd number of samples is rounded up or down.
-        let one = 1.0 / f64::from(ours.columns.min(ours.rows).max(1));
-        ours.stored == theirs.stored
-            && ours.bands == theirs.bands
+        let one = 1.0 / f64::from(own.columns.min(own.rows).max(1));
+        own.stored == theirs.stored
+            && own.bands == theirs.bands
             && times[0] > 1.0
             && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
-            && ours.of_band().is_some()
+            && own.of_band().is_some()
             && self.has_place_of(full, times)
     }
 

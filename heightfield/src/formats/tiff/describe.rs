@@ -7,7 +7,7 @@ use tiff_reader::{Ifd, TiffFile};
 use super::gdal_metadata::Metadata;
 use super::layout::NumberKind;
 use super::{georef, images};
-use crate::beside::{find_appended, apply_world_file, remark_other_place};
+use crate::beside::{apply_world_file, find_appended, remark_other_place};
 use crate::decoded::Decoded;
 use crate::input::{Data, FileBytes};
 use crate::{OpenOptions, RasterError};

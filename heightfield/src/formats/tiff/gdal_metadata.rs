@@ -29,10 +29,10 @@ impl Metadata {
             Some(xml) => Self::from_xml(xml, band),
             None => Self::default(),
         };
-        if let Some(stated) = text(image, GDAL_NODATA) {
-            let stated = no_data(stated, band, bands.into());
-            metadata.no_data = stated.value;
-            metadata.remarks.extend(stated.remark);
+        if let Some(text) = text(image, GDAL_NODATA) {
+            let parsed = no_data(text, band, bands.into());
+            metadata.no_data = parsed.value;
+            metadata.remarks.extend(parsed.remark);
         }
         metadata
     }

@@ -55,7 +55,10 @@ pub(super) fn masks(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Di
         number: number + 1,
     });
     let outside = beside.and_then(|file| {
-        let number = file.ifds().iter().position(|other| size(other) == own_size)?;
+        let number = file
+            .ifds()
+            .iter()
+            .position(|other| size(other) == own_size)?;
         let file = file.clone();
         Some(Directory { file, number })
     });

@@ -343,7 +343,9 @@ impl Layout {
         } else {
             1..1
         };
-        std::iter::once(self.band).chain(colours).chain(separate_alpha)
+        std::iter::once(self.band)
+            .chain(colours)
+            .chain(separate_alpha)
     }
 
     /// Returns the bytes of a texel before a band's sample.
@@ -387,9 +389,11 @@ impl Layout {
 fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError> {
     const FLOAT_PREDICTOR: u16 = 3;
     match (image.predictor(), format) {
-        (FLOAT_PREDICTOR, SampleFormat::Signed | SampleFormat::Unsigned) => Err(RasterError::damaged(
-            "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
-        )),
+        (FLOAT_PREDICTOR, SampleFormat::Signed | SampleFormat::Unsigned) => {
+            Err(RasterError::damaged(
+                "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
+            ))
+        }
         _ => Ok(()),
     }
 }
@@ -418,7 +422,10 @@ fn chosen_band(requested: Option<u32>, bands: u16) -> Result<usize, RasterError>
             bands => format!("the file has bands 1 to {bands}"),
         };
         let requested = format!("band {band}");
-        return Err(RasterError::NoSuchPart { requested, available });
+        return Err(RasterError::NoSuchPart {
+            requested,
+            available,
+        });
     }
     Ok(band as usize - 1)
 }

@@ -47,9 +47,9 @@ use crate::input::{Data, FileBytes};
 use crate::storage::Storage;
 use crate::{OpenOptions, RasterError};
 use blended_overviews::blended;
-use blocks::{Image, FileContext, TiffBlocks};
+use blocks::{FileContext, Image, TiffBlocks};
 use decoder_error::fault;
-use describe::{describe, overview_sizes, number_kind};
+use describe::{describe, number_kind, overview_sizes};
 use gdal_metadata::Metadata;
 use layout::Layout;
 use remote_source::RemoteSource;
@@ -184,14 +184,21 @@ fn stored(
                 }
                 return Ok((blocks.into(), remarks));
             }
-            Err(why) => storage_remarks = Some(StorageRemark::Whole(why + peak_memory_remark(&image.layout))),
+            Err(why) => {
+                storage_remarks = Some(StorageRemark::Whole(
+                    why + peak_memory_remark(&image.layout),
+                ))
+            }
         }
     }
     let layout = &image.layout;
     budget::check_memory(layout)?;
     budget::check(layout, input.len(), false)?;
     if input.is_outline() {
-        return Ok((layout.memory_type().none().into(), storage_remarks.into_iter().collect()));
+        return Ok((
+            layout.memory_type().none().into(),
+            storage_remarks.into_iter().collect(),
+        ));
     }
     let all = Part::whole(layout.columns, layout.rows);
     if let Some(remote) = input.remote() {
@@ -214,13 +221,13 @@ fn peak_memory_remark(layout: &Layout) -> &'static str {
 /// Returns a remark on strips or tiles that are decompressed to disk, if there are any.
 fn remark_unpacked(image: &Image) -> Option<StorageRemark> {
     let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
-    let whose = match &image.layout.unpacked {
+    let owner = match &image.layout.unpacked {
         Some(_) => format!("its {}", image.layout.chunks_name()),
         None => "the strips or tiles of its mask".into(),
     };
     (megabytes > 0).then(|| {
         StorageRemark::Remark(format!(
-            "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache), up to {megabytes} MB, until the program ends"
+            "{owner} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache), up to {megabytes} MB, until the program ends"
         ))
     })
 }

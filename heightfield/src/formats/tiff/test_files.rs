@@ -220,7 +220,7 @@ impl Made {
         data[..8].copy_from_slice(&[head, &short(self, 42), &long(self, at)].concat());
         data.extend(short(self, tags.len() as u32));
         let mut beyond = at + 2 + 12 * tags.len() as u32 + 4;
-        let mut far = vec![];
+        let mut out_of_line = vec![];
         for (tag, values) in tags {
             let bytes: Vec<u8> = values.iter().flat_map(|value| long(self, *value)).collect();
             data.extend(short(self, (*tag).into()));
@@ -231,11 +231,11 @@ impl Made {
             } else {
                 data.extend(long(self, beyond));
                 beyond += bytes.len() as u32;
-                far.extend(bytes);
+                out_of_line.extend(bytes);
             }
         }
         data.extend([0; 4]);
-        data.extend(far);
+        data.extend(out_of_line);
         data
     }
 }

@@ -254,21 +254,21 @@ fn by_hand(tags: &[(u16, u16, u32, Vec<u8>)], samples: &[u8]) -> Vec<u8> {
     bytes.extend((8 + samples.len() as u32).to_le_bytes());
     bytes.extend(samples);
     bytes.extend((tags.len() as u16).to_le_bytes());
-    let mut far: Vec<u8> = Vec::new();
+    let mut out_of_line: Vec<u8> = Vec::new();
     let after = bytes.len() + 12 * tags.len() + 4;
     for (tag, kind, count, value) in tags {
         bytes.extend(tag.to_le_bytes());
         bytes.extend(kind.to_le_bytes());
         bytes.extend(count.to_le_bytes());
         if value.len() > 4 {
-            bytes.extend(((after + far.len()) as u32).to_le_bytes());
-            far.extend(value);
+            bytes.extend(((after + out_of_line.len()) as u32).to_le_bytes());
+            out_of_line.extend(value);
         } else {
             bytes.extend(value.iter().chain(&[0; 4]).take(4));
         }
     }
     bytes.extend([0; 4]);
-    bytes.extend(far);
+    bytes.extend(out_of_line);
     bytes
 }
 

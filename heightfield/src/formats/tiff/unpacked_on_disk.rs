@@ -109,7 +109,11 @@ impl Unpacked {
     }
 
     /// Returns the bytes if they are already decompressed.
-    fn read_unpacked(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, RasterError>> {
+    fn read_unpacked(
+        &self,
+        chunk: &Chunk,
+        range: &Range<u64>,
+    ) -> Option<Result<Vec<u8>, RasterError>> {
         // Locked until the bytes are read, so that the slot is not reused.
         let mut state = self.state();
         let index = state.find(chunk)?;
@@ -177,7 +181,8 @@ impl SlotTable {
     /// Returns the slot of a strip or tile.
     fn find(&self, chunk: &Chunk) -> Option<usize> {
         let chunk_id = (chunk.place, chunk.covers.rows);
-        let is_same = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.chunk_id == chunk_id);
+        let is_same =
+            |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.chunk_id == chunk_id);
         self.slots.iter().position(is_same)
     }
 

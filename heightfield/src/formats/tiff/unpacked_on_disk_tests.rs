@@ -144,15 +144,15 @@ const TILES: Made = Made {
 #[test]
 fn two_tile_rows_stay_unpacked_at_any_limit_and_more_within_it() {
     let tile = 1024 * 400 * 4;
-    for (most, kept) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
-        let (_folder, layout) = layout(&TILES, TILES.bytes(), most);
+    for (max_bytes, max_tiles) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
+        let (_folder, layout) = layout(&TILES, TILES.bytes(), max_bytes);
         // Each tile is read twice, alternately.
         check_parts(&TILES, &layout);
         check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
-        assert_eq!(unpacked.max_bytes(), kept * tile);
+        assert_eq!(unpacked.max_bytes(), max_tiles * tile);
         let file = unpacked.unnamed.file.metadata().expect("told");
-        assert!(file.len() <= kept * tile, "{} {most}", file.len());
+        assert!(file.len() <= max_tiles * tile, "{} {most}", file.len());
     }
 }
 
@@ -232,8 +232,8 @@ fn least_recently_read_tile_is_evicted_first() {
     for tile in [0, 1, 2, 3, 0, 4] {
         uncompressed::read(&layout, 0, &part(tiles[tile])).expect("read");
     }
-    let kept = tiles.map(|tile| layout.is_available(&part(tile)));
-    assert_eq!(kept, [true, false, true, true, true]);
+    let available = tiles.map(|tile| layout.is_available(&part(tile)));
+    assert_eq!(available, [true, false, true, true, true]);
 }
 
 #[test]

@@ -161,7 +161,7 @@ impl Machine {
         }
         let mut bus = self.bus();
         bus.raise_interrupts();
-        let woken = bus.nvic.has_pending();
-        bus.advance(if woken { EXCEPTION_NS } else { SLEEP_NS });
+        let wakes = bus.nvic.has_pending();
+        bus.advance(if wakes { EXCEPTION_NS } else { SLEEP_NS });
     }
 }

@@ -78,9 +78,9 @@ impl ActiveMaterial {
 
     fn total_uncertainty(&self) -> Coefficients {
         match self.elapsed < SETTLED_TICKS {
-            true => {
-                std::array::from_fn(|i| self.uncertainty[i] + REMAINDER * (self.from[i] + self.coefficients[i]))
-            }
+            true => std::array::from_fn(|i| {
+                self.uncertainty[i] + REMAINDER * (self.from[i] + self.coefficients[i])
+            }),
             false => [0.0; 5],
         }
     }
@@ -111,7 +111,9 @@ impl ActiveMaterial {
     /// Returns the smallest and the largest possible friction.
     pub(super) fn friction_bounds(&self) -> [Friction; 2] {
         let uncertainty = self.total_uncertainty();
-        [-1.0, 1.0].map(|sign| self.friction_of(|i| (self.coefficients[i] + sign * uncertainty[i]).max(0.0)))
+        [-1.0, 1.0].map(|sign| {
+            self.friction_of(|i| (self.coefficients[i] + sign * uncertainty[i]).max(0.0))
+        })
     }
 
     fn friction_of(&self, number: impl Fn(usize) -> f64) -> Friction {
@@ -126,7 +128,9 @@ impl ActiveMaterial {
     /// Returns the texture, if any, and the share of it that is rendered.
     pub(super) fn texture(&self) -> Option<(&TextureOracle, f64)> {
         let share = self.speed_share * f64::from(self.fade_ticks) / f64::from(FADE_TICKS);
-        self.texture_oracle.as_ref().map(|texture_oracle| (texture_oracle, share))
+        self.texture_oracle
+            .as_ref()
+            .map(|texture_oracle| (texture_oracle, share))
     }
 
     /// Returns true if the change to this material is complete.
@@ -137,7 +141,11 @@ impl ActiveMaterial {
     /// Returns true if it behaves like another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let reported = |one: &Self| (one.class, one.elapsed, one.fade_ticks, one.was_rendered);
-        let speed = |one: &Self| one.texture_oracle.as_ref().map_or(0.0, TextureOracle::speed);
+        let speed = |one: &Self| {
+            one.texture_oracle
+                .as_ref()
+                .map_or(0.0, TextureOracle::speed)
+        };
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
         let pairs = |of: fn(&Self) -> &Coefficients| of(self).iter().zip(of(other)).all(is_near);
         reported(self) == reported(other)
@@ -158,7 +166,9 @@ impl ActiveMaterial {
     ) -> Vec<Self> {
         let mut after = match state {
             ContactState::Touching => {
-                let each = nearest.iter().flat_map(|class| self.on_class(*class, materials));
+                let each = nearest
+                    .iter()
+                    .flat_map(|class| self.on_class(*class, materials));
                 each.collect()
             }
             // A releasing contact keeps its material.
@@ -192,7 +202,8 @@ impl ActiveMaterial {
         }
         next.elapsed = (next.elapsed + 1).min(SETTLED_TICKS);
         let share = f64::from(next.elapsed.min(CHANGE_TICKS)) / f64::from(CHANGE_TICKS);
-        next.coefficients = std::array::from_fn(|i| next.from[i] + (target[i] - next.from[i]) * share);
+        next.coefficients =
+            std::array::from_fn(|i| next.from[i] + (target[i] - next.from[i]) * share);
         next.fade_texture(&texture, materials.cell_mm)
     }
 

@@ -39,7 +39,10 @@ pub(super) struct ExpectedForce {
 impl TickConditions<'_> {
     /// Returns the force without shading and edge fade.
     pub(super) fn force(&self, material: &ActiveMaterial) -> ExpectedForce {
-        let (mut stretch, mut allowed) = (self.displacement, self.allowed + ROUNDING * self.displacement.length());
+        let (mut stretch, mut allowed) = (
+            self.displacement,
+            self.allowed + ROUNDING * self.displacement.length(),
+        );
         if self.displacement.length() > MIN_N
             && let Some((oracle, share)) = material.texture()
         {

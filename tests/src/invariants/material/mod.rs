@@ -140,7 +140,9 @@ impl<'g> MaterialOracle<'g> {
                     .check_friction(candidate.friction_bounds(), observed)
                     .and_then(|()| self.check_slides(candidate, observed)),
             };
-            verdict.map_err(|violation| last_violation = Some(violation)).is_ok()
+            verdict
+                .map_err(|violation| last_violation = Some(violation))
+                .is_ok()
         });
         self.counts.with_friction += u64::from(touches && has_friction && !is_open);
         if let (true, Some(violation)) = (candidates.is_empty(), last_violation) {
@@ -220,7 +222,10 @@ impl<'g> MaterialOracle<'g> {
                 }
             };
             if !is_rendered {
-                reported = format!("{force} N of {}, {expected} by {candidate:?}", force.length());
+                reported = format!(
+                    "{force} N of {}, {expected} by {candidate:?}",
+                    force.length()
+                );
             }
             is_rendered
         });
@@ -235,7 +240,12 @@ impl<'g> MaterialOracle<'g> {
     }
 
     /// Checks that no force acts against the spring, and that shading turns it by 60° at most.
-    fn check_no_pull(&self, output: &TickConditions<'_>, force: DVec3, replied: &Replied) -> Verdict {
+    fn check_no_pull(
+        &self,
+        output: &TickConditions<'_>,
+        force: DVec3,
+        replied: &Replied,
+    ) -> Verdict {
         let (depth, size) = (output.displacement.length(), force.length());
         let is_even = self.materials.table.iter().all(|one| one.texture.is_none());
         let min = match self.shading {

@@ -22,7 +22,11 @@ const SLACK: f64 = 0.031;
 
 impl MaterialOracle<'_> {
     /// Checks that a proxy that slides on a plane, not too fast, ends where friction holds it.
-    pub(super) fn check_slides(&mut self, candidate: &ActiveMaterial, observed: &ObservedTick) -> Verdict {
+    pub(super) fn check_slides(
+        &mut self,
+        candidate: &ActiveMaterial,
+        observed: &ObservedTick,
+    ) -> Verdict {
         let (friction, [_, max]) = (candidate.friction(), candidate.friction_bounds());
         let Some(before) = self.before else {
             return Ok(());
@@ -39,35 +43,43 @@ impl MaterialOracle<'_> {
             && touches(before.sample.state)
             && touches(observed.output.state)
             && is_whole(&before.sample)
-            && [before.proxy, observed.proxy, observed.hip].into_iter().all(inside)
+            && [before.proxy, observed.proxy, observed.hip]
+                .into_iter()
+                .all(inside)
             && SLIDES.contains(&moved)
             && PRESSES.contains(&distance(observed.proxy, observed.hip));
         if !is_reported {
             return Ok(());
         }
         let [x, y, _] = observed.proxy;
-        let Some(patch) = Patch::at(self.position_oracle.terrain, [x.floor() as i32, y.floor() as i32])
-        else {
+        let Some(patch) = Patch::at(
+            self.position_oracle.terrain,
+            [x.floor() as i32, y.floor() as i32],
+        ) else {
             return Ok(());
         };
         let [east, north] = patch.slopes(x, y);
         let normal = DVec3::new(-east, -north, 1.0).normalize();
-        let way = DVec3::from_array(observed.hip) - DVec3::from_array(observed.proxy);
-        let presses = -way.dot(normal);
+        let displacement = DVec3::from_array(observed.hip) - DVec3::from_array(observed.proxy);
+        let presses = -displacement.dot(normal);
         // A HIP in the surface does not press, so friction does not act.
         if presses < PRESSES.start {
             return Ok(());
         }
-        let pulls = (way - normal * way.dot(normal)).length();
+        let pulls = (displacement - normal * displacement.dot(normal)).length();
         let trails = f64::from(friction.viscous_s) * RATE_HZ * moved;
         let held = f64::from(friction.dynamic_mu) * presses + trails;
         self.counts.sliding += 1;
         // Heights of a slope and positions are rounded.
         let times = 1.0 + f64::from(friction.dynamic_mu + friction.viscous_s * RATE_HZ as f32);
-        let place = observed.allowed_in_space(self.position_oracle.terrain) * (1.0 + east.hypot(north));
+        let place =
+            observed.allowed_in_space(self.position_oracle.terrain) * (1.0 + east.hypot(north));
         let uncertainty = f64::from(max.viscous_s - friction.viscous_s) * RATE_HZ * moved;
-        let allowed =
-            uncertainty + 1e-3 * held + SLACK * trails + 3e-4 * way.length() + 8.0 * times * place;
+        let allowed = uncertainty
+            + 1e-3 * held
+            + SLACK * trails
+            + 3e-4 * displacement.length()
+            + 8.0 * times * place;
         if (pulls - held).abs() > allowed {
             let detail = format!("pulled by {pulls}, {held} is held by {friction:?}: {observed:?}");
             return self.fail(Invariant::Slides, detail);

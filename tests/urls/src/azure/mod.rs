@@ -82,7 +82,9 @@ impl Service for Microsoft {
         let path = within.map_or(path.to_owned(), |rest| format!("/{rest}"));
         let authorization = request.headers.get(AUTHORIZATION);
         match authorization.map(|authorization| authorization.to_str().unwrap_or_default()) {
-            Some(authorization) if authorization.starts_with("Bearer ") => principal::check(authorization)?,
+            Some(authorization) if authorization.starts_with("Bearer ") => {
+                principal::check(authorization)?
+            }
             Some(authorization) => shared_key::check(account, request, authorization)?,
             None if sas::is_in(request) => sas::check(account, request, bucket(&path))?,
             None => check_public(account, bucket(&path))?,

@@ -14,7 +14,11 @@ const OLDEST: SignedDuration = SignedDuration::from_mins(15);
 
 /// # Errors
 /// If the request is not signed with the key of the account, or is too old.
-pub(super) fn check(account: &Account, request: &Parts, authorization: &str) -> Result<(), Refusal> {
+pub(super) fn check(
+    account: &Account,
+    request: &Parts,
+    authorization: &str,
+) -> Result<(), Refusal> {
     let date = header(request, "x-ms-date");
     let date = if date.is_empty() {
         header(request, "date")

@@ -1,7 +1,7 @@
 //! `gs://`
 
 use hapterra_url_tests::bucket::{PUBLIC, Server};
-use hapterra_url_tests::gcs::{UNPRIVILEGED, SURVEYOR, TOKEN, served};
+use hapterra_url_tests::gcs::{SURVEYOR, TOKEN, UNPRIVILEGED, served};
 
 use crate::opened::{
     Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
