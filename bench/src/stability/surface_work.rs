@@ -17,8 +17,8 @@ impl SurfaceWork {
         }
     }
 
-    /// Moves the arm for a time with these commands, of which the surface's part is `surface_currents_a`.
-    /// Returns the work of that part, mJ.
+    /// Moves the arm for a time with these commands, of which the surface's part is
+    /// `surface_currents_a`. Returns the work of that part, mJ.
     ///
     /// The steps are those of the plant's own integration, with the torque in the middle of each,
     /// so the sum is as exact as the motion.

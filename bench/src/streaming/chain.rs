@@ -124,7 +124,8 @@ impl<'t> Chain<'t> {
         self.client.stats()
     }
 
-    /// Runs a tick with these inputs, and calls `on_sample` with the samples that arrive at the host.
+    /// Runs a tick with these inputs, and calls `on_sample` with the samples that arrive at the
+    /// host.
     ///
     /// # Errors
     /// If host and device do not understand each other.

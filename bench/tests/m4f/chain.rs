@@ -348,9 +348,9 @@ impl<'g> Arm<'g> {
         with_params(arm, |params| with_controller(params, Controller::Off))
     }
 
-    /// Slides over the fallback, which is [`FALLBACK_HEIGHT_MM`] off, at half a cell a tick, once in each of
-    /// several directions. Counts the ticks from the arrival of tiles to the end of the blend, or
-    /// as many without tiles.
+    /// Slides over the fallback, which is [`FALLBACK_HEIGHT_MM`] off, at half a cell a tick, once
+    /// in each of several directions. Counts the ticks from the arrival of tiles to the end of the
+    /// blend, or as many without tiles.
     fn settling(
         &self,
         board: &CountingBoard,

@@ -8,8 +8,8 @@ use hapterra_tests::repository;
 
 /// The stored table, in the repository.
 const TABLE: &str = "bench/instructions-m4f.csv";
-/// A count above the stored one by more than this share, and by more than [`TOLERANCE_COUNT`] instructions,
-/// is a regression: another compiler may need a few more.
+/// A count above the stored one by more than this share, and by more than [`TOLERANCE_COUNT`]
+/// instructions, is a regression: another compiler may need a few more.
 const TOLERANCE: f64 = 0.05;
 const TOLERANCE_COUNT: f64 = 10.0;
 /// Least work of the ticks from which the cost of a unit is computed: in shorter ones the constant

@@ -30,8 +30,8 @@ impl Shared {
     /// Returns a block, read if it is not in memory; `None` if the file has no samples there.
     ///
     /// # Errors
-    /// [`NotLoaded`] if it is not in memory and `wait` is [`Wait::Never`], or if it cannot be read at
-    /// present.
+    /// [`NotLoaded`] if it is not in memory and `wait` is [`Wait::Never`], or if it cannot be read
+    /// at present.
     pub(super) fn block(
         &self,
         image: usize,

@@ -2,8 +2,9 @@
 
 use crate::RasterError;
 
-/// Returns the index in `names` of `requested`; by default, of the first name in `usual` (words, the
-/// likeliest first), or of the only name. `kind` is the file's word for its parts, for messages.
+/// Returns the index in `names` of `requested`; by default, of the first name in `usual` (words,
+/// the likeliest first), or of the only name. `kind` is the file's word for its parts, for
+/// messages.
 ///
 /// # Errors
 /// If there are no names, several unusual ones, or not the requested one.

@@ -13,8 +13,8 @@ use crate::remote::is_url;
 const MAX_PAIRS: usize = 8;
 /// Max number of comparisons in the search for pairs.
 const MAX_COMPARISONS: usize = 1 << 22;
-/// Overlaps of up to `FEW_SAMPLES` are compared whole, larger ones at `MAX_PLACES_PER_AXIS` positions per
-/// direction.
+/// Overlaps of up to `FEW_SAMPLES` are compared whole, larger ones at `MAX_PLACES_PER_AXIS`
+/// positions per direction.
 const FEW_SAMPLES: u64 = 4096;
 const MAX_PLACES_PER_AXIS: u32 = 5;
 /// Max difference of equal heights, in the file's unit, and as a share of the height.

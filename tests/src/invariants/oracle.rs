@@ -30,7 +30,8 @@ pub struct Measured {
     pub off_minimum: f64,
     /// Results compared with the exact closest point.
     pub compared: u64,
-    /// Those of `compared` beyond that bound, because of steep ground or a badly conditioned minimum.
+    /// Those of `compared` beyond that bound, because of steep ground or a badly conditioned
+    /// minimum.
     pub beyond: u64,
     /// Paths that met the surface but ended free: around a pole.
     pub around: u64,

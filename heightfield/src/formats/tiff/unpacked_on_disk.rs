@@ -51,8 +51,8 @@ struct Slot {
 }
 
 impl Unpacked {
-    /// Creates an empty file for strips or tiles of `slot_bytes` bytes: as many as the bound of the cache
-    /// allows, within `counts`.
+    /// Creates an empty file for strips or tiles of `slot_bytes` bytes: as many as the bound of the
+    /// cache allows, within `counts`.
     ///
     /// # Errors
     /// The reason why there is no space for them.
