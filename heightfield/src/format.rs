@@ -31,11 +31,11 @@ pub(super) enum Parts {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Claim {
     /// The file is of this format.
-    Decides,
+    Certain,
     /// The file should be of this format, but is damaged.
-    Promises,
+    Expected,
     /// No conclusion: other formats use the extension, too.
-    Suggests,
+    Possible,
 }
 
 impl Format {

@@ -92,7 +92,7 @@ use std::path::{Path, PathBuf};
 
 pub use crs::{LonLat, ReferenceSystem};
 pub use error::{Error, RasterError};
-pub use file_layout::{FileLayout, SamplesAre};
+pub use file_layout::{FileLayout, RasterType};
 pub use fill::Fill;
 pub use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};

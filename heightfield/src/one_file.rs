@@ -123,8 +123,8 @@ fn by_extension(extension: &str) -> Result<&'static Format, RasterError> {
         .iter()
         .filter_map(|format| Some((format, format.claim(extension)?)));
     match claims.next() {
-        Some((format, Claim::Decides)) => Ok(format),
-        Some((format, Claim::Promises)) => Err(RasterError::Unfamiliar(format!(
+        Some((format, Claim::Certain)) => Ok(format),
+        Some((format, Claim::Expected)) => Err(RasterError::Unfamiliar(format!(
             "its name says {}, its content does not begin like one",
             format.name
         ))),

@@ -319,8 +319,8 @@ impl BlockReader for PlainBlocks {
     fn stamp(&self, _: usize, _: &Part) -> Option<String> {
         let stamp = self.stamp.as_ref()?;
         let is_same = self.input.stamp().as_ref() == Some(stamp);
-        let settled = stamp.settled().filter(|_| is_same)?;
-        Some(format!("{settled} {:?}", self.plain))
+        let stable = stamp.stable_text().filter(|_| is_same)?;
+        Some(format!("{stable} {:?}", self.plain))
     }
 
     fn survey_parts(&self) -> Option<SurveyParts> {

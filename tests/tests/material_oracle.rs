@@ -49,8 +49,8 @@ impl Way {
         let steps = (0..240).chain((180..240).rev());
         let along = steps.map(|i| [from + step * f64::from(i), 10.25, 0.5]);
         let path = [[from, 10.25, 3.0]].into_iter().chain(along).collect();
-        let (execution, supply) = (Execution::LockStep, Supply::Held);
-        let mut scene = Scene::given(terrain, path, execution, supply);
+        let (execution, supply) = (Execution::LockStep, Supply::Preloaded);
+        let mut scene = Scene::new(terrain, path, execution, supply);
         scene.shading = shading;
         let shift = [0; 3];
         let how = Replay { shift, supply };

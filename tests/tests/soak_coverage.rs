@@ -115,9 +115,9 @@ fn every_promised_kind_of_scene_is_touched_and_checked() {
         touched[kind.expect("known")] += judge.measured.states[ContactState::Touching as usize];
         samples(&scene.terrain, &mut counts);
         let supply = match scene.supply {
-            Supply::Held => "every tile held",
-            Supply::Pulled { latency: 0 } => "tiles at once",
-            Supply::Pulled { .. } => "tiles late",
+            Supply::Preloaded => "every tile held",
+            Supply::OnDemand { latency: 0 } => "tiles at once",
+            Supply::OnDemand { .. } => "tiles late",
         };
         *settings.entry(supply).or_default() += 1;
     }

@@ -51,7 +51,7 @@ impl Case {
     /// Returns the pace of this case in place of `pace`.
     const fn pace(&self, pace: Pace) -> Pace {
         match self.stands_while_reading {
-            true => Pace::Standing,
+            true => Pace::Paused,
             false => pace,
         }
     }

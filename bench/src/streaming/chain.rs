@@ -62,7 +62,7 @@ pub(super) enum Pace {
     Virtual,
     /// As fast as this machine runs; time stops while a block is read, so that counts do not depend
     /// on the machine.
-    Standing,
+    Paused,
 }
 
 /// The host, its line to a device, and the device.
@@ -200,7 +200,7 @@ impl<'t> Chain<'t> {
     /// Lets a tick last a millisecond, if necessary.
     fn pace_tick(&mut self) {
         let is_reading = || self.terrain.raster().is_reading();
-        if self.pace == Pace::Standing {
+        if self.pace == Pace::Paused {
             while is_reading() {
                 std::thread::sleep(POLL_INTERVAL);
             }

@@ -71,7 +71,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     );
     // As far as a device's window reaches.
     let wide = Grid::fractal("512 × 512", [512, 512], 6, 1.0);
-    let sweeps = path::sweeps(&wide, "", 500.0, TICKS).expect("500 cells fit");
+    let sweeps = path::sweep(&wide, "", 500.0, TICKS).expect("500 cells fit");
     let sweeps: Vec<Step> = every(&sweeps.hips);
     rows.push(row(
         board,

@@ -186,12 +186,12 @@ fn coarse_levels_have_the_files_own_samples_in_any_order() {
         for level in [2, 3, 5, 6, 8, 9, 10] {
             // Each level in a new raster, then all in the same one.
             check(
-                &raster(&reader_state, &DiskCache::is_off(), order),
+                &raster(&reader_state, &DiskCache::off(), order),
                 level,
                 order,
             );
         }
-        let all = raster(&reader_state, &DiskCache::is_off(), order);
+        let all = raster(&reader_state, &DiskCache::off(), order);
         for level in [9, 6, 3, 4, 5, 7, 8, 10, 2] {
             check(&all, level, order);
         }
@@ -201,7 +201,7 @@ fn coarse_levels_have_the_files_own_samples_in_any_order() {
 #[test]
 fn repeated_read_is_cached_and_fine_level_fills_coarse_levels() {
     let reader_state = ReaderState::new("");
-    let raster = raster(&reader_state, &DiskCache::is_off(), USUAL);
+    let raster = raster(&reader_state, &DiskCache::off(), USUAL);
     check(&raster, 8, USUAL);
     let first = reader_state.reads();
     // Every 256th sample is in another block.
@@ -225,7 +225,7 @@ fn repeated_read_is_cached_and_fine_level_fills_coarse_levels() {
 #[test]
 fn surface_is_linear_between_coarse_samples() {
     let reader_state = ReaderState::new("");
-    let raster = raster(&reader_state, &DiskCache::is_off(), [true, false]);
+    let raster = raster(&reader_state, &DiskCache::off(), [true, false]);
     // None of them is no-data.
     let [a, b] = [560, 568].map(|column| height(column, 808, [true, false]));
     assert!(a > 0.0 && b > 0.0);
@@ -260,12 +260,12 @@ fn same(one: &[f64], other: &[f64]) {
 fn nonblocking_read_loads_coarse_level_in_background() {
     let reader_state = ReaderState::new("");
     let waited = read_tile(
-        &raster(&reader_state, &DiskCache::is_off(), USUAL),
+        &raster(&reader_state, &DiskCache::off(), USUAL),
         8,
         Wait::UntilRead,
     )
     .expect("here");
-    let raster = raster(&reader_state, &DiskCache::is_off(), USUAL);
+    let raster = raster(&reader_state, &DiskCache::off(), USUAL);
     reader_state.threads.lock().expect("alone").clear();
     assert_eq!(
         read_tile(&raster, 8, Wait::Never),
@@ -281,7 +281,7 @@ fn nonblocking_read_loads_coarse_level_in_background() {
 #[test]
 fn nonblocking_read_loads_fine_block_in_background() {
     let reader_state = ReaderState::new("");
-    let raster = raster(&reader_state, &DiskCache::is_off(), USUAL);
+    let raster = raster(&reader_state, &DiskCache::off(), USUAL);
     let height_at = |column| raster.read_height(column, 1000, Wait::Never);
     assert!(raster.height(300, 1000) > 0.0, "a read that may wait does");
     reader_state.threads.lock().expect("alone").clear();
@@ -354,7 +354,7 @@ fn disk_cache_serves_next_run_only_for_the_same_file_stamp() {
     ] {
         *reader_state.stamp.lock().expect("alone") = stamp.map(Into::into);
         let disk = if is_off {
-            DiskCache::is_off()
+            DiskCache::off()
         } else {
             disk.clone()
         };
@@ -440,7 +440,7 @@ fn coarse_memory_is_bounded_and_evicted_samples_stay_on_disk() {
 fn prefetch_reads_in_background_and_skips_oversized_areas() {
     for order in [[true, false], [false, true]] {
         let reader_state = ReaderState::new("");
-        let raster = raster(&reader_state, &DiskCache::is_off(), order);
+        let raster = raster(&reader_state, &DiskCache::off(), order);
         reader_state.threads.lock().expect("alone").clear();
         raster.prefetch(0, [0, 2100], [0, 1249]);
         raster.prefetch(0, [1000, 1100], [600, 650]);
@@ -474,7 +474,7 @@ fn prefetch_reads_in_background_and_skips_oversized_areas() {
 
 #[test]
 fn windows_hold_their_rows_and_report_pending_heights() {
-    let raster = raster(&ReaderState::new(""), &DiskCache::is_off(), USUAL);
+    let raster = raster(&ReaderState::new(""), &DiskCache::off(), USUAL);
     let window = Window {
         column: 700,
         row: 500,

@@ -2,7 +2,7 @@
 //! file's length and name.
 
 use crate::decoded::Decoded;
-use crate::file_layout::SamplesAre;
+use crate::file_layout::RasterType;
 use crate::format::{Claim, Format, Parts};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
@@ -17,7 +17,7 @@ use crate::{
 pub(super) const FORMAT: Format = Format {
     name: "SRTM",
     begins: |_| false,
-    extensions: &[("hgt", Claim::Decides)],
+    extensions: &[("hgt", Claim::Certain)],
     parts: Parts::One,
     decode,
 };
@@ -34,7 +34,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), plain.storage(input, options)?);
     decoded.no_data = Some(VOID);
-    decoded.file_layout.samples_are = Some(SamplesAre::Points);
+    decoded.file_layout.raster_type = Some(RasterType::Point);
     decoded.metres_per_vertical_unit = Some(1.0);
     // SRTM's heights are above the geoid EGM96, its coordinates in WGS 84.
     decoded.set_vertical_datum(5773);

@@ -83,7 +83,7 @@ pub(super) fn is_tile(path: &Path) -> bool {
     let unpacked = unpacked.unwrap_or(&lower);
     let is_hidden = lower.starts_with('.');
     let is_placed = !unpacked.ends_with(".png");
-    let claims = claim_of(unpacked).is_some_and(|claim| claim != Claim::Suggests);
+    let claims = claim_of(unpacked).is_some_and(|claim| claim != Claim::Possible);
     claims && is_placed && !is_hidden
 }
 

@@ -230,7 +230,7 @@ impl BlockReader for Mosaic {
             }
             text += &format!(" {number} {source:?}");
             for stamp in &stamps {
-                text += stamp.settled()?;
+                text += stamp.stable_text()?;
             }
         }
         Some(text)

@@ -20,7 +20,7 @@ use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
 use heightfield::printable_text::printable_json;
 use heightfield::without_key;
-use heightfield::{CellSize, CellUnit, Certainty, Fill, ReferenceSystem, SamplesAre};
+use heightfield::{CellSize, CellUnit, Certainty, Fill, ReferenceSystem, RasterType};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, reported};
 
@@ -213,9 +213,9 @@ impl FileReport {
             bands: layout.bands,
             block: layout.block,
             overviews: layout.overviews.clone(),
-            samples_are: layout.samples_are.map(|samples| match samples {
-                SamplesAre::Areas => "area",
-                SamplesAre::Points => "point",
+            samples_are: layout.raster_type.map(|samples| match samples {
+                RasterType::Area => "area",
+                RasterType::Point => "point",
             }),
             looked_at: summary.examined,
             known_whole: raster.is_summary_complete(),

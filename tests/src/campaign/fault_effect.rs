@@ -9,7 +9,7 @@ use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::ResetCause;
 
-use super::arm::Mood;
+use super::arm::HandMotion;
 use super::clock::Reading;
 use super::fault_kind::{Kind, LOADED_TICKS};
 use super::faulty_pipe::LinkDisturbance;
@@ -219,11 +219,11 @@ impl InjectedFault {
 
     /// Returns its effect on the hand.
     #[must_use]
-    pub fn mood(&self) -> Mood {
+    pub fn hand_motion(&self) -> HandMotion {
         match self.kind {
-            Kind::HotMotors | Kind::ResetUnderLoad | Kind::BrownOut => Mood::Presses,
-            Kind::Yank => Mood::Yanked(self.by_mm),
-            _ => Mood::Wanders,
+            Kind::HotMotors | Kind::ResetUnderLoad | Kind::BrownOut => HandMotion::Press,
+            Kind::Yank => HandMotion::Yank(self.by_mm),
+            _ => HandMotion::Wander,
         }
     }
 

@@ -16,7 +16,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::{ResetCause, Status};
 use heightfield::Raster;
 
-use super::arm::{Arm, Mood};
+use super::arm::{Arm, HandMotion};
 use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
 use super::fault_effect::{Core, InjectedFault};
@@ -363,12 +363,12 @@ impl<'t> Segment<'t> {
                 PRESS_TICK => self.dead_man = true,
                 _ => {}
             }
-            let mood = if at > PRESS_TICK + 300 {
-                Mood::Wanders
+            let hand_motion = if at > PRESS_TICK + 300 {
+                HandMotion::Wander
             } else {
-                Mood::Lifted
+                HandMotion::Lifted
             };
-            self.tick_with(mood, None)?;
+            self.tick_with(hand_motion, None)?;
             let latest = self.tick_checks.latest();
             if at > PRESS_TICK && self.outputs.enabled && latest == Some(Mode::Armed) {
                 return Ok(true);
@@ -384,16 +384,16 @@ impl<'t> Segment<'t> {
     }
 
     fn tick(&mut self, injected: Option<&mut InjectedFault>) -> Result<(), String> {
-        let mood = injected
+        let hand_motion = injected
             .as_ref()
-            .map_or(Mood::Wanders, |injected| injected.mood());
-        self.tick_with(mood, injected)
+            .map_or(HandMotion::Wander, |injected| injected.hand_motion());
+        self.tick_with(hand_motion, injected)
     }
 
     /// Advances everything by one tick.
     fn tick_with(
         &mut self,
-        mood: Mood,
+        hand_motion: HandMotion,
         injected: Option<&mut InjectedFault>,
     ) -> Result<(), String> {
         self.arm
@@ -445,7 +445,7 @@ impl<'t> Segment<'t> {
             .receive(output, self.now, &disturbance, tiles, &mut self.random);
         self.check_tick(core, &inputs)?;
         let currents = self.outputs.currents_a.to_array().map(f64::from);
-        self.arm.step(currents, mood);
+        self.arm.step(currents, hand_motion);
         self.armed += u64::from(self.outputs.enabled);
         self.now += 1;
         Ok(())

@@ -11,7 +11,7 @@ use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
 use super::cable::BYTES_PER_TICK;
-use crate::campaign::arm::{Arm, Mood};
+use crate::campaign::arm::{Arm, HandMotion};
 use crate::campaign::tick_invariants::{TickChecks, Truth};
 use crate::random::Random;
 
@@ -27,7 +27,7 @@ pub struct Board<'t> {
     /// True if the hand holds the dead-man switch.
     pub dead_man: bool,
     /// Behaviour of the hand.
-    pub mood: Mood,
+    pub hand_motion: HandMotion,
     /// Commands to the amplifiers in the last tick.
     pub drive: GuardOutputs,
     /// True if the device's time stops while it waits for the host.
@@ -45,7 +45,7 @@ impl<'t> Board<'t> {
             arm: Arm::new(terrain, random),
             tick_checks: TickChecks::new(record, PhantomModel::premium_1_5()),
             dead_man: false,
-            mood: Mood::Lifted,
+            hand_motion: HandMotion::Lifted,
             drive: GuardOutputs::default(),
             lock_step: false,
             ticks: [0; 2],
@@ -108,7 +108,7 @@ impl<'t> Board<'t> {
         self.tick_checks
             .check_outputs(&self.drive, &sense, [0; 3], &truth)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
-        self.arm.step(currents, self.mood);
+        self.arm.step(currents, self.hand_motion);
         self.ticks[0] += 1;
         self.ticks[1] += u64::from(self.drive.enabled);
         Ok(())

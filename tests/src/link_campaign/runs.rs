@@ -6,7 +6,7 @@ use super::host::{End, Reported, SILENCE_S};
 use super::not_a_device;
 use super::run_outcomes::{LinkStats, Outcome};
 use super::segment::Segment;
-use crate::campaign::arm::Mood;
+use crate::campaign::arm::HandMotion;
 use hapterra_core::guard::Mode;
 
 /// Time that a session may take to open or to fail, ms.
@@ -178,7 +178,7 @@ impl Run<'_, '_> {
         }
         let settled = pressed.is_some_and(|at| now >= at + ARMS);
         if settled {
-            self.segment.board.mood = Mood::Wanders;
+            self.segment.board.hand_motion = HandMotion::Wander;
         }
         match host.reported {
             Reported::Nothing => false,
@@ -306,7 +306,7 @@ impl Run<'_, '_> {
     fn release_switch(&mut self) -> Result<(), String> {
         self.segment.host = None;
         self.segment.board.dead_man = false;
-        self.segment.board.mood = Mood::Lifted;
+        self.segment.board.hand_motion = HandMotion::Lifted;
         self.segment.step()?;
         self.wait(1_000)
     }

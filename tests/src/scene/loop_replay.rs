@@ -143,7 +143,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             events: Vec::new(),
             ticks: Vec::new(),
         };
-        if replay.supply == Supply::Held {
+        if replay.supply == Supply::Preloaded {
             device.hold_all();
         }
         device
@@ -231,7 +231,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
 
     /// Requests the tiles that the tick needs, and delivers those that are due.
     fn supply(&mut self, sample: &TickRecord) {
-        let Supply::Pulled { latency } = self.replay.supply else {
+        let Supply::OnDemand { latency } = self.replay.supply else {
             return;
         };
         let demand = RequestHint {

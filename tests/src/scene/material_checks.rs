@@ -29,8 +29,8 @@ pub fn run(
 ) -> Result<(), Violation> {
     let mut random = Random::new(scene.seed ^ 0x57ab_1e55);
     let side = match scene.supply {
-        Supply::Held => SIDE,
-        Supply::Pulled { .. } => [2, 3, 4, SIDE][random.below(4)],
+        Supply::Preloaded => SIDE,
+        Supply::OnDemand { .. } => [2, 3, 4, SIDE][random.below(4)],
     };
     let mut oracle = MaterialOracle::new(scene, materials, [0; 3]);
     let usual = Replay {
@@ -101,7 +101,7 @@ fn windowed(
     let latency = [0, 1, 5][random.below(3)];
     let how = Replay {
         shift: [0; 3],
-        supply: Supply::Pulled { latency },
+        supply: Supply::OnDemand { latency },
     };
     let other = replay_in(side, scene, materials, buffers, how, |_| Ok(()))?;
     same_bits(Invariant::Window, replied, &other, [0; 3], true)
@@ -130,7 +130,7 @@ fn shifted(
     let path = scene.path.iter().map(beside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);
     let mut at = |shift| {
-        let supply = Supply::Pulled { latency: 0 };
+        let supply = Supply::OnDemand { latency: 0 };
         let mut oracle = MaterialOracle::new(scene, materials, shift);
         let how = Replay { shift, supply };
         replay_in(4, scene, materials, buffers, how, |replied| {
@@ -163,7 +163,7 @@ fn turned(
     let mut oracle = MaterialOracle::new(&twin, materials, [0; 3]);
     let how = Replay {
         shift: [0; 3],
-        supply: Supply::Pulled { latency: 0 },
+        supply: Supply::OnDemand { latency: 0 },
     };
     replay_in(4, &twin, materials, buffers, how, |replied| {
         oracle.check(replied)

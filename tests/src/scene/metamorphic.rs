@@ -70,8 +70,8 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
     let mut output = |shift| {
         // Grain and most gratings have another part there, so the oracle checks them as well.
         let mut oracle = TickOracle::new(&scene.terrain).with_texture(scene.texture);
-        let pulled = Supply::Pulled { latency: 0 };
-        let observed = scene.render(buffers, shift, pulled, |observed| {
+        let on_demand = Supply::OnDemand { latency: 0 };
+        let observed = scene.render(buffers, shift, on_demand, |observed| {
             oracle.check_texture(observed)
         })?;
         Ok(observed.into_iter().map(|observed| ObservedTick {
@@ -106,11 +106,11 @@ pub fn windowed(
         return Ok(false);
     }
     let latency = [0, 1, 5][random.below(3)];
-    let pulled = Supply::Pulled { latency };
-    let small = scene.render_in::<7>(buffers, [0; 3], pulled, |_| Ok(()))?;
+    let on_demand = Supply::OnDemand { latency };
+    let small = scene.render_in::<7>(buffers, [0; 3], on_demand, |_| Ok(()))?;
     same_bits(Invariant::Window, observed, &small, [0; 3])?;
-    if scene.supply != Supply::Held {
-        let whole = scene.render(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    if scene.supply != Supply::Preloaded {
+        let whole = scene.render(buffers, [0; 3], Supply::Preloaded, |_| Ok(()))?;
         same_bits(Invariant::Window, observed, &whole, [0; 3])?;
     }
     Ok(true)
@@ -172,7 +172,7 @@ const JUMP: f64 = 1e3;
 pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Compared {
     // On a border of the data a HIP belongs to the patch in the north-east, mirrored or not; and
     // the work left of a tick may differ.
-    let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
+    let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Preloaded;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::NoData;
     if !settles || !plain {
         return Ok(false);
@@ -183,12 +183,12 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     };
     let path: Vec<_> = scene.path.iter().map(inside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);
-    let observed = scene.render(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let observed = scene.render(buffers, [0; 3], Supply::Preloaded, |_| Ok(()))?;
     let symmetries = symmetry::all();
     let symmetry = symmetries[random.below(symmetries.len())];
     let twin = transformed(scene, symmetry);
     let mut oracle = TickOracle::of(&twin);
-    let other = twin.render(buffers, [0; 3], Supply::Held, |observed| {
+    let other = twin.render(buffers, [0; 3], Supply::Preloaded, |observed| {
         oracle.check(observed)
     })?;
     same_forces(scene, symmetry, &observed, &other, buffers)

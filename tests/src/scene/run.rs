@@ -79,7 +79,7 @@ impl Surface {
     }
 }
 
-/// The grating of a scene from [`Scene::overridden`].
+/// The grating of a scene from [`Scene::new`].
 const GRATING: Texture = Texture {
     pattern: Pattern::Grating,
     amplitude_mm: 0.05,
@@ -148,12 +148,12 @@ impl Scene {
         let kind = KINDS[random.below(KINDS.len())];
         // A hundred patches a side, or more than the window can store, or a strip of thousands.
         let (size, supply) = match random.below(4) {
-            0 | 1 => ([70 + random.below(60) as i32, 90], Supply::Held),
-            2 => ([200, 256], Supply::Held),
+            0 | 1 => ([70 + random.below(60) as i32, 90], Supply::Preloaded),
+            2 => ([200, 256], Supply::Preloaded),
             _ => {
                 let latency = [0, 3, 40][random.below(3)];
                 let size = [[1500, 40], [130, 120], [520, 400]][random.below(3)];
-                (size, Supply::Pulled { latency })
+                (size, Supply::OnDemand { latency })
             }
         };
         let terrain = Terrain::new(kind, size, random.bits());
@@ -202,7 +202,7 @@ impl Scene {
 
     /// Creates a scene with the work of a tick at 10 kHz and all metamorphic tests.
     #[must_use]
-    pub const fn overridden(
+    pub const fn new(
         terrain: Terrain,
         path: Vec<[f64; 3]>,
         execution: Execution,

@@ -38,9 +38,9 @@ impl Default for Buffers {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supply {
     /// All tiles are stored from the start.
-    Held,
+    Preloaded,
     /// Tiles are requested, and arrive later.
-    Pulled {
+    OnDemand {
         /// Ticks from the request to the tile.
         latency: u32,
     },
@@ -90,7 +90,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
             requested: Vec::new(),
             installed: Vec::new(),
         };
-        if supply == Supply::Held {
+        if supply == Supply::Preloaded {
             supplied.hold_all();
         }
         supplied
@@ -127,7 +127,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
 
     /// Requests the tiles that the tick needs, and stores those that are due.
     pub fn supply(&mut self, now: u32, contact: &Contact, output: &ContactOutput, hip: &GridPoint) {
-        let Supply::Pulled { latency } = self.supply else {
+        let Supply::OnDemand { latency } = self.supply else {
             return;
         };
         let focus = RequestHint {

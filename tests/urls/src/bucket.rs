@@ -51,7 +51,7 @@ pub(crate) enum Answer {
     /// The file at a path of the served folder.
     File(String),
     /// Another answer, as JSON.
-    Words(String),
+    Text(String),
 }
 
 /// The service that the server represents.
@@ -128,7 +128,7 @@ async fn answered<S: Service>(
         .answer(&parts, &String::from_utf8_lossy(&body));
     let (response, bytes) = match answer {
         Ok(Answer::File(path)) => served(&shared.service, path, parts, next).await,
-        Ok(Answer::Words(text)) => (Response::new(Body::from(text)), 0),
+        Ok(Answer::Text(text)) => (Response::new(Body::from(text)), 0),
         Err(refusal) => (refused(&shared.service, &refusal), 0),
     };
     let mut log = lock(&shared.log);
@@ -194,7 +194,7 @@ pub(crate) fn headers<const N: usize>(of: [(&'static str, &'static str); N]) -> 
 
 /// Returns the answer of a server to a key that it exchanges for a token.
 pub(crate) fn token(token: &str) -> Answer {
-    Answer::Words(format!(
+    Answer::Text(format!(
         r#"{{"access_token":"{token}","expires_in":3599,"token_type":"Bearer"}}"#
     ))
 }

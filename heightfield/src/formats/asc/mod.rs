@@ -20,7 +20,7 @@ use tokens::Tokens;
 pub(super) const FORMAT: Format = Format {
     name: "Esri ASCII",
     begins: is_header,
-    extensions: &[("asc", Claim::Decides), ("txt", Claim::Suggests)],
+    extensions: &[("asc", Claim::Certain), ("txt", Claim::Possible)],
     parts: Parts::One,
     decode: |input, _| decode(input),
 };

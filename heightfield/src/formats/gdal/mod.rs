@@ -288,7 +288,7 @@ fn decoded(
         bands,
         block: Some(block),
         overviews: overviews.map(|image| [image.columns, image.rows]).collect(),
-        samples_are: None,
+        raster_type: None,
     };
     let mut decoded = match conventions.is_turned {
         true => read(Transposed::new(blocks), &driver, options)?,

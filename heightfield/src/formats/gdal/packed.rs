@@ -135,7 +135,7 @@ fn only(
     entries: &[String],
     full: &dyn Fn(&str) -> PathBuf,
 ) -> Result<String, RasterError> {
-    let is_likely = |name: &&String| claim_of(name).is_some_and(|claim| claim != Claim::Suggests);
+    let is_likely = |name: &&String| claim_of(name).is_some_and(|claim| claim != Claim::Possible);
     let mut rasters: Vec<String> = entries.iter().filter(is_likely).cloned().collect();
     if rasters.is_empty() {
         let tried = entries.iter().take(MAX_TRIED);

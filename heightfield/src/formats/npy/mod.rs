@@ -14,7 +14,7 @@ use header::Header;
 pub(super) const FORMAT: Format = Format {
     name: "NumPy",
     begins: |head| head.starts_with(b"\x93NUMPY"),
-    extensions: &[("npy", Claim::Suggests)],
+    extensions: &[("npy", Claim::Possible)],
     parts: Parts::One,
     decode: |input, options| Array::in_file(input)?.heights(input, options),
 };

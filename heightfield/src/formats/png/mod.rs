@@ -17,7 +17,7 @@ use crate::{Endian, PngChannel, RasterError, Samples};
 pub(super) const FORMAT: Format = Format {
     name: "PNG",
     begins: |head| head.starts_with(b"\x89PNG\r\n\x1a\n"),
-    extensions: &[("png", Claim::Promises)],
+    extensions: &[("png", Claim::Expected)],
     parts: Parts::One,
     decode: |input, options| {
         let mut decoded = match options.encoding {

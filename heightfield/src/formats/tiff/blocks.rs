@@ -485,7 +485,7 @@ impl BlockReader for TiffBlocks {
         for (input, stamp) in self.inputs.as_ref()? {
             let is_same = input.stamp().as_ref() == Some(stamp);
             text += " ";
-            text += stamp.settled().filter(|_| is_same)?;
+            text += stamp.stable_text().filter(|_| is_same)?;
         }
         Some(text)
     }

@@ -10,7 +10,7 @@ use super::geo_keys::{GeoKeys, metres_of_code, numbers};
 use super::user_defined;
 use crate::crs::{self, ReferenceSystem};
 use crate::decoded::Decoded;
-use crate::file_layout::SamplesAre;
+use crate::file_layout::RasterType;
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 
@@ -42,7 +42,7 @@ pub(super) fn apply(
     let stated = stated.or_else(|| of_code(VERTICAL_UNITS).and_then(metres_of_code));
     decoded.set_vertical(system, stated);
     decoded.system = reference_system(&keys, by_gdal);
-    decoded.file_layout.samples_are = keys.samples_are();
+    decoded.file_layout.raster_type = keys.raster_type();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
         decoded.set_layout(map, keys.unit());
@@ -78,7 +78,7 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
         (_, &[east, north, ..], _) => ([0.0, east, 0.0], [0.0, 0.0, -north]),
         _ => return None,
     };
-    match keys.samples_are() == Some(SamplesAre::Points) {
+    match keys.raster_type() == Some(RasterType::Point) {
         true => GroundMap::from_centre(x, y),
         false => GroundMap::new(x, y),
     }

@@ -58,7 +58,7 @@ use remote_source::RemoteSource;
 pub(super) const FORMAT: Format = Format {
     name: "TIFF",
     begins: |head| starts_with_any(head, &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]),
-    extensions: &[("tif", Claim::Promises), ("tiff", Claim::Promises)],
+    extensions: &[("tif", Claim::Expected), ("tiff", Claim::Expected)],
     parts: Parts::Bands,
     decode,
 };
@@ -99,7 +99,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
         bands: bands.into(),
         block: Some(layout.chunk.into()),
         overviews: overview_sizes(&file, input)?,
-        samples_are: None,
+        raster_type: None,
     };
     let metadata = Metadata::read(full.ifd(), band, bands);
     let files: Vec<_> = once(input).chain(&mask_file).collect();
@@ -111,7 +111,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     for remark in storage_remarks {
         match remark {
             StorageRemark::Remark(remark) => decoded.remarks.push(remark),
-            StorageRemark::Whole(why) => decoded.memory_reason = Some(why),
+            StorageRemark::MemoryReason(why) => decoded.memory_reason = Some(why),
         }
     }
     if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
@@ -129,7 +129,7 @@ enum StorageRemark {
     /// A remark on how they are read.
     Remark(String),
     /// Reason why all are in memory.
-    Whole(String),
+    MemoryReason(String),
 }
 
 /// Returns the samples of the full image: left in the file if they are many and it allows that,
@@ -185,7 +185,7 @@ fn stored(
                 return Ok((blocks.into(), remarks));
             }
             Err(why) => {
-                storage_remarks = Some(StorageRemark::Whole(
+                storage_remarks = Some(StorageRemark::MemoryReason(
                     why + peak_memory_remark(&image.layout),
                 ))
             }

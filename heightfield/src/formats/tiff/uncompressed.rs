@@ -27,7 +27,7 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
     let stride = layout.texel_bytes() as usize;
     let first = layout.bytes_before(band);
     let count = u64::from(part.columns) * u64::from(part.rows);
-    let mut samples = stored.room(count)?;
+    let mut samples = stored.reserve(count)?;
     for row in part.row..part.row + part.rows {
         let row = Part {
             row,

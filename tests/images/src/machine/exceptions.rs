@@ -145,13 +145,13 @@ impl Machine {
                 let (register, shift) = BUS_FAULTS_PRIORITY;
                 let priority = (self.bus().read(register) >> shift & 0xF0) as i16;
                 if self.bus().read(on) & bit == 0 || self.priority() <= priority {
-                    self.load.set(Load::None);
+                    self.load.set(Load::Inactive);
                     return self.fault("bus fault");
                 }
                 self.enter(BUS_FAULT, priority);
             }
         }
-        self.load.set(Load::None);
+        self.load.set(Load::Inactive);
         None
     }
 }

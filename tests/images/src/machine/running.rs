@@ -77,7 +77,7 @@ impl Machine {
         self.watch_masks();
         let pc = self.register(RegisterARM::PC) | 1;
         let ended = self.core.emu_start(pc, EXC_RETURN, 0, self.slice);
-        if let Load::Of(address) = self.load.get() {
+        if let Load::Armed(address) = self.load.get() {
             return self.fail_load(address);
         }
         let pc = self.register(RegisterARM::PC);

@@ -148,7 +148,7 @@ pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, Raster
     let stride = layout.texel_bytes() as usize;
     let first = layout.bytes_before(band);
     let count = u64::from(layout.columns) * u64::from(layout.rows);
-    let mut samples = stored.room(count)?;
+    let mut samples = stored.reserve(count)?;
     for chunk in layout.chunks_of(band, &all) {
         let covers = chunk.covers;
         if chunk.bytes == 0 {
