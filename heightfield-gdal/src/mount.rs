@@ -187,7 +187,7 @@ impl Mounted {
             inner.extend(
                 neighbour.and_then(|neighbour| match neighbour.strip_prefix(&root) {
                     Some(absolute) => plain(absolute),
-                    None => plain(&format!("{folder}/{beside}")),
+                    None => plain(&format!("{folder}/{neighbour}")),
                 }),
             );
         }

@@ -248,7 +248,7 @@ mod tests {
         let remark = feet.other_unit().expect("said");
         assert!(
             remark.contains("0.3048006") && metres.other_unit().is_none(),
-            "{stated}"
+            "{remark}"
         );
         assert!(!metres.has_unit_of(&feet));
     }

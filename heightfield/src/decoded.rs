@@ -113,7 +113,7 @@ impl Decoded {
                 declared.filter(|declared| (declared / system.metres - 1.0).abs() > 1e-9)
             {
                 self.remarks.push(format!(
-                    "unit of heights: the file states units of {stated} m, and {}, which counts in units of {} m; the former is taken (--input height-unit=…)",
+                    "unit of heights: the file states units of {declared} m, and {}, which counts in units of {} m; the former is taken (--input height-unit=…)",
                     system.name, system.metres
                 ));
             }

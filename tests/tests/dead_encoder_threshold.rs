@@ -58,7 +58,7 @@ fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds:
                 ..Stands::default()
             };
         }
-        stands.check(plant.counts());
+        stands.look(plant.counts());
     }
     stands.most
 }

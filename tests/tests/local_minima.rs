@@ -143,7 +143,9 @@ fn proxy_displaced_from_its_minimum_is_detected() {
         [20.5, 20.25, ground.height_about(20.5, 20.25) - 0.5],
     ];
     let scene = Scene::new(ground, path, Execution::LockStep, Supply::Preloaded);
-    let seen = scene.render(&mut Buffers::default(), [0; 3], Supply::Preloaded, |_| Ok(()));
+    let seen = scene.render(&mut Buffers::default(), [0; 3], Supply::Preloaded, |_| {
+        Ok(())
+    });
     let honest = seen.expect("it settles")[1];
     assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
     for axis in 0..2 {
@@ -197,7 +199,12 @@ fn every_proxy_on_real_terrain_rests_at_a_closest_point() {
             let mut total = Found::default();
             for _ in 0..12 {
                 let path = hip_path::random(&terrain, &mut random, 1000);
-                let scene = Scene::new(terrain.clone(), path, Execution::LockStep, Supply::Preloaded);
+                let scene = Scene::new(
+                    terrain.clone(),
+                    path,
+                    Execution::LockStep,
+                    Supply::Preloaded,
+                );
                 let found = look(&scene, &mut Buffers::default());
                 let none = [&found.wrong, &found.disputed, &found.late]
                     .iter()

@@ -45,8 +45,8 @@ pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let folder = &path[..path.len() - name.len()];
     [
-        format!("{folder}{stem}.{extension}{rest}"),
-        format!("{path}.{extension}{rest}"),
+        format!("{folder}{stem}.{extension}{query}"),
+        format!("{path}.{extension}{query}"),
     ]
 }
 

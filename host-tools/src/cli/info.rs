@@ -20,7 +20,7 @@ use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
 use heightfield::printable_text::printable_json;
 use heightfield::without_key;
-use heightfield::{CellSize, CellUnit, Certainty, Fill, ReferenceSystem, RasterType};
+use heightfield::{CellSize, CellUnit, Certainty, Fill, RasterType, ReferenceSystem};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, reported};
 

@@ -105,7 +105,7 @@ fn all(request: &Request) -> ExitCode {
     );
     // Prints a few of each kind.
     let mut reported: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
-    for broken in &stats.broken {
+    for broken in &stats.failed {
         let times = reported.entry(&broken.invariant).or_default();
         *times += 1;
         if *times > MAX_SHOWN {
@@ -120,7 +120,7 @@ fn all(request: &Request) -> ExitCode {
             request.surface.option()
         );
     }
-    if stats.broken.is_empty() {
+    if stats.failed.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
@@ -140,7 +140,7 @@ fn live(stats: &LinkStats, elapsed: Duration, time: Duration) {
         time.as_secs(),
         stats.scenes,
         stats.ticks() as f64 / 1e6,
-        stats.broken.len()
+        stats.failed.len()
     );
     let _ = stderr().flush();
 }

@@ -63,7 +63,7 @@ impl TickChecks {
         }
     }
 
-    /// Checks the amplifiers' inputs in a tick in which the device received `sense`, with `zero` as
+    /// Checks the amplifiers' inputs in a tick in which the device received `inputs`, with `zero` as
     /// the counts of its zero pose.
     ///
     /// # Errors
@@ -76,10 +76,10 @@ impl TickChecks {
         truth: &Truth,
     ) -> Result<(), String> {
         self.outputs(drive, truth)?;
-        let told_unfit = inputs.hardware_failed || inputs.outputs_not_as_set;
-        let unsafe_input = !inputs.dead_man || inputs.emergency_stop || told_unfit;
+        let reported_unfit = inputs.hardware_failed || inputs.outputs_not_as_set;
+        let unsafe_input = !inputs.dead_man || inputs.emergency_stop || reported_unfit;
         if drive.enabled && unsafe_input {
-            return Err(format!("amplifiers on with {sense:?}"));
+            return Err(format!("amplifiers on with {inputs:?}"));
         }
         if drive.enabled {
             let reported = std::array::from_fn(|i| inputs.counts[i].wrapping_sub(zero[i]));

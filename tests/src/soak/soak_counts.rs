@@ -122,7 +122,7 @@ impl fmt::Display for LinkStats {
         let [repeated, shifted, window, turned] = self.total().metamorphic;
         writeln!(
             f,
-            "twins compared: {again} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
+            "twins compared: {repeated} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
         )?;
         on_materials(f, &self.total())?;
         for (invariant, scenes) in &self.by_invariant {
