@@ -41,8 +41,8 @@ globalThis.drawAt = (ms) => { const draw = globalThis.nextFrame; draw(ms); };
 """
 READY = """
 new Promise((done) => {
-  const look = () => (globalThis.nextFrame ? done(true) : setTimeout(look, 50));
-  look();
+  const check = () => (globalThis.nextFrame ? done(true) : setTimeout(check, 50));
+  check();
 })
 """
 

@@ -4,11 +4,11 @@ use hapterra_core::terrain::Window;
 
 use crate::baseline::{GodObject, Paper, Parry, Project, ProxyGraph, Start};
 use crate::grid::Grid;
-use crate::oracle::{self, Verdict};
+use crate::oracle::{self, Deviation};
 use crate::path::{self, Path};
 use crate::product::{self, Copy, Product, SIDE};
 use crate::stats::{interleave, part, quantiles, timing};
-use crate::variant::{Answer, Haptics};
+use crate::variant::{ContactResult, Haptics};
 
 /// Effort of a measurement.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct Effort {
     /// Times that every variant runs every path.
     pub rounds: usize,
     /// Most results of a path that are compared with the oracle.
-    pub judged: usize,
+    pub compared: usize,
 }
 
 impl Effort {
@@ -26,13 +26,13 @@ impl Effort {
     pub const FULL: Self = Self {
         ticks: 20_000,
         rounds: 15,
-        judged: 4000,
+        compared: 4000,
     };
     /// For a quick check.
     pub const QUICK: Self = Self {
         ticks: 4000,
         rounds: 5,
-        judged: 800,
+        compared: 800,
     };
 }
 
@@ -104,13 +104,13 @@ pub struct Error {
 impl Error {
     /// Computes the errors; `None` without results.
     #[must_use]
-    pub fn of(verdicts: &[Verdict]) -> Option<Self> {
-        if verdicts.is_empty() {
+    pub fn of(deviations: &[Deviation]) -> Option<Self> {
+        if deviations.is_empty() {
             return None;
         }
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let errors: Vec<f64> = verdicts.iter().map(|verdict| verdict.error).collect();
-        let angles: Vec<f64> = verdicts.iter().map(|verdict| verdict.angle).collect();
+        let errors: Vec<f64> = deviations.iter().map(|deviation| deviation.error).collect();
+        let angles: Vec<f64> = deviations.iter().map(|deviation| deviation.angle).collect();
         let (mean, angle_mean) = (mean(&errors), mean(&angles));
         let [p99, max] = quantiles(errors, [0.99, 1.0]);
         let [angle_p99] = quantiles(angles, [0.99]);
@@ -130,18 +130,18 @@ pub(crate) type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
 pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> Vec<Row> {
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(grid, &mut buffers);
-    let mut entries = ours(&window);
+    let mut entries = entries_of(&window);
     entries.extend(opponents(grid));
     let mut rows = Vec::new();
     for path in path::all(grid, effort.ticks) {
         progress(path.name);
-        rows.extend(along(grid, &path, &mut entries, effort));
+        rows.extend(compare_on_path(grid, &path, &mut entries, effort));
     }
     rows
 }
 
 /// The product's default.
-pub const SWEPT: Label = Label {
+pub const DEFAULT_VARIANT: Label = Label {
     name: "hapterra swept",
     family: Family::Ours,
     // 21 maxima a tile and 8 bytes of pyramid, over 32 × 32 samples.
@@ -149,8 +149,8 @@ pub const SWEPT: Label = Label {
 };
 
 /// Returns the product's variants on a stored field.
-pub(crate) fn ours<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
-    vec![(SWEPT, Box::new(Product::new(window)))]
+pub(crate) fn entries_of<'w, const D: usize>(window: &'w Window<'_, D>) -> Vec<Entry<'w>> {
+    vec![(DEFAULT_VARIANT, Box::new(Product::new(window)))]
 }
 
 pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
@@ -208,7 +208,12 @@ pub(crate) fn opponents(grid: &Grid) -> Vec<Entry<'_>> {
     labelled.into()
 }
 
-fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) -> Vec<Row> {
+fn compare_on_path(
+    grid: &Grid,
+    path: &Path,
+    entries: &mut [Entry<'_>],
+    effort: Effort,
+) -> Vec<Row> {
     let is_bound = |label: &Label| label.family == Family::Bound && path.name != "unmoved";
     let times = interleave(entries.len(), effort.rounds, |index| {
         let elapsed = entries[index].1.time(&path.hips);
@@ -220,7 +225,7 @@ fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) ->
         .iter_mut()
         .zip(&times)
         .map(|((label, variant), times)| {
-            let answers = variant.answers(&path.hips);
+            let results = variant.results(&path.hips);
             let (ns, ratio) = timing(times, &plain);
             Row {
                 terrain: grid.name.clone(),
@@ -228,37 +233,37 @@ fn along(grid: &Grid, path: &Path, entries: &mut [Entry<'_>], effort: Effort) ->
                 label: *label,
                 ns,
                 ratio,
-                error: error(grid, path, &answers, effort.judged),
-                jump: largest_jump(&answers[path.approach.saturating_sub(1)..]),
-                missed: missed(grid, path, &answers),
-                unconverged: part(answers.iter().map(|answer| !answer.converged)),
+                error: error(grid, path, &results, effort.compared),
+                jump: largest_jump(&results[path.approach.saturating_sub(1)..]),
+                missed: missed(grid, path, &results),
+                unconverged: part(results.iter().map(|result| !result.converged)),
             }
         });
     rows.filter(|row| !is_bound(&row.label)).collect()
 }
 
-fn error(grid: &Grid, path: &Path, answers: &[Answer], judged: usize) -> Option<Error> {
-    let every = answers.len().div_ceil(judged.max(1));
-    let verdicts = path
+fn error(grid: &Grid, path: &Path, results: &[ContactResult], compared: usize) -> Option<Error> {
+    let every = results.len().div_ceil(compared.max(1));
+    let deviations = path
         .hips
         .iter()
-        .zip(answers)
+        .zip(results)
         .step_by(every)
-        .filter(|(_, answer)| answer.touching)
-        .filter_map(|(hip, answer)| oracle::judge(grid, hip, answer));
-    Error::of(&verdicts.collect::<Vec<_>>())
+        .filter(|(_, result)| result.touching)
+        .filter_map(|(hip, result)| oracle::deviation(grid, hip, result));
+    Error::of(&deviations.collect::<Vec<_>>())
 }
 
-fn largest_jump(answers: &[Answer]) -> f64 {
-    let changes = answers.windows(2).map(|pair| pair[0].change(&pair[1]));
+fn largest_jump(results: &[ContactResult]) -> f64 {
+    let changes = results.windows(2).map(|pair| pair[0].change(&pair[1]));
     changes.fold(0.0, f64::max)
 }
 
 /// Returns the share of missed ticks: any HIP below the surface, after the first, has a force.
-fn missed(grid: &Grid, path: &Path, answers: &[Answer]) -> f64 {
-    let below = path.hips.iter().zip(answers).filter(|(hip, _)| {
+fn missed(grid: &Grid, path: &Path, results: &[ContactResult]) -> f64 {
+    let below = path.hips.iter().zip(results).filter(|(hip, _)| {
         let [x, y, z] = hip.wide;
         grid.height(x, y) - z > 1e-3
     });
-    part(below.map(|(_, answer)| !answer.touching))
+    part(below.map(|(_, result)| !result.touching))
 }

@@ -5,11 +5,11 @@ use hapterra_tests::invariants::descent;
 use hapterra_tests::invariants::surface::{Corners, Patch};
 
 use crate::grid::Grid;
-use crate::variant::{Answer, Hip};
+use crate::variant::{ContactResult, Hip};
 
 /// Errors of a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
+pub struct Deviation {
     /// Distance from the result's proxy to the exact closest point, cells.
     pub error: f64,
     /// Angle between the result's force and the exact one, degrees.
@@ -19,14 +19,14 @@ pub struct Verdict {
 /// Compares a result in contact with the local closest point at the end of a descent from it.
 /// `None` over the border of the field.
 #[must_use]
-pub fn judge(grid: &Grid, hip: &Hip, answer: &Answer) -> Option<Verdict> {
-    let displacement = answer.displacement.map(f64::from);
+pub fn deviation(grid: &Grid, hip: &Hip, result: &ContactResult) -> Option<Deviation> {
+    let displacement = result.displacement.map(f64::from);
     let proxy = [0, 1, 2].map(|i| hip.wide[i] + displacement[i]);
-    let verdict = |from: [f64; 2]| {
+    let deviation_from = |from: [f64; 2]| {
         let exact = closest(grid, &hip.wide, from)?;
         let off = [0, 1, 2].map(|i| proxy[i] - exact[i]);
         let force = [0, 1, 2].map(|i| exact[i] - hip.wide[i]);
-        Some(Verdict {
+        Some(Deviation {
             error: length(&off),
             angle: angle(&displacement, &force),
         })
@@ -34,7 +34,7 @@ pub fn judge(grid: &Grid, hip: &Hip, answer: &Answer) -> Option<Verdict> {
     let (xs, ys) = (sides(proxy[0]), sides(proxy[1]));
     let places = xs.iter().flat_map(|x| ys.iter().map(|y| [*x, *y]));
     places
-        .filter_map(verdict)
+        .filter_map(deviation_from)
         .min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
@@ -70,11 +70,11 @@ pub(crate) fn length(v: &[f64; 3]) -> f64 {
 }
 
 /// Forces below this, in cells of displacement, have no reliable direction.
-const LEAST_FORCE: f64 = 1e-3;
+const MIN_FORCE: f64 = 1e-3;
 
 /// Returns the angle between two forces, degrees.
 pub(crate) fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    if length(b) < LEAST_FORCE {
+    if length(b) < MIN_FORCE {
         return 0.0;
     }
     let cross = [0, 1, 2].map(|i| {
@@ -107,31 +107,35 @@ mod tests {
                 grid.height(from[0], from[1]) - random.between(0.0, 1.0),
             ];
             let exact = closest(&grid, &hip, from).expect("inside");
-            let far = |p: &[f64; 3]| length(&[0, 1, 2].map(|i| p[i] - hip[i]));
+            let distance = |p: &[f64; 3]| length(&[0, 1, 2].map(|i| p[i] - hip[i]));
             for i in 0..32 {
                 let turn = f64::from(i) / 32.0 * std::f64::consts::TAU;
                 let (x, y) = (exact[0] + 1e-5 * turn.cos(), exact[1] + 1e-5 * turn.sin());
                 if grid.has([x.floor() as i32, y.floor() as i32]) {
                     let near = [x, y, grid.height(x, y)];
-                    assert!(far(&near) > far(&exact) - 1e-12, "{hip:?} {exact:?}");
+                    assert!(
+                        distance(&near) > distance(&exact) - 1e-12,
+                        "{hip:?} {exact:?}"
+                    );
                 }
             }
         }
     }
 
     #[test]
-    fn oracle_measures_error_and_angle_of_an_answer() {
+    fn oracle_measures_error_and_angle_of_a_result() {
         let flat = Grid::from_fn("flat", [4, 4], |_, _| 2.0);
         let hip = Hip::at([1.5, 1.5, 1.75]);
-        let exact = judge(&flat, &hip, &Answer::touching([0.0, 0.0, 0.25]));
+        let exact = deviation(&flat, &hip, &ContactResult::touching([0.0, 0.0, 0.25]));
         assert_eq!(
             exact,
-            Some(Verdict {
+            Some(Deviation {
                 error: 0.0,
                 angle: 0.0
             })
         );
-        let off = judge(&flat, &hip, &Answer::touching([0.25, 0.0, 0.25])).expect("inside");
+        let off =
+            deviation(&flat, &hip, &ContactResult::touching([0.25, 0.0, 0.25])).expect("inside");
         assert!((off.error - 0.25).abs() < 1e-9 && (off.angle - 45.0).abs() < 1e-6);
     }
 }

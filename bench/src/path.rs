@@ -45,7 +45,7 @@ pub fn all(grid: &Grid, ticks: usize) -> Vec<Path> {
         ("sweep 500", 500.0),
         ("sweep 5000", 5000.0),
     ] {
-        paths.extend(sweeps(grid, name, length, ticks));
+        paths.extend(sweep(grid, name, length, ticks));
     }
     paths
 }
@@ -60,9 +60,9 @@ pub fn slide(grid: &Grid, name: &'static str, step: f64, ticks: usize) -> Path {
 #[must_use]
 pub fn slide_at(grid: &Grid, name: &'static str, [step, depth]: [f64; 2], ticks: usize) -> Path {
     let mut walk = Walk::new(grid, 11);
-    let mut hips = way_in(grid, walk.at, -depth);
+    let mut hips = approach_hips(grid, walk.at, -depth);
     let approach = hips.len();
-    hips.extend((0..ticks).map(|_| over(grid, walk.on(grid, step), -depth)));
+    hips.extend((0..ticks).map(|_| over(grid, walk.advance(grid, step), -depth)));
     Path::new(name, hips, approach)
 }
 
@@ -73,7 +73,7 @@ pub fn tapping(grid: &Grid, ticks: usize) -> Path {
     let mut hips = vec![over(grid, walk.at, 0.5)];
     hips.extend((0..ticks).map(|tick| {
         let phase = tick as f64 * (std::f64::consts::TAU / 100.0);
-        over(grid, walk.on(grid, 0.02), 0.5 * phase.cos())
+        over(grid, walk.advance(grid, 0.02), 0.5 * phase.cos())
     }));
     Path::new("tapping", hips, 0)
 }
@@ -90,7 +90,7 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
         height += walk.random.between(-0.3, 0.3);
         // Back from 1 cell above or below.
         height -= 2.0 * (height - height.clamp(-1.0, 1.0));
-        over(grid, walk.on(grid, step), height)
+        over(grid, walk.advance(grid, step), height)
     }));
     Path::new("random", hips, 0)
 }
@@ -99,7 +99,7 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
 #[must_use]
 pub fn resting(grid: &Grid, ticks: usize) -> Path {
     let walk = Walk::new(grid, 14);
-    let mut hips = way_in(grid, walk.at, -0.1);
+    let mut hips = approach_hips(grid, walk.at, -0.1);
     let approach = hips.len();
     let last = hips[approach - 1];
     hips.extend(std::iter::repeat_n(last, ticks));
@@ -122,7 +122,7 @@ pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> 
     let high = f64::from(grid.top()) + 2.0;
     let mut hips = Vec::with_capacity(ticks);
     while hips.len() < ticks {
-        let at = walk.on(grid, 0.5);
+        let at = walk.advance(grid, 0.5);
         hips.push(match flight {
             Flight::Low => over(grid, at, 1.0),
             Flight::High => Hip::at([at[0], at[1], high]),
@@ -134,18 +134,18 @@ pub fn flight(grid: &Grid, name: &'static str, flight: Flight, ticks: usize) -> 
 /// Returns sweeps of `length` cells in one tick each, there and back, half a cell above the highest
 /// point of their path, so that they hit nothing. `None` if the terrain is too small.
 #[must_use]
-pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Option<Path> {
-    const THERE_AND_BACK: usize = 4;
+pub fn sweep(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Option<Path> {
+    const SWEEPS_PER_LINE: usize = 4;
     let (width, height) = (grid.columns as f64, grid.rows as f64);
     if width.hypot(height) < length + 8.0 * MARGIN {
         return None;
     }
-    let ways = (2e5 / length) as usize;
-    let ways = ways.min(ticks / (2 * THERE_AND_BACK)).max(4);
+    let lines = (2e5 / length) as usize;
+    let lines = lines.min(ticks / (2 * SWEEPS_PER_LINE)).max(4);
     let mut random = Random(16);
     let sky = f64::from(grid.top()) + 2.0;
     let mut hips = Vec::new();
-    for _ in 0..ways {
+    for _ in 0..lines {
         let (from, to) = loop {
             let from = [
                 random.between(MARGIN, width - MARGIN),
@@ -162,7 +162,7 @@ pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Opt
         };
         let low = highest_between(grid, from, to) + 0.5;
         hips.push(Hip::at([from[0], from[1], sky]));
-        for _ in 0..THERE_AND_BACK {
+        for _ in 0..SWEEPS_PER_LINE {
             hips.push(Hip::at([from[0], from[1], low]));
             hips.push(Hip::at([to[0], to[1], low]));
         }
@@ -189,7 +189,7 @@ fn highest_between(grid: &Grid, from: [f64; 2], to: [f64; 2]) -> f64 {
 }
 
 /// Returns the descent from half a cell above the surface to `height`.
-pub(crate) fn way_in(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hip> {
+pub(crate) fn approach_hips(grid: &Grid, at: [f64; 2], height: f64) -> Vec<Hip> {
     (0..=10)
         .map(|i| over(grid, at, 0.5 + f64::from(i) / 10.0 * (height - 0.5)))
         .collect()
@@ -226,7 +226,7 @@ impl Walk {
         }
     }
 
-    fn on(&mut self, grid: &Grid, step: f64) -> [f64; 2] {
+    fn advance(&mut self, grid: &Grid, step: f64) -> [f64; 2] {
         self.heading += self.random.between(-0.05, 0.05);
         let next = [
             self.at[0] + step * self.heading.cos(),

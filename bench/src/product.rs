@@ -4,7 +4,7 @@ use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 /// Tiles along the window's side: enough for [`crate::grid::MAX_SIDE`], so that no variant waits
 /// for terrain.
@@ -88,14 +88,14 @@ impl<'w, 't, const D: usize> Product<'w, 't, D> {
 }
 
 impl<const D: usize> Haptics for Product<'_, '_, D> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.contact = Contact::new(ContactSettings::AT_1_KHZ);
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         let output = self.contact.step(self.window, &hip.grid);
-        Answer {
+        ContactResult {
             touching: output.state == ContactState::Touching,
             converged: output.converged,
             displacement: output.displacement.to_array(),
@@ -103,8 +103,8 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
     }
 
     /// For the oracle: the proxy itself, before any fade.
-    fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
-        self.forget();
+    fn results(&mut self, path: &[Hip]) -> Vec<ContactResult> {
+        self.reset();
         let step = |hip: &Hip| {
             let output = self.contact.step(self.window, &hip.grid);
             let touching = output.state == ContactState::Touching;
@@ -113,7 +113,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
             } else {
                 output.displacement
             };
-            Answer {
+            ContactResult {
                 touching,
                 converged: output.converged,
                 displacement: displacement.to_array(),
@@ -127,21 +127,21 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
 /// only for a HIP at rest.
 #[derive(Default)]
 pub struct Copy {
-    last: Option<(Hip, Answer)>,
+    last: Option<(Hip, ContactResult)>,
 }
 
 impl Haptics for Copy {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.last = None;
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         match &self.last {
-            Some((known, answer)) if known.grid == hip.grid => *answer,
+            Some((known, result)) if known.grid == hip.grid => *result,
             _ => {
-                self.last = Some((*hip, Answer::touching([0.0, 0.0, 0.1])));
-                Answer::FREE
+                self.last = Some((*hip, ContactResult::touching([0.0, 0.0, 0.1])));
+                ContactResult::FREE
             }
         }
     }

@@ -11,7 +11,7 @@ use crate::baseline::newton;
 use crate::clock::Stopwatch;
 use crate::compare::{Effort, Error, Family, Label, Row};
 use crate::grid::Grid;
-use crate::oracle::{self, Verdict};
+use crate::oracle::{self, Deviation};
 use crate::path::Random;
 use crate::stats::{interleave, timing};
 
@@ -39,12 +39,12 @@ impl Case {
         let single = |x: f64| f64::from(x as f32);
         let hip = [single(x), single(y), single(grid.height(x, y) - depth)];
         let turn = random.between(0.0, std::f64::consts::TAU);
-        let before = [
+        let previous = [
             hip[0] + 0.01 * turn.cos(),
             hip[1] + 0.01 * turn.sin(),
             hip[2],
         ];
-        let last = oracle::closest(&grid, &before, [x, y]).unwrap_or(hip);
+        let last = oracle::closest(&grid, &previous, [x, y]).unwrap_or(hip);
         Self {
             corners,
             hip,
@@ -53,7 +53,7 @@ impl Case {
         }
     }
 
-    fn ours(&self, start: (f32, f32)) -> (f64, f64) {
+    fn converge(&self, start: (f32, f32)) -> (f64, f64) {
         let z = self.hip[2] as f32;
         let patch = Patch::new(self.corners.map(|h| h - z));
         let hip = (self.hip[0] as f32, self.hip[1] as f32);
@@ -71,7 +71,7 @@ impl Case {
     }
 
     /// Returns the errors of a point compared with the local closest point below it.
-    fn judge(&self, (u, v): (f64, f64)) -> Option<Verdict> {
+    fn deviation(&self, (u, v): (f64, f64)) -> Option<Deviation> {
         // The upper borders belong to this patch, as there is no other.
         let inside = |x: f64| x.clamp(0.0, 1.0 - f64::EPSILON);
         let from = [inside(u), inside(v)];
@@ -83,7 +83,7 @@ impl Case {
         ];
         let force = [0, 1, 2].map(|i| exact[i] - self.hip[i]);
         let off = [0, 1, 2].map(|i| displacement[i] - force[i]);
-        Some(Verdict {
+        Some(Deviation {
             error: oracle::length(&off),
             angle: oracle::angle(&displacement, &force),
         })
@@ -112,10 +112,10 @@ const SOLVERS: [Solver<Case, (f64, f64)>; 11] = [
         case.newton_double(50)
     }),
     ("hapterra, from the centre", Family::Ours, |case| {
-        case.ours((0.5, 0.5))
+        case.converge((0.5, 0.5))
     }),
     ("hapterra, from the last", Family::Ours, |case| {
-        case.ours(case.last)
+        case.converge(case.last)
     }),
 ];
 
@@ -128,13 +128,13 @@ pub fn patches(effort: Effort) -> Vec<Row> {
             .map(|_| Case::random(&mut random, slope))
             .collect();
         let terrain = format!("one patch, slope {slope}");
-        let (first, rest) = cases.split_at(effort.judged.min(CASES));
+        let (first, rest) = cases.split_at(effort.compared.min(CASES));
         measure(
             (&terrain, "closest"),
             &SOLVERS,
             [first, rest],
             effort,
-            Case::judge,
+            Case::deviation,
         )
     };
     SLOPES.into_iter().flat_map(rows).collect()
@@ -144,13 +144,13 @@ pub fn patches(effort: Effort) -> Vec<Row> {
 fn measure<Case, Found>(
     (terrain, path): (&str, &'static str),
     solvers: &[Solver<Case, Found>],
-    [judged, rest]: [&[Case]; 2],
+    [compared, rest]: [&[Case]; 2],
     effort: Effort,
-    judge: impl Fn(&Case, Found) -> Option<Verdict>,
+    deviation: impl Fn(&Case, Found) -> Option<Deviation>,
 ) -> Vec<Row> {
     let times = interleave(solvers.len(), effort.rounds, |index| {
         let watch = Stopwatch::start();
-        for case in judged.iter().chain(rest) {
+        for case in compared.iter().chain(rest) {
             black_box(solvers[index].2(black_box(case)));
         }
         watch.elapsed().as_secs_f64() * 1e9 / CASES as f64
@@ -159,7 +159,9 @@ fn measure<Case, Found>(
         .iter()
         .zip(&times)
         .map(|((name, family, solve), own)| {
-            let verdicts = judged.iter().filter_map(|case| judge(case, solve(case)));
+            let deviations = compared
+                .iter()
+                .filter_map(|case| deviation(case, solve(case)));
             let (ns, ratio) = timing(own, &times[0]);
             Row {
                 terrain: terrain.to_owned(),
@@ -171,7 +173,7 @@ fn measure<Case, Found>(
                 },
                 ns,
                 ratio,
-                error: Error::of(&verdicts.collect::<Vec<_>>()),
+                error: Error::of(&deviations.collect::<Vec<_>>()),
                 jump: 0.0,
                 missed: 0.0,
                 unconverged: 0.0,
@@ -213,13 +215,13 @@ pub fn roots(effort: Effort) -> Vec<Row> {
         [-random.between(0.0, 1.0), middle, random.between(0.0, 1.0)].map(|x| x as f32)
     };
     let gaps: Vec<Gap> = (0..CASES).map(|_| gap()).collect();
-    let judge = |gap: &Gap, found: f32| {
+    let deviation = |gap: &Gap, found: f32| {
         let exact = root(gap.map(f64::from), f64::sqrt);
-        Some(Verdict {
+        Some(Deviation {
             error: (f64::from(found) - exact).abs(),
             angle: 0.0,
         })
     };
     let place = ("ray quadratic", "square root");
-    measure(place, &ROOTS, [&gaps, &[]], effort, judge)
+    measure(place, &ROOTS, [&gaps, &[]], effort, deviation)
 }

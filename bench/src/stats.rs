@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn every_variant_is_first_in_turn() {
+    fn variants_take_turns_at_being_first() {
         let mut order = Vec::new();
         let measured = interleave(3, 3, |index| {
             order.push(index);

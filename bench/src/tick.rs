@@ -8,16 +8,16 @@ use std::process::ExitCode;
 
 use hapterra_lab::product::{self, Product};
 use hapterra_lab::tick_states::{STATES, terrain};
-use hapterra_lab::variant::{Answer, Haptics, Hip};
+use hapterra_lab::variant::{ContactResult, Haptics, Hip};
 
 /// Tiles along the window's side, as on a device.
 const SIDE: usize = 8;
 
 fn main() -> ExitCode {
-    let wanted = std::env::args().nth(1).unwrap_or_default();
-    let Some((_, make)) = STATES.iter().find(|(name, _)| *name == wanted) else {
+    let requested = std::env::args().nth(1).unwrap_or_default();
+    let Some((_, make)) = STATES.iter().find(|(name, _)| *name == requested) else {
         let names = STATES.map(|(name, _)| format!("{name:?}")).join(", ");
-        eprintln!("error: no state is called {wanted:?}\nhint: name one of {names}");
+        eprintln!("error: no state is called {requested:?}\nhint: name one of {names}");
         return ExitCode::FAILURE;
     };
     let grid = terrain();
@@ -39,6 +39,6 @@ fn main() -> ExitCode {
 
 /// Runs one tick; callgrind counts this function by its name.
 #[inline(never)]
-fn counted_tick(product: &mut Product<'_, '_, SIDE>, hip: &Hip) -> Answer {
+fn counted_tick(product: &mut Product<'_, '_, SIDE>, hip: &Hip) -> ContactResult {
     product.tick(hip)
 }

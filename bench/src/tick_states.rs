@@ -36,7 +36,7 @@ pub const STATES: [(&str, Make); 8] = [
     }),
     ("resting", resting),
     ("sweep 50, miss", |grid| {
-        last(path::sweeps(grid, "", 50.0, TICKS).expect("50 cells fit"))
+        last(path::sweep(grid, "", 50.0, TICKS).expect("50 cells fit"))
     }),
 ];
 

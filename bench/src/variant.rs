@@ -38,7 +38,7 @@ impl Hip {
 
 /// Result of a variant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Answer {
+pub struct ContactResult {
     /// True if there is a force.
     pub touching: bool,
     /// True if all work for this HIP was done.
@@ -47,7 +47,7 @@ pub struct Answer {
     pub displacement: [f32; 3],
 }
 
-impl Answer {
+impl ContactResult {
     /// The result without a force.
     pub const FREE: Self = Self {
         touching: false,
@@ -66,7 +66,7 @@ impl Answer {
     }
 }
 
-impl Answer {
+impl ContactResult {
     /// Returns the change from this displacement to another, cells.
     #[must_use]
     pub fn change(&self, other: &Self) -> f64 {
@@ -78,14 +78,14 @@ impl Answer {
 /// A method of rendering a height field: the product's or another.
 pub trait Haptics {
     /// Clears all state of earlier ticks.
-    fn forget(&mut self);
+    fn reset(&mut self);
 
     /// Runs one tick.
-    fn tick(&mut self, hip: &Hip) -> Answer;
+    fn tick(&mut self, hip: &Hip) -> ContactResult;
 
     /// Returns the time for a whole path, with cleared state.
     fn time(&mut self, path: &[Hip]) -> Duration {
-        self.forget();
+        self.reset();
         let watch = Stopwatch::start();
         for hip in path {
             black_box(self.tick(black_box(hip)));
@@ -94,8 +94,8 @@ pub trait Haptics {
     }
 
     /// Returns the results along a path, with cleared state.
-    fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
-        self.forget();
+    fn results(&mut self, path: &[Hip]) -> Vec<ContactResult> {
+        self.reset();
         path.iter().map(|hip| self.tick(hip)).collect()
     }
 }

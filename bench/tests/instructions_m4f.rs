@@ -18,8 +18,8 @@ fn tick_instruction_counts_do_not_exceed_the_stored_table() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
-    let wanted = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
-    let scenes = if wanted.is_empty() {
+    let requested = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
+    let scenes = if requested.is_empty() {
         soak::PART
     } else {
         soak::ALL
@@ -30,9 +30,9 @@ fn tick_instruction_counts_do_not_exceed_the_stored_table() {
     rows.extend(soak::rows(&board, scenes));
     println!("{}", Row::TITLES);
     rows.iter().for_each(|row| println!("{row}"));
-    if wanted == "write" {
+    if requested == "write" {
         return Table::write(&rows);
     }
-    let worse = Table::kept().worse(&rows);
-    assert!(worse.is_empty(), "{}", worse.join("\n"));
+    let regressions = Table::recorded().regressions(&rows);
+    assert!(regressions.is_empty(), "{}", regressions.join("\n"));
 }

@@ -28,13 +28,16 @@ const TABLE: &str =
 /// Compares a page with the generated text, or writes it.
 fn check(page: &str, text: &str) {
     let path = repository().join("docs/reference").join(page);
-    if std::env::var_os("HAPTERRA_DOCS").is_some_and(|wanted| wanted == "write") {
+    if std::env::var_os("HAPTERRA_DOCS").is_some_and(|requested| requested == "write") {
         std::fs::write(&path, text).expect("written");
     }
-    let kept = read(page);
-    let first = kept.lines().zip(text.lines()).find(|(old, new)| old != new);
+    let recorded = read(page);
+    let first = recorded
+        .lines()
+        .zip(text.lines())
+        .find(|(old, new)| old != new);
     assert!(
-        kept == text,
+        recorded == text,
         "docs/reference/{page} is old: type cargo xtask docs --write. First: {first:#?}"
     );
 }
@@ -65,7 +68,7 @@ fn sentence(text: &str) -> String {
     format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
-fn shown(text: Option<&StyledStr>) -> String {
+fn plain_text(text: Option<&StyledStr>) -> String {
     text.map(ToString::to_string).unwrap_or_default()
 }
 
@@ -73,7 +76,7 @@ fn shown(text: Option<&StyledStr>) -> String {
 fn about(arg: &Arg) -> String {
     let short = arg.get_short().map(|short| format!("-{short}, "));
     let short = short.unwrap_or_default();
-    let mut text = format!("`{short}{arg}`: {}", sentence(&shown(arg.get_help())));
+    let mut text = format!("`{short}{arg}`: {}", sentence(&plain_text(arg.get_help())));
     let takes_value = arg.get_action().takes_values();
     let values = arg.get_possible_values();
     let values = values
@@ -115,19 +118,19 @@ fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTre
         page,
         "\n## {program} {}\n\n{}\n\n",
         command.get_name(),
-        sentence(&shown(command.get_about()))
+        sentence(&plain_text(command.get_about()))
     );
     let arguments = own(command);
     let (mut first, mut then): (Vec<&Arg>, Vec<&Arg>) =
         arguments.into_iter().partition(|arg| arg.is_positional());
     first.append(&mut then);
-    let (elsewhere, here): (Vec<&Arg>, Vec<&Arg>) =
+    let (documented, here): (Vec<&Arg>, Vec<&Arg>) =
         { first.into_iter() }.partition(|arg| shared.contains(&about(arg)));
     for arg in here {
         item(page, &about(arg));
     }
-    if !elsewhere.is_empty() {
-        let names: Vec<_> = elsewhere.iter().map(|arg| format!("`{arg}`")).collect();
+    if !documented.is_empty() {
+        let names: Vec<_> = documented.iter().map(|arg| format!("`{arg}`")).collect();
         let link = "[Of several commands](#options-of-several-commands)";
         item(page, &format!("{link}: {}.", names.join(", ")));
     }

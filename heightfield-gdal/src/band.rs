@@ -287,7 +287,7 @@ impl<'d> Band<'d> {
         let _call = Call::begin();
         let functions = &self.loaded.functions;
         // SAFETY: the buffer has space for the window's samples of that type, without gaps.
-        let stated = unsafe {
+        let status = unsafe {
             (functions.CPLErrorReset)();
             (functions.GDALRasterIO)(
                 self.handle,
@@ -304,7 +304,7 @@ impl<'d> Band<'d> {
                 0,
             )
         };
-        match stated <= WARNING {
+        match status <= WARNING {
             true => Ok(()),
             false => Err(self.loaded.refused("the samples cannot be read")),
         }

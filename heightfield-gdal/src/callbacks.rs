@@ -67,7 +67,7 @@ fn caught<T>(otherwise: T, call: impl FnOnce() -> Option<T>) -> T {
 ///
 /// # Safety
 /// `name` is null or a text that is valid during the call.
-unsafe fn asked(name: *const c_char) -> Option<(Arc<Mounted>, String)> {
+unsafe fn parse_name(name: *const c_char) -> Option<(Arc<Mounted>, String)> {
     // SAFETY: guaranteed by the caller. GDAL omits the prefix.
     let name = format!("{PREFIX}{}", unsafe { from_c(name) }?);
     let (mounted, name) = at(&name)?;
@@ -81,12 +81,12 @@ unsafe extern "C" fn open(
 ) -> *mut c_void {
     caught(ptr::null_mut(), || {
         // SAFETY: GDAL's texts, which are valid during the call.
-        let ((mounted, name), access) = unsafe { (asked(name)?, from_c(access)?) };
+        let ((mounted, name), access) = unsafe { (parse_name(name)?, from_c(access)?) };
         if access.contains(['w', 'a', '+']) {
             return None;
         }
         let Some(file) = mounted.open(&name) else {
-            say_missing();
+            set_not_found();
             return None;
         };
         Some(Box::into_raw(Box::new(OpenFile {
@@ -100,7 +100,7 @@ unsafe extern "C" fn open(
 }
 
 /// Sets the error number from which GDAL makes its message for a failed opening.
-fn say_missing() {
+fn set_not_found() {
     // SAFETY: the pointer is to this thread's own error number.
     #[cfg(target_os = "linux")]
     unsafe {
@@ -116,7 +116,7 @@ fn say_missing() {
 unsafe extern "C" fn stat(_: *mut c_void, name: *const c_char, stat: *mut Stat, _: c_int) -> c_int {
     caught(FAILED, || {
         // SAFETY: GDAL's text, and its structure, which is zeroed.
-        let ((mounted, name), stat) = unsafe { (asked(name)?, stat.as_mut()?) };
+        let ((mounted, name), stat) = unsafe { (parse_name(name)?, stat.as_mut()?) };
         let bytes = mounted.open(&name)?.bytes();
         stat.st_mode = libc::S_IFREG as _;
         stat.st_size = bytes.try_into().ok()?;
@@ -129,11 +129,11 @@ unsafe extern "C" fn stat(_: *mut c_void, name: *const c_char, stat: *mut Stat, 
 unsafe extern "C" fn sibling_files(_: *mut c_void, name: *const c_char) -> *mut *mut c_char {
     caught(ptr::null_mut(), || {
         // SAFETY: GDAL's text.
-        let (mounted, name) = unsafe { asked(name)? };
+        let (mounted, name) = unsafe { parse_name(name)? };
         let own = name.rsplit('/').next().map(str::to_owned);
-        let beside = mounted.beside(&name)?;
+        let neighbours = mounted.neighbours(&name)?;
         let mut list = ptr::null_mut();
-        for name in own.into_iter().chain(beside) {
+        for name in own.into_iter().chain(neighbours) {
             let name = to_c(&name).ok()?;
             // SAFETY: the text is valid during the call, which copies it.
             list = unsafe { (mounted.library().functions.CSLAddString)(list, name.as_ptr()) };
@@ -182,14 +182,15 @@ unsafe extern "C" fn read(
     caught(0, || {
         // SAFETY: GDAL has it open.
         let file = unsafe { opened(file)? };
-        let wanted = size.checked_mul(count).filter(|wanted| *wanted > 0)?;
-        let left = file.file.bytes().saturating_sub(file.at);
-        let bytes = usize::try_from(left).map_or(wanted, |left| wanted.min(left));
+        let requested = size.checked_mul(count).filter(|requested| *requested > 0)?;
+        let remaining = file.file.bytes().saturating_sub(file.at);
+        let bytes =
+            usize::try_from(remaining).map_or(requested, |remaining| requested.min(remaining));
         let read = file.mounted.read_at(&*file.file, file.at, bytes)?;
         // SAFETY: GDAL's buffer has space for all requested bytes, and `read` has no more.
         unsafe { ptr::copy_nonoverlapping(read.as_ptr(), buffer.cast(), bytes) };
         file.at += bytes as u64;
-        file.is_at_end = bytes < wanted;
+        file.is_at_end = bytes < requested;
         Some(bytes / size)
     })
 }

@@ -21,7 +21,7 @@ const ARRAYS: u32 = 0x10;
 const FINE: i32 = 0;
 
 /// Open options of all drivers.
-const OF_ALL: [&str; 1] = ["OVERVIEW_LEVEL"];
+const COMMON_OPEN_OPTIONS: [&str; 1] = ["OVERVIEW_LEVEL"];
 
 /// An open raster, closed on drop.
 pub struct Dataset {
@@ -82,21 +82,23 @@ impl Dataset {
             self.loaded.metadata(driver, "DMD_OPENOPTIONLIST", None)?
         };
         let list = list.unwrap_or_default().replace('"', "'");
-        let known = list.split("name='").skip(1);
-        let known: Vec<_> = known.filter_map(|rest| rest.split('\'').next()).collect();
+        let available = list.split("name='").skip(1);
+        let available: Vec<_> = available
+            .filter_map(|rest| rest.split('\'').next())
+            .collect();
         for option in options {
             let option = option.to_string_lossy();
             let name = option.split('=').next().unwrap_or_default();
-            let is_known = |known: &str| known.eq_ignore_ascii_case(name);
-            if !OF_ALL
+            let is_same = |available: &str| available.eq_ignore_ascii_case(name);
+            if !COMMON_OPEN_OPTIONS
                 .into_iter()
-                .chain(known.iter().copied())
-                .any(is_known)
+                .chain(available.iter().copied())
+                .any(is_same)
             {
                 return Err(Error::OpenOption {
                     name: name.to_owned(),
                     driver: self.driver(),
-                    known: known.join(", "),
+                    available: available.join(", "),
                 });
             }
         }
@@ -179,8 +181,8 @@ impl Dataset {
     /// [`Error::NoSuchPart`].
     pub fn band(&self, number: u32) -> Result<Band<'_>, Error> {
         let no_such = || Error::NoSuchPart {
-            asked: format!("band {number}"),
-            there: match self.bands() {
+            requested: format!("band {number}"),
+            available: match self.bands() {
                 0 => "the file holds no band of its own".to_owned(),
                 1 => "the file has band 1 alone".to_owned(),
                 bands => format!("the file has bands 1 to {bands}"),
@@ -201,10 +203,10 @@ impl Dataset {
     pub fn geo_transform(&self) -> Option<[f64; 6]> {
         let mut numbers = [0.0; 6];
         // SAFETY: the array has space for six numbers.
-        let stated = unsafe {
+        let status = unsafe {
             (self.loaded.functions.GDALGetGeoTransform)(self.handle, numbers.as_mut_ptr())
         };
-        (stated == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
+        (status == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
     }
 
     /// Returns the reference system as GDAL's WKT.

@@ -50,25 +50,25 @@ pub enum Error {
         seconds: u64,
     },
     /// An open option that the driver does not support.
-    #[error("GDAL's driver {driver} has no open option {name} (it has: {known})")]
+    #[error("GDAL's driver {driver} has no open option {name} (it has: {available})")]
     OpenOption {
         /// The option.
         name: String,
         /// The driver.
         driver: String,
         /// The options that it supports.
-        known: String,
+        available: String,
     },
     /// A text for GDAL that contains a zero byte.
     #[error("{0:?} contains a zero byte, which GDAL's interface cannot carry")]
     ZeroByte(String),
     /// A part that the raster does not have.
-    #[error("there is no {asked}: {there}")]
+    #[error("there is no {requested}: {available}")]
     NoSuchPart {
         /// The request.
-        asked: String,
+        requested: String,
         /// The available ones.
-        there: String,
+        available: String,
     },
     /// A window or a buffer of the wrong size.
     #[error("a window of {window:?} does not fit: {why}")]

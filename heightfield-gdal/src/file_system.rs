@@ -22,7 +22,7 @@ pub trait FileSystem: Send + Sync {
     ///
     /// # Errors
     /// The reason why they are unknown.
-    fn beside(&self, name: &str) -> io::Result<Vec<String>>;
+    fn neighbours(&self, name: &str) -> io::Result<Vec<String>>;
 
     /// Returns prefixes of absolute names, as `https://host/`, by which a VRT may reference these
     /// files. A prefix that contains another comes before it.

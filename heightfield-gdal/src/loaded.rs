@@ -84,15 +84,15 @@ impl Loaded {
     /// Returns an error with GDAL's last message on this thread.
     pub(crate) fn refused(&self, otherwise: &str) -> Error {
         // SAFETY: the text is valid until the next call on this thread, and is copied.
-        let stated = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
-        let stated = stated.unwrap_or_else(|| otherwise.to_owned());
+        let message = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
+        let message = message.unwrap_or_else(|| otherwise.to_owned());
         // The text may quote the file, and must not control a terminal.
         let plain = |c: char| match c {
             '\n' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
             c => c,
         };
-        Error::Refused(stated.trim().chars().map(plain).collect())
+        Error::Refused(message.trim().chars().map(plain).collect())
     }
 
     /// Returns an item of the metadata of a dataset or band.

@@ -33,7 +33,7 @@ struct State {
     depths: HashMap<String, u32>,
     /// Number of threads that are waiting for a file, and the start of the first wait.
     waiting: u32,
-    begun: Option<Instant>,
+    wait_start: Option<Instant>,
     /// Total time in which GDAL has waited for files.
     waited: Duration,
 }
@@ -108,21 +108,24 @@ impl Mounted {
     /// Returns the total time in which GDAL has waited for files, including current waits.
     pub(crate) fn waited(&self) -> Duration {
         let state = self.state();
-        state.waited + state.begun.map_or(Duration::ZERO, |begun| begun.elapsed())
+        state.waited
+            + state
+                .wait_start
+                .map_or(Duration::ZERO, |wait_start| wait_start.elapsed())
     }
 
     /// Runs a read, and records its time and its error.
     fn read<T>(&self, read: impl FnOnce() -> io::Result<T>) -> Option<T> {
         let mut state = self.state();
         state.waiting += 1;
-        state.begun.get_or_insert_with(Instant::now);
+        state.wait_start.get_or_insert_with(Instant::now);
         drop(state);
         let read = read();
         let mut state = self.state();
         state.waiting -= 1;
         if state.waiting == 0 {
-            let begun = state.begun.take();
-            state.waited += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
+            let wait_start = state.wait_start.take();
+            state.waited += wait_start.map_or(Duration::ZERO, |wait_start| wait_start.elapsed());
         }
         match read {
             Ok(read) => return Some(read),
@@ -180,11 +183,13 @@ impl Mounted {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         let mut inner = Vec::new();
         for named in &named {
-            let beside = named.at_server(&root).map_err(refused)?;
-            inner.extend(beside.and_then(|beside| match beside.strip_prefix(&root) {
-                Some(absolute) => plain(absolute),
-                None => plain(&format!("{folder}/{beside}")),
-            }));
+            let neighbour = named.at_server(&root).map_err(refused)?;
+            inner.extend(
+                neighbour.and_then(|neighbour| match neighbour.strip_prefix(&root) {
+                    Some(absolute) => plain(absolute),
+                    None => plain(&format!("{folder}/{neighbour}")),
+                }),
+            );
         }
         let mut state = self.state();
         for name in inner.into_iter().take(vrt::MAX_FILES) {
@@ -194,9 +199,9 @@ impl Mounted {
     }
 
     /// Returns the names of the files beside a file, if they are known.
-    pub(crate) fn beside(&self, name: &str) -> Option<Vec<String>> {
+    pub(crate) fn neighbours(&self, name: &str) -> Option<Vec<String>> {
         let name = plain(name)?;
-        self.read(|| self.files.beside(&name))
+        self.read(|| self.files.neighbours(&name))
     }
 
     /// Reads bytes of an open file.

@@ -9,9 +9,9 @@ const SIGN: &[u8] = b"<MRF_META";
 /// Max size of a header, bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 20;
 /// Elements with names of files beside the header.
-const BESIDE: [&str; 2] = ["DataFile", "IndexFile"];
+const NEIGHBOUR_KEYS: [&str; 2] = ["DataFile", "IndexFile"];
 /// The element with another raster, which GDAL copies.
-const COPIED: &str = "Source";
+const COPIED_KEY: &str = "Source";
 
 /// Returns true if a file's first bytes are an MRF's.
 pub(crate) fn begins(head: &[u8]) -> bool {
@@ -36,8 +36,8 @@ pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>
             names.any(|name| named.node.eq_ignore_ascii_case(name))
         };
         let name = named.value.trim();
-        let leads_away = is_any_of(&BESIDE) && !is_beside(name);
-        if leads_away || is_any_of(&[COPIED]) {
+        let leaves_folder = is_any_of(&NEIGHBOUR_KEYS) && !is_neighbour(name);
+        if leaves_folder || is_any_of(&[COPIED_KEY]) {
             return Ok(Err(format!(
                 "it names {name}, which need not lie beside it: get both files, and open the MRF here"
             )));
@@ -47,7 +47,7 @@ pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>
 }
 
 /// Returns true if a name is neither absolute nor outside the MRF's folder.
-fn is_beside(name: &str) -> bool {
+fn is_neighbour(name: &str) -> bool {
     let mut parts = name.split(['/', '\\']);
     !name.contains(':') && parts.all(|part| !part.is_empty() && !part.starts_with('.'))
 }
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_beside_a_file_are_plain() {
+    fn neighbour_names_are_plain() {
         for (name, is_it) in [
             ("hills.dat", true),
             ("data/hills.v2.dat", true),
@@ -71,7 +71,7 @@ mod tests {
             ("http://h/hills.dat", false),
             ("", false),
         ] {
-            assert_eq!(is_beside(name), is_it, "{name}");
+            assert_eq!(is_neighbour(name), is_it, "{name}");
         }
     }
 }

@@ -14,21 +14,21 @@ use crate::pending_calls::Call;
 
 /// Time limit for opening, without GDAL's waits for files from the caller. A VRT of 26,000 files
 /// opens within a second.
-const OPEN_WITHIN: Duration = Duration::from_secs(6);
+const OPEN_TIMEOUT: Duration = Duration::from_secs(6);
 /// Max time of waits that is not counted: a single request takes less.
-const WAIT_WITHIN: Duration = Duration::from_secs(120);
+const MAX_SERVER_WAIT: Duration = Duration::from_secs(120);
 /// Interval between checks of the time.
-const LOOK: Duration = Duration::from_millis(50);
+const MIN_POLL: Duration = Duration::from_millis(50);
 
 /// Opens a raster in its own thread, which is abandoned if it does not end.
 ///
 /// # Errors
 /// As [`Dataset::open`]; [`Error::Slow`].
 pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
-    let begun = Instant::now();
+    let started = Instant::now();
     let slow = || Error::Slow {
         path: path.to_owned(),
-        seconds: begun.elapsed().as_secs(),
+        seconds: started.elapsed().as_secs(),
     };
     let (send, opened) = sync_channel(1);
     let (loaded, own) = (loaded.clone(), path.to_owned());
@@ -48,10 +48,10 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
         let waited = files
             .as_ref()
             .map_or(Duration::ZERO, |files| files.waited());
-        let left = left(begun.elapsed(), waited);
-        match opened.recv_timeout(left.max(LOOK)) {
+        let remaining = remaining(started.elapsed(), waited);
+        match opened.recv_timeout(remaining.max(MIN_POLL)) {
             Ok(opened) => return opened,
-            Err(RecvTimeoutError::Timeout) if !left.is_zero() => {}
+            Err(RecvTimeoutError::Timeout) if !remaining.is_zero() => {}
             Err(_) => break,
         }
     }
@@ -59,8 +59,8 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
 }
 
 /// Returns the time left for opening; `waited` is the time of waits for the caller.
-fn left(elapsed: Duration, waited: Duration) -> Duration {
-    (OPEN_WITHIN + waited.min(WAIT_WITHIN)).saturating_sub(elapsed)
+fn remaining(elapsed: Duration, waited: Duration) -> Duration {
+    (OPEN_TIMEOUT + waited.min(MAX_SERVER_WAIT)).saturating_sub(elapsed)
 }
 
 #[cfg(test)]
@@ -68,11 +68,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waiting_for_a_server_is_not_counted_but_it_ends() {
+    fn server_wait_is_not_counted_but_bounded() {
         let [zero, second] = [0, 1].map(Duration::from_secs);
-        assert_eq!(left(zero, zero), OPEN_WITHIN);
-        assert_eq!(left(OPEN_WITHIN, zero), zero);
-        assert_eq!(left(60 * second, 58 * second), OPEN_WITHIN - 2 * second);
-        assert_eq!(left(OPEN_WITHIN + WAIT_WITHIN, 2 * WAIT_WITHIN), zero);
+        assert_eq!(remaining(zero, zero), OPEN_TIMEOUT);
+        assert_eq!(remaining(OPEN_TIMEOUT, zero), zero);
+        assert_eq!(
+            remaining(60 * second, 58 * second),
+            OPEN_TIMEOUT - 2 * second
+        );
+        assert_eq!(
+            remaining(OPEN_TIMEOUT + MAX_SERVER_WAIT, 2 * MAX_SERVER_WAIT),
+            zero
+        );
     }
 }

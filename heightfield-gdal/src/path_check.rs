@@ -18,7 +18,7 @@ use crate::xml::Text;
 pub(crate) fn check(library: &Loaded, path: &Path) -> Result<(), Error> {
     let names = Names {
         library,
-        seen: HashSet::new(),
+        visited: HashSet::new(),
     };
     check_kind(path)?;
     check_siblings(path)?;
@@ -28,7 +28,7 @@ pub(crate) fn check(library: &Loaded, path: &Path) -> Result<(), Error> {
 /// A traversal of the files that VRTs reference.
 struct Names<'l> {
     library: &'l Loaded,
-    seen: HashSet<PathBuf>,
+    visited: HashSet<PathBuf>,
 }
 
 impl Names<'_> {
@@ -59,15 +59,15 @@ impl Names<'_> {
         for part in named.parts() {
             for name in [part, part.trim_start_matches('/')] {
                 for path in [folder.join(name), PathBuf::from(name)] {
-                    if self.seen.contains(&path) || fs::metadata(&path).is_err() {
+                    if self.visited.contains(&path) || fs::metadata(&path).is_err() {
                         continue;
                     }
                     check_kind(&path)?;
-                    if self.seen.len() >= vrt::MAX_FILES {
+                    if self.visited.len() >= vrt::MAX_FILES {
                         let why = format!("more than {} files are named", vrt::MAX_FILES);
                         return refused(&path, &why);
                     }
-                    self.seen.insert(path.clone());
+                    self.visited.insert(path.clone());
                     found.push(path);
                 }
             }
@@ -87,8 +87,8 @@ fn text_of_vrt(path: &Path) -> Result<Option<String>, Error> {
     {
         return Ok(None);
     }
-    let rest = vrt::MAX_BYTES + 1 - bytes.len() as u64;
-    if !is_read(file.take(rest).read_to_end(&mut bytes)) {
+    let limit = vrt::MAX_BYTES + 1 - bytes.len() as u64;
+    if !is_read(file.take(limit).read_to_end(&mut bytes)) {
         return Ok(None);
     }
     match bytes.len() as u64 > vrt::MAX_BYTES {
@@ -114,9 +114,9 @@ fn check_siblings(path: &Path) -> Result<(), Error> {
     for entry in entries.flatten() {
         let other = entry.path();
         let is_regular = entry.file_type().is_ok_and(|kind| kind.is_file());
-        let behind = stem(&other).strip_prefix(&own).map(str::to_owned);
+        let suffix = stem(&other).strip_prefix(&own).map(str::to_owned);
         let belongs =
-            behind.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_', '-']));
+            suffix.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_', '-']));
         if !is_regular && belongs {
             check_kind(&other)?;
         }

@@ -12,7 +12,7 @@ const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI
                        PostGISRaster GeoRaster";
 
 /// Setting for the URLs that GDAL may fetch, by their endings.
-const FETCHED: &str = "CPL_VSIL_CURL_ALLOWED_EXTENSIONS";
+const FETCHED_EXTENSIONS: &str = "CPL_VSIL_CURL_ALLOWED_EXTENSIONS";
 
 /// Settings of GDAL. They apply to the whole process: those of the first load are used.
 ///
@@ -42,7 +42,7 @@ impl Default for Settings {
 
 /// Returns true if the user's environment defines which URLs may be fetched.
 pub(crate) fn is_fetching_allowed() -> bool {
-    std::env::var_os(FETCHED).is_some()
+    std::env::var_os(FETCHED_EXTENSIONS).is_some()
 }
 
 impl Settings {
@@ -50,7 +50,7 @@ impl Settings {
     pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
         // The number is random, so no URL ends like this.
         let number = RandomState::new().build_hasher().finish();
-        let nothing = format!(".nothing-is-fetched-{number:016x}");
+        let unused = format!(".nothing-is-fetched-{number:016x}");
         let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
         let mut options = vec![
             ("GDAL_CACHEMAX", cache.as_str()),
@@ -61,7 +61,7 @@ impl Settings {
             ("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO"),
         ];
         if !is_fetching_allowed() {
-            options.push((FETCHED, nothing.as_str()));
+            options.push((FETCHED_EXTENSIONS, unused.as_str()));
         }
         for (name, value) in options {
             let (name, value) = (to_c(name)?, to_c(value)?);

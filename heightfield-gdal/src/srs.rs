@@ -11,7 +11,7 @@ use crate::text::{from_c, to_c};
 /// `OGRERR_NONE`.
 const FINE: c_int = 0;
 /// Min confidence, percent, at which a match counts as the same system.
-const SURE: c_int = 90;
+const MIN_CONFIDENCE: c_int = 90;
 
 /// A horizontal reference system, as described by PROJ.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,16 +69,16 @@ impl SpatialReference {
         let mut at = text.as_ptr().cast_mut();
         // SAFETY: GDAL advances the pointer past the text that it has read, and does not write to
         // it.
-        let said = unsafe { (loaded.functions.OSRImportFromWkt)(system.handle, &raw mut at) };
-        system.read(said)
+        let status = unsafe { (loaded.functions.OSRImportFromWkt)(system.handle, &raw mut at) };
+        system.read(status)
     }
 
     /// Creates a system from its code.
     pub(crate) fn of_epsg(loaded: &Loaded, code: u16) -> Result<Self, Error> {
         let system = Owned::new(loaded)?;
         // SAFETY: the system was made above.
-        let said = unsafe { (loaded.functions.OSRImportFromEPSG)(system.handle, code.into()) };
-        system.read(said)
+        let status = unsafe { (loaded.functions.OSRImportFromEPSG)(system.handle, code.into()) };
+        system.read(status)
     }
 }
 
@@ -95,7 +95,7 @@ impl<'l> Owned<'l> {
         }
     }
 
-    fn read(&self, said: c_int) -> Result<SpatialReference, Error> {
+    fn read(&self, status: c_int) -> Result<SpatialReference, Error> {
         let functions = &self.loaded.functions;
         let handle = self.handle;
         let refused = || {
@@ -111,7 +111,7 @@ impl<'l> Owned<'l> {
             ]
         };
         let unit = match kind {
-            _ if said != FINE => return Err(refused()),
+            _ if status != FINE => return Err(refused()),
             [0, 0] => return Err(refused()),
             // SAFETY: as above.
             [0, _] => {
@@ -122,14 +122,14 @@ impl<'l> Owned<'l> {
                 (functions.OSRGetAngularUnits)(handle, ptr::null_mut())
             }),
         };
-        let mut said = FINE;
+        let mut status = FINE;
         let mut to_wgs84 = [0.0; 7];
         // SAFETY: as above; the name is copied.
         let (name, major, inverse, meridian, shift) = unsafe {
             (
                 from_c((functions.OSRGetName)(handle)),
-                (functions.OSRGetSemiMajor)(handle, &raw mut said),
-                (functions.OSRGetInvFlattening)(handle, &raw mut said),
+                (functions.OSRGetSemiMajor)(handle, &raw mut status),
+                (functions.OSRGetInvFlattening)(handle, &raw mut status),
                 (functions.OSRGetPrimeMeridian)(handle, ptr::null_mut()),
                 (functions.OSRGetTOWGS84)(handle, to_wgs84.as_mut_ptr(), 7),
             )
@@ -172,27 +172,27 @@ impl<'l> Owned<'l> {
         let mut text: *mut c_char = ptr::null_mut();
         // SAFETY: GDAL returns a text, which is copied and freed.
         unsafe {
-            let said = (functions.OSRExportToProj4)(self.handle, &raw mut text);
+            let status = (functions.OSRExportToProj4)(self.handle, &raw mut text);
             let copy = from_c(text);
             (functions.VSIFree)(text.cast());
-            copy.filter(|_| said == FINE)
+            copy.filter(|_| status == FINE)
         }
     }
 
     /// Returns EPSG's code as stated, or the code of a single certain match.
     fn epsg(&self) -> Option<u32> {
-        self.stated(ptr::null()).or_else(|| self.matching())
+        self.code_of(ptr::null()).or_else(|| self.matching())
     }
 
     /// Returns the code of the datum's geographic system: for datum codes in EPSG's oldest range,
     /// the code less 2000.
     fn usual_base(&self) -> Option<u32> {
-        let datum = self.stated(c"DATUM".as_ptr())?;
+        let datum = self.code_of(c"DATUM".as_ptr())?;
         (6000..7000).contains(&datum).then(|| datum - 2000)
     }
 
     /// Returns the stated EPSG code of a part, or of the system itself (null).
-    fn stated(&self, part: *const c_char) -> Option<u32> {
+    fn code_of(&self, part: *const c_char) -> Option<u32> {
         let functions = &self.loaded.functions;
         // SAFETY: the part is null or a valid text; texts are copied.
         let (authority, code) = unsafe {
@@ -221,10 +221,10 @@ impl<'l> Owned<'l> {
             // SAFETY: both lists have `count` entries; the system belongs to the list and is not
             // dropped.
             unsafe {
-                if *sureness.add(at) >= SURE {
+                if *sureness.add(at) >= MIN_CONFIDENCE {
                     let handle = *found.add(at);
                     let one = std::mem::ManuallyDrop::new(Owned { handle, ..*self });
-                    codes.extend(one.stated(ptr::null()));
+                    codes.extend(one.code_of(ptr::null()));
                 }
             }
         }

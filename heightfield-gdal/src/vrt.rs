@@ -85,8 +85,8 @@ impl Text {
 
     /// Returns the parts that may be file names.
     pub(crate) fn parts(&self) -> impl Iterator<Item = &str> {
-        let whole = self.value.as_str();
-        let parts = whole.split(DIVIDERS).chain([whole]);
+        let value = self.value.as_str();
+        let parts = value.split(DIVIDERS).chain([value]);
         parts.filter(|part| !part.is_empty())
     }
 
@@ -119,12 +119,12 @@ impl Text {
             return Ok(Some(value));
         }
         self.check_here()?;
-        let is_beside = self.is_relative && !value.starts_with(['/', '\\']);
+        let is_neighbour = self.is_relative && !value.starts_with(['/', '\\']);
         let is_here = |part: &str| {
             let is_absolute = part.starts_with(['/', '\\']) || Path::new(part).is_absolute();
-            (is_absolute || !is_beside) && fs::metadata(part).is_ok()
+            (is_absolute || !is_neighbour) && fs::metadata(part).is_ok()
         };
-        if self.is_file_name() && !is_beside || self.parts().any(is_here) {
+        if self.is_file_name() && !is_neighbour || self.parts().any(is_here) {
             return Err(format!(
                 "it names {} on this computer: name what lies beside it (relativeToVRT=\"1\")",
                 self.shown()

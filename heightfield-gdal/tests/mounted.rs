@@ -45,12 +45,12 @@ impl FileSystem for Files {
         Ok(Box::new(Bytes(file.clone())))
     }
 
-    fn beside(&self, name: &str) -> io::Result<Vec<String>> {
+    fn neighbours(&self, name: &str) -> io::Result<Vec<String>> {
         let header = name.replace(".dat", ".hdr");
         let own = name.rsplit('/').next().unwrap_or_default();
-        let beside = header.rsplit('/').next().unwrap_or_default().to_owned();
-        let is_there = beside != own && self.by_name.contains_key(&header);
-        Ok(is_there.then_some(beside).into_iter().collect())
+        let header_name = header.rsplit('/').next().unwrap_or_default().to_owned();
+        let is_there = header_name != own && self.by_name.contains_key(&header);
+        Ok(is_there.then_some(header_name).into_iter().collect())
     }
 
     fn roots(&self) -> &[String] {
@@ -114,7 +114,7 @@ fn last(gdal: &Library, name: &str) -> Result<f64, Error> {
 }
 
 #[test]
-fn files_and_those_beside_them_are_read_by_name() {
+fn files_and_their_neighbours_are_read_by_name() {
     let vrts = [
         ("a/beside.vrt", vrt("./b/../west.dat", true)),
         ("a/by_root.vrt", vrt("http://h/a/east.dat", false)),
@@ -204,7 +204,7 @@ fn index() -> Vec<u8> {
 }
 
 #[test]
-fn an_mrf_names_files_beside_it_only() {
+fn mrf_may_name_only_its_neighbours() {
     let folder = tempfile::tempdir().expect("a folder");
     let [samples, _] = field(0);
     let (data, idx) = (folder.path().join("x.dat"), folder.path().join("x.idx"));
@@ -256,7 +256,7 @@ fn an_mrf_names_files_beside_it_only() {
 }
 
 #[test]
-fn vrts_in_each_other_end() {
+fn circular_vrts_end_at_the_nesting_limit() {
     let number = |at: u32| format!("a/{at}.vrt");
     let vrts: Vec<_> = (0..40)
         .map(|at| (number(at), vrt(&format!("{}.vrt", (at + 1) % 40), true)))
@@ -298,13 +298,16 @@ fn unreadable_file_is_a_fault_but_missing_file_is_not() {
     for name in ["../a/west.dat", "", "a/", "a/../../x.dat", "panic.dat"] {
         assert!(last(&gdal, &mount.path(name)).is_err(), "{name}");
     }
-    let gone = mount.path("a/west.dat");
+    let unmounted = mount.path("a/west.dat");
     drop(mount);
-    assert!(last(&gdal, &gone).is_err(), "nothing is mounted any more");
+    assert!(
+        last(&gdal, &unmounted).is_err(),
+        "nothing is mounted any more"
+    );
 }
 
 #[test]
-fn a_dataset_keeps_its_files_and_reports_what_they_lack() {
+fn dataset_keeps_its_files_after_its_mount_is_dropped() {
     let Some((gdal, mount, _)) = mounted(&[]) else {
         return;
     };

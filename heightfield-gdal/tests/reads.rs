@@ -23,7 +23,7 @@ fn write(folder: &Path) -> std::path::PathBuf {
 }
 
 #[test]
-fn samples_and_what_they_mean_are_read() {
+fn samples_and_their_metadata_are_read() {
     let Some(gdal) = gdal() else { return };
     assert!(gdal.version() >= Version::OLDEST, "{gdal:?}");
     assert!(gdal.drivers().iter().any(|driver| driver.name == "ENVI"));
@@ -46,7 +46,7 @@ fn samples_and_what_they_mean_are_read() {
 }
 
 #[test]
-fn a_dataset_is_used_on_another_thread() {
+fn dataset_can_be_used_on_another_thread() {
     let Some(gdal) = gdal() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let dataset = gdal.open(&write(folder.path()), &[]).expect("opened");
@@ -55,7 +55,7 @@ fn a_dataset_is_used_on_another_thread() {
 }
 
 #[test]
-fn windows_and_buffers_that_do_not_fit_are_refused() {
+fn windows_and_buffers_of_wrong_size_are_refused() {
     let Some(gdal) = gdal() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let dataset = gdal.open(&write(folder.path()), &[]).expect("opened");
@@ -67,8 +67,8 @@ fn windows_and_buffers_that_do_not_fit_are_refused() {
             columns,
             rows,
         };
-        let stated = Band::read(&band, window, &mut vec![0_u8; room]);
-        assert!(matches!(stated, Err(Error::Window { .. })), "{stated:?}");
+        let result = Band::read(&band, window, &mut vec![0_u8; room]);
+        assert!(matches!(result, Err(Error::Window { .. })), "{result:?}");
     };
     refused([0, 0, 4, 3], 11);
     refused([0, 0, 4, 3], 13);

@@ -19,7 +19,7 @@ mod wkt;
 use super::globe::Globe;
 pub(super) use datum::Datum;
 pub use datum::LonLat;
-pub(crate) use definition::{vertical, vertical_beside};
+pub(crate) use definition::{vertical, vertical_of_compound};
 pub use system::ReferenceSystem;
 pub(super) use unit::Unit;
 use wkt::Node;
@@ -39,7 +39,7 @@ pub(super) struct Vertical {
 
 impl Vertical {
     /// Reads the vertical system in a text, beside a horizontal system.
-    fn beside(root: &Node) -> Option<Self> {
+    fn of_compound(root: &Node) -> Option<Self> {
         let node = root.child(&["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"])?;
         Self::of(node)
     }
@@ -84,7 +84,7 @@ mod tests {
 
     /// Against PROJ's own scale factors (`proj -S`).
     #[test]
-    fn a_unit_of_the_map_is_as_long_as_it_is_on_the_ground() {
+    fn map_unit_has_its_length_on_the_ground() {
         let cases = [
             (26911, (386_000.0, 3_790_000.0), 1.000_240),
             (2056, (2_600_000.0, 1_200_000.0), 0.999_992),
@@ -92,12 +92,12 @@ mod tests {
             // NAD27 needs no shift grid for that.
             (26711, (386_000.0, 3_790_000.0), 1.000_240),
         ];
-        for (code, place, wanted) in cases {
+        for (code, place, expected) in cases {
             let system = ReferenceSystem::from_code(code).expect("known");
             let tangents = system.tangents(place).expect("in reach");
             for lead in [tangents.x, tangents.y] {
                 let length = lead.iter().map(|part| part * part).sum::<f64>().sqrt();
-                assert!((length / wanted - 1.0).abs() < 1e-3, "{code}: {length}");
+                assert!((length / expected - 1.0).abs() < 1e-3, "{code}: {length}");
             }
             assert_eq!(system.tangents((1e12, 1e12)), None);
         }
@@ -105,7 +105,7 @@ mod tests {
 
     /// Against PROJ 9 (pyproj, to the system's own `geodetic_crs`).
     #[test]
-    fn places_on_the_globe_and_back() {
+    fn positions_round_trip_through_longitude_and_latitude() {
         let cases = [
             (26911, (386000.0, 3790000.0), (-118.237991257, 34.244866903)),
             (2056, (2650000.0, 1180000.0), (8.094280924, 46.770599962)),
@@ -131,23 +131,25 @@ mod tests {
             (2193, (1600000.0, 5400000.0), (173.000000000, -41.551664523)),
             (3577, (900000.0, -3600000.0), (141.682619704, -32.702404944)),
         ];
-        for (code, place, wanted) in cases {
+        for (code, place, expected) in cases {
             let by_code = ReferenceSystem::from_code(code).expect("known");
             let wkt = crs_definitions::from_code(code).expect("known").wkt;
             let (by_text, _) = ReferenceSystem::from_wkt(wkt);
             assert_eq!(Some(&by_code), by_text.as_ref(), "the text names its code");
             let found = by_code.own_degrees(place).expect("in reach");
-            let off = (found.0 - wanted.0).abs().max((found.1 - wanted.1).abs());
-            assert!(off < 1e-7, "{code}: {found:?} for {wanted:?}");
+            let error = (found.0 - expected.0)
+                .abs()
+                .max((found.1 - expected.1).abs());
+            assert!(error < 1e-7, "{code}: {found:?} for {expected:?}");
             let found = by_code.to_lonlat(place).expect("in reach");
             let back = by_code.from_lonlat(found).expect("in reach");
-            let off = (back.0 - place.0).abs().max((back.1 - place.1).abs());
-            assert!(off < 1e-2, "{code}: {back:?} for {place:?}");
+            let error = (back.0 - place.0).abs().max((back.1 - place.1).abs());
+            assert!(error < 1e-2, "{code}: {back:?} for {place:?}");
         }
     }
 
     #[test]
-    fn angles_of_a_text_may_be_grads() {
+    fn wkt_angles_may_be_grads() {
         let text = r#"GEOGCS["old Paris",DATUM["NTF",SPHEROID["Clarke 1880 (IGN)",6378249.2,293.4660212936269]],PRIMEM["Greenwich",0],UNIT["grad",0.01570796326794897]]"#;
         let (system, _) = ReferenceSystem::from_wkt(text);
         let place = system
@@ -161,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_without_a_code_has_its_own_numbers() {
+    fn wkt_without_a_code_uses_its_own_parameters() {
         if !lonlat_tests::has_libgdal() {
             return;
         }
@@ -198,7 +200,7 @@ mod tests {
     /// Against PROJ 9.5 (pyproj), from the datum's own degrees, by `tests/data/epsg_places.py`: a place
     /// of every twentieth projected system.
     #[test]
-    fn codes_are_where_proj_has_them() {
+    fn codes_have_the_positions_of_proj() {
         let places = include_str!("crs/places.txt").lines().skip(1);
         let mut unplaced = vec![];
         for line in places {
@@ -215,8 +217,8 @@ mod tests {
                 continue;
             };
             let east = (found.0 - longitude) * latitude.to_radians().cos();
-            let off_m = 111_000.0 * east.hypot(found.1 - latitude);
-            assert!(off_m < 1.0, "{code}: {off_m} m off");
+            let error_m = 111_000.0 * east.hypot(found.1 - latitude);
+            assert!(error_m < 1.0, "{code}: {error_m} m off");
         }
         // Two urban grids of Colombia, whose projection no other system uses.
         assert_eq!(unplaced, [6255.0, 6275.0]);
@@ -224,7 +226,7 @@ mod tests {
 
     /// A unit beside a code overrides the code's unit, in a text as in keys.
     #[test]
-    fn unit_of_a_text_counts_beside_its_code() {
+    fn wkt_unit_has_priority_over_its_code() {
         let text = |unit: &str| {
             format!(r#"PROJCS["here",GEOGCS["NAD83"],{unit},AUTHORITY["EPSG","26945"]]"#)
         };
@@ -243,10 +245,10 @@ mod tests {
             (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9,
             "{a:?} {b:?}"
         );
-        let stated = feet.other_unit().expect("said");
+        let remark = feet.other_unit().expect("said");
         assert!(
-            stated.contains("0.3048006") && metres.other_unit().is_none(),
-            "{stated}"
+            remark.contains("0.3048006") && metres.other_unit().is_none(),
+            "{remark}"
         );
         assert!(!metres.has_unit_of(&feet));
     }

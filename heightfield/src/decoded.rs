@@ -51,7 +51,7 @@ pub(super) struct Decoded {
     /// Zero of the heights, if the file states it.
     pub(super) vertical_datum: Option<VerticalDatum>,
     /// Reason why all samples are in memory, if the format could have left them in the file.
-    pub(super) why_whole: Option<String>,
+    pub(super) memory_reason: Option<String>,
     /// The samples' layout in the file.
     pub(super) file_layout: FileLayout,
     /// Remarks for the user.
@@ -96,7 +96,7 @@ impl Decoded {
             metres_per_vertical_unit: None,
             vertical_unit_from: Certainty::Stated,
             vertical_datum: None,
-            why_whole: None,
+            memory_reason: None,
             file_layout: FileLayout::default(),
             remarks: Vec::new(),
         }
@@ -106,18 +106,18 @@ impl Decoded {
 impl Decoded {
     /// Sets unit, datum and direction from a vertical reference system; `stated` is the number of
     /// metres in a unit, if the file states it.
-    pub(super) fn set_vertical(&mut self, system: Option<Vertical>, stated: Option<f64>) {
-        self.metres_per_vertical_unit = stated.or(system.as_ref().map(|system| system.metres));
+    pub(super) fn set_vertical(&mut self, system: Option<Vertical>, declared: Option<f64>) {
+        self.metres_per_vertical_unit = declared.or(system.as_ref().map(|system| system.metres));
         if let Some(system) = system {
-            if let Some(stated) =
-                stated.filter(|stated| (stated / system.metres - 1.0).abs() > 1e-9)
+            if let Some(declared) =
+                declared.filter(|declared| (declared / system.metres - 1.0).abs() > 1e-9)
             {
                 self.remarks.push(format!(
-                    "unit of heights: the file states units of {stated} m, and {}, which counts in units of {} m; the former is taken (--input height-unit=…)",
+                    "unit of heights: the file states units of {declared} m, and {}, which counts in units of {} m; the former is taken (--input height-unit=…)",
                     system.name, system.metres
                 ));
             }
-            if stated.is_none() && system.code.is_some() {
+            if declared.is_none() && system.code.is_some() {
                 self.vertical_unit_from = Certainty::FromCode;
             }
             if system.is_depth {
@@ -161,12 +161,12 @@ impl Decoded {
 
     /// Adds a remark if more samples are in memory than would be for a file that is read in
     /// windows.
-    pub(super) fn tell_if_whole(&mut self, max_bytes: u64) {
-        if let Storage::Held { samples, .. } = &self.storage
+    pub(super) fn remark_if_in_memory(&mut self, max_bytes: u64) {
+        if let Storage::Memory { samples, .. } = &self.storage
             && samples.bytes() as u64 > max_bytes
         {
             let megabytes = samples.bytes() / 1_000_000;
-            let why = self.why_whole.as_deref();
+            let why = self.memory_reason.as_deref();
             let why = why.unwrap_or("its format has no windows, or too large ones");
             let remark = format!(
                 "it is read as a whole, {megabytes} MB: {why}. As this it stays on the disk: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE IN OUT.tif"
@@ -197,7 +197,7 @@ impl Decoded {
         if columns < 2 || rows < 2 {
             return Err(RasterError::TooSmall { columns, rows });
         }
-        if let Some(samples) = self.storage.held()
+        if let Some(samples) = self.storage.in_memory()
             && columns.checked_mul(rows) != u64::try_from(samples.len()).ok()
         {
             return Err(RasterError::damaged(format!(
@@ -211,33 +211,34 @@ impl Decoded {
                 self.scale, self.offset
             )));
         }
-        self.settle_no_data(no_data);
+        self.resolve_no_data(no_data);
         self.cell = self.cell.filter(CellSize::is_valid);
         self.storage.set_order(self.south_up, self.east_first);
-        let mut seen = RefCell::new(Outermost::NONE);
+        let mut outermost = RefCell::new(Outermost::NONE);
         let survey = match &self.storage {
-            Storage::Held { .. } => Survey::of_all(self.summarise(seen.get_mut())),
+            Storage::Memory { .. } => Survey::of_all(self.summarise(outermost.get_mut())),
             Storage::Blocks(blocks) => {
-                let survey = blocks.survey(|stored| self.counted(stored, &mut seen.borrow_mut()));
+                let survey =
+                    blocks.survey(|stored| self.counted(stored, &mut outermost.borrow_mut()));
                 if let Some(outage) = blocks.take_outage() {
                     return Err(outage);
                 }
                 survey
             }
         };
-        let doubts = seen.into_inner().remarks(self.no_data.is_some());
-        self.remarks.extend(doubts);
+        let suspicions = outermost.into_inner().remarks(self.no_data.is_some());
+        self.remarks.extend(suspicions);
         match survey.summary.has_none() {
             true => Err(RasterError::AllNoData {
                 // Some samples were read twice.
-                samples: survey.summary.holes.min(columns * rows),
+                samples: survey.summary.no_data.min(columns * rows),
             }),
             false => Ok(survey),
         }
     }
 
     /// Sets the no-data value to `no_data`, or else to the file's, as the sample type stores it.
-    pub(super) fn settle_no_data(&mut self, no_data: Option<f64>) {
+    pub(super) fn resolve_no_data(&mut self, no_data: Option<f64>) {
         self.no_data = no_data
             .or(self.no_data)
             .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
@@ -257,25 +258,25 @@ impl Decoded {
         stored.map_or(f64::NAN, |stored| self.height_of(stored))
     }
 
-    /// As `height_in_file`, and counts the value in `seen`.
-    fn counted(&self, stored: Option<f64>, seen: &mut Outermost) -> f64 {
+    /// As `height_in_file`, and counts the value in `outermost`.
+    fn counted(&self, stored: Option<f64>, outermost: &mut Outermost) -> f64 {
         if let Some(stored) = stored.filter(|stored| self.no_data != Some(*stored)) {
-            seen.add(stored);
+            outermost.add(stored);
         }
         self.height_in_file(stored)
     }
 
     /// Computes range and number of no-data samples in one pass over the samples in memory.
-    fn summarise(&self, seen: &mut Outermost) -> HeightSummary {
+    fn summarise(&self, outermost: &mut Outermost) -> HeightSummary {
         let mut summary = HeightSummary::EMPTY;
-        let Storage::Held { samples, mask } = &self.storage else {
+        let Storage::Memory { samples, mask } = &self.storage else {
             return summary;
         };
-        let hole = |index| mask.as_ref().is_some_and(|mask| mask.contains(index));
+        let is_no_data = |index| mask.as_ref().is_some_and(|mask| mask.contains(index));
         with_samples!(samples, values => {
             for (index, value) in values.iter().enumerate() {
-                let stored = (!hole(index)).then(|| value.widen());
-                summary.add(self.counted(stored, seen));
+                let stored = (!is_no_data(index)).then(|| value.widen());
+                summary.add(self.counted(stored, outermost));
             }
         });
         summary

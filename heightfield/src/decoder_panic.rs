@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_panic_in_a_decoder_is_an_error() {
+    fn panic_in_a_decoder_is_an_error() {
         let outcome: Result<(), RasterError> = guarded("test", || panic!("index out of range"));
         assert!(matches!(outcome, Err(RasterError::DecoderFailed("test"))));
         assert!(!GUARDED.get());

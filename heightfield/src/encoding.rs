@@ -43,7 +43,7 @@ pub(super) fn no_codes(what: &str) -> RasterError {
 
 impl Decoded {
     /// Interprets the samples as codes of heights. Code 0 is below all ground, so it is no-data.
-    pub(super) fn take_codes(&mut self, encoding: Encoding) {
+    pub(super) fn decode_as_codes(&mut self, encoding: Encoding) {
         (self.offset, self.scale) = encoding.metres();
         self.no_data = Some(0.0);
         self.metres_per_vertical_unit = Some(1.0);

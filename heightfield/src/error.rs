@@ -48,7 +48,7 @@ pub enum RasterError {
     UnknownFormat,
     /// GDAL reads the format, but libgdal is missing.
     #[error("{format} is read through GDAL: {why}")]
-    WantsGdal {
+    NeedsGdal {
         /// Name of the format.
         format: &'static str,
         /// Reason why GDAL is not available.
@@ -91,16 +91,16 @@ pub enum RasterError {
         bands: u16,
     },
     /// The user chose a band or variable that is not there.
-    #[error("there is no {asked}: {there}")]
+    #[error("there is no {requested}: {available}")]
     NoSuchPart {
         /// The request.
-        asked: String,
+        requested: String,
         /// The available parts.
-        there: String,
+        available: String,
     },
     /// The user gave a cell size, but the file states another.
     #[error("the file states its own cell size: {0}")]
-    CellKnown(String),
+    CellSizeStated(String),
     /// A colour picture that looks as if its colours encoded heights.
     #[error("not a height field as it is: a colour picture that looks like {}", match .0 {
         Encoding::TerrainRgb => "Terrain-RGB heights",
@@ -142,7 +142,7 @@ pub enum RasterError {
     NoTiles(String),
     /// STAC items in which no asset, or more than one, could be the heights.
     #[error("no terrain: {why} (assets: {})", names.join(", "))]
-    WhichAsset {
+    AmbiguousAssets {
         /// The item, and its fault.
         why: String,
         /// Names of all its assets, or of those that could be the heights.
@@ -150,7 +150,7 @@ pub enum RasterError {
     },
     /// STAC items that GDAL cannot open as a terrain, though it can open their files.
     #[error("no terrain: {why}")]
-    ToBuild {
+    NeedsVrt {
         /// The fault.
         why: String,
         /// The files, by GDAL's names.
@@ -221,10 +221,10 @@ impl RasterError {
     }
 
     /// Returns true if a retry may succeed: the error says nothing about the file's samples.
-    pub(super) fn is_of_the_line(&self) -> bool {
+    pub(super) fn is_connection_error(&self) -> bool {
         match self {
             Self::Remote(error) => !is_missing(error),
-            Self::InTile { fault, .. } => fault.is_of_the_line(),
+            Self::InTile { fault, .. } => fault.is_connection_error(),
             _ => false,
         }
     }

@@ -10,16 +10,16 @@ pub struct FileLayout {
     /// Columns and rows of the overviews, the finest first.
     pub overviews: Vec<[u32; 2]>,
     /// The meaning of a sample, if the file states it.
-    pub samples_are: Option<SamplesAre>,
+    pub raster_type: Option<RasterType>,
 }
 
 /// The meaning of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SamplesAre {
+pub enum RasterType {
     /// The area of its cell.
-    Areas,
+    Area,
     /// The point in the middle of its cell.
-    Points,
+    Point,
 }
 
 impl Default for FileLayout {
@@ -28,7 +28,7 @@ impl Default for FileLayout {
             bands: 1,
             block: None,
             overviews: Vec::new(),
-            samples_are: None,
+            raster_type: None,
         }
     }
 }

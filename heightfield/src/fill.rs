@@ -64,13 +64,13 @@ impl Fill {
                     true => at[axis].checked_add(distance),
                     false => at[axis].checked_sub(distance),
                 };
-                let mut there = at;
-                there[axis] = index.filter(|index| *index < size[axis])?;
-                Some(there)
+                let mut neighbour = at;
+                neighbour[axis] = index.filter(|index| *index < size[axis])?;
+                Some(neighbour)
             };
-            let looked_at = (1..=self.0).map_while(|distance| Some((distance, along(distance)?)));
-            for (distance, there) in looked_at {
-                let (height, status) = read(there);
+            let neighbours = (1..=self.0).map_while(|distance| Some((distance, along(distance)?)));
+            for (distance, neighbour) in neighbours {
+                let (height, status) = read(neighbour);
                 reads.add(status);
                 if !status.is_complete() {
                     break;

@@ -98,10 +98,10 @@ fn write_npy(folder: &Path) -> PathBuf {
     path
 }
 
-fn options(within: u32, most_in_memory_bytes: u64) -> OpenOptions {
+fn options(within: u32, max_in_memory_bytes: u64) -> OpenOptions {
     OpenOptions {
         fill: Fill::within(within),
-        most_in_memory_bytes,
+        max_in_memory_bytes,
         ..OpenOptions::default()
     }
 }
@@ -128,11 +128,11 @@ fn check(raster: &Raster, within: u32) {
         for (index, found) in (0..).zip(heights) {
             let (column, row) = (column + index % columns, row + index / columns);
             let from_north = (SIZE[1] - 1 - row) as usize;
-            let wanted = reference(&all, column as usize, from_north, within as usize);
-            match wanted {
-                Some(wanted) => {
-                    let off = (f64::from(found) - wanted).abs();
-                    assert!(off < 1e-4, "{within}: {column} {row}: {found} {wanted}");
+            let expected = reference(&all, column as usize, from_north, within as usize);
+            match expected {
+                Some(expected) => {
+                    let off = (f64::from(found) - expected).abs();
+                    assert!(off < 1e-4, "{within}: {column} {row}: {found} {expected}");
                 }
                 None => assert!(found.is_nan(), "{within}: {column} {row}: {found}"),
             }
@@ -146,7 +146,7 @@ fn filled_heights_are_those_of_the_reference() {
     for path in [write_flt(folder.path()), write_npy(folder.path())] {
         for (within, in_memory) in [(1, 0), (10, 0), (64, 0), (10, u64::MAX)] {
             let raster = Raster::open(&path, &options(within, in_memory)).expect("opened");
-            assert_eq!(raster.is_known_whole(), in_memory > 0);
+            assert_eq!(raster.is_summary_complete(), in_memory > 0);
             check(&raster, within);
         }
     }
@@ -188,10 +188,10 @@ fn coarse_levels_are_filled_from_their_own_samples() {
         let read = raster.read_row(level, row as u32, 0, &mut heights, Wait::UntilRead);
         assert!(read.is_complete());
         for (column, found) in heights.iter().enumerate() {
-            let wanted = reference(&all, column, row, 3).unwrap_or(f64::NAN);
-            let is_same = (found - wanted).abs() < 1e-9 || found.is_nan() && wanted.is_nan();
-            assert!(is_same, "{column} {row}: {found} {wanted}");
-            filled += u32::from(all[row][column].is_none() && !wanted.is_nan());
+            let expected = reference(&all, column, row, 3).unwrap_or(f64::NAN);
+            let is_same = (found - expected).abs() < 1e-9 || found.is_nan() && expected.is_nan();
+            assert!(is_same, "{column} {row}: {found} {expected}");
+            filled += u32::from(all[row][column].is_none() && !expected.is_nan());
         }
     }
     assert!(filled > 500, "{filled}");
@@ -206,7 +206,7 @@ fn distances_have_a_limit() {
 }
 
 #[test]
-fn a_file_without_data_is_refused_and_classes_are_not_filled() {
+fn file_without_data_is_refused_and_classes_are_unfilled() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("holes.asc");
     let head = "ncols 3\nnrows 2\ncellsize 1\nNODATA_value -1\n";
@@ -221,7 +221,7 @@ fn a_file_without_data_is_refused_and_classes_are_not_filled() {
     // The weights are equal: 1, 3, and 5 below.
     assert_eq!(filled.height(1, 1), 3.0);
     assert_eq!(
-        (filled.summary().holes, filled.fill()),
+        (filled.summary().no_data, filled.fill()),
         (1, Fill::within(1))
     );
     let classes = OpenOptions {
@@ -233,7 +233,7 @@ fn a_file_without_data_is_refused_and_classes_are_not_filled() {
 }
 
 #[test]
-fn files_that_are_filled_have_another_print() {
+fn filled_files_have_another_hash() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = write_npy(folder.path());
     let print = |within| {
@@ -283,8 +283,8 @@ impl BlockReader for Late {
         };
         Ok(Block {
             samples: columns.map(value).collect::<Vec<_>>().into(),
-            holes: None,
-            is_lacking: false,
+            no_data_mask: None,
+            is_incomplete: false,
         })
     }
 
@@ -294,7 +294,7 @@ impl BlockReader for Late {
 }
 
 #[test]
-fn a_height_is_pending_while_a_neighbour_is() {
+fn height_is_pending_while_a_neighbour_is() {
     let is_here = Arc::new(AtomicBool::new(false));
     let image = BlockImage {
         columns: 128,

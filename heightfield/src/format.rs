@@ -31,11 +31,11 @@ pub(super) enum Parts {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Claim {
     /// The file is of this format.
-    Decides,
+    Certain,
     /// The file should be of this format, but is damaged.
-    Promises,
+    Expected,
     /// No conclusion: other formats use the extension, too.
-    Suggests,
+    Possible,
 }
 
 impl Format {
@@ -46,17 +46,20 @@ impl Format {
     pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), RasterError> {
         if options.encoding.is_some() && !["PNG", "TIFF"].contains(&self.name) {
             return Err(RasterError::NoSuchPart {
-                asked: "picture with heights in its colours".into(),
-                there: format!("the file is {}", self.name),
+                requested: "picture with heights in its colours".into(),
+                available: format!("the file is {}", self.name),
             });
         }
-        let refused = |asked: String| {
+        let refused = |requested: String| {
             let has = match self.parts {
                 Parts::One => "one field of heights",
                 Parts::Bands => "bands, chosen by number",
             };
-            let there = format!("{} has {has}", self.name);
-            Err(RasterError::NoSuchPart { asked, there })
+            let available = format!("{} has {has}", self.name);
+            Err(RasterError::NoSuchPart {
+                requested,
+                available,
+            })
         };
         match (&options.variable, options.band) {
             (Some(variable), _) => refused(format!("variable {variable}")),
@@ -88,7 +91,7 @@ mod tests {
     use crate::Encoding;
 
     #[test]
-    fn a_choice_that_a_format_does_not_have_is_refused() {
+    fn choice_that_a_format_does_not_have_is_refused() {
         let accepting = |options: &OpenOptions| {
             let formats = FORMATS.iter();
             let formats = formats.filter(|format| format.check_choice(options).is_ok());

@@ -104,7 +104,7 @@ fn unstated_reference_system_has_no_lonlat() {
 }
 
 #[test]
-fn a_longitude_is_found_in_the_turn_that_the_file_counts_in() {
+fn longitude_is_found_in_the_turn_of_the_file() {
     let map = transform([170.0, -10.0], [0.1, 0.0], [0.0, 0.1]);
     let pacific = Georeference::new(map, None, Some(degrees(0.1)), [200.0, 100.0]);
     let [x, y] = pacific.of_lonlat([-175.0, -5.0]).expect("there");
@@ -114,7 +114,7 @@ fn a_longitude_is_found_in_the_turn_that_the_file_counts_in() {
 }
 
 #[test]
-fn a_cell_is_as_large_as_it_is_at_the_place() {
+fn cell_size_is_that_of_its_position() {
     let map = transform([10.0, 59.0], [0.001, 0.0], [0.0, 0.001]);
     let globe = reference(Some(4326));
     let cell = Some(degrees(0.001));

@@ -100,10 +100,10 @@ mod tests {
 
     /// Against PROJ's `geod` with each body's axes.
     #[test]
-    fn a_degree_is_as_long_as_on_its_own_body() {
+    fn degree_has_the_length_of_its_own_body() {
         let moon = Globe::new(1_737_400.0, 0.0).expect("a sphere");
         let mars = Globe::from_axes(3_396_190.0, 3_376_200.0).expect("an ellipsoid");
-        for (globe, latitude, wanted) in [
+        for (globe, latitude, expected) in [
             (Globe::EARTH, 0.0, [111_319.491, 110_574.276]),
             (Globe::EARTH, 60.0, [55_800.0, 111_412.2]),
             (moon, 60.0, [15_161.676, 30_323.351]),
@@ -111,8 +111,8 @@ mod tests {
         ] {
             let found = globe.metres_per_degree(latitude);
             for axis in 0..2 {
-                let off = found[axis] / wanted[axis] - 1.0;
-                assert!(off.abs() < 1e-5, "{globe:?}: {found:?} for {wanted:?}");
+                let error = found[axis] / expected[axis] - 1.0;
+                assert!(error.abs() < 1e-5, "{globe:?}: {found:?} for {expected:?}");
             }
         }
         assert!(Globe::EARTH.is_earth() && !moon.is_earth() && !mars.is_earth());

@@ -28,13 +28,13 @@ pub struct Bounds {
 impl Bounds {
     /// Returns the smallest rectangle around some points; `None` without a finite point.
     pub(super) fn around(points: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
-        let nothing = Self {
+        let empty = Self {
             west: f64::INFINITY,
             south: f64::INFINITY,
             east: f64::NEG_INFINITY,
             north: f64::NEG_INFINITY,
         };
-        let all = points.into_iter().fold(nothing, |all, (x, y)| Self {
+        let all = points.into_iter().fold(empty, |all, (x, y)| Self {
             west: all.west.min(x),
             south: all.south.min(y),
             east: all.east.max(x),
@@ -153,7 +153,7 @@ impl GroundMap {
     }
 
     /// Returns the cosine of the angle between a row and a northward column.
-    pub(super) fn lean(&self) -> f64 {
+    pub(super) fn shear(&self) -> f64 {
         let (map, (east, south)) = (&self.0, self.steps());
         let along = map.pixel_width * map.skew_x + map.skew_y * map.pixel_height;
         match self.is_straight() {

@@ -8,10 +8,10 @@ pub struct HeightSummary {
     /// Highest height in the file's vertical unit.
     pub highest: f64,
     /// Samples without a height.
-    pub holes: u64,
+    pub no_data: u64,
     /// Samples read for the summary: all, or for a raster that stays in its file, those of a
     /// coarser image or of some parts.
-    pub looked_at: u64,
+    pub examined: u64,
 }
 
 impl HeightSummary {
@@ -19,15 +19,15 @@ impl HeightSummary {
     pub(super) const EMPTY: Self = Self {
         lowest: f64::INFINITY,
         highest: f64::NEG_INFINITY,
-        holes: 0,
-        looked_at: 0,
+        no_data: 0,
+        examined: 0,
     };
 
     /// Counts a height; NaN is no-data.
     pub(super) fn add(&mut self, height: f64) {
-        self.looked_at += 1;
+        self.examined += 1;
         if height.is_nan() {
-            self.holes += 1;
+            self.no_data += 1;
         } else {
             self.lowest = self.lowest.min(height);
             self.highest = self.highest.max(height);

@@ -25,7 +25,7 @@ pub(super) struct FileBytes {
     data: Data,
     outline: bool,
     /// Source of neighbouring files at URLs.
-    elsewhere: RemoteFetcher,
+    fetcher: RemoteFetcher,
 }
 
 /// Source of the bytes.
@@ -41,19 +41,19 @@ pub(super) enum Data {
 
 impl FileBytes {
     /// Opens a file on disk or at a URL.
-    pub(super) fn open(path: &Path, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
+    pub(super) fn open(path: &Path, fetcher: &RemoteFetcher) -> Result<Self, RasterError> {
         let bytes = match path.to_str().filter(|name| is_url(name)) {
-            Some(url) => Self::at_url(url, elsewhere)?,
+            Some(url) => Self::at_url(url, fetcher)?,
             None => Self::on_disk(path)?,
         };
         Ok(Self {
-            elsewhere: elsewhere.clone(),
+            fetcher: fetcher.clone(),
             ..bytes
         })
     }
 
-    fn at_url(url: &str, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
-        let file = elsewhere.open(url).map_err(RasterError::Remote)?;
+    fn at_url(url: &str, fetcher: &RemoteFetcher) -> Result<Self, RasterError> {
+        let file = fetcher.open(url).map_err(RasterError::Remote)?;
         let (len, data) = (file.len(), Data::Remote(file, url.to_owned()));
         Ok(Self::new(file_name(url), len, data))
     }
@@ -81,12 +81,12 @@ impl FileBytes {
             len,
             data,
             outline: false,
-            elsewhere: RemoteFetcher::default(),
+            fetcher: RemoteFetcher::default(),
         }
     }
 
     /// Returns the same bytes; if `outline` is true, only the header's metadata is read.
-    pub(super) fn in_outline(self, outline: bool) -> Self {
+    pub(super) fn with_outline(self, outline: bool) -> Self {
         Self { outline, ..self }
     }
 
@@ -127,8 +127,8 @@ impl FileBytes {
     }
 
     /// Returns the fetcher of the files at URLs.
-    pub(super) const fn elsewhere(&self) -> &RemoteFetcher {
-        &self.elsewhere
+    pub(super) const fn fetcher(&self) -> &RemoteFetcher {
+        &self.fetcher
     }
 
     /// Returns the file, if it is at a URL.
@@ -160,7 +160,7 @@ impl FileBytes {
     }
 
     /// Returns a second handle on the same bytes, for storage; `None` if they are in memory.
-    pub(super) fn again(&self) -> Result<Option<Self>, RasterError> {
+    pub(super) fn try_clone(&self) -> Result<Option<Self>, RasterError> {
         let data = match &self.data {
             Data::File(file, path) => {
                 let file = file.try_clone().map_err(RasterError::Unreadable)?;
@@ -172,7 +172,7 @@ impl FileBytes {
         };
         let own = Self::new(&self.name, self.len, data);
         Ok(Some(Self {
-            elsewhere: self.elsewhere.clone(),
+            fetcher: self.fetcher.clone(),
             ..own
         }))
     }
@@ -200,19 +200,19 @@ impl FileBytes {
     /// Reads bytes at an offset.
     pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, RasterError> {
         let is_inside = at.checked_add(count).is_some_and(|end| end <= self.len);
-        let (true, Ok(room)) = (is_inside, usize::try_from(count)) else {
+        let (true, Ok(capacity)) = (is_inside, usize::try_from(count)) else {
             return Err(RasterError::Truncated(
                 "it ends before its samples do".into(),
             ));
         };
         let read = match &self.data {
             Data::File(file, _) => {
-                let mut bytes = vec![0; room];
+                let mut bytes = vec![0; capacity];
                 read_exact_at(file, &mut bytes, at).map(|()| bytes)
             }
             #[cfg(test)]
-            Data::Memory(bytes) => Ok(bytes[at as usize..][..room].to_vec()),
-            Data::Remote(file, _) => file.read_at(at, room),
+            Data::Memory(bytes) => Ok(bytes[at as usize..][..capacity].to_vec()),
+            Data::Remote(file, _) => file.read_at(at, capacity),
         };
         read.map_err(|error| RasterError::from_io(error, "the samples"))
     }
@@ -232,16 +232,16 @@ impl FileBytes {
     ///
     /// # Errors
     /// [`RasterError::AbsurdSize`].
-    pub(super) fn check_holds(
+    pub(super) fn check_size(
         &self,
         columns: u32,
         rows: u32,
         bytes: u64,
     ) -> Result<(), RasterError> {
         let samples = u64::from(columns) * u64::from(rows);
-        let room = self.len.saturating_mul(DEFLATE_RATIO);
+        let capacity = self.len.saturating_mul(DEFLATE_RATIO);
         match samples.checked_mul(bytes) {
-            Some(promised) if promised <= room => Ok(()),
+            Some(promised) if promised <= capacity => Ok(()),
             _ => Err(RasterError::AbsurdSize(format!(
                 "{columns} × {rows} samples in a file of {} bytes",
                 self.len

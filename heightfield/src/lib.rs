@@ -92,7 +92,7 @@ use std::path::{Path, PathBuf};
 
 pub use crs::{LonLat, ReferenceSystem};
 pub use error::{Error, RasterError};
-pub use file_layout::{FileLayout, SamplesAre};
+pub use file_layout::{FileLayout, RasterType};
 pub use fill::Fill;
 pub use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
@@ -188,17 +188,17 @@ impl Raster {
         options: &OpenOptions,
         decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, RasterError>,
     ) -> Result<Self, Error> {
-        options.elsewhere.set_disk_cache(&options.disk_cache);
+        options.fetcher.set_disk_cache(&options.disk_cache);
         decode(path, options)
             .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
             .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
             .and_then(|mut decoded| {
                 decoded.storage.set_path(path);
                 decoded.storage.set_disk_cache(&options.disk_cache);
-                decoded.tell_if_whole(options.most_in_memory_bytes);
+                decoded.remark_if_in_memory(options.max_in_memory_bytes);
                 Self::checked(decoded, options.no_data)
             })
-            .inspect(|_| options.elsewhere.touch())
+            .inspect(|_| options.fetcher.set_terrain_open())
             .map(|raster| Self {
                 path: path.to_owned(),
                 fill: options.fill.filter(|_| !options.classes),
@@ -270,7 +270,7 @@ impl Raster {
     /// Returns the number of blocks read from the file; zero if all samples are in memory.
     pub fn blocks_read(&self) -> u64 {
         match &self.source.storage {
-            Storage::Held { .. } => 0,
+            Storage::Memory { .. } => 0,
             Storage::Blocks(blocks) => blocks.blocks_read(),
         }
     }
@@ -278,8 +278,8 @@ impl Raster {
     /// Returns the number of blocks in the file; zero if all samples are in memory.
     pub fn blocks(&self) -> u64 {
         match &self.source.storage {
-            Storage::Held { .. } => 0,
-            Storage::Blocks(blocks) => blocks.count(),
+            Storage::Memory { .. } => 0,
+            Storage::Blocks(blocks) => blocks.block_count(),
         }
     }
 
@@ -287,7 +287,7 @@ impl Raster {
     /// ([`Wait::Never`]). Coarse samples that are computed from the file do not count.
     pub fn is_reading(&self) -> bool {
         match &self.source.storage {
-            Storage::Held { .. } => false,
+            Storage::Memory { .. } => false,
             Storage::Blocks(blocks) => blocks.is_reading(),
         }
     }
@@ -298,7 +298,7 @@ impl Raster {
     /// The reason why a height could not be read.
     pub fn check_complete(&self) -> Result<(), Error> {
         let outage = match &self.source.storage {
-            Storage::Held { .. } => None,
+            Storage::Memory { .. } => None,
             Storage::Blocks(blocks) => blocks.take_outage(),
         };
         outage.map_or(Ok(()), |fault| Err(Error::new(&self.path, fault)))
@@ -439,7 +439,7 @@ impl Raster {
     /// Returns the image of the file that serves a level; 0 is the full one.
     fn image_of(&self, level: u8) -> usize {
         match &self.source.storage {
-            Storage::Held { .. } => 0,
+            Storage::Memory { .. } => 0,
             Storage::Blocks(blocks) => blocks.image_of(level),
         }
     }
@@ -448,7 +448,7 @@ impl Raster {
     /// in memory, where any sample is available.
     pub fn level_for(&self, samples: f64) -> u8 {
         match self.source.storage {
-            Storage::Held { .. } => 0,
+            Storage::Memory { .. } => 0,
             Storage::Blocks(_) => samples.max(1.0).log2() as u8,
         }
     }
@@ -461,7 +461,7 @@ impl Raster {
         let at = [self.file_column(column), self.file_row(row)];
         let size = [self.columns(), self.rows()];
         self.filled(at, size, |at| match &self.source.storage {
-            Storage::Held { samples, mask } => {
+            Storage::Memory { samples, mask } => {
                 let [column, row] = at.map(u64::from);
                 let index = (row * u64::from(self.columns()) + column) as usize;
                 let height = match mask.as_ref().is_some_and(|mask| mask.contains(index)) {
@@ -528,18 +528,18 @@ impl Raster {
 
     /// Returns the samples in the file's own type and order; `None` if they stay in the file.
     pub fn samples(&self) -> Option<&Samples> {
-        self.source.storage.held()
+        self.source.storage.in_memory()
     }
 
     /// Returns true if the summary covers all samples: always if they are in memory.
-    pub fn is_known_whole(&self) -> bool {
+    pub fn is_summary_complete(&self) -> bool {
         self.samples().is_some()
     }
 
     /// Returns the max memory of the samples, bytes.
     pub fn memory_bytes(&self) -> usize {
         match &self.source.storage {
-            Storage::Held { samples, .. } => samples.bytes(),
+            Storage::Memory { samples, .. } => samples.bytes(),
             Storage::Blocks(blocks) => blocks.max_bytes(),
         }
     }

@@ -85,9 +85,9 @@ fn or_by_gdal(
     match (gdal::decode(path, options), fault) {
         (Ok(decoded), _) => Ok(decoded),
         (Err(by_gdal), UnknownFormat) => Err(by_gdal),
-        (Err(by_gdal @ RasterError::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
+        (Err(by_gdal @ RasterError::NeedsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
         // This crate's fault is more specific than these errors of GDAL, but not than others.
-        (Err(UnknownFormat | ByGdal(_) | RasterError::WantsGdal { .. }), fault) => Err(fault),
+        (Err(UnknownFormat | ByGdal(_) | RasterError::NeedsGdal { .. }), fault) => Err(fault),
         (Err(by_gdal), _) => Err(by_gdal),
     }
 }
@@ -108,8 +108,8 @@ fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), Rast
     match &options.open_options[..] {
         [] => Ok(()),
         [first, ..] => Err(RasterError::NoSuchPart {
-            asked: format!("open option {first}"),
-            there: format!("the file is {format}, which is read without GDAL"),
+            requested: format!("open option {first}"),
+            available: format!("the file is {format}, which is read without GDAL"),
         }),
     }
 }
@@ -123,8 +123,8 @@ fn by_extension(extension: &str) -> Result<&'static Format, RasterError> {
         .iter()
         .filter_map(|format| Some((format, format.claim(extension)?)));
     match claims.next() {
-        Some((format, Claim::Decides)) => Ok(format),
-        Some((format, Claim::Promises)) => Err(RasterError::Unfamiliar(format!(
+        Some((format, Claim::Certain)) => Ok(format),
+        Some((format, Claim::Expected)) => Err(RasterError::Unfamiliar(format!(
             "its name says {}, its content does not begin like one",
             format.name
         ))),

@@ -20,7 +20,7 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Rast
             decoded => decoded,
         };
     }
-    one_file::decode(&FileBytes::open(path, &options.elsewhere)?, options)
+    one_file::decode(&FileBytes::open(path, &options.fetcher)?, options)
 }
 
 /// Decodes files as one terrain.

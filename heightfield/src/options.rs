@@ -38,15 +38,15 @@ pub struct OpenOptions {
     pub gdal: bool,
     /// Samples that need more bytes than this stay in the file, if its format allows it, and are
     /// read in blocks on access.
-    pub most_in_memory_bytes: u64,
+    pub max_in_memory_bytes: u64,
     /// Source of files at URLs.
-    pub elsewhere: RemoteFetcher,
+    pub fetcher: RemoteFetcher,
     /// Folder for coarse samples of a terrain in its file. By default, none are stored.
     pub disk_cache: DiskCache,
 }
 
 impl OpenOptions {
-    /// Default of [`OpenOptions::most_in_memory_bytes`], in units of
+    /// Default of [`OpenOptions::max_in_memory_bytes`], in units of
     /// 2²⁰ bytes.
     pub const IN_MEMORY_MB: u32 = 128;
 }
@@ -66,8 +66,8 @@ impl Default for OpenOptions {
             encoding: None,
             classes: false,
             gdal: true,
-            most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
-            elsewhere: RemoteFetcher::default(),
+            max_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
+            fetcher: RemoteFetcher::default(),
             disk_cache: DiskCache::off(),
         }
     }

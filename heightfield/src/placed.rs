@@ -63,7 +63,7 @@ fn turned(map: &GroundMap) -> Vec<String> {
     if map.is_straight() {
         return words;
     }
-    let (rotation, leaning) = (map.rotation(), map.lean().asin().to_degrees());
+    let (rotation, leaning) = (map.rotation(), map.shear().asin().to_degrees());
     if rotation.abs() >= STRAIGHT_DEGREES {
         words.push(format!(
             "the grid is rotated by {rotation:.1}° against east: x runs along its rows, not to the east"
@@ -78,7 +78,7 @@ fn turned(map: &GroundMap) -> Vec<String> {
 }
 
 impl Decoded {
-    /// Returns the unit of the coordinates after `lay_out`; `None` if it was guessed.
+    /// Returns the unit of the coordinates after `set_layout`; `None` if it was guessed.
     pub(super) fn ground_unit(&self) -> Option<GroundUnit> {
         let (cell, place) = (self.cell?, self.place?);
         let is_guess = cell.certainty == Certainty::Assumed && self.system.is_none();
@@ -91,17 +91,17 @@ impl Decoded {
 
     /// Sets orientation, cell and place. If the file states no `unit`, the unit of its reference
     /// system is used, which must be set before; without one, the unit is guessed from the numbers.
-    pub(super) fn lay_out(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
+    pub(super) fn set_layout(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
         let other_unit = self.system.as_ref().and_then(ReferenceSystem::other_unit);
-        let said = turned(&map).into_iter().chain(other_unit);
-        let new = said.filter(|line| !self.remarks.contains(line));
+        let new_remarks = turned(&map).into_iter().chain(other_unit);
+        let new = new_remarks.filter(|line| !self.remarks.contains(line));
         self.remarks.extend(new.collect::<Vec<_>>());
         let unit = unit.or(self.system.as_ref().map(GroundUnit::of));
         let degrees = unit.map_or(1.0, |unit| unit.degrees);
         let mut cell = self.cell_of(&map, unit);
-        cell.lean = map.lean();
+        cell.lean = map.shear();
         self.cell = Some(self.on_ground(&map, cell, degrees).unwrap_or(cell));
         self.place = Some(Place { map, degrees });
     }
@@ -116,7 +116,7 @@ impl Decoded {
     /// Sets the side of the cells in metres to the user's value, if the file does not state it.
     ///
     /// # Errors
-    /// [`RasterError::CellKnown`] if the file states it.
+    /// [`RasterError::CellSizeStated`] if the file states it.
     pub(super) fn with_ground_cell(mut self, side_m: Option<f64>) -> Result<Self, RasterError> {
         let Some(side_m) = side_m else {
             return Ok(self);
@@ -126,7 +126,9 @@ impl Decoded {
             .filter(|cell| cell.certainty != Certainty::Assumed)
         {
             let (east, north) = cell.ground_metres();
-            return Err(RasterError::CellKnown(format!("{east:.3} × {north:.3} m")));
+            return Err(RasterError::CellSizeStated(format!(
+                "{east:.3} × {north:.3} m"
+            )));
         }
         let metre = CellUnit::Length { metres: 1.0 };
         let sides = match self.cell {

@@ -55,14 +55,14 @@ mod tests {
 
     #[test]
     fn text_that_a_terminal_obeys_is_escaped() {
-        for (reported, seen) in [
+        for (reported, expected) in [
             ("\x1b[2J\x1b]0;owned\x07", "\\u{1b}[2J\\u{1b}]0;owned\\u{7}"),
             ("board\r\nfault none", "board\\r\\nfault none"),
             ("\u{9b}31m", "\\u{9b}31m"),           // CSI in one character
             ("abc\u{202e}cba", "abc\\u{202e}cba"), // right to left from here
             ("a\u{200b}b\0\x7f", "a\\u{200b}b\\0\\u{7f}"),
         ] {
-            assert_eq!(printable(reported), seen);
+            assert_eq!(printable(reported), expected);
         }
         // The last one as macOS file systems store it, in two characters.
         for plain in [

@@ -8,9 +8,9 @@ use std::hash::Hasher;
 
 use twox_hash::XxHash64;
 
-use super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
+use super::blocks::{Block, BlockImage, BlockReader, Part, SurveyParts};
 use super::input::FileBytes;
-use super::read::Stored;
+use super::read::StoredType;
 use super::samples::{Endian, SampleType, Samples, with_samples};
 use super::storage::Storage;
 use super::{OpenOptions, RasterError, subsampled};
@@ -24,20 +24,20 @@ const COARSE_BLOCK: u32 = 32;
 /// one response.
 const WIDE_BLOCK: [u32; 2] = [32_768, 2];
 /// Samples farther apart than this, bytes, are read one by one.
-const FAR: u64 = 4096;
+const MAX_STRIDE: u64 = 4096;
 /// Max bytes of one read, if rows are contiguous.
-const AT_ONCE: u64 = 1 << 20;
+const READ_BYTES: u64 = 1 << 20;
 /// Max bytes of samples at a URL that are fetched at once.
 const FEW_BYTES: u64 = 1 << 20;
 /// Parts per direction that are read at opening, if a file is not read whole.
-const PLACES: u32 = 6;
+const PARTS_PER_AXIS: u32 = 6;
 
 /// Offsets of samples in a file, bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RawSamples {
     pub(super) columns: u32,
     pub(super) rows: u32,
-    pub(super) stored: Stored,
+    pub(super) stored: StoredType,
     pub(super) endian: Endian,
     /// Offset of the first sample.
     pub(super) first: u64,
@@ -51,7 +51,7 @@ impl RawSamples {
     /// Returns the layout of contiguous rows.
     pub(super) fn packed(
         (columns, rows): (u32, u32),
-        stored: Stored,
+        stored: StoredType,
         endian: Endian,
         first: u64,
     ) -> Self {
@@ -89,81 +89,88 @@ impl RawSamples {
     ) -> Result<Storage, RasterError> {
         let count = u64::from(self.columns) * u64::from(self.rows);
         let bytes = count.saturating_mul(self.stored.bytes());
-        let most = match input.remote() {
-            Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
-            None => options.most_in_memory_bytes,
+        let max = match input.remote() {
+            Some(_) => options.max_in_memory_bytes.min(FEW_BYTES),
+            None => options.max_in_memory_bytes,
         };
-        if bytes > most
-            && let Some(own) = input.again()?
+        if bytes > max
+            && let Some(own) = input.try_clone()?
         {
             return Ok(PlainBlocks::new(self, own).into());
         }
         if input.is_outline() {
-            return Ok(self.stored.room(0)?.into());
+            return Ok(self.stored.reserve(0)?.into());
         }
         let all = Part::whole(self.columns, self.rows);
-        Ok(self.read(input, &all, Grain::ALL)?.into())
+        Ok(self.read(input, &all, Subsampling::ALL)?.into())
     }
 
-    /// Reads a part of the image with the samples of `grain`.
-    fn read(&self, input: &FileBytes, part: &Part, grain: Grain) -> Result<Samples, RasterError> {
+    /// Reads a part of the image with the samples of `subsampling`.
+    fn read(
+        &self,
+        input: &FileBytes,
+        part: &Part,
+        subsampling: Subsampling,
+    ) -> Result<Samples, RasterError> {
         if self.sample > self.row {
             let part = turned(part);
-            let samples = self.turned().read(input, &part, grain.turned())?;
+            let samples = self.turned().read(input, &part, subsampling.turned())?;
             return Ok(transposed(&samples, part.rows, part.columns));
         }
         let mut samples = self
             .stored
-            .room(u64::from(part.columns) * u64::from(part.rows))?;
-        let apart = self.sample * u64::from(grain.every);
-        let along = (u64::from(part.columns) - 1) * apart + self.stored.bytes();
-        let is_packed = grain.every == 1 && along == self.row;
+            .reserve(u64::from(part.columns) * u64::from(part.rows))?;
+        let stride = self.sample * u64::from(subsampling.every);
+        let along = (u64::from(part.columns) - 1) * stride + self.stored.bytes();
+        let is_packed = subsampling.every == 1 && along == self.row;
         let rows_at_once = match is_packed {
-            true => (AT_ONCE / along).clamp(1, part.rows.into()) as u32,
+            true => (READ_BYTES / along).clamp(1, part.rows.into()) as u32,
             false => 1,
         };
         for row in (0..part.rows).step_by(rows_at_once as usize) {
             let rows = rows_at_once.min(part.rows - row);
-            let at = self.place(part.column, part.row + row, grain);
-            if apart > FAR {
+            let at = self.place(part.column, part.row + row, subsampling);
+            if stride > MAX_STRIDE {
                 for column in 0..part.columns {
-                    let at = at + u64::from(column) * apart;
+                    let at = at + u64::from(column) * stride;
                     let bytes = input.read_at(at, self.stored.bytes())?;
-                    self.append(&mut samples, &bytes, apart);
+                    self.append(&mut samples, &bytes, stride);
                 }
             } else {
                 let bytes = input.read_at(at, (u64::from(rows) - 1) * self.row + along)?;
-                self.append(&mut samples, &bytes, apart);
+                self.append(&mut samples, &bytes, stride);
             }
         }
         Ok(samples)
     }
 
-    fn append(&self, samples: &mut Samples, bytes: &[u8], apart: u64) {
+    fn append(&self, samples: &mut Samples, bytes: &[u8], stride: u64) {
         self.stored
-            .append(samples, bytes, apart as usize, self.endian);
+            .append(samples, bytes, stride as usize, self.endian);
     }
 
-    fn place(&self, column: u32, row: u32, grain: Grain) -> u64 {
-        let [column, row] = [(column, grain.first[0]), (row, grain.first[1])]
-            .map(|(index, first)| u64::from(index) * u64::from(grain.every) + u64::from(first));
+    fn place(&self, column: u32, row: u32, subsampling: Subsampling) -> u64 {
+        let [column, row] =
+            [(column, subsampling.first[0]), (row, subsampling.first[1])].map(|(index, first)| {
+                u64::from(index) * u64::from(subsampling.every) + u64::from(first)
+            });
         self.first + row * self.row + column * self.sample
     }
 
     /// Returns the byte ranges of a part, in reading order.
-    fn ranges(&self, part: &Part, grain: Grain) -> Vec<std::ops::Range<u64>> {
+    fn ranges(&self, part: &Part, subsampling: Subsampling) -> Vec<std::ops::Range<u64>> {
         if self.sample > self.row {
-            return self.turned().ranges(&turned(part), grain.turned());
+            return self.turned().ranges(&turned(part), subsampling.turned());
         }
-        let is_far = self.sample * u64::from(grain.every) > FAR;
-        let along = if is_far { part.columns } else { 1 };
+        let is_sparse = self.sample * u64::from(subsampling.every) > MAX_STRIDE;
+        let along = if is_sparse { part.columns } else { 1 };
         let to = part.columns / along;
         let size = self.stored.bytes();
         let rows = part.row..part.row + part.rows;
         let each = rows.flat_map(|row| (0..along).map(move |column| (part.column + column, row)));
         let range = |(column, row)| {
-            let last = self.place(column + to - 1, row, grain);
-            self.place(column, row, grain)..last + size
+            let last = self.place(column + to - 1, row, subsampling);
+            self.place(column, row, subsampling)..last + size
         };
         each.map(range).collect()
     }
@@ -171,12 +178,12 @@ impl RawSamples {
 
 /// The samples of an image: every `every`-th, from a first column and row.
 #[derive(Clone, Copy, Debug)]
-struct Grain {
+struct Subsampling {
     every: u32,
     first: [u32; 2],
 }
 
-impl Grain {
+impl Subsampling {
     /// All samples.
     const ALL: Self = Self {
         every: 1,
@@ -242,8 +249,8 @@ impl PlainBlocks {
 }
 
 impl PlainBlocks {
-    fn grain(&self, image: usize) -> Grain {
-        Grain {
+    fn subsampling(&self, image: usize) -> Subsampling {
+        Subsampling {
             every: 1 << image,
             first: self.images[image].first,
         }
@@ -260,7 +267,7 @@ impl BlockReader for PlainBlocks {
     }
 
     fn sample_type(&self) -> SampleType {
-        self.plain.stored.held()
+        self.plain.stored.memory_type()
     }
 
     fn is_stored(&self, _: usize, _: &Part) -> bool {
@@ -271,19 +278,25 @@ impl BlockReader for PlainBlocks {
         subsampled::set_order(&mut self.images, south_up, east_first);
     }
 
-    fn want(&self, image: usize, parts: &[Part]) {
+    fn prefetch(&self, image: usize, parts: &[Part]) {
         if let Some(remote) = self.input.remote() {
-            let grain = self.grain(image);
-            remote.want(parts.iter().flat_map(|part| self.plain.ranges(part, grain)));
+            let subsampling = self.subsampling(image);
+            remote.prefetch(
+                parts
+                    .iter()
+                    .flat_map(|part| self.plain.ranges(part, subsampling)),
+            );
         }
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
-        self.want(image, std::slice::from_ref(part));
+        self.prefetch(image, std::slice::from_ref(part));
         Ok(Block {
-            samples: self.plain.read(&self.input, part, self.grain(image))?,
-            holes: None,
-            is_lacking: false,
+            samples: self
+                .plain
+                .read(&self.input, part, self.subsampling(image))?,
+            no_data_mask: None,
+            is_incomplete: false,
         })
     }
 
@@ -306,17 +319,17 @@ impl BlockReader for PlainBlocks {
     fn stamp(&self, _: usize, _: &Part) -> Option<String> {
         let stamp = self.stamp.as_ref()?;
         let is_same = self.input.stamp().as_ref() == Some(stamp);
-        let settled = stamp.settled().filter(|_| is_same)?;
-        Some(format!("{settled} {:?}", self.plain))
+        let stable = stamp.stable_text().filter(|_| is_same)?;
+        Some(format!("{stable} {:?}", self.plain))
     }
 
-    fn looks(&self) -> Option<Looks> {
-        Some(subsampled::places(&self.images[0], PLACES))
+    fn survey_parts(&self) -> Option<SurveyParts> {
+        Some(subsampled::spread_parts(&self.images[0], PARTS_PER_AXIS))
     }
 
-    fn kept_bytes(&self) -> usize {
+    fn max_memory_bytes(&self) -> usize {
         match self.is_remote {
-            true => crate::remote::RemoteFile::kept_bytes(),
+            true => crate::remote::RemoteFile::max_memory_bytes(),
             false => 0,
         }
     }

@@ -29,7 +29,7 @@ fn file(folder: &Path) -> (FileBytes, RawSamples) {
     let plain = RawSamples {
         columns: SIZE[0],
         rows: SIZE[1],
-        stored: Stored::Held(SampleType::I16),
+        stored: StoredType::Held(SampleType::I16),
         endian: Endian::Big,
         first: 37,
         row: u64::from(SIZE[0]) * 3 + 5,
@@ -48,7 +48,7 @@ fn part(column: u32, row: u32, columns: u32, rows: u32) -> Part {
 }
 
 #[test]
-fn a_part_of_every_image_has_its_own_samples_in_either_order() {
+fn parts_of_images_have_their_samples_in_either_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let (input, plain) = file(folder.path());
     for every in [1, 2, 64] {
@@ -68,11 +68,11 @@ fn a_part_of_every_image_has_its_own_samples_in_either_order() {
             };
             Samples::from(values)
         };
-        let grain = Grain {
+        let subsampling = Subsampling {
             every,
             first: [0; 2],
         };
-        let read = plain.read(&input, &part, grain).expect("inside");
+        let read = plain.read(&input, &part, subsampling).expect("inside");
         assert_eq!(read, expected(false), "{every}");
         let turned = Part {
             column: part.row,
@@ -80,17 +80,17 @@ fn a_part_of_every_image_has_its_own_samples_in_either_order() {
             columns: part.rows,
             rows: part.columns,
         };
-        let read = plain.turned().read(&input, &turned, grain);
+        let read = plain.turned().read(&input, &turned, subsampling);
         assert_eq!(read.expect("inside"), expected(true), "{every}, turned");
     }
 }
 
 #[test]
-fn samples_that_lie_far_apart_are_read_where_they_are() {
+fn widely_spaced_samples_are_read_one_by_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let (input, plain) = file(folder.path());
     let bytes = std::fs::read(folder.path().join("samples.raw")).expect("there");
-    let far = RawSamples {
+    let spaced = RawSamples {
         columns: 5,
         rows: 4,
         row: 90_000,
@@ -98,22 +98,22 @@ fn samples_that_lie_far_apart_are_read_where_they_are() {
         ..plain
     };
     let at = |column: u64, row: u64| {
-        let at = (37 + row * far.row + column * far.sample) as usize;
+        let at = (37 + row * spaced.row + column * spaced.sample) as usize;
         i16::from_be_bytes([bytes[at], bytes[at + 1]])
     };
     // Every second sample, over more rows than one read covers.
-    let grain = Grain {
+    let subsampling = Subsampling {
         every: 2,
         first: [0, 1],
     };
     let places = [1, 3].into_iter();
     let places = places.flat_map(|row| [0, 2, 4].map(|column| (column, row)));
     let expected: Vec<i16> = places.map(|(column, row)| at(column, row)).collect();
-    let read = far.read(&input, &part(0, 0, 3, 2), grain);
+    let read = spaced.read(&input, &part(0, 0, 3, 2), subsampling);
     assert_eq!(read.expect("inside"), Samples::from(expected));
 }
 
-fn opened(path: &Path, most_in_memory_bytes: u64) -> Raster {
+fn opened(path: &Path, max_in_memory_bytes: u64) -> Raster {
     let options = OpenOptions {
         raw: Some(RawLayout {
             columns: SIZE[0],
@@ -121,7 +121,7 @@ fn opened(path: &Path, most_in_memory_bytes: u64) -> Raster {
             sample: SampleType::I16,
             endian: Endian::Little,
         }),
-        most_in_memory_bytes,
+        max_in_memory_bytes,
         ..OpenOptions::default()
     };
     Raster::open(path, &options).expect("opens")
@@ -136,15 +136,16 @@ fn blockwise_and_in_memory_heights_match_on_all_levels() {
         .flat_map(|(column, row)| value(column, row).to_le_bytes())
         .collect();
     std::fs::write(&path, bytes).expect("written");
-    let (held, blocks) = (opened(&path, u64::MAX), opened(&path, 0));
-    assert!(held.samples().is_some() && blocks.samples().is_none());
-    assert!(!blocks.is_known_whole());
+    let (in_memory, blocks) = (opened(&path, u64::MAX), opened(&path, 0));
+    assert!(in_memory.samples().is_some() && blocks.samples().is_none());
+    assert!(!blocks.is_summary_complete());
     for level in 0..9 {
         let count = ((SIZE[0] - 1) >> level) + 1;
         let mut rows = [vec![0.0; count as usize], vec![0.0; count as usize]];
         for row in (0..SIZE[1] >> level).step_by(7) {
             assert!(
-                held.read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
+                in_memory
+                    .read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
                     .is_complete()
             );
             assert!(
@@ -179,9 +180,9 @@ fn levels_count_from_south_west_in_any_file_order() {
             if down == "-1" { "1" } else { "-1" }
         );
         std::fs::write(folder.path().join("hills.hdr"), header).expect("written");
-        let [held, blocks] = [u64::MAX, 0].map(|most_in_memory_bytes| {
+        let [in_memory, blocks] = [u64::MAX, 0].map(|max_in_memory_bytes| {
             let options = OpenOptions {
-                most_in_memory_bytes,
+                max_in_memory_bytes,
                 ..OpenOptions::default()
             };
             Raster::open(&path, &options).expect("opens")
@@ -191,7 +192,8 @@ fn levels_count_from_south_west_in_any_file_order() {
         let mut rows = [[0.0; 60], [0.0; 60]];
         for (level, row) in [(0, 3), (1, 200), (2, 100), (4, 30)] {
             assert!(
-                held.read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
+                in_memory
+                    .read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
                     .is_complete()
             );
             assert!(

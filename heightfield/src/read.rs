@@ -7,7 +7,7 @@ use super::samples::{Endian, SampleType, SampleValue, Samples, with_samples};
 
 /// The type of a sample in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stored {
+pub(super) enum StoredType {
     /// A type that is also used in memory.
     Held(SampleType),
     /// Half floats, single floats in memory.
@@ -18,7 +18,7 @@ pub(super) enum Stored {
     U64,
 }
 
-impl Stored {
+impl StoredType {
     /// Returns the bytes of a sample in the file.
     pub(super) const fn bytes(self) -> u64 {
         match self {
@@ -29,7 +29,7 @@ impl Stored {
     }
 
     /// Returns the type of the samples in memory.
-    pub(super) const fn held(self) -> SampleType {
+    pub(super) const fn memory_type(self) -> SampleType {
         match self {
             Self::Held(sample) => sample,
             Self::F16 => SampleType::F32,
@@ -39,8 +39,8 @@ impl Stored {
 
     /// Returns an empty vector with capacity for `count` samples; the caller has checked that the
     /// file holds them.
-    pub(super) fn room(self, count: u64) -> Result<Samples, RasterError> {
-        let mut samples = self.held().none();
+    pub(super) fn reserve(self, count: u64) -> Result<Samples, RasterError> {
+        let mut samples = self.memory_type().none();
         let reserved = usize::try_from(count).ok().and_then(
             |count| with_samples!(&mut samples, values => values.try_reserve_exact(count).ok()),
         );
@@ -50,10 +50,10 @@ impl Stored {
         Ok(samples)
     }
 
-    /// Appends the samples in `bytes`, which are `apart` bytes apart, to `samples` from
-    /// [`Stored::room`].
-    pub(super) fn append(self, samples: &mut Samples, bytes: &[u8], apart: usize, endian: Endian) {
-        let each = || bytes.chunks(apart);
+    /// Appends the samples in `bytes`, which are `stride` bytes apart, to `samples` from
+    /// [`StoredType::reserve`].
+    pub(super) fn append(self, samples: &mut Samples, bytes: &[u8], stride: usize, endian: Endian) {
+        let each = || bytes.chunks(stride);
         match (self, samples) {
             (Self::F16, Samples::F32(values)) => {
                 values
@@ -62,10 +62,14 @@ impl Stored {
                     }));
             }
             (Self::I64, Samples::F64(values)) => {
-                values.extend(each().map(|bytes| i64::from_le_bytes(little(bytes, endian)) as f64));
+                values.extend(
+                    each().map(|bytes| i64::from_le_bytes(to_little_endian(bytes, endian)) as f64),
+                );
             }
             (Self::U64, Samples::F64(values)) => {
-                values.extend(each().map(|bytes| u64::from_le_bytes(little(bytes, endian)) as f64));
+                values.extend(
+                    each().map(|bytes| u64::from_le_bytes(to_little_endian(bytes, endian)) as f64),
+                );
             }
             (_, samples) => with_samples!(samples, values => extend(values, each(), endian)),
         }
@@ -81,7 +85,7 @@ fn extend<'b, T: SampleValue>(
 }
 
 /// Returns the first eight bytes, least significant first.
-fn little(bytes: &[u8], endian: Endian) -> [u8; 8] {
+fn to_little_endian(bytes: &[u8], endian: Endian) -> [u8; 8] {
     let mut eight: [u8; 8] = bytes[..8].try_into().unwrap_or_default();
     if endian == Endian::Big {
         eight.reverse();

@@ -181,14 +181,14 @@ impl Samples {
     /// The no-data value of a float32 file is often written with the digits of a double
     /// (-3.4028234663852886e+38): it is rounded to `f32` first.
     pub(super) fn comparable_no_data(&self, value: f64) -> Option<f64> {
-        fn held<T: SampleValue>(_: &[T], value: f64) -> f64 {
+        fn rounded<T: SampleValue>(_: &[T], value: f64) -> f64 {
             T::nearest(value).widen()
         }
-        let held = with_samples!(self, values => held(values, value));
+        let result = with_samples!(self, values => rounded(values, value));
         // NaN is no-data in every float file, so it needs no rule. An integer type that had to
         // change the value cannot store it.
-        let same = matches!(self, Self::F32(_)) || held == value;
-        (same && !held.is_nan()).then_some(held)
+        let same = matches!(self, Self::F32(_)) || result == value;
+        (same && !result.is_nan()).then_some(result)
     }
 }
 

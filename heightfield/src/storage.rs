@@ -11,7 +11,7 @@ use crate::disk_cache::DiskCache;
 #[derive(Clone, Debug)]
 pub(super) enum Storage {
     /// All samples in memory.
-    Held {
+    Memory {
         /// `columns × rows` samples, the file's first row first.
         samples: Samples,
         /// No-data that no value marks.
@@ -23,7 +23,7 @@ pub(super) enum Storage {
 
 impl From<Samples> for Storage {
     fn from(samples: Samples) -> Self {
-        Self::Held {
+        Self::Memory {
             samples,
             mask: None,
         }
@@ -38,9 +38,9 @@ impl<R: BlockReader + 'static> From<R> for Storage {
 
 impl Storage {
     /// Returns the samples, if all are in memory.
-    pub(super) fn held(&self) -> Option<&Samples> {
+    pub(super) fn in_memory(&self) -> Option<&Samples> {
         match self {
-            Self::Held { samples, .. } => Some(samples),
+            Self::Memory { samples, .. } => Some(samples),
             Self::Blocks(_) => None,
         }
     }
@@ -48,7 +48,7 @@ impl Storage {
     /// Returns the type of a sample.
     pub(super) fn sample_type(&self) -> SampleType {
         match self {
-            Self::Held { samples, .. } => samples.sample_type(),
+            Self::Memory { samples, .. } => samples.sample_type(),
             Self::Blocks(blocks) => blocks.sample_type(),
         }
     }
@@ -79,9 +79,9 @@ impl Storage {
     }
 
     /// Marks no-data in samples that are in memory.
-    pub(super) fn set_no_data(&mut self, holes: Option<NoDataMask>) {
-        if let Self::Held { mask, .. } = self {
-            *mask = holes.filter(|holes| !holes.is_clear());
+    pub(super) fn set_no_data(&mut self, no_data_mask: Option<NoDataMask>) {
+        if let Self::Memory { mask, .. } = self {
+            *mask = no_data_mask.filter(|no_data_mask| !no_data_mask.is_clear());
         }
     }
 }

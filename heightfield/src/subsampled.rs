@@ -1,9 +1,9 @@
 //! Images with every 2ᵏ-th sample of a field, for files without overviews.
 
-use super::blocks::{BlockImage, Looks, Part};
+use super::blocks::{BlockImage, Part, SurveyParts};
 
 /// Side, in samples, of the parts that are read at opening, if a file is not read whole.
-const PLACE: u32 = 64;
+const PART_SIDE: u32 = 64;
 
 /// Returns the full image and coarser ones while these have cells; `block` returns the columns and
 /// rows of a block of the image with every 2ᵏ-th sample.
@@ -30,18 +30,18 @@ pub(super) fn set_order(images: &mut [BlockImage], south_up: bool, east_first: b
     };
     let last = [full.columns, full.rows].map(|count| count.max(1) - 1);
     for (k, image) in images.iter_mut().enumerate() {
-        let left_over = |last: u32, is_turned: bool| if is_turned { last % (1 << k) } else { 0 };
+        let remainder = |last: u32, is_turned: bool| if is_turned { last % (1 << k) } else { 0 };
         image.first = [
-            left_over(last[0], east_first),
-            left_over(last[1], !south_up),
+            remainder(last[0], east_first),
+            remainder(last[1], !south_up),
         ];
     }
 }
 
 /// Returns parts spread over a full image, `each` per direction.
-pub(super) fn places(full: &BlockImage, each: u32) -> Looks {
+pub(super) fn spread_parts(full: &BlockImage, each: u32) -> SurveyParts {
     let along = |count: u32, number: u32| {
-        let size = PLACE.min(count);
+        let size = PART_SIDE.min(count);
         let last = u64::from(count - size) * u64::from(number) / u64::from(each.max(2) - 1);
         (last as u32, size)
     };
@@ -56,7 +56,7 @@ pub(super) fn places(full: &BlockImage, each: u32) -> Looks {
             rows,
         }
     });
-    Looks {
+    SurveyParts {
         image: 0,
         parts: parts.collect(),
     }

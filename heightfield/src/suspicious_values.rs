@@ -69,7 +69,7 @@ impl Outermost {
         if self.count == 0 {
             return remarks;
         }
-        let low = LOW.contains(&self.lowest) || (!is_declared && self.may_be_zero_for_none());
+        let low = LOW.contains(&self.lowest) || (!is_declared && self.zero_may_mean_no_data());
         let suspects = [
             ("lowest", self.lowest, low),
             ("highest", self.highest, HIGH.contains(&self.highest)),
@@ -83,7 +83,7 @@ impl Outermost {
     }
 
     /// Returns true if zeros lie far below all other values, as in the border of a warped image.
-    fn may_be_zero_for_none(&self) -> bool {
+    fn zero_may_mean_no_data(&self) -> bool {
         let others = self.highest - self.next;
         self.lowest == 0.0
             && self.lowest_count.saturating_mul(ONE_IN) >= self.count
@@ -97,18 +97,18 @@ mod tests {
     use super::*;
 
     fn remarks(values: &[f64], is_declared: bool) -> String {
-        let mut seen = Outermost::NONE;
-        values.iter().for_each(|value| seen.add(*value));
-        seen.remarks(is_declared).join("; ")
+        let mut outermost = Outermost::NONE;
+        values.iter().for_each(|value| outermost.add(*value));
+        outermost.remarks(is_declared).join("; ")
     }
 
     #[test]
-    fn values_that_stand_for_no_data_elsewhere_are_named() {
+    fn common_no_data_values_are_reported() {
         for value in LOW.into_iter().chain(HIGH) {
-            let stated = remarks(&[367.0, value, 400.0], false);
+            let reported = remarks(&[367.0, value, 400.0], false);
             assert!(
-                stated.contains(&format!("--input no-data={value}")),
-                "{stated}"
+                reported.contains(&format!("--input no-data={value}")),
+                "{reported}"
             );
         }
         assert!(remarks(&[0.0, 367.0, 960.0], false).contains("--input no-data=0"));

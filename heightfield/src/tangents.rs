@@ -38,7 +38,7 @@ impl Tangents {
         column_step: [f64; 2],
         row_step: [f64; 2],
     ) -> Option<CellSize> {
-        let (along, up) = (self.lead(column_step), self.lead(row_step));
+        let (along, up) = (self.displacement(column_step), self.displacement(row_step));
         let (long, high) = (dot(along, along).sqrt(), dot(up, up).sqrt());
         let (east, north) = cell.metres();
         let lean = dot(along, up) / (long * high);
@@ -49,7 +49,7 @@ impl Tangents {
         })
     }
 
-    fn lead(&self, [dx, dy]: [f64; 2]) -> [f64; 3] {
+    fn displacement(&self, [dx, dy]: [f64; 2]) -> [f64; 3] {
         [0, 1, 2].map(|axis| dx * self.x[axis] + dy * self.y[axis])
     }
 }

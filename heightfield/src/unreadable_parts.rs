@@ -17,7 +17,7 @@ const WARNINGS: usize = 8;
 pub(super) struct UnreadableParts {
     /// The file's name for warnings.
     name: String,
-    known: Mutex<HashSet<(usize, [u32; 2])>>,
+    reported: Mutex<HashSet<(usize, [u32; 2])>>,
 }
 
 impl UnreadableParts {
@@ -25,23 +25,23 @@ impl UnreadableParts {
     pub(super) fn of(name: &str) -> Self {
         Self {
             name: name.to_owned(),
-            known: Mutex::default(),
+            reported: Mutex::default(),
         }
     }
 
     /// Returns true if reading the part at a column and row of an image failed before.
     pub(super) fn has(&self, image: usize, first: [u32; 2]) -> bool {
-        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        known.contains(&(image, first))
+        let reported = self.reported.lock().unwrap_or_else(PoisonError::into_inner);
+        reported.contains(&(image, first))
     }
 
     /// Warns once per part of an image that cannot be read.
     pub(super) fn warn(&self, image: usize, part: &Part, fault: &RasterError) {
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() < MAX && !known.insert((image, [part.column, part.row])) {
+        let mut reported = self.reported.lock().unwrap_or_else(PoisonError::into_inner);
+        if reported.len() < MAX && !reported.insert((image, [part.column, part.row])) {
             return;
         }
-        if known.len() <= WARNINGS {
+        if reported.len() <= WARNINGS {
             tracing::warn!(
                 "columns {} to {}, rows {} to {} of {}{} cannot be read and count as no data: {fault}",
                 part.column,
@@ -51,7 +51,7 @@ impl UnreadableParts {
                 if image > 0 { "an overview of " } else { "" },
                 self.name
             );
-        } else if known.len() == WARNINGS + 1 {
+        } else if reported.len() == WARNINGS + 1 {
             tracing::warn!("more of {} cannot be read and count as no data", self.name);
         }
     }

@@ -4,7 +4,7 @@ use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
 /// Max depth of elements, and max number of attributes.
-const DEEPEST: usize = 16;
+const MAX_DEPTH: usize = 16;
 const MAX_ATTRIBUTES: usize = 64;
 
 /// A closed element.
@@ -55,8 +55,8 @@ pub(super) fn for_each(text: &str, mut visit: impl FnMut(&[Element])) -> Result<
             _ => {}
         }
         has_any |= !open.is_empty();
-        if open.len() > DEEPEST {
-            return Err(format!("it is deeper than {DEEPEST} elements"));
+        if open.len() > MAX_DEPTH {
+            return Err(format!("it is deeper than {MAX_DEPTH} elements"));
         }
     }
 }
@@ -101,23 +101,23 @@ fn resolved(reference: &quick_xml::events::BytesRef<'_>) -> Result<String, Strin
 mod tests {
     use super::*;
 
-    fn seen(text: &str) -> Result<Vec<String>, String> {
-        let mut seen = Vec::new();
+    fn paths(text: &str) -> Result<Vec<String>, String> {
+        let mut paths = Vec::new();
         for_each(text, |open| {
             let names: Vec<_> = open.iter().map(|element| element.name.as_str()).collect();
-            seen.push(format!(
+            paths.push(format!(
                 "{}={}",
                 names.join("/"),
                 open[open.len() - 1].text.trim()
             ));
         })?;
-        Ok(seen)
+        Ok(paths)
     }
 
     #[test]
-    fn elements_have_the_path_of_their_ancestors() {
+    fn visited_elements_include_their_ancestors() {
         let text = "<?xml version='1.0'?><a><b k='1'>x &amp; &#233;</b><c/></a>";
-        assert_eq!(seen(text).expect("XML"), ["a/b=x & é", "a/c=", "a="]);
+        assert_eq!(paths(text).expect("XML"), ["a/b=x & é", "a/c=", "a="]);
     }
 
     #[test]
@@ -135,7 +135,7 @@ mod tests {
             "<a></b>",
             "<a>&x;</a>",
         ] {
-            assert!(seen(text).is_err(), "{}", &text[..text.len().min(40)]);
+            assert!(paths(text).is_err(), "{}", &text[..text.len().min(40)]);
         }
     }
 }

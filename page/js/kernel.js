@@ -1,7 +1,7 @@
 // The kernel: the C library (c/include/hapterra.h), compiled to WebAssembly, by its C names.
 
 import { TICK_HZ } from "./clock.js";
-import { every, stepOf } from "./terrain.js";
+import { everyNth, stepOf } from "./terrain.js";
 
 /** Sizes of the header's structures, bytes. */
 const SURFACE_BYTES = 48;
@@ -71,7 +71,7 @@ export class Kernel {
    * second, fourth, … sample, as in the command. */
   setTerrain(terrain, tipMm) {
     const step = stepOf(terrain.cellMm, tipMm);
-    const { heights, nx, ny, cellMm } = every(terrain, step);
+    const { heights, nx, ny, cellMm } = everyNth(terrain, step);
     const c = this.#c;
     const at = this.#alloc(heights.byteLength);
     this.#memory.f32.set(heights, at / 4);
@@ -88,18 +88,18 @@ export class Kernel {
 
   /** Begins a contact: the next step is its first. */
   begin(surface) {
-    this.#write(surface);
+    this.#writeSurface(surface);
     this.#checkContact(this.#c.hapterra_contact_begin(this.#contact, this.#terrain, this.#surface, 1, TICK_HZ));
   }
 
   /** Changes the surface between two steps; the contact continues. */
   setSurface(surface) {
-    this.#write(surface);
+    this.#writeSurface(surface);
     this.#checkContact(this.#c.hapterra_contact_set_surface(this.#contact, this.#surface, 1));
   }
 
   /** Writes the forces of a surface into a path, as computed by a new contact. */
-  again(surface, path) {
+  recompute(surface, path) {
     const now = this.#contact;
     this.#contact = this.#c.hapterra_contact_new();
     try {
@@ -111,7 +111,7 @@ export class Kernel {
     }
   }
 
-  #write({ friction, stiffness, texture, wavelength }) {
+  #writeSurface({ friction, stiffness, texture, wavelength }) {
     this.#c.hapterra_surface_default(this.#surface);
     const { f32, u32 } = this.#memory;
     const first = this.#surface / 4;

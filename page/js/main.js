@@ -6,10 +6,10 @@ import { command, npy, surfaceFile } from "./path.js";
 import { Pointer } from "./pointer.js";
 import { read } from "./read/file.js";
 import { Sound } from "./sound.js";
-import { fit, made } from "./terrain.js";
+import { fit, generate } from "./terrain.js";
 import { Touch } from "./touch.js";
 import { Scene } from "./view/scene.js";
-import { facts, scale, show, title } from "./words.js";
+import { scaleBar, showFacts, showTitle, showValues } from "./words.js";
 
 const MAX_PRESS_N = 4;
 const WAVELENGTH_MM = 2;
@@ -24,14 +24,14 @@ function surface() {
   return { friction, stiffness, texture, wavelength: WAVELENGTH_MM };
 }
 
-function say(text) {
+function showMessage(text) {
   element("said").textContent = text;
 }
 
 /** Returns the server's terrain, or one by formula. */
-async function first() {
+async function firstTerrain() {
   const about = await fetch("terrain.json").then((answer) => (answer.ok ? answer.json() : null));
-  if (about === null || !about.file) return made(7);
+  if (about === null || !about.file) return generate(7);
   const answer = await fetch(about.file);
   if (!answer.ok) throw new Error(`The terrain ${about.file} is not beside this page (${answer.status}). Make the folder again: cargo xtask demo --touch FILE.`);
   return { ...(await read(about.file, new Uint8Array(await answer.arrayBuffer()))), ...about };
@@ -48,7 +48,7 @@ function save(name, content) {
 async function main() {
   const scene = new Scene(element("view"));
   const kernel = await load("kernel.wasm");
-  const touch = new Touch(kernel, fit(await first()), surface(), Number(element("tip").value));
+  const touch = new Touch(kernel, fit(await firstTerrain()), surface(), Number(element("tip").value));
   const [clock, sound] = [new Clock(), new Sound()];
   let bar = null;
   let seed = 7;
@@ -56,20 +56,20 @@ async function main() {
   const setTerrain = (raw) => {
     const terrain = fit(raw);
     touch.setTerrain(terrain);
-    shown(terrain);
+    display(terrain);
   };
-  const shown = (terrain) => {
+  const display = (terrain) => {
     scene.setTerrain(terrain);
-    bar = scale(terrain);
-    title(terrain);
+    bar = scaleBar(terrain);
+    showTitle(terrain);
   };
-  const shownValues = () => show(surface(), touch.arm.pressN, Number(element("tip").value));
+  const updateValues = () => showValues(surface(), touch.arm.pressN, Number(element("tip").value));
   const hand = {
     get pressN() { return touch.arm.pressN; },
     press(newtons) {
       touch.arm.pressN = Math.round(Math.max(0, Math.min(MAX_PRESS_N, newtons)) * 10) / 10;
       element("press").value = touch.arm.pressN;
-      shownValues();
+      updateValues();
     },
     turn(yaw, pitch) {
       scene.camera.yaw += yaw;
@@ -83,28 +83,28 @@ async function main() {
   };
   const pointer = new Pointer(element("view"), hand);
 
-  const changed = () => {
+  const applySurface = () => {
     touch.setSurface(surface());
-    shownValues();
+    updateValues();
   };
-  element("tip").addEventListener("input", shownValues);
+  element("tip").addEventListener("input", updateValues);
   element("tip").addEventListener("change", () => {
     try {
       touch.setTip(Number(element("tip").value));
     } catch (why) {
-      say(why.message);
+      showMessage(why.message);
       element("tip").value = touch.tipMm;
-      shownValues();
+      updateValues();
     }
   });
-  for (const id of sliders) element(id).addEventListener("input", changed);
+  for (const id of sliders) element(id).addEventListener("input", applySurface);
   element("press").addEventListener("input", (event) => hand.press(Number(event.target.value)));
   for (const [name, values] of Object.entries(PRESETS)) {
     const button = document.createElement("button");
     button.textContent = name;
     button.addEventListener("click", () => {
       sliders.forEach((id, i) => (element(id).value = values[i]));
-      changed();
+      applySurface();
     });
     element("presets").append(button);
   }
@@ -112,10 +112,10 @@ async function main() {
     sound.toggle();
     element("sound").textContent = sound.isOn ? "Sound off" : "Sound on";
   });
-  element("new").addEventListener("click", () => setTerrain(made((seed += 1))));
+  element("new").addEventListener("click", () => setTerrain(generate((seed += 1))));
   element("save").addEventListener("click", () => {
     const { isMixed } = touch.path;
-    if (isMixed) kernel.again(touch.surface, touch.path);
+    if (isMixed) kernel.recompute(touch.surface, touch.path);
     save("path.csv", touch.path.csv());
     save("terrain.npy", npy(touch.terrain));
     const surface = surfaceFile(touch.surface);
@@ -124,27 +124,27 @@ async function main() {
     element("mixed").hidden = !isMixed;
     element("command").textContent = command(touch.terrain, touch.surface, touch.tipMm);
   });
-  const opened = async (file) => {
+  const openFile = async (file) => {
     if (!file) return;
     try {
-      say(`Reading ${file.name}…`);
+      showMessage(`Reading ${file.name}…`);
       setTerrain(await read(file.name, new Uint8Array(await file.arrayBuffer())));
-      say("");
+      showMessage("");
     } catch (why) {
-      say(why.message);
+      showMessage(why.message);
     }
   };
   element("open").addEventListener("click", () => element("file").click());
-  element("file").addEventListener("change", (event) => opened(event.target.files[0]));
+  element("file").addEventListener("change", (event) => openFile(event.target.files[0]));
   const drop = (name, is) => addEventListener(name, (event) => {
     event.preventDefault();
     document.body.classList.toggle("dropping", is);
-    if (name === "drop") opened(event.dataTransfer.files[0]);
+    if (name === "drop") openFile(event.dataTransfer.files[0]);
   });
   drop("dragover", true);
   drop("dragleave", false);
   drop("drop", false);
-  element("said").addEventListener("click", () => say(""));
+  element("said").addEventListener("click", () => showMessage(""));
   document.addEventListener("visibilitychange", () => clock.pause());
 
   let phase = 0;
@@ -161,22 +161,22 @@ async function main() {
       try {
         touch.tick();
       } catch (why) {
-        say(why.message);
+        showMessage(why.message);
         break;
       }
       change += Math.hypot(...touch.force.map((n, axis) => n - before[axis])) / ticks;
     }
-    sound.hear(Math.hypot(...touch.force), change);
+    sound.update(Math.hypot(...touch.force), change);
     scene.draw(touch, bar.mm);
-    facts(scene, touch, clock, bar);
+    showFacts(scene, touch, clock, bar);
     requestAnimationFrame(frame);
   };
-  shown(touch.terrain);
+  display(touch.terrain);
   hand.press(1);
-  say("");
+  showMessage("");
   // For tests.
   globalThis.hapterra = { touch, clock, scene, pointer, sound };
   requestAnimationFrame(frame);
 }
 
-main().catch((why) => say(why.message));
+main().catch((why) => showMessage(why.message));

@@ -42,7 +42,7 @@ export class Sound {
   }
 
   /** Sets a frame's force, N, and its change from tick to tick, N. */
-  hear(newtons, changeN) {
+  update(newtons, changeN) {
     if (!this.isOn) return;
     const soon = this.#context.currentTime;
     this.tone.frequency.setTargetAtTime(BASE_HZ + PER_NEWTON_HZ * newtons, soon, 0.02);

@@ -23,7 +23,7 @@ const UNKNOWN_RELIEF_MM = 32;
  */
 export function fit(raw) {
   if (raw.nx < 2 || raw.ny < 2) throw new Error(`${raw.name}: ${raw.nx} × ${raw.ny} samples are no surface. Drop a grid of at least 2 × 2 heights.`);
-  const squares = squared(raw);
+  const squares = toSquareCells(raw);
   const { nx, ny } = squares;
   const [low, high] = range(squares.heights);
   if (!(high >= low)) throw new Error(`${raw.name}: no height is in it, only no-data. Check which value means no data.`);
@@ -63,7 +63,7 @@ function range(heights) {
  * Returns square cells over the field: the finer axis keeps its samples, or every n-th of them if
  * there would be too many, and the other is interpolated. Nearly square cells keep their heights.
  */
-function squared(raw) {
+function toSquareCells(raw) {
   const [east, north = east] = [raw.cellM ?? 1].flat();
   const isSquare = Math.abs(east - north) <= SQUARE * Math.min(east, north);
   const [width, depth] = isSquare ? [1, 1] : [east, north];
@@ -100,34 +100,34 @@ export function stepOf(cellMm, tipMm) {
 }
 
 /** Returns every `step`-th sample from the south-west. */
-export function every({ nx, ny, heights, cellMm }, step) {
+export function everyNth({ nx, ny, heights, cellMm }, step) {
   if (step === 1) return { nx, ny, heights, cellMm };
   const [columns, rows] = [nx, ny].map((count) => Math.floor((count - 1) / step) + 1);
-  const kept = new Float32Array(columns * rows);
+  const thinned = new Float32Array(columns * rows);
   for (let row = 0; row < rows; row++) {
-    for (let i = 0; i < columns; i++) kept[row * columns + i] = heights[row * step * nx + i * step];
+    for (let i = 0; i < columns; i++) thinned[row * columns + i] = heights[row * step * nx + i * step];
   }
-  return { nx: columns, ny: rows, heights: kept, cellMm: cellMm * step };
+  return { nx: columns, ny: rows, heights: thinned, cellMm: cellMm * step };
 }
 
 /** Returns the rows in the opposite order: most files begin in the north. */
-export function turned(heights, nx, ny) {
+export function reverseRows(heights, nx, ny) {
   const rows = new Float32Array(nx * ny);
   for (let row = 0; row < ny; row++) rows.set(heights.subarray(row * nx, (row + 1) * nx), (ny - 1 - row) * nx);
   return rows;
 }
 
 /** Returns a mountain range by formula, for a page without a file; the same for the same seed. */
-export function made(seed, size = 512) {
+export function generate(seed, size = 512) {
   const heights = new Float32Array(size * size);
   for (let row = 0; row < size; row++) {
-    for (let i = 0; i < size; i++) heights[row * size + i] = range_m((i / size) * 3.4, (row / size) * 3.4, seed);
+    for (let i = 0; i < size; i++) heights[row * size + i] = rangeHeight((i / size) * 3.4, (row / size) * 3.4, seed);
   }
   return { name: "a made mountain range", nx: size, ny: size, heights, cellM: 24, unitM: 1 };
 }
 
 /** Returns ridges on ridges, metres: high ground is rough, valleys are smooth. */
-function range_m(x, y, seed) {
+function rangeHeight(x, y, seed) {
   // Distorted, so that ridges wind.
   const bentX = x + 0.35 * noise(x * 0.9, y * 0.9, seed + 71);
   const bentY = y + 0.35 * noise(x * 0.9, y * 0.9, seed + 72);

@@ -4,7 +4,7 @@ import { Arm } from "./arm.js";
 import { Path } from "./path.js";
 
 /** Height of a path's beginning above the ground, mm: a point that begins below it has no force. */
-const ABOVE_MM = 0.05;
+const CLEARANCE_MM = 0.05;
 /** Height of a lifted arm above the highest ground, mm. */
 const HOVER_MM = 8;
 /** Minimum distance of the hand from the terrain's edges, mm. */
@@ -61,7 +61,7 @@ export class Touch {
   /** Lifts an arm inside the ground to just above it. */
   #lift() {
     const [x, y, z] = this.arm.at;
-    const above = this.kernel.heightAt(x, y) + ABOVE_MM;
+    const above = this.kernel.heightAt(x, y) + CLEARANCE_MM;
     if (z <= above) this.arm.put([x, y, above]);
   }
 

@@ -4,7 +4,7 @@ const element = (id) => document.getElementById(id);
 const set = (id, values) => Object.entries(values).forEach(([name, value]) => element(id).setAttribute(name, value));
 
 /** Values beside the sliders. */
-export function show({ friction, stiffness, texture }, pressN, tipMm) {
+export function showValues({ friction, stiffness, texture }, pressN, tipMm) {
   element("tip-is").textContent = tipMm > 0 ? `ball of ${tipMm} mm` : "point";
   element("press-is").textContent = pressN > 0 ? `${pressN.toFixed(1)} N` : "lifted";
   element("friction-is").textContent = friction > 0 ? friction.toFixed(2) : "none";
@@ -13,7 +13,7 @@ export function show({ friction, stiffness, texture }, pressN, tipMm) {
 }
 
 /** Name and size of the terrain. */
-export function title({ name, nx, ny, of, isSquare, range, exaggeration, metresPerMm }) {
+export function showTitle({ name, nx, ny, of, isSquare, range, exaggeration, metresPerMm }) {
   const samples = !isSquare ? `${nx} × ${ny} square cells out of ${of[0]} × ${of[1]} heights` : nx === of[0] && ny === of[1] ? `${nx} × ${ny} heights` : `${nx} × ${ny} of ${of[0]} × ${of[1]} heights`;
   const unit = metresPerMm === null ? "" : " m";
   const heights = `${range.map((height) => Math.round(height).toLocaleString("en")).join(" to ")}${unit}`;
@@ -22,11 +22,11 @@ export function title({ name, nx, ny, of, isSquare, range, exaggeration, metresP
 }
 
 /** A bar of a round length: `mm` in the hand, `text` on the ground. */
-export function scale({ widthMm, metresPerMm }) {
+export function scaleBar({ widthMm, metresPerMm }) {
   const perMm = metresPerMm ?? 1;
-  const most = 0.45 * widthMm * perMm;
-  const ten = 10 ** Math.floor(Math.log10(most));
-  const round = [5, 2, 1].find((n) => n * ten <= most) * ten;
+  const maxLength = 0.45 * widthMm * perMm;
+  const ten = 10 ** Math.floor(Math.log10(maxLength));
+  const round = [5, 2, 1].find((n) => n * ten <= maxLength) * ten;
   const [value, unit] = metresPerMm === null ? [round, "mm in the hand"] : round < 1000 ? [round, "m"] : [round / 1000, "km"];
   return { mm: round / perMm, text: `${value} ${unit}` };
 }
@@ -38,7 +38,7 @@ function loadedKb() {
 }
 
 /** Shows a frame's numbers, and the cursor at the proxy. */
-export function facts({ camera, canvas, scaleAt }, { arm, proxy, force, state, path }, clock, bar) {
+export function showFacts({ camera, canvas, scaleAt }, { arm, proxy, force, state, path }, clock, bar) {
   const px = (at) => {
     const [left, top] = camera.project(at);
     return [left * canvas.clientWidth, top * canvas.clientHeight];
@@ -55,7 +55,7 @@ export function facts({ camera, canvas, scaleAt }, { arm, proxy, force, state, p
   const [sx, sy] = px([scaleAt[0] + bar.mm / 2, scaleAt[1], scaleAt[2]]);
   set("scale", { x: sx, y: sy + 20 });
   element("scale").textContent = bar.text;
-  const lost = clock.lostMs >= 1 ? `${(clock.lostMs / 1000).toFixed(1)} s not run: this machine was busy` : "no time lost";
-  const kept = path.isFull ? "path full at 5 minutes" : `${(path.rows / 1000).toFixed(0)} s of path`;
-  element("facts").textContent = `${state} · 1,000 steps a second, ${lost} · ${kept} · ${loadedKb()} kB of page and kernel · drag or arrow keys turn the view, shift and wheel zoom`;
+  const lostText = clock.lostMs >= 1 ? `${(clock.lostMs / 1000).toFixed(1)} s not run: this machine was busy` : "no time lost";
+  const pathText = path.isFull ? "path full at 5 minutes" : `${(path.rows / 1000).toFixed(0)} s of path`;
+  element("facts").textContent = `${state} · 1,000 steps a second, ${lostText} · ${pathText} · ${loadedKb()} kB of page and kernel · drag or arrow keys turn the view, shift and wheel zoom`;
 }

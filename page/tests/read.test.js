@@ -3,7 +3,7 @@ import test from "node:test";
 import { deflateSync } from "node:zlib";
 
 import { read } from "../js/read/file.js";
-import { every, fit, made, stepOf } from "../js/terrain.js";
+import { everyNth, fit, generate, stepOf } from "../js/terrain.js";
 
 const bytes = (text) => new TextEncoder().encode(text);
 
@@ -109,11 +109,11 @@ test("cells of degrees become squares of true slopes", () => {
 test("large ball has fewer samples, as in the command", () => {
   assert.deepEqual([-1, 0, 2, 8, 8.1, 16, 40].map((tip) => stepOf(1, tip)), [1, 1, 1, 1, 2, 2, 8]);
   const heights = Float32Array.from({ length: 35 }, (_, i) => i);
-  assert.deepEqual(every({ nx: 7, ny: 5, heights, cellMm: 2 }, 4), { nx: 2, ny: 2, heights: Float32Array.from([0, 4, 28, 32]), cellMm: 8 });
+  assert.deepEqual(everyNth({ nx: 7, ny: 5, heights, cellMm: 2 }, 4), { nx: 2, ny: 2, heights: Float32Array.from([0, 4, 28, 32]), cellMm: 8 });
 });
 
 test("made terrain is the same for a seed, and has heights everywhere", () => {
-  const [a, b, c] = [made(7, 40), made(7, 40), made(8, 40)];
+  const [a, b, c] = [generate(7, 40), generate(7, 40), generate(8, 40)];
   assert.deepEqual(a.heights, b.heights);
   assert.notDeepEqual(a.heights, c.heights);
   assert.ok(a.heights.every(Number.isFinite));

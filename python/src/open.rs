@@ -24,7 +24,7 @@ use crate::{notes, refused};
 /// Descriptions of a terrain, by the command's own definitions.
 #[derive(Parser)]
 #[command(name = "open", no_binary_name = true, disable_help_flag = true)]
-struct Words {
+struct OpenArguments {
     #[command(flatten)]
     reading: ReadingOptions,
     #[command(flatten)]
@@ -46,7 +46,7 @@ pub(crate) struct Size {
 
 self_cell!(
     /// A raster, and the grid over it.
-    struct Over {
+    struct GridOverRaster {
         owner: Arc<Raster>,
         #[covariant]
         dependent: Laid,
@@ -55,7 +55,7 @@ self_cell!(
 
 /// A part of a raster at a scale.
 pub(crate) struct Opened {
-    over: Over,
+    grid_over_raster: GridOverRaster,
     /// Column and row of its south-west sample in the grid.
     first: [u32; 2],
     /// Samples from west to east, and from south to north.
@@ -67,7 +67,7 @@ pub(crate) struct Opened {
 impl Opened {
     /// Opens a file, or several as one, by the command's options, with its whole extent.
     pub(crate) fn open(paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Arc<Self>> {
-        let Words { reading, size } = parsed(words)?;
+        let OpenArguments { reading, size } = parse(words)?;
         let options = reading.options().map_err(failed)?;
         let raster = match &paths[..] {
             [path] => Raster::open(path, &options),
@@ -77,7 +77,7 @@ impl Opened {
         if let Some(note) = assumed_unit(&raster) {
             notes::add(&note);
         }
-        Ok(Arc::new(Self::laid(
+        Ok(Arc::new(Self::placed(
             Arc::new(raster),
             &size,
             Target::Whole,
@@ -92,14 +92,14 @@ impl Opened {
         size_mm: [f64; 2],
         words: Vec<OsString>,
     ) -> PyResult<Arc<Self>> {
-        let Words { size, .. } = parsed(words)?;
-        let raster = Arc::clone(self.over.borrow_owner());
-        let whole = Self::laid(raster, &size, Target::At(at.0, at.1))?;
-        let middle = whole.mm_at(at.0, at.1)?;
-        let cell_mm = whole.terrain().scale().cell_mm();
-        let (mut first, mut samples) = ([0; 2], whole.samples);
+        let OpenArguments { size, .. } = parse(words)?;
+        let raster = Arc::clone(self.grid_over_raster.borrow_owner());
+        let reopened = Self::placed(raster, &size, Target::At(at.0, at.1))?;
+        let middle = reopened.mm_at(at.0, at.1)?;
+        let cell_mm = reopened.terrain().scale().cell_mm();
+        let (mut first, mut samples) = ([0; 2], reopened.samples);
         for axis in 0..2 {
-            let (size, last) = (size_mm[axis], f64::from(whole.samples[axis] - 1));
+            let (size, last) = (size_mm[axis], f64::from(reopened.samples[axis] - 1));
             if !(size.is_finite() && size >= cell_mm) {
                 return Err(refused(format!(
                     "size_mm is {size_mm:?}: give device millimetres, a cell of {cell_mm} at least"
@@ -114,13 +114,13 @@ impl Opened {
         Ok(Arc::new(Self {
             first,
             samples,
-            ..whole
+            ..reopened
         }))
     }
 
-    fn laid(raster: Arc<Raster>, size: &Size, target: Target) -> PyResult<Self> {
+    fn placed(raster: Arc<Raster>, size: &Size, target: Target) -> PyResult<Self> {
         let read = Arc::clone(&raster);
-        let over = Over::try_new(raster, |raster| {
+        let grid_over_raster = GridOverRaster::try_new(raster, |raster| {
             let grid = target.grid(raster, HapticCells::Square)?;
             let options = PlacementOptions {
                 target,
@@ -133,16 +133,16 @@ impl Opened {
             Ok::<_, Failure>(view.terrain(grid)?)
         });
         // Heights that could not be fetched are not no-data.
-        let over = over.map_err(|failure| match read.check_complete() {
+        let grid_over_raster = grid_over_raster.map_err(|failure| match read.check_complete() {
             Err(error) => unread(error),
             Ok(()) => failed(failure),
         })?;
-        let samples = over
+        let samples = grid_over_raster
             .borrow_dependent()
             .size()
             .map(|patches| patches as u32 + 1);
         Ok(Self {
-            over,
+            grid_over_raster,
             first: [0, 0],
             samples,
             unread: Mutex::default(),
@@ -150,7 +150,7 @@ impl Opened {
     }
 
     pub(crate) fn terrain(&self) -> &Laid<'_> {
-        self.over.borrow_dependent()
+        self.grid_over_raster.borrow_dependent()
     }
 
     /// Returns it as a terrain that can be touched.
@@ -195,7 +195,7 @@ impl Opened {
     }
 
     /// Returns the file's own statements about its data.
-    pub(crate) fn stated(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn facts(&self) -> Vec<(&'static str, String)> {
         let raster = self.terrain().raster();
         let crs = raster.reference_system().map(|system| match system.code() {
             Some(code) => format!("EPSG:{code}"),
@@ -203,7 +203,7 @@ impl Opened {
         });
         let side_m = self.terrain().grid().side_m().map(|side| side.to_string());
         let unit_m = raster.stated_metres_per_vertical_unit();
-        let stated = [
+        let facts = [
             ("format", Some(raster.format().to_owned())),
             ("crs", crs),
             ("cell_m", side_m),
@@ -213,8 +213,8 @@ impl Opened {
                 Some(place::bounds_in_words(&raster.georeference())),
             ),
         ];
-        let stated = stated.into_iter();
-        stated
+        let facts = facts.into_iter();
+        facts
             .filter_map(|(name, text)| Some((name, text?)))
             .collect()
     }
@@ -283,8 +283,8 @@ impl Size {
     }
 }
 
-fn parsed(words: Vec<OsString>) -> PyResult<Words> {
-    Words::try_parse_from(words).map_err(|error| {
+fn parse(words: Vec<OsString>) -> PyResult<OpenArguments> {
+    OpenArguments::try_parse_from(words).map_err(|error| {
         let text = error.to_string();
         let text = text.split("\n\nUsage: ").next().unwrap_or(&text);
         refused(text.strip_prefix("error: ").unwrap_or(text))

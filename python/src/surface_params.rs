@@ -8,7 +8,7 @@ use pyo3::{Bound, Py, PyResult, Python, pyclass, pymethods};
 
 use crate::refused;
 
-const LIKE: SurfaceParams = SurfaceParams::PREMIUM;
+const DEFAULTS: SurfaceParams = SurfaceParams::PREMIUM;
 /// The command's defaults of a texture, mm.
 const WAVELENGTH_MM: f32 = 1.0;
 const MAX_AMPLITUDE_MM: f32 = 0.2;
@@ -48,9 +48,9 @@ pub(crate) struct Surface {
 impl Surface {
     #[new]
     #[pyo3(signature = (
-        *, stiffness=LIKE.stiffness_n_per_mm, max_force=LIKE.max_force_n,
-        friction=LIKE.friction.dynamic_mu, static_friction=None,
-        viscous_friction=LIKE.friction.viscous_s, damping=LIKE.damping.ns_per_m,
+        *, stiffness=DEFAULTS.stiffness_n_per_mm, max_force=DEFAULTS.max_force_n,
+        friction=DEFAULTS.friction.dynamic_mu, static_friction=None,
+        viscous_friction=DEFAULTS.friction.viscous_s, damping=DEFAULTS.damping.ns_per_m,
         shading="none", texture="none", texture_amplitude=None, texture_wavelength=WAVELENGTH_MM,
         texture_direction=0.0, texture_seed=0, materials=Vec::new(),
     ))]
@@ -81,7 +81,7 @@ impl Surface {
             },
             damping: Damping {
                 ns_per_m: damping,
-                ..LIKE.damping
+                ..DEFAULTS.damping
             },
             shading: choice("shading", SHADINGS, shading)?,
             texture: match choice("texture", PATTERNS, texture)? {

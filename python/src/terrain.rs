@@ -135,7 +135,7 @@ impl Terrain {
 
     /// Returns the statements of the file, as pairs of a name and a text.
     fn stated(&self) -> PyResult<Vec<(&'static str, String)>> {
-        Ok(self.opened()?.stated())
+        Ok(self.opened()?.facts())
     }
 
     /// Returns the heights of some rows, counted from the south, as f8, without rows beyond the

@@ -60,14 +60,14 @@ impl VirtualArm {
         let (targets, remarks) = contact.ticks(py, targets, t_s)?;
         let touched = &mut *contact.lock()?;
         let mut rows = Vec::new();
-        let Some(mut held) = py.detach(|| self.held(&targets))? else {
+        let Some(mut at_rest) = py.detach(|| self.at_rest(&targets))? else {
             return Ok((PyByteArray::new(py, &rows), remarks, None));
         };
         let tick_s = 1.0 / f64::from(contact.rate_hz);
         let mut why = None;
         for at in (0..targets.len()).step_by(UNINTERRUPTED) {
             let ahead = targets.get(at..).unwrap_or_default();
-            let ran = py.detach(|| self.touch(&mut held, touched, ahead, tick_s, &mut rows));
+            let ran = py.detach(|| self.run_ticks(&mut at_rest, touched, ahead, tick_s, &mut rows));
             if let Err(error) = ran {
                 why = Some(contact.raised(error).value(py).to_string());
                 break;
@@ -81,7 +81,7 @@ impl VirtualArm {
 
 impl VirtualArm {
     /// Returns the arm at rest at the first target, held by the hand; `None` without targets.
-    fn held(&self, targets: &[Tick]) -> PyResult<Option<Plant>> {
+    fn at_rest(&self, targets: &[Tick]) -> PyResult<Option<Plant>> {
         let model = PhantomModel::premium_1_5();
         for (_, at_mm) in targets {
             self.placement.joints_at(&model, *at_mm).map_err(refused)?;
@@ -97,7 +97,7 @@ impl VirtualArm {
     }
 
     /// Runs ticks at the first of these targets, up to the next check for Ctrl-C.
-    fn touch(
+    fn run_ticks(
         &self,
         plant: &mut Plant,
         contact: &mut Touched,

@@ -18,35 +18,35 @@ OWN = [sys.executable, "-m", "hapterra"]
 
 
 @pytest.fixture
-def own(monkeypatch):
+def package_command(monkeypatch):
     """Selects the package's command, even if the environment names another."""
     monkeypatch.delenv("HAPTERRA", raising=False)
 
 
-def test_console_script_and_module_are_the_command(own):
+def test_console_script_and_module_are_the_command(package_command):
     script = Path(sys.executable).with_name("hapterra")
     for words in (OWN, [script]):
-        told = subprocess.run([*words, "--version"], check=True, capture_output=True, text=True)
-        assert told.stdout.startswith("hapterra "), told
-    assert run("--version") == told.stdout
+        result = subprocess.run([*words, "--version"], check=True, capture_output=True, text=True)
+        assert result.stdout.startswith("hapterra "), result
+    assert run("--version") == result.stdout
 
 
-def test_command_is_what_the_environment_names(monkeypatch, own):
+def test_command_is_what_the_environment_names(monkeypatch, package_command):
     assert command() == OWN
     monkeypatch.setenv("HAPTERRA", "/opt/hapterra")
     assert command() == ["/opt/hapterra"]
 
 
-def test_command_starts_without_numpy(own):
+def test_command_starts_without_numpy(package_command):
     code = (
         "import sys, runpy; sys.modules['numpy'] = None; sys.argv = ['hapterra', '--version'];"
         "runpy.run_module('hapterra', run_name='__main__')"
     )
-    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert told.stdout.startswith("hapterra ")
+    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert result.stdout.startswith("hapterra ")
 
 
-def test_failures_have_the_text_and_the_hint(own, tmp_path):
+def test_failures_have_the_text_and_the_hint(package_command, tmp_path):
     with pytest.raises(CommandError) as failed:
         run("info", tmp_path / "nothing.tif")
     assert "nothing.tif" in failed.value.message and failed.value.hint
@@ -71,8 +71,8 @@ def test_command_runs_once_in_a_process():
         "from hapterra import _native; assert _native.main(['--version'], []) == 0;"
         "_native.main(['--version'], [])"
     )
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "RuntimeError: the command has run in this process" in told.stderr
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "RuntimeError: the command has run in this process" in result.stderr
 
 
 def serving(folder):
@@ -97,9 +97,9 @@ def test_ctrl_c_ends_a_command_cleanly(tmp_path):
     ) as child:
         begun(tmp_path, lambda: child.poll() is not None)
         child.send_signal(signal.SIGINT)
-        told = child.communicate()[1]
-    assert child.returncode == 0, told
-    assert "Traceback" not in told
+        result = child.communicate()[1]
+    assert child.returncode == 0, result
+    assert "Traceback" not in result
     assert (tmp_path / "felt.csv").read_text("utf-8").count("\n") > 10
 
 
@@ -112,13 +112,13 @@ def test_killed_worker_is_reported_by_its_guardian(tmp_path):
         workers = Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split()
         for worker in workers:
             os.kill(int(worker), signal.SIGKILL)
-        told = child.communicate()[1]
-    assert len(workers) == 1 and child.returncode == 128 + signal.SIGKILL, told
-    assert "felt.csv" in told and "is what was written of it" in told
+        result = child.communicate()[1]
+    assert len(workers) == 1 and child.returncode == 128 + signal.SIGKILL, result
+    assert "felt.csv" in result and "is what was written of it" in result
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT there")
-def test_ctrl_c_ends_the_command_of_a_run(tmp_path, own, monkeypatch):
+def test_ctrl_c_ends_the_command_of_a_run(tmp_path, package_command, monkeypatch):
     children, start = [], subprocess.Popen
 
     def popen(*words, **how):

@@ -86,7 +86,7 @@ def test_native_device_from_arming_to_disarmed(tmp_path):
         assert (sample.state, sample.view) == (rows["state"][at], int(rows["view"][at]))
 
 
-def test_array_is_loaded_as_it_lies(tmp_path):
+def test_array_is_loaded_in_its_orientation(tmp_path):
     heights = np.arange(12.0).reshape(3, 4)
     heights[0, 0] = np.nan
     path, scale = Terrain(heights, cell_mm=2, origin="lower")._write(tmp_path / "a.npy")
@@ -111,7 +111,7 @@ def test_exception_leaves_the_arm_disarmed(tmp_path):
     assert device.is_disarmed and (tmp_path / "felt.csv").exists()
 
 
-def test_what_does_not_open_is_the_commands_error(tmp_path):
+def test_failed_open_raises_the_commands_error(tmp_path):
     with connect("native") as device:
         with pytest.raises(DeviceError, match="load"):
             device.arm()
@@ -126,7 +126,7 @@ def test_what_does_not_open_is_the_commands_error(tmp_path):
         connect("serial")
 
 
-def test_emulated_board_without_an_image_says_what_to_type(monkeypatch):
+def test_emulated_board_without_image_suggests_a_command(monkeypatch):
     monkeypatch.delenv("HAPTERRA_MPS2_ELF", raising=False)
     with connect("emulated") as device:
         device.load(hills())
@@ -218,8 +218,8 @@ def test_ctrl_c_leaves_the_arm_disarmed(tmp_path):
     child = script(tmp_path)
     # As a terminal sends it: to all processes of the group.
     os.killpg(child.pid, signal.SIGINT)
-    told, _ = child.communicate(timeout=120)
-    assert told == "interrupted\ndisarmed True\n" and child.returncode == 0
+    result, _ = child.communicate(timeout=120)
+    assert result == "interrupted\ndisarmed True\n" and child.returncode == 0
     ends_early(tmp_path / "felt.csv")
 
 
@@ -308,7 +308,7 @@ def test_arm_that_is_not_armed_in_time_is_disarmed(played):
 
 @posix
 @pytest.mark.parametrize("left", [True, False], ids=["disarm", "an exception"])
-def test_board_that_does_not_confirm_is_an_error_that_says_so(played, left):
+def test_unconfirmed_board_is_an_explicit_error(played, left):
     end = 'tell("end", disarmed=False)\nprint("error: the board did not confirm", file=sys.stderr)'
     played(f'mode("armed")\nsys.stdin.read()\n{end}\nsys.exit(1)')
     with pytest.raises(NotDisarmedError, match="switch the amplifiers off"):
@@ -367,7 +367,7 @@ def test_staircase_asks_a_person_on_an_arm(played, tmp_path, monkeypatch, capsys
     tell("end", disarmed=True)
     """)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("hapterra._connect.at_the_terminal", lambda said: said == "FAULT 6")
+    monkeypatch.setattr("hapterra._connect.ask_at_terminal", lambda said: said == "FAULT 6")
     words = ["friction_jnd.py", "--device", "usb", "--trials", "40", "--out", "jnd.png"]
     monkeypatch.setattr(sys, "argv", words)
     answers = itertools.cycle(["neither", "1", "2"])
@@ -375,8 +375,8 @@ def test_staircase_asks_a_person_on_an_arm(played, tmp_path, monkeypatch, capsys
         "builtins.input", lambda said: "" if said.startswith("Stroke") else next(answers)
     )
     runpy.run_path(str(STAIRCASE), run_name="__main__")
-    told = capsys.readouterr()
-    assert "Weber fraction" in told.out and "friction" not in told.err
+    result = capsys.readouterr()
+    assert "Weber fraction" in result.out and "friction" not in result.err
     log = (tmp_path / "log").read_text().splitlines()
     frictions = [float(line.split()[1]) for line in log if line.startswith("friction ")]
     pairs = list(zip(frictions[::2], frictions[1::2]))
@@ -399,7 +399,7 @@ def test_recording_that_fails_is_an_error_of_a_disarmed_board(played):
 
 
 @posix
-def test_samples_that_nobody_takes_are_dropped_and_counted(played):
+def test_unread_samples_are_dropped_and_counted(played):
     flood = """
     mode("armed")
     for tick in range(5000):
@@ -421,10 +421,10 @@ def test_samples_that_nobody_takes_are_dropped_and_counted(played):
 
 TERMINAL = """
 import sys, time
-from hapterra._terminal import at_the_terminal
+from hapterra._terminal import ask_at_terminal
 sys.stdin.readline()
 time.sleep(0.5)
-print("answer", at_the_terminal("is it in its zero pose?"))
+print("answer", ask_at_terminal("is it in its zero pose?"))
 """
 
 
@@ -452,38 +452,38 @@ def test_enter_counts_after_the_question_is_shown(typed, answer):
 
 
 @posix
-def test_question_is_not_asked_where_nobody_sees_it():
+def test_question_needs_a_terminal():
     import pty
 
     ours, theirs = pty.openpty()
     os.write(ours, b"begin\n\n")
-    told = subprocess.run([sys.executable, "-c", TERMINAL], stdin=theirs, capture_output=True)
+    result = subprocess.run([sys.executable, "-c", TERMINAL], stdin=theirs, capture_output=True)
     os.close(ours)
     os.close(theirs)
-    assert told.stdout == b"answer False\n", told
+    assert result.stdout == b"answer False\n", result
 
 
-def test_question_is_taken_once_with_all_of_its_lines():
-    session = faked()
+def test_question_is_returned_once_with_all_lines():
+    session = fake_session()
     assert session.take_question() is None
     for asks, lines in [(7, ["a", "b"]), (7, ["a", "b"]), (7, ["c"])]:
-        session._take({"event": "arming", "lines": lines, "asks": asks})
+        session._handle_event({"event": "arming", "lines": lines, "asks": asks})
     assert session.take_question() == (7, "a\nb\nc") and session.take_question() is None
-    session._take({"event": "arming", "lines": ["a"], "asks": 7})
+    session._handle_event({"event": "arming", "lines": ["a"], "asks": 7})
     assert session.take_question() is None
-    session._take({"event": "arming", "lines": ["d"], "asks": 8})
+    session._handle_event({"event": "arming", "lines": ["d"], "asks": 8})
     assert session.take_question() == (8, "d")
 
 
-def faked(words=("run",), code="pass", **options):
+def fake_session(words=("run",), code="pass", **options):
     """Returns a session of a Python that runs some code."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hapterra._session.command", lambda: [sys.executable, "-c", code])
         return Session(words, lambda event: None, **options)
 
 
-def line_of(told):
-    return f"import sys; print({told!r}, file=sys.stderr)"
+def line_of(text):
+    return f"import sys; print({text!r}, file=sys.stderr)"
 
 
 # State of the session.
@@ -513,15 +513,15 @@ def test_device_that_is_not_confirmed_stays_an_error(played):
 
 @posix
 def test_exit_code_0_confirms_nothing():
-    session = faked()
+    session = fake_session()
     session.view = 0
     with pytest.raises(NotDisarmedError):
         session.end()
-    session = faked(code=line_of("usb: the board has confirmed that it is disarmed"))
+    session = fake_session(code=line_of("usb: the board has confirmed that it is disarmed"))
     session.view = 0
     session.end()
     assert session.is_disarmed
-    session = faked(code=line_of("mark `the board has confirmed that it is disarmed` at tick 7"))
+    session = fake_session(code=line_of("mark `the board has confirmed that it is disarmed` at tick 7"))
     session.view = 0
     with pytest.raises(NotDisarmedError):
         session.end()
@@ -549,10 +549,10 @@ def test_ctrl_c_while_it_ends_does_not_lose_the_session(played, monkeypatch):
 
 @posix
 def test_mode_and_view_come_from_samples_too():
-    session = faked()
-    session._take({"event": "sample", "mode": "armed", "view": 3})
+    session = fake_session()
+    session._handle_event({"event": "sample", "mode": "armed", "view": 3})
     assert (session.mode, session.view) == ("armed", 3)
-    session._take({"event": "end", "disarmed": False})
+    session._handle_event({"event": "end", "disarmed": False})
     assert session.mode == "armed" and not session.is_disarmed
 
 
@@ -579,19 +579,19 @@ def test_closed_stderr_and_half_a_line_keep_the_session(played, monkeypatch):
         device.arm()
         assert device.mark("mine").tick == 2
         session = device._session
-        assert not session.wait(lambda: session.is_over, 0.5) and device.is_armed
+        assert not session.wait(lambda: session.has_ended, 0.5) and device.is_armed
     assert device.is_disarmed
 
 
 @posix
 @pytest.mark.parametrize("quiet", [False, True])
-def test_quiet_session_passes_on_what_is_warned_of(capsys, quiet):
+def test_quiet_session_forwards_warnings(capsys, quiet):
     lines = ["view 1: friction 0.6", "mark           `a` at tick 7", "  12.0 s free",
              "error: another host has taken the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
-    session = faked(code=line_of("\n".join(lines)), is_quiet=quiet)
+    session = fake_session(code=line_of("\n".join(lines)), is_quiet=quiet)
     session.end() if quiet else session._stderr.join()
-    told = capsys.readouterr().err.splitlines()
-    assert told == [f"hapterra: {line}" for line in lines[3 if quiet else 0 :] if "12.0" not in line]
+    result = capsys.readouterr().err.splitlines()
+    assert result == [f"hapterra: {line}" for line in lines[3 if quiet else 0 :] if "12.0" not in line]
 
 
 # Params.
@@ -611,7 +611,7 @@ def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path,
             tell("refused", text="a friction of 20")
     tell("end", disarmed=True)
     """)
-    monkeypatch.setattr("hapterra._connect._DONE_S", 0.5)
+    monkeypatch.setattr("hapterra._connect._COMMAND_TIMEOUT_S", 0.5)
     with connect("usb") as device:
         with pytest.raises(ValueError, match="connect"):
             device.load(hills(), device="usb")
@@ -631,7 +631,7 @@ def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path,
             params.friction = 0.2
         with pytest.raises(DeviceError, match="friction is not known"):
             params.static_friction = 0.5
-        device._touched["stiffness"] = None
+        device._current_surface["stiffness"] = None
         with pytest.raises(DeviceError, match="stiffness is not known"):
             params.stiffness = 0.5
         device.command("reset")
@@ -644,7 +644,7 @@ def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path,
 
 
 @posix
-def test_viewer_that_goes_on_does_not_hold_the_end_up(played, tmp_path, monkeypatch):
+def test_open_viewer_does_not_delay_the_end(played, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     played("""
     import subprocess
@@ -680,9 +680,9 @@ def ends(text):
     """Runs Python that has armed a simulated device. Returns its output."""
     text = ENDS.format(tests=str(Path(__file__).parent)) + textwrap.dedent(text)
     words = [sys.executable, "-c", text]
-    told = subprocess.run(words, capture_output=True, text=True, timeout=60)
-    assert told.returncode == 0, told.stderr
-    return told.stdout.splitlines()
+    result = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    return result.stdout.splitlines()
 
 
 ENDED = 'mode("armed")\nsys.stdin.read()\nopen("ended", "w")\ntell("end", disarmed=True)'
@@ -700,7 +700,7 @@ def test_thread_that_reads_samples_does_not_keep_the_arm_armed(played, tmp_path,
 def test_device_that_is_replaced_ends_its_session(played, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     played(ENDED)
-    told = ends("""
+    result = ends("""
     device.params
     gc.disable()
     device = None
@@ -709,14 +709,14 @@ def test_device_that_is_replaced_ends_its_session(played, tmp_path, monkeypatch)
         time.sleep(0.05)
     print(os.path.exists("ended"))
     """)
-    assert told == ["True"]
+    assert result == ["True"]
 
 
 @posix
 def test_fork_leaves_the_arm_and_its_folder_to_the_parent(played, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     played(ENDED)
-    told = ends("""
+    result = ends("""
     def refused(what):
         try:
             what()
@@ -733,7 +733,7 @@ def test_fork_leaves_the_arm_and_its_folder_to_the_parent(played, tmp_path, monk
     device.disarm()
     print(device.is_disarmed)
     """)
-    assert told == ["[True, True, True, True]", "True False", "True"]
+    assert result == ["[True, True, True, True]", "True False", "True"]
 
 
 @posix
@@ -747,7 +747,7 @@ def test_all_sessions_are_asked_to_end_before_one_is_awaited(tmp_path, monkeypat
     while len(os.listdir()) < 2:
         time.sleep(0.05)
     """
-    sessions = [faked([name], textwrap.dedent(code)) for name in "ab"]
+    sessions = [fake_session([name], textwrap.dedent(code)) for name in "ab"]
     _end_all()
     assert [session._child.returncode for session in sessions] == [0, 0]
 

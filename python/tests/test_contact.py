@@ -21,7 +21,7 @@ def test_spring_pushes_up_by_its_stiffness():
     assert (force, state, proxy[2]) == ((0, 0, 0.5), State.TOUCHING, 2)
 
 
-def test_path_that_begins_below_ground_says_so():
+def test_path_beginning_below_ground_is_reported():
     contact = Contact(FLAT)
     below = contact.step([5, 5, 1])
     assert (below.state, below.force_n, below.surface_mm) == (State.BELOW_GROUND, (0, 0, 0), 2)
@@ -41,7 +41,7 @@ def test_run_is_its_steps():
     assert steps.flags.writeable and (steps["state"] == State.TOUCHING).sum() == 50
 
 
-def test_run_goes_on_where_the_last_one_ended():
+def test_run_continues_from_the_last_one():
     whole, parts = Contact(FLAT, Surface(friction=0.4)), Contact(FLAT, Surface(friction=0.4))
     path = np.r_[DOWN, DOWN[-1] + np.c_[np.linspace(0, 5, 200), np.zeros((200, 2))]]
     twice = np.r_[parts.run(path[:120]), parts.run(path[120:])]
@@ -84,7 +84,7 @@ def test_times_are_sampled_at_the_tick_rate():
     assert len(Contact(FLAT).run(path, t=[3, 3, 3])) == 3
 
 
-def test_times_that_cannot_be_are_errors():
+def test_impossible_times_are_errors():
     path = np.array([[1.0, 1, 5], [2, 1, 5], [3, 1, 5]])
     for t, text in [
         ([0, 1, 0.5], r"t\[2\]: time goes back from 1 s to 0.5 s"),

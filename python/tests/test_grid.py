@@ -26,7 +26,7 @@ def same(terrain, heights=HEIGHTS, mm_per_unit=0.5 / 30):
     assert np.array(found) == pytest.approx(heights * terrain.height_mm_per_unit)
 
 
-def test_xarray_lies_where_its_coordinates_say():
+def test_xarray_is_placed_by_its_coordinates():
     for da in [
         array(),
         array(HEIGHTS[::-1], y=Y[::-1]),
@@ -121,7 +121,7 @@ def dataset(heights=HEIGHTS, transform=None, crs="EPSG:32633", nodata=None, unit
     return memory.open()
 
 
-def test_rasterio_lies_where_its_transform_says():
+def test_rasterio_is_placed_by_its_transform():
     for heights, transform in [
         (HEIGHTS, None),
         (HEIGHTS[::-1], rasterio.Affine(30, 0, 5e5, 0, 30, 4e6)),

@@ -28,7 +28,7 @@ def outputs(notebook):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_prints_what_is_stored(name):
+def test_notebook_prints_its_stored_output(name):
     if name == "stiffness" and "HAPTERRA_LAB" not in os.environ:
         pytest.skip("cargo xtask python --test names hapterra-lab")
     stored = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)

@@ -143,7 +143,7 @@ def test_damaged_parts_are_holes_and_warnings(tmp_path):
     ],
     ids=["height", "step", "run"],
 )
-def test_parts_that_have_gone_meanwhile_are_warnings(tmp_path, touch):
+def test_deleted_parts_are_warnings(tmp_path, touch):
     file = huge(tmp_path)
     terrain = Terrain.open(file, raw=f"{SIDE}x{SIDE}", cell="1m")
     os.truncate(file, 1000)
@@ -254,7 +254,7 @@ def test_places_are_longitude_and_latitude_too(tmp_path):
         terrain.mm_at(7, 45, "EPSG:4326")
 
 
-def test_places_that_cannot_be_are_errors(tmp_path):
+def test_impossible_places_are_errors(tmp_path):
     heights = (30 * hills()).astype("f4")
     heights[40:60, 40:60] = np.nan
     terrain = Terrain.open(written(tmp_path / "hills.tif", heights))

@@ -87,13 +87,13 @@ def test_examples_of_the_tutorial_run_in_their_order(tmp_path):
         ("from hapterra import *", {"pandas", "xarray", "rasterio"}),
     ],
 )
-def test_imports_take_no_more_than_they_need(code, free_of):
+def test_imports_are_minimal(code, free_of):
     code = f"import sys; {code}; print({free_of!r} & set(sys.modules))"
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert told.stdout.strip() == "set()"
 
 
-def test_names_are_all_there():
+def test_all_names_are_exported():
     assert set(hapterra.__all__) == set(hapterra._MODULES)
     assert set(hapterra.__all__) <= set(dir(hapterra))
     with pytest.raises(AttributeError, match="module 'hapterra' has no attribute 'nothing'"):

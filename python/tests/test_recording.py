@@ -89,7 +89,7 @@ def test_replay_is_on_the_terrain_that_was_recorded(recorded, tmp_path):
     assert flat.settings["terrain"]["file"] == str(other)
 
 
-def test_views_and_marks_are_told(recorded, tmp_path):
+def test_views_and_marks_are_reported(recorded, tmp_path):
     text = recorded[0].read_text("utf-8")
     lines = text.splitlines(keepends=True)
     first = next(n for n, line in enumerate(lines) if not line.startswith("#"))
@@ -102,7 +102,7 @@ def test_views_and_marks_are_told(recorded, tmp_path):
     assert recording.marks == [mark]
 
 
-def test_cut_row_is_left_out_with_a_warning(recorded, tmp_path):
+def test_cut_row_is_skipped_with_a_warning(recorded, tmp_path):
     text = recorded[0].read_text("utf-8")
     (tmp_path / "cut.csv").write_text(text[: text.rindex(",") - 8])
     with pytest.warns(UserWarning, match="cut in the middle"):
@@ -110,7 +110,7 @@ def test_cut_row_is_left_out_with_a_warning(recorded, tmp_path):
     assert len(recording.steps) == 2_999
 
 
-def test_files_that_are_none_are_errors(tmp_path):
+def test_other_files_are_errors(tmp_path):
     with pytest.raises(FileNotFoundError):
         read_recording(tmp_path / "none.csv")
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")

@@ -16,7 +16,7 @@ needs_lab = pytest.mark.skipif(
 
 
 @needs_lab
-def test_trials_are_those_that_were_asked_for():
+def test_trials_match_the_request():
     trials = stability(rate=1000, stiffness=[0.5, 20], passivity="off", arm_friction=0.1, delay_us=200)
     assert set(trials["stiffness_n_per_mm"]) == {0.5, 20}
     assert set(trials["tick_hz"]) == {1000} and set(trials["controller"]) == {False}

@@ -9,7 +9,7 @@ from hapterra import Contact, Surface, Terrain
 RAMP = np.arange(12.0).reshape(3, 4)
 
 
-def test_origin_says_where_the_first_row_lies():
+def test_origin_sets_the_first_row():
     upper = Terrain(RAMP, cell_mm=2)
     lower = Terrain(RAMP, cell_mm=2, origin="lower")
     assert upper.height_mm(2, 0) == 9 and lower.height_mm(2, 0) == 1
@@ -99,7 +99,7 @@ def test_bad_arrays_are_errors():
             Contact(Terrain(heights, cell_mm=1))
 
 
-def test_materials_lie_where_the_array_says():
+def test_materials_follow_the_array():
     materials = np.zeros((40, 40), int)
     materials[:, 20:] = 1
     terrain = Terrain(np.ones((40, 40)), cell_mm=0.5, materials=materials)

@@ -71,7 +71,7 @@ def server(tmp_path):
     server.server_close()
 
 
-def answered(ask):
+def capture_error(ask):
     """Returns the answer after the connection is retried."""
     while True:
         try:
@@ -81,7 +81,7 @@ def answered(ask):
 
 
 @pytest.mark.filterwarnings("ignore:.* can(not)? be read")
-def test_heights_that_do_not_come_are_errors_and_no_holes(server, tmp_path):
+def test_unavailable_heights_are_errors_not_holes(server, tmp_path):
     url = f"http://127.0.0.1:{server.server_port}/hills.tif"
     here = Terrain.open(tmp_path / "hills.tif", cell_mm=0.5)
     there = Terrain.open(url, cell_mm=0.5, in_memory=0, cache="off")
@@ -97,8 +97,8 @@ def test_heights_that_do_not_come_are_errors_and_no_holes(server, tmp_path):
     with pytest.raises(StepError, match="(?s)step 0 of the path: .*hint: "):
         contact.run([(*places[2], 60)] * 5)
     server.is_down = False
-    assert answered(lambda: there.height_mm(*places[1])) == here.height_mm(*places[1])
-    answered(lambda: there.height_mm(*places[2]))
+    assert capture_error(lambda: there.height_mm(*places[1])) == here.height_mm(*places[1])
+    capture_error(lambda: there.height_mm(*places[2]))
     # The same steps as those of a contact without an error.
     path = [(*places[2], 60), (*places[2], 0)]
     assert np.array_equal(contact.run(path), Contact(here).run(path))

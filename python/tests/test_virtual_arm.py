@@ -16,14 +16,14 @@ LEVEL = Terrain(np.zeros((101, 101)), cell_mm=1.0)
 STROKE = [(30, 50, 5), (30, 50, -5), (70, 50, -5)]
 
 
-def stroked(arm=None, corners=STROKE, **surface):
+def run_stroke(arm=None, corners=STROKE, **surface):
     contact, t = Contact(LEVEL, Surface(**surface)), np.arange(0, 1.5005, 0.001)
     targets = np.column_stack([np.interp(t, [0.0, 0.3, 1.5], axis) for axis in zip(*corners)])
     return (arm or VirtualArm((50, 50, 10))).run(contact, targets, t)
 
 
 def test_hand_presses_with_what_its_springs_give():
-    steps = stroked(corners=[STROKE[0], STROKE[1], STROKE[1]])
+    steps = run_stroke(corners=[STROKE[0], STROKE[1], STROKE[1]])
     assert steps.dtype == ARM_STEP and len(steps) == 1501
     assert np.array_equal(steps["tick"], np.arange(1501))
     first, last = steps[0], steps[-1]
@@ -37,17 +37,17 @@ def test_hand_presses_with_what_its_springs_give():
 
 def test_friction_holds_the_hand_back():
     for mu in (0.1, 0.4, 0.8):
-        steps = stroked(friction=mu)[900:]
+        steps = run_stroke(friction=mu)[900:]
         along, across = -steps["force_n"][:, 0], steps["force_n"][:, 2]
         assert abs(np.median(along / across) - mu) < 0.01 * mu
-    behind = [70 - stroked(friction=mu)["hand_mm"][-1, 0] for mu in (0.0, 0.4, 0.8)]
+    behind = [70 - run_stroke(friction=mu)["hand_mm"][-1, 0] for mu in (0.0, 0.4, 0.8)]
     assert behind[0] < behind[1] < behind[2]
 
 
 def test_same_arguments_give_the_same_bits():
-    assert stroked(friction=0.4).tobytes() == stroked(friction=0.4).tobytes()
+    assert run_stroke(friction=0.4).tobytes() == run_stroke(friction=0.4).tobytes()
     weak = VirtualArm((50, 50, 10), arm_stiffness=150, hand_mass=0.3)
-    assert stroked(weak)["force_n"][-1, 2] < 0.8 * stroked()["force_n"][-1, 2]
+    assert run_stroke(weak)["force_n"][-1, 2] < 0.8 * run_stroke()["force_n"][-1, 2]
 
 
 def test_other_threads_work_while_the_arm_moves():
@@ -59,15 +59,15 @@ def test_other_threads_work_while_the_arm_moves():
 
     thread = threading.Thread(target=count)
     thread.start()
-    stroked()
+    run_stroke()
     ended.set()
     thread.join()
     assert counts[0] > 3
 
 
-def test_what_cannot_be_is_refused():
+def test_impossible_arguments_are_refused():
     with pytest.raises(ValueError, match="cannot reach"):
-        stroked(corners=[STROKE[0], (30, 900, 5), STROKE[0]])
+        run_stroke(corners=[STROKE[0], (30, 900, 5), STROKE[0]])
     with pytest.raises(ValueError, match="hand_mass is 0"):
         VirtualArm((0, 0, 0), hand_mass=0)
     with pytest.raises(ValueError, match="shape"):

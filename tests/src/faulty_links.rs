@@ -45,7 +45,7 @@ impl<T> Faulty<T> {
         }
     }
 
-    fn harm(&mut self, bytes: &[u8]) -> Vec<u8> {
+    fn corrupt(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
         if bytes.is_empty() || self.random.below(self.one_in) != 0 {
             return bytes;
@@ -66,7 +66,7 @@ impl<T> Faulty<T> {
 
 impl<T: Transport> Transport for Faulty<T> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let bytes = self.harm(bytes);
+        let bytes = self.corrupt(bytes);
         self.inner.send(&bytes)
     }
 
@@ -74,8 +74,8 @@ impl<T: Transport> Transport for Faulty<T> {
         if self.incoming.is_empty() {
             let mut chunk = [0; 4096];
             let n = self.inner.receive(&mut chunk, wait)?;
-            let harmed = self.harm(&chunk[..n]);
-            self.incoming.extend(harmed);
+            let corrupted = self.corrupt(&chunk[..n]);
+            self.incoming.extend(corrupted);
         }
         io::Read::read(&mut self.incoming, into)
     }

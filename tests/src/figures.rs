@@ -93,10 +93,12 @@ fn compare(source: &str, text: &str, root: &Path) -> Result<(), String> {
     let is_figure = |c: char| c.is_ascii_digit() || "+-.,e".contains(c);
     let end = text.find(|c| !is_figure(c)).unwrap_or(text.len());
     let shown = text[..end].trim_end_matches(['.', ',', '-']);
-    let kept = look_up(source, root).map_err(|why| format!("{source}: {why}"))?;
-    match is_rounded(shown, kept) {
+    let recorded = look_up(source, root).map_err(|why| format!("{source}: {why}"))?;
+    match is_rounded(shown, recorded) {
         Some(true) => Ok(()),
-        Some(false) => Err(format!("{source}: the page says {shown}, the table {kept}")),
+        Some(false) => Err(format!(
+            "{source}: the page says {shown}, the table {recorded}"
+        )),
         None => Err(format!(
             "{source}: no figure behind the comment, but {shown:?}"
         )),

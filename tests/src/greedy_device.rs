@@ -16,7 +16,7 @@ use crate::timeouts::pass;
 
 /// Bytes of one read, and the pause between two reads.
 const PAUSE: Duration = Duration::from_millis(100);
-const SIP: usize = 1_024;
+const CHUNK_BYTES: usize = 1_024;
 
 /// Starts a device that accepts every scene, repeats requests for the same tiles, and reads a few
 /// bytes from time to time.
@@ -37,19 +37,19 @@ pub fn start() -> SocketAddr {
 
 fn answer(mut host: TcpStream) {
     let mut reader = FrameReader::<MAX_FRAME>::new();
-    let mut chunk = [0; SIP];
+    let mut chunk = [0; CHUNK_BYTES];
     let mut epoch = None;
     while let Ok(read @ 1..) = host.read(&mut chunk) {
         let mut bytes = &chunk[..read];
-        let mut stated = vec![];
+        let mut sent = vec![];
         while !bytes.is_empty() {
             let (taken, content) = reader.push(bytes);
             bytes = &bytes[taken..];
             if let Some(Ok(content)) = content {
-                stated.extend(answer_to(content, &mut epoch));
+                sent.extend(answer_to(content, &mut epoch));
             }
         }
-        if host.write_all(&stated).is_err() {
+        if host.write_all(&sent).is_err() {
             return;
         }
         if let Some((session, epoch)) = epoch {
@@ -66,7 +66,7 @@ fn answer(mut host: TcpStream) {
 type Taken = Option<(SessionNumber, u32)>;
 
 fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
-    let Some(received) = frames::stated_by_host(content) else {
+    let Some(received) = frames::parse_host_frame(content) else {
         return vec![];
     };
     let session = received.session;

@@ -259,8 +259,8 @@ impl CountingBoard {
             .args(["-icount", &format!("shift={SHIFT},sleep=off")])
             .output()
             .expect("QEMU starts");
-        let stated = String::from_utf8_lossy(&ran.stderr);
-        assert!(ran.status.success(), "{}: {stated}", ran.status);
+        let stderr = String::from_utf8_lossy(&ran.stderr);
+        assert!(ran.status.success(), "{}: {stderr}", ran.status);
         let mut counted = records(folder, "ticks.bin");
         if let Some(follow) = self.follow {
             add_cycles(&mut counted, &follow(&self.image, folder));
@@ -371,11 +371,16 @@ fn coarse_bytes(size: FieldSize, place: CoarseTile, field: &dyn Samples) -> Vec<
 }
 
 /// Returns the samples of a tile by its first sample and their distance in cells.
-fn bytes_of(size: FieldSize, first: Cell, apart: i32, height: impl Fn(i32, i32) -> f32) -> Vec<u8> {
+fn bytes_of(
+    size: FieldSize,
+    first: Cell,
+    spacing: i32,
+    height: impl Fn(i32, i32) -> f32,
+) -> Vec<u8> {
     let post = |i: usize| {
         let [x, y] = [
-            first.x + (i % TILE_SAMPLES) as i32 * apart,
-            first.y + (i / TILE_SAMPLES) as i32 * apart,
+            first.x + (i % TILE_SAMPLES) as i32 * spacing,
+            first.y + (i / TILE_SAMPLES) as i32 * spacing,
         ];
         match size.columns < x || size.rows < y || x < 0 || y < 0 {
             true => f32::NAN,

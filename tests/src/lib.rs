@@ -65,7 +65,7 @@ pub fn shared(path: &str) -> Option<PathBuf> {
 
 /// Variables that cargo sets for a test program, one a line. Without their removal, build scripts
 /// that read them run again, and the binary is rebuilt for the tests of each package.
-const OF_CARGO: &str = include_str!("cargo_variables.txt");
+const CARGO_ENVIRONMENT: &str = include_str!("cargo_variables.txt");
 
 /// Returns the path of the real `hapterra` binary, which is built first if necessary.
 ///
@@ -78,7 +78,7 @@ pub fn hapterra_binary() -> &'static Path {
         // probably built before.
         let this = std::env::current_exe().expect("this program has a path");
         let target = this.ancestors().nth(3).expect("it is in a target folder");
-        let build = OF_CARGO
+        let build = CARGO_ENVIRONMENT
             .lines()
             .fold(escargot::CargoBuild::new(), |build, variable| {
                 build.env_remove(variable)

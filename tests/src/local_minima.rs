@@ -164,25 +164,25 @@ fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2])
         let local = at[axis] - f64::from(own.cell[axis]);
         i32::from(local == 1.0) - i32::from(local == 0.0)
     };
-    let ways = [side(0), side(1)];
-    let others = [[ways[0], 0], [0, ways[1]], ways];
+    let steps = [side(0), side(1)];
+    let others = [[steps[0], 0], [0, steps[1]], steps];
     others
         .into_iter()
-        .filter(|way| *way != [0, 0])
-        .filter_map(|way| {
-            let cell = [own.cell[0] + way[0], own.cell[1] + way[1]];
-            Some((way, Patch::at(terrain, cell)?))
+        .filter(|step| *step != [0, 0])
+        .filter_map(|step| {
+            let cell = [own.cell[0] + step[0], own.cell[1] + step[1]];
+            Some((step, Patch::at(terrain, cell)?))
         })
-        .all(|(way, patch)| !leads_down(&patch, hip, at, way))
+        .all(|(step, patch)| !leads_down(&patch, hip, at, step))
 }
 
 /// Returns true if the distance falls from a point on a patch's border into the patch.
-fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
+fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], step: [i32; 2]) -> bool {
     let rise = patch.height(x, y) - hip[2];
     let [east, north] = patch.slopes(x, y);
     let slopes = [(x - hip[0]) + rise * east, (y - hip[1]) + rise * north];
     let steep = [east, north].map(|m| LEVEL * (1.0 + m.abs()) * (1.0 + rise.abs()));
-    (0..2).any(|axis| way[axis] != 0 && slopes[axis] * f64::from(way[axis]) < -steep[axis])
+    (0..2).any(|axis| step[axis] != 0 && slopes[axis] * f64::from(step[axis]) < -steep[axis])
 }
 
 #[cfg(test)]
@@ -191,7 +191,7 @@ mod tests {
     use crate::scene::terrain::Kind;
 
     #[test]
-    fn both_sides_of_a_ridge_and_the_bottom_of_a_valley() {
+    fn minima_are_found_on_ridges_and_in_valleys() {
         let ridge = Terrain::from_fn(Kind::Ridges, [8, 8], |x, _| -((x - 4).abs() as f32));
         let hip = [4.0, 3.5, -0.001];
         let all = around(&ridge, hip, [4.0, 3.5]);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_twist_has_more_than_one() {
+    fn twisted_patch_has_several_minima() {
         // z = 8·(u − ½)·(v − ½): seen from far below the middle, two corners are near.
         let saddle = Terrain::from_fn(
             Kind::Twisted,

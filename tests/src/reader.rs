@@ -40,7 +40,7 @@ impl Reader {
     /// Returns true if it reads a file: GDAL reads no NumPy, and `hapterra` leaves rare formats to
     /// GDAL.
     #[must_use]
-    pub fn knows(self, file: &str) -> bool {
+    pub fn supports(self, file: &str) -> bool {
         let foreign: &[&str] = match self {
             Self::Own => &[".zip", ".gz", ".npz", ".dat", ".dt0", ".dem", ".nc", ".grd"],
             Self::Gdal => &[".npy", ".npz", ".raw", "in_alpha.png"],

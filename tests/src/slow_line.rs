@@ -14,7 +14,7 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use crate::link_campaign::frames::{from_host, stated_by_host};
+use crate::link_campaign::frames::{from_host, parse_host_frame};
 use crate::timeouts::HANG;
 
 /// Tiles along the side of the window, as on the emulated board.
@@ -104,14 +104,14 @@ impl InMemory {
 impl Stepped for InMemory {
     fn exchange(&mut self, frames: &[u8]) -> Vec<u8> {
         self.unread.extend(frames);
-        let (mut stated, mut chunk) = (vec![], [0; 512]);
+        let (mut received, mut chunk) = (vec![], [0; 512]);
         loop {
             let taken = self.device.receive(&self.unread);
             self.unread.drain(..taken);
             let n = self.device.link.transmit(&mut chunk);
-            stated.extend(&chunk[..n]);
+            received.extend(&chunk[..n]);
             if (taken, n) == (0, 0) {
-                return stated;
+                return received;
             }
         }
     }
@@ -172,13 +172,13 @@ impl OnBoard {
     }
 
     /// Counts the answers to heartbeats that end in these bytes.
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn receive(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.from_link.push(bytes);
             bytes = &bytes[taken..];
             let frame = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>));
-            if let Some(Ok(stated)) = frame {
-                self.unanswered -= i32::from(matches!(stated.message, ToHost::Heartbeat { .. }));
+            if let Some(Ok(framed)) = frame {
+                self.unanswered -= i32::from(matches!(framed.message, ToHost::Heartbeat { .. }));
             }
         }
     }
@@ -187,22 +187,22 @@ impl OnBoard {
     fn send(&mut self, frame: &[u8]) {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let (_, content) = reader.push(frame);
-        let message = content.and_then(Result::ok).and_then(stated_by_host);
+        let message = content.and_then(Result::ok).and_then(parse_host_frame);
         self.unanswered +=
-            i32::from(message.is_some_and(|stated| stated.message == ToDevice::Heartbeat));
+            i32::from(message.is_some_and(|framed| framed.message == ToDevice::Heartbeat));
         self.link.send(frame).expect("the board is there");
     }
 
     /// Waits until the board has processed everything. Returns its messages.
-    fn settle(&mut self, session: SessionNumber) -> Vec<u8> {
+    fn wait_until_processed(&mut self, session: SessionNumber) -> Vec<u8> {
         self.send(&from_host(session, &ToDevice::Heartbeat));
-        let mut stated = vec![];
+        let mut received = vec![];
         while self.unanswered > 0 {
             let more = self.read();
-            self.hear(&more);
-            stated.extend(more);
+            self.receive(&more);
+            received.extend(more);
         }
-        stated
+        received
     }
 
     fn currents(&mut self) -> Currents {
@@ -222,9 +222,9 @@ impl OnBoard {
 impl Stepped for OnBoard {
     fn exchange(&mut self, frames: &[u8]) -> Vec<u8> {
         self.link.send(frames).expect("the board is there");
-        let stated = self.read();
-        self.hear(&stated);
-        stated
+        let received = self.read();
+        self.receive(&received);
+        received
     }
 
     fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8> {
@@ -237,14 +237,14 @@ impl Stepped for OnBoard {
         let tick_s = f64::from(currents.tick_ns) / 1e9;
         self.arm.step(currents.currents_a.map(f64::from), tick_s);
         self.ticks += 1;
-        let mut stated = self.settle(session);
+        let mut received = self.wait_until_processed(session);
         // One by one, so that the effect of a frame does not depend on the arrival of the next.
         for frame in frames.split_inclusive(|byte| *byte == 0) {
             self.send(frame);
-            stated.extend(self.settle(session));
+            received.extend(self.wait_until_processed(session));
         }
         // Answers overtake waiting samples, which are sent before the next answer.
-        stated.extend(self.settle(session));
-        stated
+        received.extend(self.wait_until_processed(session));
+        received
     }
 }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::hapterra_binary;
-use crate::link_campaign::frames::stated_by_host;
+use crate::link_campaign::frames::parse_host_frame;
 use crate::terrain_file;
 use crate::timeouts::{HANG, wait_until};
 use hapterra::link::{ControlSession, Native, Tcp, Transport};
@@ -26,17 +26,17 @@ pub struct SocketDevice {
     pub address: SocketAddr,
     /// True if it receives nothing.
     pub deaf: Arc<AtomicBool>,
-    seen: Arc<Seen>,
+    counts: Arc<MessageCounts>,
 }
 
 /// Counters that tests wait for.
 #[derive(Default)]
-struct Seen {
+struct MessageCounts {
     /// Ticks of the device.
     ticks: AtomicU64,
     /// Messages to open and close a session that it missed while deaf.
-    unheard_hellos: AtomicU64,
-    unheard_byes: AtomicU64,
+    ignored_hellos: AtomicU64,
+    ignored_byes: AtomicU64,
 }
 
 impl SocketDevice {
@@ -51,8 +51,8 @@ impl SocketDevice {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("a port");
         let deaf = Arc::new(AtomicBool::new(false));
-        let seen = Arc::new(Seen::default());
-        let (is_deaf, to_see) = (Arc::clone(&deaf), Arc::clone(&seen));
+        let counts = Arc::new(MessageCounts::default());
+        let (is_deaf, to_see) = (Arc::clone(&deaf), Arc::clone(&counts));
         std::thread::spawn(move || {
             let (mut device, mut between) = make();
             for stream in listener.incoming() {
@@ -63,38 +63,38 @@ impl SocketDevice {
         Self {
             address,
             deaf,
-            seen,
+            counts,
         }
     }
 
     /// Waits until this many milliseconds of the device's time have passed.
     pub fn pass_ms(&self, ms: u64) {
-        let ticks = || self.seen.ticks.load(Ordering::Relaxed);
+        let ticks = || self.counts.ticks.load(Ordering::Relaxed);
         let until = ticks() + ms;
         wait_until("ticks of the device", || ticks() >= until);
     }
 
     /// Waits until a host has sent an open to the deaf device.
-    pub fn wait_for_unheard_hello(&self) {
-        let hellos = &self.seen.unheard_hellos;
+    pub fn wait_for_ignored_hello(&self) {
+        let hellos = &self.counts.ignored_hellos;
         wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
     }
 
     /// Waits until a host has sent a close to the deaf device.
-    pub fn wait_for_unheard_bye(&self) {
-        let byes = &self.seen.unheard_byes;
+    pub fn wait_for_ignored_bye(&self) {
+        let byes = &self.counts.ignored_byes;
         wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
     }
 
     /// Waits until a host or its guardian has sent the deaf device a message that ends a session.
-    pub fn wait_for_unheard_end(&self) {
+    pub fn wait_for_ignored_end(&self) {
         let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
-        let Seen {
-            unheard_hellos,
-            unheard_byes,
+        let MessageCounts {
+            ignored_hellos,
+            ignored_byes,
             ..
-        } = &*self.seen;
-        wait_until("an end", || count(unheard_hellos) + count(unheard_byes) > 0);
+        } = &*self.counts;
+        wait_until("an end", || count(ignored_hellos) + count(ignored_byes) > 0);
     }
 
     /// Returns the end of the last session, as reported to the next host.
@@ -122,10 +122,10 @@ fn serve(
     device: &mut Native,
     mut stream: TcpStream,
     deaf: &AtomicBool,
-    seen: &Seen,
+    counts: &MessageCounts,
     between: &mut dyn FnMut(),
 ) {
-    let mut unheard = FrameReader::<MAX_FRAME>::new();
+    let mut ignored = FrameReader::<MAX_FRAME>::new();
     let wait = Some(Duration::from_millis(1));
     stream.set_read_timeout(wait).expect("set");
     let mut chunk = [0; 4096];
@@ -133,31 +133,31 @@ fn serve(
         match stream.read(&mut chunk) {
             Ok(0) => return,
             Ok(n) if !deaf.load(Ordering::Relaxed) => device.send(&chunk[..n]).expect("in memory"),
-            Ok(n) => note(seen, &mut unheard, &chunk[..n]),
+            Ok(n) => note(counts, &mut ignored, &chunk[..n]),
             Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {}
             Err(_) => return,
         }
         between();
         // A few milliseconds of its time pass.
         device.pass(TICKS);
-        seen.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
-        let stated = device
+        counts.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
+        let sent = device
             .receive(&mut chunk, Duration::ZERO)
             .expect("in memory");
-        if stream.write_all(&chunk[..stated]).is_err() {
+        if stream.write_all(&chunk[..sent]).is_err() {
             return;
         }
     }
 }
 
 /// Counts the messages that the deaf device misses.
-fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
+fn note(counts: &MessageCounts, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
     while !bytes.is_empty() {
         let (taken, content) = reader.push(bytes);
         bytes = &bytes[taken..];
-        let count = match content.and_then(Result::ok).and_then(stated_by_host) {
-            Some(stated) if matches!(stated.message, ToDevice::Hello(_)) => &seen.unheard_hellos,
-            Some(stated) if stated.message == ToDevice::Bye => &seen.unheard_byes,
+        let count = match content.and_then(Result::ok).and_then(parse_host_frame) {
+            Some(framed) if matches!(framed.message, ToDevice::Hello(_)) => &counts.ignored_hellos,
+            Some(framed) if framed.message == ToDevice::Bye => &counts.ignored_byes,
             _ => continue,
         };
         count.fetch_add(1, Ordering::Relaxed);
@@ -204,8 +204,8 @@ pub fn start(served: &SocketDevice, folder: &Path, more: &[&str]) -> Child {
 
 /// Waits until the command prints the terrain's name, which it does when the session is open.
 pub fn has_begun(stdout: &mut impl Read) {
-    let mut begun = [0; 16];
-    stdout.read_exact(&mut begun).expect("a session");
+    let mut first_bytes = [0; 16];
+    stdout.read_exact(&mut first_bytes).expect("a session");
 }
 
 /// Sends a signal by its name.

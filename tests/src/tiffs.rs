@@ -24,7 +24,7 @@ pub fn tiff(data: &[u8], images: &[Directory]) -> Vec<u8> {
     bytes.extend(data);
     for (number, image) in images.iter().enumerate() {
         let mut beyond = bytes.len() + 2 + 12 * image.len() + 4;
-        let mut far = Vec::new();
+        let mut out_of_line = Vec::new();
         bytes.extend((image.len() as u16).to_le_bytes());
         for (tag, values) in image {
             let (kind, count, value) = stored(values);
@@ -35,12 +35,12 @@ pub fn tiff(data: &[u8], images: &[Directory]) -> Vec<u8> {
             } else {
                 bytes.extend((beyond as u32).to_le_bytes());
                 beyond += value.len();
-                far.extend(value);
+                out_of_line.extend(value);
             }
         }
         let next = if number + 1 < images.len() { beyond } else { 0 };
         bytes.extend((next as u32).to_le_bytes());
-        bytes.extend(far);
+        bytes.extend(out_of_line);
     }
     bytes
 }

@@ -20,20 +20,20 @@ use std::time::{Duration, Instant, SystemTime};
 /// Time after which a test stops waiting for a result that normally arrives at once, and fails.
 pub const HANG: Duration = Duration::from_secs(600);
 /// Interval between two checks of a condition.
-const LOOK: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Waits until `look` returns a value.
+/// Waits until `poll` returns a value.
 ///
 /// # Panics
 /// After [`HANG`], with `what` in the message.
-pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+pub fn wait_for<T>(what: &str, mut poll: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
     loop {
-        if let Some(found) = look() {
+        if let Some(found) = poll() {
             return found;
         }
         assert!(began.elapsed() < HANG, "in vain for {HANG:?}: {what}");
-        sleep(LOOK);
+        sleep(POLL_INTERVAL);
     }
 }
 
@@ -57,7 +57,7 @@ pub fn end_of(mut child: Child) -> Output {
             child.wait().expect("the child has ended");
             panic!("the child still ran after {HANG:?}");
         }
-        sleep(LOOK);
+        sleep(POLL_INTERVAL);
     }
     child.wait_with_output().expect("its output")
 }

@@ -9,13 +9,13 @@
 "use strict";
 
 const CHANNEL = "hapterra";
-const AGAIN_MS = 1000;
-const LEAST_MS = 20000;
-const SIGN = 0xffffffff;
+const RETRY_MS = 1000;
+const MIN_RELOAD_MS = 20000;
+const KEEP_ALIVE = 0xffffffff;
 const LOST = 0xfffffffe;
 
-const said = document.getElementById("said");
-const pageBytes = Number(said.dataset.pageBytes);
+const message = document.getElementById("said");
+const pageBytes = Number(message.dataset.pageBytes);
 
 // For tests and statistics.
 const state = { pieces: 0, bytes: 0, connections: 0, memory: 0, isOver: false, isLost: false, isStarted: false };
@@ -28,24 +28,24 @@ window.matchMedia = (query) => {
   return media(scheme === null ? query : scheme[1] === "dark" ? "all" : "not all");
 };
 
-function say(text) {
-  said.textContent = text;
+function showMessage(text) {
+  message.textContent = text;
 }
 
-function seen() {
+function isVisible() {
   return document.visibilityState !== "hidden";
 }
 
-function whenSeen() {
+function whenVisible() {
   return new Promise((resolve) => {
-    const look = () => {
-      if (seen()) {
-        document.removeEventListener("visibilitychange", look);
+    const resolveIfVisible = () => {
+      if (isVisible()) {
+        document.removeEventListener("visibilitychange", resolveIfVisible);
         resolve();
       }
     };
-    document.addEventListener("visibilitychange", look);
-    look();
+    document.addEventListener("visibilitychange", resolveIfVisible);
+    resolveIfVisible();
   });
 }
 
@@ -90,11 +90,11 @@ class Bytes {
 
 // Reads the stream once; returns true if the session has ended.
 async function read(viewer, memory, feed) {
-  const cut = new AbortController();
-  const hide = () => seen() || cut.abort();
-  document.addEventListener("visibilitychange", hide);
+  const controller = new AbortController();
+  const abortIfHidden = () => isVisible() || controller.abort();
+  document.addEventListener("visibilitychange", abortIfHidden);
   try {
-    const answer = await fetch(feed, { signal: cut.signal, cache: "no-store" });
+    const answer = await fetch(feed, { signal: controller.signal, cache: "no-store" });
     if (!answer.ok) return false;
     if (state.connections > 0) location.reload();
     state.connections += 1;
@@ -105,33 +105,33 @@ async function read(viewer, memory, feed) {
       const length = new DataView(head.buffer).getUint32(0, true);
       state.isLost = length === LOST;
       if (length === 0 || state.isLost) return true;
-      if (length === SIGN) continue;
+      if (length === KEEP_ALIVE) continue;
       const piece = await bytes.take(length);
       if (piece === null) return false;
       viewer.send_rrd_to_channel(CHANNEL, piece);
-      say("");
+      showMessage("");
       state.pieces += 1;
       state.bytes += length;
       state.memory = memory.buffer.byteLength;
-      if (state.memory > pageBytes && performance.now() > LEAST_MS) location.reload();
+      if (state.memory > pageBytes && performance.now() > MIN_RELOAD_MS) location.reload();
     }
   } catch (error) {
     return false;
   } finally {
-    document.removeEventListener("visibilitychange", hide);
-    cut.abort();
+    document.removeEventListener("visibilitychange", abortIfHidden);
+    controller.abort();
   }
 }
 
 async function follow(viewer, memory, feed) {
   for (;;) {
-    await whenSeen();
+    await whenVisible();
     if (await read(viewer, memory, feed)) break;
-    if (seen() && state.connections > 0) say("hapterra-view has ended, or this page was too slow. Trying again…");
-    await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+    if (isVisible() && state.connections > 0) showMessage("hapterra-view has ended, or this page was too slow. Trying again…");
+    await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
   state.isOver = true;
-  say(state.isLost ? "hapterra is gone: it was killed, or it crashed. The page shows its last data." : "");
+  showMessage(state.isLost ? "hapterra is gone: it was killed, or it crashed. The page shows its last data." : "");
 }
 
 async function main() {
@@ -161,4 +161,4 @@ async function main() {
   await follow(viewer, program.memory, isGathered ? "feed?gathered" : "feed");
 }
 
-main().catch((error) => say(`The viewer cannot start: ${error}`));
+main().catch((error) => showMessage(`The viewer cannot start: ${error}`));

@@ -64,7 +64,7 @@ pub fn draw(
     let mut from = BufReader::with_capacity(1 << 16, from);
     let mut drawing: Option<Drawing> = None;
     let (mut reported, mut is_reported, mut file) = (false, false, Ok(rrd));
-    greeted(&mut from)?;
+    check_greeting(&mut from)?;
     while let Some(message) = read(&mut from)? {
         if message == Message::End {
             is_reported = true;
@@ -75,7 +75,7 @@ pub fn draw(
             history.begin(scene.is_live);
         }
         let entries = Drawing::take(&mut drawing, message)?;
-        file = file.and_then(|rrd| written(rrd, &entries));
+        file = file.and_then(|rrd| write_rrd(rrd, &entries));
         history.put(entries)?;
         let is_live = drawing.as_ref().is_some_and(Drawing::is_live);
         if has_samples && is_live && !reported {
@@ -84,9 +84,9 @@ pub fn draw(
         }
     }
     if let Some(drawing) = &mut drawing {
-        let rest = drawing.finish()?;
-        file = file.and_then(|rrd| written(rrd, &rest));
-        history.put(rest)?;
+        let remaining = drawing.finish()?;
+        file = file.and_then(|rrd| write_rrd(rrd, &remaining));
+        history.put(remaining)?;
     }
     let rrd = file.and_then(|rrd| rrd.map_or(Ok(()), RrdFile::finish));
     history.end(match is_reported {
@@ -99,14 +99,14 @@ pub fn draw(
     Ok(Ended { is_reported, rrd })
 }
 
-fn written(mut rrd: Option<RrdFile>, entries: &[Entry]) -> Result<Option<RrdFile>> {
+fn write_rrd(mut rrd: Option<RrdFile>, entries: &[Entry]) -> Result<Option<RrdFile>> {
     if let Some(rrd) = &mut rrd {
         rrd.put(entries)?;
     }
     Ok(rrd)
 }
 
-fn greeted(from: &mut impl Read) -> Result<()> {
+fn check_greeting(from: &mut impl Read) -> Result<()> {
     match read(from)? {
         Some(Message::Hello(hello)) if hello.version == VERSION => Ok(()),
         Some(Message::Hello(hello)) => bail!(

@@ -19,24 +19,24 @@ const OPTIONS: &str = "HAPTERRA_VIEW_OPTIONS";
 /// Time for which the page remains after the session's end, when no page is open.
 const LINGER: Duration = Duration::from_secs(15);
 /// Time between two checks for an open page.
-const LOOK: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 fn main() -> ExitCode {
-    let stated = std::env::var_os(OPTIONS).unwrap_or_default();
-    let stated = stated.to_string_lossy().into_owned();
+    let extra = std::env::var_os(OPTIONS).unwrap_or_default();
+    let extra = extra.to_string_lossy().into_owned();
     let words = std::env::args_os().skip(1);
-    let words = words.chain(stated.split_whitespace().map(OsString::from));
-    let shown = Options::read(words).and_then(|options| match options {
+    let words = words.chain(extra.split_whitespace().map(OsString::from));
+    let result = Options::read(words).and_then(|options| match options {
         Some(options) => show(&options),
         None => {
-            tell(HELP);
+            print_line(HELP);
             Ok(())
         }
     });
-    match shown {
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
-            tell(&format!("hapterra-view: error: {why:#}"));
+            print_line(&format!("hapterra-view: error: {why:#}"));
             ExitCode::FAILURE
         }
     }
@@ -46,10 +46,10 @@ fn show(options: &Options) -> Result<()> {
     let history = History::new(options.history_bytes);
     let rrd = options.rrd.as_deref().map(RrdFile::create).transpose()?;
     let ports = options.ports();
-    let kept = Arc::clone(&history);
-    let server = Server::start(options.bind, &ports, kept, options.page_bytes)?;
+    let served = Arc::clone(&history);
+    let server = Server::start(options.bind, &ports, served, options.page_bytes)?;
     if server.is_open() {
-        tell(
+        print_line(
             "hapterra-view: warning: other machines can open the page, and see the terrain and the hand",
         );
     }
@@ -57,25 +57,25 @@ fn show(options: &Options) -> Result<()> {
     let mut is_reported = false;
     let mut on_scene = || {
         is_reported = true;
-        tell(&format!("view           {url}"));
+        print_line(&format!("view           {url}"));
         if options.browser {
             open(&url);
         }
     };
     let ended = feed::draw(std::io::stdin().lock(), &history, rrd, &mut on_scene)?;
     if let Err(why) = &ended.rrd {
-        tell(&format!(
+        print_line(&format!(
             "hapterra-view: warning: {why:#}: it is not complete"
         ));
     }
     if is_reported {
-        linger(&history, options.linger, &watched(ended.is_reported));
+        linger(&history, options.linger, &watch_stdin(ended.is_reported));
     }
-    let kept = history.kept();
-    if kept.cut > 0 {
-        tell(&format!(
+    let stats = history.stats();
+    if stats.dropped > 0 {
+        print_line(&format!(
             "view           pages were too slow {} times, and came again",
-            kept.cut
+            stats.dropped
         ));
     }
     ended.rrd
@@ -83,33 +83,34 @@ fn show(options: &Options) -> Result<()> {
 
 /// Watches for the end of `hapterra`, which keeps the pipe open after the stream's end while it
 /// runs.
-fn watched(has_ended: bool) -> Arc<AtomicBool> {
-    let is_gone = Arc::new(AtomicBool::new(!has_ended));
-    let reported = Arc::clone(&is_gone);
+fn watch_stdin(has_ended: bool) -> Arc<AtomicBool> {
+    let has_hapterra_ended = Arc::new(AtomicBool::new(!has_ended));
+    let reported = Arc::clone(&has_hapterra_ended);
     // Without a thread, `hapterra` counts as running.
     let _ = std::thread::Builder::new().spawn(move || {
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         reported.store(true, Ordering::Release);
     });
-    is_gone
+    has_hapterra_ended
 }
 
 /// Waits while a page is open, and for a page while `hapterra` runs.
-fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
-    let mut alone_since = Instant::now();
+fn linger(history: &History, linger: Option<Duration>, has_hapterra_ended: &AtomicBool) {
+    let mut no_page_since = Instant::now();
     loop {
-        let kept = history.kept();
-        if kept.pages > 0 {
-            alone_since = Instant::now();
+        let stats = history.stats();
+        if stats.pages > 0 {
+            no_page_since = Instant::now();
         }
         // Pages that received everything are not counted any more, so only the time since they
         // connected remains as a criterion.
         let timeout = linger.unwrap_or(LINGER);
-        let may_go = linger.is_some() || kept.came > 0 || is_gone.load(Ordering::Acquire);
-        if may_go && kept.pages == 0 && alone_since.elapsed() >= timeout {
+        let may_end =
+            linger.is_some() || stats.connected > 0 || has_hapterra_ended.load(Ordering::Acquire);
+        if may_end && stats.pages == 0 && no_page_since.elapsed() >= timeout {
             return;
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -137,6 +138,6 @@ fn open(url: &str) {
 }
 
 /// Prints a line, and ignores a closed output.
-fn tell(line: &str) {
+fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

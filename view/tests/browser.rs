@@ -12,7 +12,7 @@ use hapterra_view_stream::Message;
 use common::browser::{Browser, Colours, Page, program};
 use common::recorded::{Csv, check, entities};
 use common::scene::{batch, greeting, layer, resting, scene, tiles_around, zoomed_scene};
-use common::{HANG, Running, Viewer, emulated, folder, hapterra, memory_of, signal, started_by};
+use common::{HANG, Running, Viewer, child_process, emulated, folder, hapterra, memory_of, signal};
 
 /// The areas of the terrain and of the plots in the page.
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
@@ -26,7 +26,7 @@ const FORCE: [u8; 3] = [255, 230, 60];
 const MAP: [f64; 4] = [0.58, 0.05, 0.21, 0.4];
 const WHITE: [u8; 3] = [255, 255, 255];
 /// Minimum decrease of that square's pixels when its sides are a quarter as long.
-const SHORTER: usize = 80;
+const MIN_DECREASE: usize = 80;
 
 /// Software draws the pages: one test at a time.
 static ONE: Mutex<()> = Mutex::new(());
@@ -46,18 +46,18 @@ impl Session {
             held: vec![],
         };
         for message in [greeting(), scene(true), layer()] {
-            assert!(session.viewer.tell(&message));
+            assert!(session.viewer.send(&message));
         }
-        session.go_on(1000);
+        session.feed_samples(1000);
         let address = session.viewer.address();
         (session, address)
     }
 
-    fn go_on(&mut self, ticks: u64) {
+    fn feed_samples(&mut self, ticks: u64) {
         let until = self.tick + ticks;
         while self.tick < until {
             for message in batch(self.tick, self.tick + 100, &mut self.held) {
-                assert!(self.viewer.tell(&message));
+                assert!(self.viewer.send(&message));
             }
             self.tick += 100;
         }
@@ -68,12 +68,12 @@ impl Session {
 fn shown(
     browser: &mut Browser,
     page: &Page,
-    go_on: &mut dyn FnMut(),
+    feed_samples: &mut dyn FnMut(),
     is_right: impl Fn(&Colours, &Colours) -> bool,
 ) -> (Colours, Colours) {
     let until = Instant::now() + HANG;
     loop {
-        go_on();
+        feed_samples();
         std::thread::sleep(Duration::from_millis(200));
         let picture = browser.picture(page);
         let terrain = browser.colours(page, &picture, TERRAIN, &MARKS);
@@ -109,11 +109,11 @@ fn browser_in(folder: &Path) -> Option<Browser> {
 fn foreign<'b>(browser: &'b Browser, address: &str) -> Vec<&'b String> {
     let requests = browser.requests.iter();
     requests
-        .filter(|asked| !asked.starts_with(address))
-        .filter(|asked| {
+        .filter(|request| !request.starts_with(address))
+        .filter(|request| {
             !["data:", "blob:", "about:"]
                 .iter()
-                .any(|own| asked.starts_with(own))
+                .any(|own| request.starts_with(own))
         })
         .collect()
 }
@@ -136,11 +136,11 @@ fn page_shows_live_scene_and_plots_without_foreign_requests() {
     };
     let (mut session, address) = Session::start("--linger 0");
     let page = browser.open(&address);
-    let mut go_on = || session.go_on(200);
-    let (terrain, plots) = shown(&mut browser, &page, &mut go_on, is_whole);
+    let mut feed_samples = || session.feed_samples(200);
+    let (terrain, plots) = shown(&mut browser, &page, &mut feed_samples, is_whole);
     // They change while the hand moves.
     let moved = |now: &Colours, then: &Colours| now.hash != then.hash;
-    shown(&mut browser, &page, &mut go_on, |now, plotted| {
+    shown(&mut browser, &page, &mut feed_samples, |now, plotted| {
         is_whole(now, plotted) && moved(now, &terrain) && moved(plotted, &plots)
     });
     // A second page hides the first, which reloads when it is visible again; then the first one is
@@ -148,29 +148,29 @@ fn page_shows_live_scene_and_plots_without_foreign_requests() {
     let began = browser.number(&page, "performance.timeOrigin");
     browser.set_seen(&page, false);
     let second = browser.open(&address);
-    shown(&mut browser, &second, &mut go_on, is_whole);
+    shown(&mut browser, &second, &mut feed_samples, is_whole);
     browser.close(&second);
     browser.set_seen(&page, true);
     let until = Instant::now() + HANG;
     while browser.number(&page, "performance.timeOrigin") == began {
-        go_on();
+        feed_samples();
         std::thread::sleep(Duration::from_millis(200));
         assert!(Instant::now() < until, "it goes on with what it had");
     }
-    shown(&mut browser, &page, &mut go_on, is_whole);
+    shown(&mut browser, &page, &mut feed_samples, is_whole);
     browser.reload(&page);
-    shown(&mut browser, &page, &mut go_on, is_whole);
+    shown(&mut browser, &page, &mut feed_samples, is_whole);
     let foreign = foreign(&browser, &address);
     assert!(foreign.is_empty(), "requests elsewhere: {foreign:?}");
     assert!(
         browser
             .requests
             .iter()
-            .any(|asked| asked.ends_with("/feed?gathered"))
+            .any(|request| request.ends_with("/feed?gathered"))
     );
     // Killing the browser has no effect on the session.
     drop(browser);
-    session.go_on(2000);
+    session.feed_samples(2000);
     assert!(session.viewer.end());
     remove(&folder);
 }
@@ -184,15 +184,15 @@ fn oversized_page_reloads_and_continues() {
     };
     let (mut session, address) = Session::start("--linger 0 --page-mb 64");
     let page = browser.open(&address);
-    let mut until = |wanted: &dyn Fn(f64, f64) -> bool| {
+    let mut until = |condition: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + HANG;
         loop {
-            session.go_on(500);
+            session.feed_samples(500);
             std::thread::sleep(Duration::from_millis(500));
             let began = browser.number(&page, "performance.timeOrigin");
             let bytes = browser.number(&page, "window.hapterra.bytes");
             if let (Some(began), Some(bytes)) = (began, bytes)
-                && wanted(began, bytes)
+                && condition(began, bytes)
             {
                 return began;
             }
@@ -201,9 +201,13 @@ fn oversized_page_reloads_and_continues() {
     };
     let first = until(&|_, bytes| bytes > 0.0);
     // It receives the earlier entries again, and the new ones.
-    let again = until(&|began, bytes| began != first && bytes > 0.0);
+    let reconnected = until(&|began, bytes| began != first && bytes > 0.0);
     // Not at once: its first entries may already be larger.
-    assert!(again - first > 20_000.0, "after {} ms", again - first);
+    assert!(
+        reconnected - first > 20_000.0,
+        "after {} ms",
+        reconnected - first
+    );
     drop(browser);
     assert!(session.viewer.end());
     remove(&folder);
@@ -226,11 +230,11 @@ fn page_shows_live_contact_on_the_emulated_board() {
         .arg(format!("--device=emulated:{}", image.display()))
         .arg("--out")
         .arg(&folder);
-    let mut demo = Running::shown(&mut demo, &format!("--rrd {}", live.display()));
+    let mut demo = Running::start_with_viewer(&mut demo, &format!("--rrd {}", live.display()));
     let address = demo.address();
     let page = browser.open(&address);
     let mut is_touched = || {
-        assert!(demo.goes_on(), "it ended before the page was seen");
+        assert!(demo.is_running(), "it ended before the page was seen");
     };
     let (terrain, plots) = shown(&mut browser, &page, &mut is_touched, is_whole);
     shown(&mut browser, &page, &mut is_touched, |now, plotted| {
@@ -247,7 +251,7 @@ fn page_shows_live_contact_on_the_emulated_board() {
     drop(browser);
     demo.interrupt();
     assert!(demo.end());
-    let reported = demo.words();
+    let reported = demo.output();
     for figure in [" run, 0 late", " 0 lost on the link, 0 dropped"] {
         assert!(reported.contains(figure), "{reported}");
     }
@@ -271,7 +275,7 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     let mut viewer = Viewer::start("--linger 0");
     let begin = [greeting(), scene(true), layer()];
     for message in begin.iter().chain(&tiles_around([2, 2])) {
-        assert!(viewer.tell(message));
+        assert!(viewer.send(message));
     }
     let mut tick = 0;
     let mut rest = |viewer: &mut Viewer, scale: f64, east_mm: f64| {
@@ -280,13 +284,13 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
         tick = ticks.end;
         let samples = ticks.map(resting(scale, east_mm)).collect::<Vec<_>>();
         for samples in samples.chunks(100) {
-            assert!(viewer.tell(&Message::Samples(samples.to_vec())));
+            assert!(viewer.send(&Message::Samples(samples.to_vec())));
         }
     };
     rest(&mut viewer, 1.0, 0.0);
     let page = browser.open(&viewer.address());
-    let mut go_on = || rest(&mut viewer, 1.0, 0.0);
-    shown(&mut browser, &page, &mut go_on, is_whole);
+    let mut feed_samples = || rest(&mut viewer, 1.0, 0.0);
+    shown(&mut browser, &page, &mut feed_samples, is_whole);
     // Waits for a correct picture that is followed by an equal one.
     let mut settled = |is_right: &dyn Fn(&mut Browser, &str) -> bool| {
         let until = Instant::now() + HANG;
@@ -304,15 +308,15 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     };
     let first = settled(&|_, _| true);
     for (scale, east_mm) in [(1.0, 25.0), (1.0, 0.0), (2.0, 0.0), (1.0, 0.0)] {
-        assert!(viewer.tell(&zoomed_scene(scale, east_mm)));
+        assert!(viewer.send(&zoomed_scene(scale, east_mm)));
         rest(&mut viewer, scale, east_mm);
         let is_first = (scale, east_mm) == (1.0, 0.0);
         settled(&|browser, picture| {
-            let apart = browser.difference(&page, [&first, picture], TERRAIN);
+            let difference = browser.difference(&page, [&first, picture], TERRAIN);
             if is_first {
-                apart < SAME
+                difference < SAME
             } else {
-                apart > OTHER
+                difference > OTHER
             }
         });
     }
@@ -336,7 +340,7 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
         .args(["--commands", "-", "--out"])
         .arg(&folder)
         .stdin(Stdio::piped());
-    let mut demo = Running::shown(&mut demo, "");
+    let mut demo = Running::start_with_viewer(&mut demo, "");
     let page = browser.open(&demo.address());
     shown(&mut browser, &page, &mut || {}, is_whole);
     // White on the map, twice the expected value in a row: the hand continues to cross the lines.
@@ -354,15 +358,15 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
             assert!(Instant::now() < until, "{count} pixels");
         }
     };
-    let whole = white(&|count| count > SHORTER);
+    let whole = white(&|count| count > MIN_DECREASE);
     demo.type_lines("zoom 2\nzoom 2\n");
-    let zoomed = white(&|count| count + SHORTER < whole);
+    let zoomed = white(&|count| count + MIN_DECREASE < whole);
     demo.type_lines("reset\n");
-    white(&|count| count > zoomed + SHORTER / 2);
+    white(&|count| count > zoomed + MIN_DECREASE / 2);
     drop(browser);
     demo.interrupt();
     assert!(demo.end());
-    let reported = demo.words();
+    let reported = demo.output();
     assert!(!reported.contains("not shown"), "{reported}");
     remove(&folder);
 }
@@ -387,9 +391,9 @@ fn killed(who: Killed, says: &str) {
     demo.args([
         "demo", "--device", "native", "--rounds", "900", "--view", "--out",
     ]);
-    let mut demo = Running::shown(demo.arg(&folder), "");
+    let mut demo = Running::start_with_viewer(demo.arg(&folder), "");
     let page = browser.open(&demo.address());
-    let viewer = started_by(demo.id(), "hapterra-view").expect("a viewer");
+    let viewer = child_process(demo.id(), "hapterra-view").expect("a viewer");
     shown(&mut browser, &page, &mut || {}, is_whole);
     signal(
         "-KILL",
@@ -402,7 +406,7 @@ fn killed(who: Killed, says: &str) {
     let until = Instant::now() + HANG;
     while !{ browser.value(&page, "document.getElementById('said').textContent") }
         .as_str()
-        .is_some_and(|stated| stated.contains(says))
+        .is_some_and(|text| text.contains(says))
     {
         assert!(Instant::now() < until, "the page does not say so");
         std::thread::sleep(Duration::from_millis(200));
@@ -410,10 +414,10 @@ fn killed(who: Killed, says: &str) {
     drop(browser);
     if who == Killed::Viewer {
         std::thread::sleep(Duration::from_secs(1));
-        assert!(demo.goes_on());
+        assert!(demo.is_running());
         demo.interrupt();
         assert!(demo.end());
-        let reported = demo.words();
+        let reported = demo.output();
         assert!(
             reported.contains(" 0 lost on the link, 0 dropped"),
             "{reported}"

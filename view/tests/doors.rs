@@ -8,7 +8,7 @@ use std::net::TcpStream;
 use hapterra_view_stream::{Hello, Message};
 
 use common::scene::{batch, greeting, layer, scene};
-use common::{HANG, Viewer, asked};
+use common::{HANG, Viewer, send_request};
 
 /// Starts a viewer that shows the beginning of a live session; returns it and its port.
 fn live(options: &str) -> (Viewer, u16) {
@@ -16,14 +16,14 @@ fn live(options: &str) -> (Viewer, u16) {
     let mut held = Vec::new();
     let messages = [greeting(), scene(true), layer()];
     for message in messages.iter().chain(&batch(0, 100, &mut held)) {
-        assert!(viewer.tell(message));
+        assert!(viewer.send(message));
     }
     let port = viewer.port();
     (viewer, port)
 }
 
 fn get(port: u16, path: &str, host: &str, more: &str) -> String {
-    asked(
+    send_request(
         port,
         &format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{more}Connection: close\r\n\r\n"),
     )
@@ -71,7 +71,11 @@ fn foreign_hosts_origins_and_write_methods_are_refused() {
         let request = format!(
             "{method} {path} HTTP/1.1\r\nHost: {own}\r\nContent-Length: 2\r\nConnection: close\r\n\r\nhi"
         );
-        assert_eq!(status(&asked(port, &request)), 405, "{method} {path}");
+        assert_eq!(
+            status(&send_request(port, &request)),
+            405,
+            "{method} {path}"
+        );
     }
 }
 
@@ -97,13 +101,13 @@ fn stalled_and_disconnecting_pages_do_not_block_the_viewer() {
             drop(reading(port, 20_000));
         }
         for message in batch(100 * round, 100 * (round + 1), &mut held) {
-            assert!(viewer.tell(&message), "round {round}");
+            assert!(viewer.send(&message), "round {round}");
         }
     }
     drop(hanging);
     // The last page receives the whole recording, and its end.
     let mut last = reading(port, 1000);
-    assert!(viewer.tell(&Message::End));
+    assert!(viewer.send(&Message::End));
     let mut rest = Vec::new();
     last.read_to_end(&mut rest).expect("the stream ends");
     assert!(rest.ends_with(&[0; 4]), "its end is said");
@@ -111,13 +115,13 @@ fn stalled_and_disconnecting_pages_do_not_block_the_viewer() {
 }
 
 #[test]
-fn a_stream_of_another_version_or_of_none_is_named() {
+fn stream_of_another_or_no_version_is_reported() {
     let mut viewer = Viewer::start("");
     let other = Message::Hello(Hello {
         version: 999,
         program: "9.9".into(),
     });
-    assert!(viewer.tell(&other));
+    assert!(viewer.send(&other));
     let line = viewer.line();
     assert!(
         line.contains("999") && line.contains("build both"),
@@ -125,7 +129,7 @@ fn a_stream_of_another_version_or_of_none_is_named() {
     );
     assert!(!viewer.end());
     let mut viewer = Viewer::start("");
-    viewer.hang_up();
+    viewer.close_stream();
     assert!(
         viewer
             .line()
@@ -140,9 +144,9 @@ fn feed_end_distinguishes_session_end_from_lost_hapterra() {
         let (mut viewer, port) = live("");
         let mut page = reading(port, 1000);
         if is_reported {
-            assert!(viewer.tell(&Message::End));
+            assert!(viewer.send(&Message::End));
         }
-        viewer.hang_up();
+        viewer.close_stream();
         let mut rest = Vec::new();
         page.read_to_end(&mut rest).expect("the stream ends");
         assert!(rest.ends_with(&u32::to_le_bytes(last)), "{is_reported}");
@@ -153,7 +157,7 @@ fn feed_end_distinguishes_session_end_from_lost_hapterra() {
 fn viewer_exits_after_the_last_page_disconnects() {
     let (mut viewer, port) = live("--linger 0.2");
     let page = reading(port, 1000);
-    viewer.hang_up();
+    viewer.close_stream();
     std::thread::sleep(std::time::Duration::from_millis(100));
     drop(page);
     assert!(viewer.end());
@@ -163,7 +167,7 @@ fn viewer_exits_after_the_last_page_disconnects() {
 fn viewer_exits_if_hapterra_dies_before_any_page_connects() {
     let (mut viewer, _) = live("");
     // No end is sent. The viewer's own time-out is 15 s.
-    viewer.hang_up();
+    viewer.close_stream();
     assert!(viewer.end());
 }
 
@@ -174,14 +178,14 @@ fn full_disk_under_rrd_file_is_reported_and_page_still_works() {
     let mut held = Vec::new();
     for round in 1..100u64 {
         for message in batch(100 * round, 100 * (round + 1), &mut held) {
-            assert!(viewer.tell(&message), "round {round}");
+            assert!(viewer.send(&message), "round {round}");
         }
     }
     assert_eq!(
         status(&get(port, "/", &format!("127.0.0.1:{port}"), "")),
         200
     );
-    assert!(viewer.tell(&Message::End));
+    assert!(viewer.send(&Message::End));
     let line = viewer.line();
     assert!(
         line.contains(".rrd") && line.contains("not complete"),
@@ -191,7 +195,7 @@ fn full_disk_under_rrd_file_is_reported_and_page_still_works() {
 }
 
 #[test]
-fn an_address_that_others_reach_is_warned_of() {
+fn reachable_address_is_warned_of() {
     let viewer = Viewer::start("--bind 0.0.0.0");
     assert!(viewer.line().contains("warning: other machines"));
 }

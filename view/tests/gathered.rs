@@ -64,27 +64,27 @@ impl Reported {
 fn gathered_feed_has_the_same_rows_in_far_fewer_entries() {
     let mut viewer = Viewer::start("--linger 5");
     for message in [greeting(), scene(true), layer()] {
-        assert!(viewer.tell(&message));
+        assert!(viewer.send(&message));
     }
     let mut held = Vec::new();
-    let mut go_on = |viewer: &mut Viewer, from: u64, to: u64| {
+    let mut feed_samples = |viewer: &mut Viewer, from: u64, to: u64| {
         for begin in (from..to).step_by(BATCH as usize) {
             for message in batch(begin, to.min(begin + BATCH), &mut held) {
-                assert!(viewer.tell(&message), "tick {begin}");
+                assert!(viewer.send(&message), "tick {begin}");
             }
         }
     };
-    go_on(&mut viewer, 0, 100);
+    feed_samples(&mut viewer, 0, 100);
     let port = viewer.port();
     let reading = |path: &'static str| {
         let feed = Feed::open(port, path);
         std::thread::spawn(move || reported(feed))
     };
     let pages = [reading("/feed"), reading("/feed?gathered")];
-    go_on(&mut viewer, 100, TICKS / 2);
+    feed_samples(&mut viewer, 100, TICKS / 2);
     let amid = reading("/feed");
-    go_on(&mut viewer, TICKS / 2, TICKS);
-    assert!(viewer.tell(&Message::End));
+    feed_samples(&mut viewer, TICKS / 2, TICKS);
+    assert!(viewer.send(&Message::End));
     let [fine, gathered] = pages.map(|page| page.join().expect("the stream is read"));
     let amid = amid.join().expect("the stream is read");
     let late = reported(Feed::open(port, "/feed"));

@@ -18,7 +18,7 @@ const TINTS: usize = 400;
 
 #[test]
 #[ignore = "a figure of this machine"]
-fn the_time_until_a_browser_shows_the_terrain() {
+fn browser_shows_the_terrain_within_its_time() {
     let (Some(mut demo), Some(program)) = (hapterra(), program()) else {
         println!("SKIPPED: no hapterra, or no Chromium here");
         return;
@@ -29,12 +29,12 @@ fn the_time_until_a_browser_shows_the_terrain() {
         .args(std::env::var_os("TERRAIN").map(PathBuf::from))
         .arg("--out")
         .arg(&folder);
-    let mut demo = Running::shown(&mut demo, "");
+    let mut demo = Running::start_with_viewer(&mut demo, "");
     // This line begins the session with the device.
-    demo.tells("device ");
+    demo.wait_for_line("device ");
     let session = Instant::now();
     let address = demo.address();
-    let stated = session.elapsed();
+    let elapsed = session.elapsed();
     let page = browser.open(&address);
     let (mut started, mut reported) = (None, None);
     loop {
@@ -55,7 +55,7 @@ fn the_time_until_a_browser_shows_the_terrain() {
     }
     let shown = session.elapsed();
     println!(
-        "from the session's begin: address {stated:?}, viewer started {started:?}, first piece {reported:?}, terrain seen {shown:?}"
+        "from the session's begin: address {elapsed:?}, viewer started {started:?}, first piece {reported:?}, terrain seen {shown:?}"
     );
     drop(browser);
     demo.interrupt();

@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use common::browser::{Browser, Page, program};
-use common::{Running, emulated, folder, hapterra, memory_of, signal, started_by};
+use common::{Running, child_process, emulated, folder, hapterra, memory_of, signal};
 
 /// Memory bound of the viewer: the history is full after some minutes, and the rest is noise of the
 /// allocator.
@@ -57,7 +57,7 @@ fn touching(into: &Path) -> Option<Command> {
 
 /// Returns the lines of a session's summary about late ticks, lost samples, and tiles that were
 /// requested but not delivered.
-fn harm(reported: &str) -> Vec<&str> {
+fn complaints(reported: &str) -> Vec<&str> {
     let good = [
         ("ticks ", " run, 0 late"),
         ("telemetry ", " 0 lost on the link, 0 dropped"),
@@ -76,11 +76,11 @@ fn harm(reported: &str) -> Vec<&str> {
 }
 
 #[test]
-fn each_bad_figure_is_reported_alone() {
+fn each_bad_figure_is_reported() {
     let good = "ticks          9 run, 0 late\n\
                 tiles          8 fetched (35044 bytes), 2 of them again\n\
                 telemetry      9 samples, 0 lost on the link, 0 dropped by the device\n";
-    assert!(harm(good).is_empty());
+    assert!(complaints(good).is_empty());
     let unanswered = format!("{good}link           1 requests and questions without an answer\n");
     let bad = [
         good.replace("0 late", "10 late"),
@@ -89,13 +89,13 @@ fn each_bad_figure_is_reported_alone() {
         unanswered,
     ];
     for reported in &bad {
-        assert_eq!(harm(reported).len(), 1, "{reported}");
+        assert_eq!(complaints(reported).len(), 1, "{reported}");
     }
 }
 
 #[test]
 #[ignore = "takes ten minutes"]
-fn ten_minutes_of_history_stay_bounded() {
+fn history_of_ten_minutes_is_bounded() {
     let folder = folder("long");
     let Some(mut demo) = touching(&folder) else {
         println!("SKIPPED: HAPTERRA names no program");
@@ -106,9 +106,9 @@ fn ten_minutes_of_history_stay_bounded() {
     let is_alone = std::env::var_os("ALONE").is_some();
     let options = std::env::var("HAPTERRA_VIEW_OPTIONS").unwrap_or_default();
     let since = Instant::now();
-    let mut demo = Running::shown(&mut demo, &options);
+    let mut demo = Running::start_with_viewer(&mut demo, &options);
     let address = demo.address();
-    let viewer = started_by(demo.id(), "hapterra-view").expect("the viewer runs");
+    let viewer = child_process(demo.id(), "hapterra-view").expect("the viewer runs");
     let mut browser = Browser::start(&program().expect("a Chromium"), &folder);
     let page = browser.open(&address);
     let mut second = None;
@@ -116,15 +116,15 @@ fn ten_minutes_of_history_stay_bounded() {
         "minute | hapterra, MB | viewer, MB | page, MB, for s | told to the page, MB | second shown, of the session's"
     );
     let began = Instant::now();
-    let mut most = [0; 3];
+    let mut maxima = [0; 3];
     for minute in 1..=minutes {
         let until = Duration::from_secs(60 * minute);
         std::thread::sleep(until.saturating_sub(began.elapsed()));
-        assert!(demo.goes_on(), "{}", demo.words());
+        assert!(demo.is_running(), "{}", demo.output());
         let of_page = of_page(&mut browser, &page);
         let figures = [memory_of(demo.id()), memory_of(viewer), of_page.bytes];
-        for (most, now) in most.iter_mut().zip(figures) {
-            *most = now.max(*most);
+        for (max, now) in maxima.iter_mut().zip(figures) {
+            *max = now.max(*max);
         }
         let [host, viewer_now, page_now] = figures.map(|bytes| bytes >> 20);
         let (age, reported) = (of_page.age_s, of_page.reported >> 20);
@@ -145,12 +145,12 @@ fn ten_minutes_of_history_stay_bounded() {
     drop(browser);
     demo.interrupt();
     let ended_well = demo.end();
-    let reported = demo.words();
-    println!("{reported}\nmost, bytes: {most:?}");
+    let reported = demo.output();
+    println!("{reported}\nmost, bytes: {maxima:?}");
     assert!(ended_well, "{reported}");
-    assert_eq!(harm(&reported), Vec::<&str>::new(), "{reported}");
+    assert_eq!(complaints(&reported), Vec::<&str>::new(), "{reported}");
     let bounds = [HOST_BYTES, VIEWER_BYTES, PAGE_BYTES];
-    let are_kept = most.iter().zip(bounds).all(|(most, bound)| *most < bound);
-    assert!(are_kept, "{most:?}");
+    let are_kept = maxima.iter().zip(bounds).all(|(max, bound)| *max < bound);
+    assert!(are_kept, "{maxima:?}");
     let _ = std::fs::remove_dir_all(folder);
 }

@@ -42,7 +42,7 @@ impl Shown {
             .args(["--commands", "-", "--out"])
             .arg(&folder)
             .stdin(Stdio::piped());
-        let mut demo = Running::shown(&mut demo, "");
+        let mut demo = Running::start_with_viewer(&mut demo, "");
         let address = demo.address();
         demo.type_lines(typed);
         let began = Instant::now();
@@ -61,12 +61,12 @@ impl Shown {
     fn keep(&mut self, path: &Path, is_right: impl Fn(&Colours) -> bool) {
         loop {
             std::thread::sleep(Duration::from_millis(500));
-            let kept = self.browser.photograph(&self.page);
+            let photo = self.browser.photograph(&self.page);
             // Colours of exactly the stored picture: a browser decodes both formats.
-            let picture = BASE64_STANDARD.encode(&kept);
+            let picture = BASE64_STANDARD.encode(&photo);
             let colours = { &mut self.browser }.colours(&self.page, &picture, TERRAIN, &MARKS);
             if is_right(&colours) {
-                return std::fs::write(path, kept).expect("written");
+                return std::fs::write(path, photo).expect("written");
             }
             assert!(self.began.elapsed() < HANG, "{colours:?}");
         }

@@ -5,7 +5,7 @@ mod common;
 use std::path::Path;
 use std::process::Command;
 
-use common::framed::{check_frames, laid};
+use common::framed::{check_frames, stick_sides};
 use common::recorded::{Csv, check, check_views, entities, scalars};
 use common::{Running, folder, hapterra};
 
@@ -32,8 +32,8 @@ fn live_and_recorded_views_have_the_values_of_the_csv() {
     let folder = folder("demo");
     let live = folder.join("live.rrd");
     demo.args(["demo", "--device", "native", "--duration", "4s", "--view"]);
-    let stated = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
-    assert!(!stated.contains("not shown"), "{stated}");
+    let output = Running::run_to_end(demo.arg("--out").arg(&folder), &rrd(&live));
+    assert!(!output.contains("not shown"), "{output}");
     let recording = folder.join("fractal.csv");
     let csv = Csv::read(&recording);
     let shown = entities(&live);
@@ -55,11 +55,11 @@ fn live_and_recorded_views_have_the_values_of_the_csv() {
 
     let terrain = folder.join("hills.tif");
     synth(&terrain, "1024");
-    let again = folder.join("again.rrd");
+    let repeated = folder.join("again.rrd");
     let mut view = hapterra().expect("named");
     view.arg("view").arg(&recording).arg("--ignore-settings");
-    Running::whole(view.arg(&terrain), &rrd(&again));
-    check(&csv, &entities(&again));
+    Running::run_to_end(view.arg(&terrain), &rrd(&repeated));
+    check(&csv, &entities(&repeated));
     std::fs::remove_dir_all(folder).expect("it goes");
 }
 
@@ -74,7 +74,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let (terrain, commands) = (at("hills.tif"), at("commands"));
     let lines = "at 3.5 zoom 2\nat 4.3 pan 4 3\nat 5.1 exaggerate 1.5\n";
     std::fs::write(&commands, lines).expect("written");
-    let run = |command: &mut Command, into: &Path| Running::whole(command, &rrd(into));
+    let run = |command: &mut Command, into: &Path| Running::run_to_end(command, &rrd(into));
     synth(&terrain, "512");
     let mut demo = hapterra().expect("named");
     demo.args(["demo", "--device", "native", "--duration", "6s", "--view"]);
@@ -126,15 +126,15 @@ fn map_shows_the_extent_fitted_to_the_workspace() {
         .args(["--bbox", "501000,1500,503000,3000", "--out"])
         .arg(&folder)
         .arg(&terrain);
-    Running::whole(&mut demo, &rrd(&shown));
+    Running::run_to_end(&mut demo, &rrd(&shown));
     let csv = Csv::read(&folder.join("hills.csv"));
-    let sides = laid(&csv, &entities(&shown));
+    let sides = stick_sides(&csv, &entities(&shown));
     // The first sample is at 500,005, 5; a metre of this map is 1.0004 on the ground here.
-    let wanted = [995.0, 1495.0, 2995.0, 2995.0].map(|metres| 1.0004 * metres);
+    let expected = [995.0, 1495.0, 2995.0, 2995.0].map(|metres| 1.0004 * metres);
     let off = sides
         .iter()
-        .zip(wanted)
-        .map(|(side, wanted)| (side - wanted).abs());
+        .zip(expected)
+        .map(|(side, expected)| (side - expected).abs());
     assert!(off.fold(0.0, f64::max) < 1.0, "{sides:?}");
     std::fs::remove_dir_all(folder).expect("it goes");
 }

@@ -72,7 +72,7 @@ fn page_receives_the_coarse_layer_before_finer_ones() {
     let mut messages = vec![greeting(), scene(true), Message::Layer(whole), finer];
     messages.extend(batch(0, 300, &mut vec![]));
     for message in &messages {
-        assert!(viewer.tell(message));
+        assert!(viewer.send(message));
     }
     let reported = reported(viewer.port());
     check(&reported, &["/terrain/layer1/", "/terrain/tiles/"]);
@@ -96,15 +96,15 @@ fn demo_page_receives_the_coarse_layer_first() {
         .arg("--out")
         .arg(&folder);
     let began = Instant::now();
-    let mut demo = Running::shown(&mut demo, "");
+    let mut demo = Running::start_with_viewer(&mut demo, "");
     // This line begins the session with the device.
-    demo.tells("device ");
+    demo.wait_for_line("device ");
     let (read, session) = (began.elapsed(), Instant::now());
     let port = demo.port();
-    let stated = session.elapsed();
+    let elapsed = session.elapsed();
     let after = check(&reported(port), &[]);
     println!(
-        "terrain read after {read:?}; then the page's address after {stated:?}, and the coarse whole {after:?} after it was asked for"
+        "terrain read after {read:?}; then the page's address after {elapsed:?}, and the coarse whole {after:?} after it was asked for"
     );
     assert!(demo.end());
     std::fs::remove_dir_all(folder).expect("it goes");

@@ -30,7 +30,7 @@ pub(crate) struct Exception {
     pub(crate) callee: &'static str,
     /// For a call through a register: parts of the names of its possible callees. They are checked
     /// like all other functions that an interrupt reaches.
-    pub(crate) leads_to: &'static [&'static str],
+    pub(crate) targets: &'static [&'static str],
     /// Reason why it is safe.
     #[expect(dead_code, reason = "for the reader of the table")]
     pub(crate) because: &'static str,
@@ -49,9 +49,9 @@ pub(crate) struct Board {
     /// exception reaches may panic.
     pub(crate) runs_tasks: &'static [&'static str],
     /// Calls through a register under an interrupt that were followed by hand.
-    pub(crate) known_indirect: &'static [Exception],
+    pub(crate) allowed_indirect: &'static [Exception],
     /// Calls to panics, directly or indirectly, under an interrupt that are proven never to happen.
-    pub(crate) known_calls: &'static [Exception],
+    pub(crate) allowed_calls: &'static [Exception],
     /// The interrupt whose code runs from a memory without wait states, if there is one.
     pub(crate) fast_interrupt: Option<&'static str>,
     /// Its memories. Bytes outside all of them are an error.
@@ -72,21 +72,21 @@ const EMULATED_CALLS: &[Exception] = &[
     Exception {
         caller: &["Serial", "on_received"],
         callee: "panic_already_borrowed",
-        leads_to: &[],
+        targets: &[],
         because: "embassy's ring of bytes is borrowed in critical sections only, which hold this \
                   interrupt back",
     },
     Exception {
         caller: &["Serial", "on_received"],
         callee: "core::panicking::panic",
-        leads_to: &[],
+        targets: &[],
         because: "embassy's ring of bytes keeps its places below its length, and was asked whether \
                   there is room",
     },
     Exception {
         caller: &["wire::frame::Framing"],
         callee: "core::panicking::panic",
-        leads_to: &[],
+        targets: &[],
         because: "the frame of a program that has ended: some twenty bytes into 64. A panic there \
                   would end it once more",
     },
@@ -96,7 +96,7 @@ const EMULATED_CALLS: &[Exception] = &[
 const TIMER_QUEUE: Exception = Exception {
     caller: &["TIM5"],
     callee: "panic_already_borrowed",
-    leads_to: &[],
+    targets: &[],
     because: "the queue of timers is borrowed in critical sections only, this interrupt's among \
               them; they hold this interrupt back, so it finds no borrow",
 };
@@ -121,7 +121,7 @@ const EMULATED_WAKERS: &[Exception] = &[
     Exception {
         caller: &["core::fmt::write"],
         callee: "",
-        leads_to: &[],
+        targets: &[],
         because: "the last words of an emulated program that has ended; a panic among them would \
                   end it once more",
     },
@@ -131,7 +131,7 @@ const fn waker(caller: &'static [&'static str]) -> Exception {
     Exception {
         caller,
         callee: "",
-        leads_to: &["embassy_executor::raw::waker::wake"],
+        targets: &["embassy_executor::raw::waker::wake"],
         because: "a task's waker: all tasks are embassy's, so there is one table of what wakers do",
     }
 }
@@ -151,7 +151,7 @@ const fn queue(caller: &'static [&'static str]) -> Exception {
     Exception {
         caller,
         callee: "panic_const_rem_by_zero",
-        leads_to: &[],
+        targets: &[],
         because: "heapless' queues wrap by `% length`, and know their length, never 0, only at run time",
     }
 }
@@ -168,8 +168,8 @@ pub(crate) static BOARDS: [Board; 4] = [
         elf_variable: "HAPTERRA_MPS2_ELF",
         // Only on this board tasks run in an interrupt, the lowest.
         runs_tasks: &["Executor"],
-        known_indirect: EMULATED_WAKERS,
-        known_calls: EMULATED_CALLS,
+        allowed_indirect: EMULATED_WAKERS,
+        allowed_calls: EMULATED_CALLS,
         fast_interrupt: None,
         memories: &[
             // Zero-wait SRAM instead of flash, with the budget of the G474.
@@ -182,8 +182,8 @@ pub(crate) static BOARDS: [Board; 4] = [
         chip: Some("STM32G474RETx"),
         elf_variable: "HAPTERRA_G474_ELF",
         runs_tasks: &[],
-        known_indirect: WAKERS,
-        known_calls: G474_CALLS,
+        allowed_indirect: WAKERS,
+        allowed_calls: G474_CALLS,
         fast_interrupt: None,
         memories: &[
             // Half of the flash. At 192 KiB the image had 116 bytes left, and its size determined
@@ -198,8 +198,8 @@ pub(crate) static BOARDS: [Board; 4] = [
         chip: Some("STM32H743ZITx"),
         elf_variable: "HAPTERRA_H743_ELF",
         runs_tasks: &[],
-        known_indirect: WAKERS,
-        known_calls: H743_CALLS,
+        allowed_indirect: WAKERS,
+        allowed_calls: H743_CALLS,
         fast_interrupt: Some("TIM7"),
         memories: H743_MEMORIES,
     },
@@ -208,8 +208,8 @@ pub(crate) static BOARDS: [Board; 4] = [
         chip: Some("STM32H743ZITx"),
         elf_variable: "HAPTERRA_H743_SPI_ELF",
         runs_tasks: &[],
-        known_indirect: WAKERS,
-        known_calls: H743_CALLS,
+        allowed_indirect: WAKERS,
+        allowed_calls: H743_CALLS,
         fast_interrupt: Some("TIM7"),
         memories: H743_MEMORIES,
     },

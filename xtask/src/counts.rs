@@ -12,26 +12,26 @@ use crate::setup::{emulator, qemu, toolchain};
 /// Counts over all scenes, prints the counts beside their targets, and compares them with the
 /// stored table, or rewrites it. About five minutes on two cores.
 pub(crate) fn counts(write: bool) -> Result<()> {
-    let wanted = if write { "write" } else { "all" };
-    replay("hapterra-lab", "instructions_m4f", &["--nocapture"], wanted)
+    let scope = if write { "write" } else { "all" };
+    replay("hapterra-lab", "instructions_m4f", &["--nocapture"], scope)
 }
 
 /// Computes the cycles of a tick on the boards' chips, prints them, and compares them with the
 /// stored table, or rewrites it. Uses the random scenes that the tests count and those with the
 /// costliest ticks; or all scenes, which takes half an hour on two cores.
-pub(crate) fn cycles(wanted: Option<&str>) -> Result<()> {
+pub(crate) fn cycles(scope: Option<&str>) -> Result<()> {
     emulator::ready()?;
     let words = ["--nocapture", "--ignored"];
     replay(
         "hapterra-image-tests",
         "cycles",
         &words,
-        wanted.unwrap_or_default(),
+        scope.unwrap_or_default(),
     )
 }
 
 /// Runs a program that replays scenes on the counting image.
-fn replay(package: &str, program: &str, words: &[&str], wanted: &str) -> Result<()> {
+fn replay(package: &str, program: &str, words: &[&str], scope: &str) -> Result<()> {
     let qemu = qemu::ready()?;
     let image = image()?;
     let mut command = cargo();
@@ -40,7 +40,7 @@ fn replay(package: &str, program: &str, words: &[&str], wanted: &str) -> Result<
         .args(words)
         .env("HAPTERRA_QEMU", qemu)
         .env(image::COUNTS_VARIABLE, image)
-        .env("HAPTERRA_COUNTS", wanted);
+        .env("HAPTERRA_COUNTS", scope);
     run(&mut command)
 }
 

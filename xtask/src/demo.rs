@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
 use crate::image;
-use crate::run::{hapterra, root, say, shown, timed};
+use crate::run::{command_line, hapterra, report, root, timed};
 use crate::setup::{gdal, qemu, toolchain};
 use crate::view;
 
@@ -36,16 +36,16 @@ pub(crate) struct Emulation {
 /// Builds the programs and runs `hapterra demo`; returns its exit code.
 pub(crate) fn demo(request: &Request) -> Result<i32> {
     let emulation = match request.device().as_deref() {
-        None => emulation_or_say_why(),
+        None => emulation_or_report(),
         Some("emulated") => Some(emulation()?),
         Some(_) => None,
     };
     if request
         .file
         .as_ref()
-        .is_some_and(|file| gdal::is_wanted_for(file.as_ref()))
+        .is_some_and(|file| gdal::is_needed_for(file.as_ref()))
     {
-        gdal::ready_or_say_why();
+        gdal::ready_or_report();
     }
     let mut command = Command::new(hapterra(request.features())?);
     command.args(request.words(emulation.is_some()));
@@ -56,10 +56,10 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     if request.view {
         command.env("HAPTERRA_VIEW", view::build()?);
     }
-    say(format!("running: {}", shown(&command)));
+    report(format!("running: {}", command_line(&command)));
     let status = command
         .status()
-        .with_context(|| format!("cannot start `{}`", shown(&command)))?;
+        .with_context(|| format!("cannot start `{}`", command_line(&command)))?;
     // `None`: ended by a signal.
     Ok(status.code().unwrap_or(1))
 }
@@ -74,11 +74,11 @@ pub(crate) fn emulation() -> Result<Emulation> {
     Ok(Emulation { image, qemu })
 }
 
-fn emulation_or_say_why() -> Option<Emulation> {
+fn emulation_or_report() -> Option<Emulation> {
     emulation()
         .inspect_err(|why| {
-            say(format!("the emulated board cannot be had: {why:#}"));
-            say("so the same application runs compiled for this machine (--device native)");
+            report(format!("the emulated board cannot be had: {why:#}"));
+            report("so the same application runs compiled for this machine (--device native)");
         })
         .ok()
 }
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_emulated_board_is_used_where_it_can_be_had() {
+    fn emulated_board_is_used_if_available() {
         let line = line(Some("a b.tif"), &["--out=x", "--duration", "3s"], true);
         assert_eq!(
             line,
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_of_the_users_is_not_overruled() {
+    fn device_option_of_the_user_is_kept() {
         let line = line(None, &["--device", "usb", "--out", "x"], false);
         assert_eq!(line, "demo --exaggeration auto --device usb --out x");
     }
@@ -203,9 +203,9 @@ mod tests {
     }
 
     #[test]
-    fn relief_that_is_stated_is_not_overruled() {
-        for stated in ["--exaggeration=1", "--exaggeration=2mm/unit"] {
-            let line = line(None, &[stated, "--out", "x"], false);
+    fn relief_option_of_the_user_is_kept() {
+        for relief in ["--exaggeration=1", "--exaggeration=2mm/unit"] {
+            let line = line(None, &[relief, "--out", "x"], false);
             assert!(!line.contains("auto"), "{line}");
         }
     }

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::run::{cargo, on_path, root, run, run_quietly, say, target_dir};
+use crate::run::{cargo, on_path, report, root, run, run_quietly, target_dir};
 
 /// The workspaces, each with a lock file.
 const WORKSPACES: [&str; 4] = [
@@ -26,9 +26,9 @@ pub(crate) enum Advisories {
 
 impl Advisories {
     /// Reports dependencies that were not checked.
-    pub(crate) fn say(self) {
+    pub(crate) fn report(self) {
         if let Some(line) = self.not_checked() {
-            say(line);
+            report(line);
         }
     }
 
@@ -47,14 +47,14 @@ pub(crate) fn check_all() -> Result<()> {
     for workspace in WORKSPACES {
         advisories = check(workspace)?;
     }
-    advisories.say();
+    advisories.report();
     Ok(())
 }
 
 /// Checks the dependencies of a workspace, stated by its manifest, against deny.toml.
 pub(crate) fn check(manifest: &str) -> Result<Advisories> {
     let program = ready()?;
-    say(format!("the dependencies of {manifest}"));
+    report(format!("the dependencies of {manifest}"));
     let deny = |words: &[&str]| {
         let of = ["--manifest-path", manifest, "--config", "deny.toml"];
         with(&program, &[&of, words].concat())
@@ -109,7 +109,7 @@ fn ready() -> Result<PathBuf> {
     if own.is_file() {
         return Ok(own);
     }
-    say("cargo-deny is not here; building one under target/ (once, about a minute)");
+    report("cargo-deny is not here; building one under target/ (once, about a minute)");
     let mut install = cargo();
     install
         .args([
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_lock_file_of_the_project_is_checked() {
+    fn all_lock_files_of_the_project_are_checked() {
         let lock = |manifest: &&str| root().join(manifest).with_extension("lock").is_file();
         assert!(WORKSPACES.iter().all(lock));
         let folders = root().read_dir().expect("a folder").flatten();

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::run::{OF_TESTS, cargo, on_path, root, run, say, timed};
+use crate::run::{TEST_VARIABLES, cargo, on_path, report, root, run, timed};
 
 /// Programs that test the pages.
 const TESTS: [&str; 4] = ["--test", "reference_pages", "--test", "docs"];
@@ -18,7 +18,7 @@ pub(crate) fn docs(write: bool) -> Result<()> {
     let mut tests = cargo();
     tests
         .arg("test")
-        .args(OF_TESTS)
+        .args(TEST_VARIABLES)
         .args(TESTS)
         .env("HAPTERRA_DOCS", if write { "write" } else { "check" });
     timed("checking the pages", || run(&mut tests))?;
@@ -27,7 +27,7 @@ pub(crate) fn docs(write: bool) -> Result<()> {
             run(Command::new(mdbook).arg("build").arg(root().join("docs")))
         }),
         None => {
-            say("mdBook NOT FOUND: book not built; to build it: cargo install mdbook");
+            report("mdBook NOT FOUND: book not built; to build it: cargo install mdbook");
             Ok(())
         }
     }

@@ -12,7 +12,7 @@ const TARGETS: [&str; 5] = ["terrain", "text", "tick", "tile", "wire"];
 /// Maximum bytes of an input: some hundred ticks or messages, a file with its headers.
 const MAX: u32 = 4096;
 /// Seconds after which an input counts as hanging.
-const PATIENCE_S: u32 = 20;
+const TIMEOUT_S: u32 = 20;
 
 /// Fuzzes `target` for `minutes` minutes, from the inputs of earlier runs in `fuzz/corpus`. An
 /// input that fails ends the run and is stored in `fuzz/artifacts`.
@@ -36,7 +36,7 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
                 .current_dir(root().join("fuzz"))
                 .arg(format!("-max_total_time={seconds}"))
                 .arg(format!("-max_len={MAX}"))
-                .arg(format!("-timeout={PATIENCE_S}"))
+                .arg(format!("-timeout={TIMEOUT_S}"))
                 .arg("-print_final_stats=1")
                 .env("CARGO_TARGET_DIR", target_dir()),
         )
@@ -44,8 +44,8 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
 }
 
 fn seconds(minutes: &str) -> Result<u64> {
-    let known = minutes.parse().ok().filter(|m: &f64| *m > 0.0);
-    let minutes = known.with_context(|| format!("{minutes} is no number of minutes"))?;
+    let valid = minutes.parse().ok().filter(|m: &f64| *m > 0.0);
+    let minutes = valid.with_context(|| format!("{minutes} is no number of minutes"))?;
     Ok((60.0 * minutes).ceil() as u64)
 }
 
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_target_is_there_and_no_other() {
+    fn targets_match_those_of_the_fuzz_crate() {
         let mut found: Vec<_> = std::fs::read_dir(root().join("fuzz/fuzz_targets"))
             .expect("a folder")
             .map(|entry| entry.expect("readable").path())
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_make_no_sense_are_refused() {
+    fn invalid_arguments_are_refused() {
         assert_eq!(seconds("0.5").unwrap(), 30);
         assert!(seconds("0").is_err() && seconds("soon").is_err());
         let message = fuzz("tock", "1").unwrap_err().to_string();

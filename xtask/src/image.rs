@@ -51,7 +51,7 @@ mod tests {
     use crate::board::BOARDS;
 
     #[test]
-    fn the_feature_and_the_binary_follow_the_board() {
+    fn feature_and_binary_follow_the_board() {
         let line = package_words(&BOARDS[1], BOARDS[1].name).join(" ");
         assert_eq!(
             line,

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 
 use crate::board::{BOARDS, EMULATED};
 use crate::image::{COUNTS, package_words};
-use crate::run::{cargo, run, say, timed};
+use crate::run::{cargo, report, run, timed};
 use crate::setup::{emulator, toolchain};
 
 /// Runs all of them; the first failure ends it.
@@ -46,7 +46,7 @@ pub(crate) fn lint() -> Result<()> {
     }
     match toolchain::with_wasm() {
         Ok(()) => timed("clippy for the browser's kernel", || run(&mut wasm()))?,
-        Err(why) => say(format!("SKIPPED: clippy for the browser's kernel: {why:#}")),
+        Err(why) => report(format!("SKIPPED: clippy for the browser's kernel: {why:#}")),
     }
     timed("documentation", || {
         let mut command = cargo();

@@ -192,7 +192,7 @@ fn setup() -> Result<()> {
     let toolchain = setup::toolchain::ready()?;
     let qemu = setup::qemu::ready()?;
     setup::emulator::ready()?;
-    run::say(format!(
+    run::report(format!(
         "ready: {toolchain:?} toolchain for the boards, {}",
         qemu.display()
     ));
@@ -210,15 +210,15 @@ fn boards(words: &mut lexopt::Parser) -> Result<&'static [board::Board]> {
 
 /// Returns the given one of these flags.
 fn flag(words: &mut lexopt::Parser, names: &[&'static str]) -> Result<Option<&'static str>> {
-    let mut given = None;
+    let mut chosen = None;
     while let Some(word) = words.next()? {
         let named = |name: &&&str| matches!(&word, Long(long) if long == *name);
-        given = match names.iter().find(named) {
+        chosen = match names.iter().find(named) {
             Some(name) => Some(*name),
             None => return Err(word.unexpected().into()),
         };
     }
-    Ok(given)
+    Ok(chosen)
 }
 
 /// Parses `[--quick] [-- ARGS]`: arguments after `--` are passed on unchanged.
@@ -314,15 +314,15 @@ mod tests {
 
     #[test]
     fn help_is_found_before_two_dashes_only() {
-        let asks = |words: &[&str]| is_help(words.iter().map(OsString::from));
-        assert!(asks(&["demo", "--touch", "--help"]));
-        assert!(asks(&["test", "-h"]));
-        assert!(!asks(&["demo", "--", "--help"]));
-        assert!(!asks(&["demo", "help"]));
+        let has_help = |words: &[&str]| is_help(words.iter().map(OsString::from));
+        assert!(has_help(&["demo", "--touch", "--help"]));
+        assert!(has_help(&["test", "-h"]));
+        assert!(!has_help(&["demo", "--", "--help"]));
+        assert!(!has_help(&["demo", "help"]));
     }
 
     #[test]
-    fn a_misplaced_option_is_explained() {
+    fn misplaced_option_is_explained() {
         let message = demo(&["a.tif", "--rounds", "3"]).unwrap_err().to_string();
         assert!(message.contains("after `--`"), "{message}");
         assert!(demo(&["a.tif", "b.tif"]).is_err());

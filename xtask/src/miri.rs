@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::nightly;
-use crate::run::{root, run, say, target_dir, timed};
+use crate::run::{report, root, run, target_dir, timed};
 
 /// Parts of the names of tests that simulate an arm for seconds to hours, tick by tick. The other
 /// tests use fewer cases under Miri (core's `cases`).
@@ -19,7 +19,7 @@ const LONG: [&str; 6] = [
 /// Runs the tests; reports if Miri is not installed and cannot be installed.
 pub(crate) fn miri() -> Result<()> {
     if let Err(why) = nightly::ready(&["miri", "--version"], "miri,rust-src") {
-        say(format!("skipped: no Miri: {why:#}"));
+        report(format!("skipped: no Miri: {why:#}"));
         return Ok(());
     }
     timed("core's tests under Miri", || {

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::run::{output, say, shown};
+use crate::run::{command_line, output, report};
 
 /// Returns the nightly compiler's cargo, independent of the toolchain that runs this program.
 pub(crate) fn cargo(words: &[&str]) -> Command {
@@ -29,8 +29,8 @@ pub(crate) fn ready(words: &[&str], components: &str) -> Result<()> {
     if !components.is_empty() {
         install.args(["--component", components]);
     }
-    let line = shown(&install);
-    say(format!("installing: {line}"));
+    let line = command_line(&install);
+    report(format!("installing: {line}"));
     let installed = output(&mut install).is_some() && is_here();
     ensure!(
         installed,

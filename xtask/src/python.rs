@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
 use crate::run::{
-    cargo, output, root, run, run_quietly, say, target_dir, tested_programs, timed,
+    cargo, output, report, root, run, run_quietly, target_dir, tested_programs, timed,
     without_own_variables,
 };
 use crate::{demo, deny};
@@ -33,7 +33,7 @@ pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
 
 fn build_by(how: &[&str]) -> Result<Option<(PathBuf, PathBuf)>> {
     let Some(python) = interpreter()? else {
-        say("SKIPPED: the Python package: there is no Python 3.9 or newer on the PATH");
+        report("SKIPPED: the Python package: there is no Python 3.9 or newer on the PATH");
         return Ok(None);
     };
     let python = environment(&python)?;
@@ -52,11 +52,11 @@ pub(crate) fn test() -> Result<()> {
         return Ok(());
     };
     timed("linting the Python package's crate", lint)?;
-    deny::check("python/Cargo.toml")?.say();
+    deny::check("python/Cargo.toml")?.report();
     install(&python, &[&format!("{}[test]", wheel.display())])?;
     // The version does not change during development.
-    let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
-    install(&python, &again)?;
+    let reinstall = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
+    install(&python, &reinstall)?;
     let [_, lab] = tested_programs()?;
     let mut tests = Command::new(&python);
     tests
@@ -68,7 +68,7 @@ pub(crate) fn test() -> Result<()> {
             tests.env(EMULATED.elf_variable, board.image);
             tests.env("HAPTERRA_QEMU", board.qemu);
         }
-        Err(why) => say(format!("SKIPPED: the emulated board from Python: {why:#}")),
+        Err(why) => report(format!("SKIPPED: the emulated board from Python: {why:#}")),
     }
     timed("running the Python package's tests", || run(&mut tests))
 }
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn programs_that_are_no_python_are_not_taken() {
+    fn programs_that_are_no_python_are_ignored() {
         for program in ["/no/such/python", "false", "true"] {
             assert!(Python::of(Path::new(program)).is_none(), "{program}");
         }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 
 /// Prints one line of progress to stderr, so that stdout has only results.
-pub(crate) fn say(line: impl AsRef<str>) {
+pub(crate) fn report(line: impl AsRef<str>) {
     eprintln!("xtask: {}", line.as_ref());
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn target_dir() -> PathBuf {
 /// Variables that cargo sets for a program that it runs, one a line. They differ for each program
 /// that calls cargo. So the build scripts that read them would run again, and their dependents
 /// would be rebuilt.
-const OF_CARGO: &str = include_str!("../../tests/src/cargo_variables.txt");
+const CARGO_VARIABLES: &str = include_str!("../../tests/src/cargo_variables.txt");
 
 /// Returns the cargo that runs this program, in the workspace root, for a build for the host.
 pub(crate) fn cargo() -> Command {
@@ -47,14 +47,14 @@ pub(crate) fn cargo() -> Command {
 /// Removes the variables that cargo sets for this program: a build script that reads them would run
 /// again.
 pub(crate) fn without_own_variables(command: &mut Command) {
-    for variable in OF_CARGO.lines() {
+    for variable in CARGO_VARIABLES.lines() {
         command.env_remove(variable);
     }
 }
 
 /// The packages and features of all tests: with others, cargo would rebuild dependencies. The image
 /// tests need probe-rs anyway, and the command is also tested with it.
-pub(crate) const OF_TESTS: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
+pub(crate) const TEST_VARIABLES: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
 
 /// Builds `hapterra` for a user, and returns its path.
 pub(crate) fn hapterra(features: &[&str]) -> Result<PathBuf> {
@@ -78,7 +78,7 @@ pub(crate) fn hapterra(features: &[&str]) -> Result<PathBuf> {
 pub(crate) fn tested_programs() -> Result<[PathBuf; 2]> {
     let names = ["hapterra", "hapterra-lab"];
     let mut build = cargo();
-    build.arg("build").args(OF_TESTS);
+    build.arg("build").args(TEST_VARIABLES);
     build.args(names.map(|name| ["--bin", name]).as_flattened());
     // If the targets include a test, cargo uses the dependencies' features for tests.
     build.args(["--test", "page"]);
@@ -94,7 +94,7 @@ pub(crate) fn built(profile: &str, name: &str) -> PathBuf {
 
 /// Runs `command` to its end; a failure is an error with the command's name.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
-    let line = shown(command);
+    let line = command_line(command);
     let status = command
         .status()
         .with_context(|| format!("cannot start `{line}`"))?;
@@ -106,15 +106,15 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
 
 /// Runs a verbose program like [`run`], and shows its output only if it fails.
 pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
-    let line = shown(command);
+    let line = command_line(command);
     let done = command
         .stdin(Stdio::null())
         .output()
         .with_context(|| format!("cannot start `{line}`"))?;
     if !done.status.success() {
-        let stated = [done.stdout, done.stderr].concat();
-        let stated = String::from_utf8_lossy(&stated);
-        bail!("`{line}` failed ({})\n{}", done.status, stated.trim());
+        let output = [done.stdout, done.stderr].concat();
+        let output = String::from_utf8_lossy(&output);
+        bail!("`{line}` failed ({})\n{}", done.status, output.trim());
     }
     Ok(())
 }
@@ -141,10 +141,10 @@ pub(crate) fn on_path(program: &str) -> Option<PathBuf> {
 
 /// Runs `step`, and prints its name and duration.
 pub(crate) fn timed<T>(name: &str, step: impl FnOnce() -> Result<T>) -> Result<T> {
-    say(name);
+    report(name);
     let start = Instant::now();
     let done = step().with_context(|| format!("{name}: failed"))?;
-    say(format!(
+    report(format!(
         "{name}: done in {:.1} s",
         start.elapsed().as_secs_f64()
     ));
@@ -152,7 +152,7 @@ pub(crate) fn timed<T>(name: &str, step: impl FnOnce() -> Result<T>) -> Result<T
 }
 
 /// Returns a command line as a user would type it.
-pub(crate) fn shown(command: &Command) -> String {
+pub(crate) fn command_line(command: &Command) -> String {
     let name = Path::new(command.get_program()).file_stem();
     let words = name.into_iter().chain(command.get_args());
     let words: Vec<_> = words.map(OsStr::to_string_lossy).collect();
@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_command_is_named() {
+    fn failed_command_is_named() {
         let mut command = cargo();
         command.arg("no-such-command").stderr(Stdio::null());
         let message = run(&mut command).unwrap_err().to_string();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_program_is_named() {
+    fn missing_program_is_named() {
         let message = run(&mut Command::new("/no/such/program"))
             .unwrap_err()
             .to_string();
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_root_is_the_workspace() {
+    fn root_is_the_workspace() {
         assert!(root().join("xtask/Cargo.toml").is_file());
     }
 }

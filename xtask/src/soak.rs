@@ -4,7 +4,7 @@ use std::ffi::OsString;
 
 use anyhow::{Result, bail};
 
-use crate::run::{cargo, run, shown, target_dir, timed};
+use crate::run::{cargo, command_line, run, target_dir, timed};
 
 /// Builds the stress test in its own profile, fast and without the product's slow linking, and
 /// passes `words` to it.
@@ -21,7 +21,10 @@ pub(crate) fn soak(words: Vec<OsString>) -> Result<()> {
     command.args(words);
     let status = command.status()?;
     if !status.success() {
-        bail!("`{}` found wrong answers ({status})", shown(&command));
+        bail!(
+            "`{}` found wrong answers ({status})",
+            command_line(&command)
+        );
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
 use crate::deny::Advisories;
-use crate::run::{OF_TESTS, cargo, run, say, shown, timed};
+use crate::run::{TEST_VARIABLES, cargo, command_line, report, run, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, page, panics, python, size};
 
@@ -44,7 +44,7 @@ pub(crate) struct Request {
 /// All failures, with the commands that repeat them.
 pub(crate) fn test(request: &Request) -> Result<()> {
     let qemu = qemu::ready()?;
-    gdal::ready_or_say_why();
+    gdal::ready_or_report();
     if !request.quick {
         emulator::ready()?;
     }
@@ -54,7 +54,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     let (mut failures, mut notes) = (vec![], vec![]);
     let mut step = |repeat: &str, result: Result<()>| {
         if let Err(why) = result {
-            say(format!("error: {why:#}"));
+            report(format!("error: {why:#}"));
             failures.push(repeat.to_owned());
         }
     };
@@ -70,7 +70,11 @@ pub(crate) fn test(request: &Request) -> Result<()> {
         let mut command = cargo();
         command
             .args(["test", "--no-fail-fast"])
-            .args(if request.quick { &QUICK[..] } else { &OF_TESTS })
+            .args(if request.quick {
+                &QUICK[..]
+            } else {
+                &TEST_VARIABLES
+            })
             .env("HAPTERRA_QEMU", &qemu)
             .env(image::COUNTS_VARIABLE, &counts);
         for (board, path) in &images {
@@ -94,12 +98,12 @@ pub(crate) fn test(request: &Request) -> Result<()> {
             ("cargo xtask python --test", python::test),
         ] {
             if let Err(why) = test() {
-                say(format!("error: {why:#}"));
+                report(format!("error: {why:#}"));
                 failures.push(repeat.to_owned());
             }
         }
     }
-    notes.iter().for_each(say);
+    notes.iter().for_each(report);
     if failures.is_empty() {
         return Ok(());
     }
@@ -173,7 +177,7 @@ fn by_program(command: Command) -> Result<Vec<Failed>> {
 
 /// Runs `cargo test`, and shows each line of its output. Returns the programs that failed.
 fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Vec<Failed>> {
-    let line = shown(&command);
+    let line = command_line(&command);
     let (from, to) = io::pipe()?;
     command.stdout(to.try_clone()?).stderr(to);
     let child = command.spawn();

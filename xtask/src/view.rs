@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::board::EMULATED;
 use crate::demo::emulation;
 use crate::deny;
-use crate::run::{built, cargo, on_path, root, run, say, tested_programs, timed};
+use crate::run::{built, cargo, on_path, report, root, run, tested_programs, timed};
 use crate::setup::packages::{self, found_or_installed};
 
 /// Variable with the browser for the page's tests.
@@ -46,11 +46,11 @@ pub(crate) fn test() -> Result<()> {
     timed("checking the viewer's dependencies", || {
         deny::check("view/Cargo.toml")
     })?
-    .say();
+    .report();
     let mut tests = tests()?;
     match browser() {
         Ok(browser) => drop(tests.env(BROWSER, browser)),
-        Err(why) => say(format!("SKIPPED: the page in a browser: {why:#}")),
+        Err(why) => report(format!("SKIPPED: the page in a browser: {why:#}")),
     }
     match emulation() {
         Ok(board) => drop(
@@ -58,7 +58,7 @@ pub(crate) fn test() -> Result<()> {
                 .env(EMULATED.elf_variable, board.image)
                 .env("HAPTERRA_QEMU", board.qemu),
         ),
-        Err(why) => say(format!("SKIPPED: the page of the emulated board: {why:#}")),
+        Err(why) => report(format!("SKIPPED: the page of the emulated board: {why:#}")),
     }
     timed("running the viewer's tests", || run(&mut tests))
 }

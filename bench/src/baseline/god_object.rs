@@ -8,7 +8,7 @@ use hapterra::published::Line;
 
 use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 /// Largest number of facets that hold it at once.
 const PLANES: usize = 3;
@@ -20,7 +20,7 @@ pub struct GodObject<'g> {
     grid: &'g Grid,
     hip: Option<[f64; 3]>,
     god: [f64; 3],
-    answer: Answer,
+    result: ContactResult,
 }
 
 impl<'g> GodObject<'g> {
@@ -31,7 +31,7 @@ impl<'g> GodObject<'g> {
             grid,
             hip: None,
             god: [0.0; 3],
-            answer: Answer::FREE,
+            result: ContactResult::FREE,
         }
     }
 
@@ -43,20 +43,24 @@ impl<'g> GodObject<'g> {
         to: &[f64; 3],
         known: &[Facet],
     ) -> Option<([f64; 3], Facet, Plane)> {
-        let way = [0, 1, 2].map(|i| to[i] - from[i]);
-        let at = |t: f64| [0, 1, 2].map(|i| from[i] + t * way[i]);
+        let displacement = [0, 1, 2].map(|i| to[i] - from[i]);
+        let at = |t: f64| [0, 1, 2].map(|i| from[i] + t * displacement[i]);
         // On the diagonal, x + y is one more than at the cell's corner.
-        let (sum, rise) = (from[0] + from[1], way[0] + way[1]);
+        let (sum, rise) = (from[0] + from[1], displacement[0] + displacement[1]);
         let mut entered = 0.0;
         let line = Line::new([from[0], from[1]], [to[0], to[1]]);
         for cell in line.filter(|cell| self.grid.has(*cell)) {
             let [x, y] = cell.map(f64::from);
             let leaves = |i: usize, low: f64| {
-                let border = if way[i] > 0.0 { low + 1.0 } else { low };
-                if way[i] == 0.0 {
+                let border = if displacement[i] > 0.0 {
+                    low + 1.0
+                } else {
+                    low
+                };
+                if displacement[i] == 0.0 {
                     1.0
                 } else {
-                    ((border - from[i]) / way[i]).min(1.0)
+                    ((border - from[i]) / displacement[i]).min(1.0)
                 }
             };
             let left = leaves(0, x).min(leaves(1, y)).max(entered);
@@ -94,20 +98,20 @@ impl<'g> GodObject<'g> {
 }
 
 impl Haptics for GodObject<'_> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.hip = None;
-        self.answer = Answer::FREE;
+        self.result = ContactResult::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         let hip = hip.wide;
         match self.hip.replace(hip) {
             None => {
                 self.god = hip;
-                return self.answer;
+                return self.result;
             }
-            Some(last) if last == hip && !self.answer.touching => return self.answer,
+            Some(last) if last == hip && !self.result.touching => return self.result,
             Some(_) => {}
         }
         let mut facets = [Facet {
@@ -127,12 +131,12 @@ impl Haptics for GodObject<'_> {
             goal = nearest_on(&planes[..held], &hip);
         }
         self.god = goal;
-        self.answer = if held == 0 {
-            Answer::FREE
+        self.result = if held == 0 {
+            ContactResult::FREE
         } else {
-            Answer::touching([0, 1, 2].map(|i| (goal[i] - hip[i]) as f32))
+            ContactResult::touching([0, 1, 2].map(|i| (goal[i] - hip[i]) as f32))
         };
-        self.answer
+        self.result
     }
 }
 

@@ -3,7 +3,7 @@
 use hapterra::published::{Heights, Paper, Real};
 
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 impl Heights for Grid {
     #[inline]
@@ -37,14 +37,15 @@ impl OfHip for f64 {
 }
 
 impl<R: OfHip> Haptics for Paper<&Grid, R> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         Self::forget(self);
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
-        self.step(R::hip(hip)).map_or(Answer::FREE, |displacement| {
-            Answer::touching(displacement.map(R::single))
-        })
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
+        self.step(R::hip(hip))
+            .map_or(ContactResult::FREE, |displacement| {
+                ContactResult::touching(displacement.map(R::single))
+            })
     }
 }

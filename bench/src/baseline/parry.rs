@@ -8,7 +8,7 @@ use parry3d::utils::Array2;
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 /// Call that finds the nearest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub struct Parry<'g> {
     hip: Option<Hip>,
     /// Distance from the HIP to the surface in contact.
     depth: Option<f32>,
-    answer: Answer,
+    result: ContactResult,
 }
 
 impl<'g> Parry<'g> {
@@ -49,7 +49,7 @@ impl<'g> Parry<'g> {
             project,
             hip: None,
             depth: None,
-            answer: Answer::FREE,
+            result: ContactResult::FREE,
         }
     }
 
@@ -92,19 +92,19 @@ impl<'g> Parry<'g> {
 }
 
 impl Haptics for Parry<'_> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.hip = None;
         self.depth = None;
-        self.answer = Answer::FREE;
+        self.result = ContactResult::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         let Some(last) = self.hip.replace(*hip) else {
-            return self.answer;
+            return self.result;
         };
         if last.grid == hip.grid {
-            return self.answer;
+            return self.result;
         }
         let (from, to) = (self.local(last.single), self.local(hip.single));
         let touches = match self.depth {
@@ -112,17 +112,17 @@ impl Haptics for Parry<'_> {
             None => !self.is_free(from, to) && self.is_below(hip),
         };
         let nearest = touches.then(|| self.nearest(to, (to - from).length()));
-        self.answer = match nearest.flatten() {
+        self.result = match nearest.flatten() {
             Some(point) => {
                 let displacement = point - to;
                 self.depth = Some(displacement.length());
-                Answer::touching([displacement.x, displacement.z, displacement.y])
+                ContactResult::touching([displacement.x, displacement.z, displacement.y])
             }
             None => {
                 self.depth = None;
-                Answer::FREE
+                ContactResult::FREE
             }
         };
-        self.answer
+        self.result
     }
 }

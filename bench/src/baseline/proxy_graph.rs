@@ -3,7 +3,7 @@
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 /// Most moves in one tick.
 const MOVES: u32 = 4096;
@@ -29,7 +29,7 @@ pub struct ProxyGraph<'g> {
     grid: &'g Grid,
     hip: Option<[f64; 3]>,
     node: Option<Node>,
-    answer: Answer,
+    result: ContactResult,
 }
 
 impl<'g> ProxyGraph<'g> {
@@ -40,7 +40,7 @@ impl<'g> ProxyGraph<'g> {
             grid,
             hip: None,
             node: None,
-            answer: Answer::FREE,
+            result: ContactResult::FREE,
         }
     }
 
@@ -79,7 +79,7 @@ impl<'g> ProxyGraph<'g> {
     #[inline]
     fn nearer(&self, node: &Node, hip: &[f64; 3]) -> Option<Node> {
         let mut best = *node;
-        let mut look = |post: [i32; 2], to: [i32; 2]| {
+        let mut visit = |post: [i32; 2], to: [i32; 2]| {
             if let Some(there) = self.on_edge(post, to, hip)
                 && there.squared < best.squared * (1.0 - 1e-12)
             {
@@ -90,14 +90,14 @@ impl<'g> ProxyGraph<'g> {
         if node.t == 0.0 || node.t == 1.0 {
             let vertex = if node.t == 0.0 { node.post } else { end };
             for spoke in SPOKES {
-                look(vertex, spoke);
+                visit(vertex, spoke);
             }
         } else {
             let turn = SPOKES.iter().position(|s| *s == node.to).unwrap_or(0);
             for side in [1, 5] {
                 let third = SPOKES[(turn + side) % 6];
-                look(node.post, third);
-                look(end, [third[0] - node.to[0], third[1] - node.to[1]]);
+                visit(node.post, third);
+                visit(end, [third[0] - node.to[0], third[1] - node.to[1]]);
             }
         }
         (best.squared < node.squared).then_some(best)
@@ -118,37 +118,37 @@ impl<'g> ProxyGraph<'g> {
     #[inline]
     fn depth(&self, hip: &[f64; 3]) -> Option<f64> {
         let facet = Facet::under(hip[0], hip[1]);
-        let held = self.grid.has(facet.cell);
-        held.then(|| facet.plane(self.grid).above(hip))
+        let has_data = self.grid.has(facet.cell);
+        has_data.then(|| facet.plane(self.grid).above(hip))
     }
 }
 
 impl Haptics for ProxyGraph<'_> {
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.hip = None;
         self.node = None;
-        self.answer = Answer::FREE;
+        self.result = ContactResult::FREE;
     }
 
     #[inline]
-    fn tick(&mut self, hip: &Hip) -> Answer {
+    fn tick(&mut self, hip: &Hip) -> ContactResult {
         let hip = hip.wide;
         if self.hip.replace(hip) == Some(hip) {
-            return self.answer;
+            return self.result;
         }
         if self.depth(&hip).is_none_or(|depth| depth <= 0.0) {
             self.node = None;
-            self.answer = Answer::FREE;
-            return self.answer;
+            self.result = ContactResult::FREE;
+            return self.result;
         }
         let start = match &self.node {
             Some(node) => self.on_edge(node.post, node.to, &hip),
             None => self.on_edge([hip[0] as i32, hip[1] as i32], SPOKES[0], &hip),
         };
         self.node = start.map(|start| self.descend(start, &hip));
-        self.answer = self.node.map_or(Answer::FREE, |node| {
-            Answer::touching(node.displacement.map(|x| x as f32))
+        self.result = self.node.map_or(ContactResult::FREE, |node| {
+            ContactResult::touching(node.displacement.map(|x| x as f32))
         });
-        self.answer
+        self.result
     }
 }

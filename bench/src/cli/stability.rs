@@ -192,7 +192,7 @@ fn parse_damping(text: &str) -> Result<Damping, String> {
         ns_per_m,
         ..Damping::NONE
     })?;
-    let most = Damping::MAX_NS_PER_M;
+    let max = Damping::MAX_NS_PER_M;
     let valid = damping.is_valid().then_some(damping);
-    valid.ok_or_else(|| format!("expected 0 to {most} N·s/m"))
+    valid.ok_or_else(|| format!("expected 0 to {max} N·s/m"))
 }

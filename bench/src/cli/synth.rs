@@ -50,12 +50,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::new(error).hint("a surface needs at least --size 2x2"));
     }
     let usual = args.kind.usual_amplitude_cells() * args.cell;
-    let stated = args.amplitude.map(|height| match args.kind {
+    let amplitude = args.amplitude.map(|height| match args.kind {
         // The kind's own amplitude is a slope.
         Kind::Plane => height / Synth::new(Kind::Plane, 0, 1.0).rise(columns, rows),
         _ => height,
     });
-    let synth = Synth::new(args.kind, args.seed, stated.unwrap_or(usual));
+    let synth = Synth::new(args.kind, args.seed, amplitude.unwrap_or(usual));
     let grid = Grid {
         columns,
         rows,

@@ -36,16 +36,16 @@ pub(super) const GROUNDS: [Ground; 5] = [
     },
     Ground {
         name: "ridge",
-        height: |x, y| -0.3 * across(x, y).abs(),
+        height: |x, y| -0.3 * distance_to_line(x, y).abs(),
     },
     Ground {
         name: "valley",
-        height: |x, y| 0.3 * across(x, y).abs(),
+        height: |x, y| 0.3 * distance_to_line(x, y).abs(),
     },
 ];
 
 /// Returns the distance from a line oblique to the grid, cells.
-fn across(x: f64, y: f64) -> f64 {
+fn distance_to_line(x: f64, y: f64) -> f64 {
     0.92 * x - 0.39 * y + 0.2
 }
 

@@ -8,21 +8,21 @@ mod arrival;
 mod ground;
 mod row;
 
-use crate::compare::{Label, opponents, ours};
-use crate::path::{Random, over, way_in};
+use crate::compare::{Label, entries_of, opponents};
+use crate::path::{Random, approach_hips, over};
 use crate::product;
-use crate::variant::{Answer, Haptics, Hip};
+use crate::variant::{ContactResult, Haptics, Hip};
 
 use ground::{GROUNDS, Ground};
 use row::SIDE;
 pub use row::{DEPTH, Row, STEP};
 
 /// Straight paths over a ground.
-const WAYS: usize = 24;
+const PATHS: usize = 24;
 /// Ticks of each.
 const TICKS: usize = 1000;
 /// The variants.
-const COMPARED: [&str; 6] = [
+const COMPARED_VARIANTS: [&str; 6] = [
     "hapterra swept",
     "paper f32",
     "paper f64",
@@ -40,25 +40,25 @@ pub fn measure() -> Vec<Row> {
 
 fn over_ground(ground: &Ground) -> Vec<Row> {
     let grid = ground.grid();
-    let ways = ways(ground);
+    let paths = paths(ground);
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(&grid, &mut buffers);
-    let mut entries = ours(&window);
+    let mut entries = entries_of(&window);
     entries.extend(opponents(&grid));
     // The best of the paper's and of parry's settings, without the copy, which is not a contact.
-    entries.retain(|(label, _)| COMPARED.contains(&label.name));
+    entries.retain(|(label, _)| COMPARED_VARIANTS.contains(&label.name));
     let row = |(label, variant): &mut (Label, Box<dyn Haptics + '_>)| {
-        let rendered: Vec<Vec<Answer>> = ways
+        let rendered: Vec<Vec<ContactResult>> = paths
             .iter()
-            .map(|way| {
-                variant.forget();
-                way.hips.iter().map(|hip| variant.tick(hip)).collect()
+            .map(|path| {
+                variant.reset();
+                path.hips.iter().map(|hip| variant.tick(hip)).collect()
             })
             .collect();
-        let slid: Vec<&[Answer]> = rendered
+        let slid: Vec<&[ContactResult]> = rendered
             .iter()
-            .zip(&ways)
-            .map(|(answers, way)| &answers[way.approach - 1..])
+            .zip(&paths)
+            .map(|(results, path)| &results[path.approach - 1..])
             .collect();
         Row::of(ground.name, *label, &slid)
     };
@@ -66,30 +66,33 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
 }
 
 /// A path to below the surface, and then straight on.
-struct Way {
+struct StraightPath {
     hips: Vec<Hip>,
     approach: usize,
 }
 
 /// Returns straight paths in all directions over the middle of the field.
-fn ways(ground: &Ground) -> Vec<Way> {
+fn paths(ground: &Ground) -> Vec<StraightPath> {
     let grid = ground.grid();
     let mut random = Random(17);
     let middle = [grid.columns as f64 / 2.0, grid.rows as f64 / 2.0];
-    (0..WAYS)
+    (0..PATHS)
         .map(|_| {
             let heading = random.between(0.0, std::f64::consts::TAU);
-            let aside = random.between(-3.0, 3.0);
+            let offset = random.between(-3.0, 3.0);
             let (north, east) = heading.sin_cos();
             let at = |tick: f64| {
-                let along = STEP * (tick - TICKS as f64 / 2.0);
-                let off = [east * along - north * aside, north * along + east * aside];
-                [middle[0] + off[0], middle[1] + off[1]]
+                let distance = STEP * (tick - TICKS as f64 / 2.0);
+                let displacement = [
+                    east * distance - north * offset,
+                    north * distance + east * offset,
+                ];
+                [middle[0] + displacement[0], middle[1] + displacement[1]]
             };
-            let mut hips = way_in(&grid, at(0.0), -DEPTH);
+            let mut hips = approach_hips(&grid, at(0.0), -DEPTH);
             let approach = hips.len();
             hips.extend((1..=TICKS).map(|tick| over(&grid, at(tick as f64), -DEPTH)));
-            Way { hips, approach }
+            StraightPath { hips, approach }
         })
         .collect()
 }
@@ -97,22 +100,22 @@ fn ways(ground: &Ground) -> Vec<Way> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::{Family, SWEPT};
+    use crate::compare::{DEFAULT_VARIANT, Family};
 
-    fn largest(rows: &[Row], ground: &str, name: &str) -> f64 {
+    fn max_change(rows: &[Row], ground: &str, name: &str) -> f64 {
         let is = |row: &&Row| row.ground == ground && row.label.name == name;
-        rows.iter().find(is).expect("it is measured").largest
+        rows.iter().find(is).expect("it is measured").max_change
     }
 
     /// No more than the change of the exact closest point, computed in f64, and the bounds of
     /// docs/explanation/contact.md.
     #[test]
-    fn the_force_is_as_continuous_as_the_surface() {
+    fn force_is_as_continuous_as_the_surface() {
         let rows = measure();
-        let ours = |ground| largest(&rows, ground, SWEPT.name);
+        let default_change = |ground| max_change(&rows, ground, DEFAULT_VARIANT.name);
         for ground in &GROUNDS {
-            let exact = largest(&rows, ground.name, "paper f64");
-            let own = ours(ground.name);
+            let exact = max_change(&rows, ground.name, "paper f64");
+            let own = default_change(ground.name);
             assert!(own < 1.01 * exact + 1e-6, "{}: {own} {exact}", ground.name);
         }
         let bounds = [
@@ -131,28 +134,36 @@ mod tests {
             ("1 cell late over a coarse fallback", 0.0531),
         ];
         for (ground, bound) in bounds {
-            assert!(ours(ground) < bound, "{ground}: {}", ours(ground));
+            assert!(
+                default_change(ground) < bound,
+                "{ground}: {}",
+                default_change(ground)
+            );
         }
     }
 
     #[test]
-    fn triangles_have_creases_where_the_surface_has_none() {
+    fn triangles_have_edges_where_the_surface_is_smooth() {
         let rows = measure();
         for name in ["god-object", "parry within", "proxy graph"] {
-            assert!(largest(&rows, "saddle", name) > 5e-3, "{name}");
+            assert!(max_change(&rows, "saddle", name) > 5e-3, "{name}");
         }
     }
 
     #[test]
-    fn row_reports_largest_jump_and_missed_share() {
-        let still = Answer::touching([0.0, 0.0, 0.1]);
-        let jumped = Answer::touching([0.03, 0.0, 0.14]);
+    fn row_reports_max_change_and_missed_share() {
+        let still = ContactResult::touching([0.0, 0.0, 0.1]);
+        let jumped = ContactResult::touching([0.03, 0.0, 0.14]);
         let label = Label {
             name: "",
             family: Family::Ours,
             extra_bytes: 0.0,
         };
-        let row = Row::of("", label, &[&[still, still, jumped], &[Answer::FREE]]);
-        assert!((row.largest - 0.05).abs() < 1e-6 && row.missed == 0.25);
+        let row = Row::of(
+            "",
+            label,
+            &[&[still, still, jumped], &[ContactResult::FREE]],
+        );
+        assert!((row.max_change - 0.05).abs() < 1e-6 && row.missed == 0.25);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::compare::Label;
 use crate::stats::{part, quantiles};
-use crate::variant::Answer;
+use crate::variant::ContactResult;
 
 /// Motion of the HIP in a tick, cells.
 pub const STEP: f64 = 0.01;
@@ -19,7 +19,7 @@ pub struct Row {
     /// The variant.
     pub label: Label,
     /// Largest change of the displacement in a tick, cells.
-    pub largest: f64,
+    pub max_change: f64,
     /// 99th percentile of this change, cells.
     pub p99: f64,
     /// Share of the ticks without a force.
@@ -28,19 +28,19 @@ pub struct Row {
 
 impl Row {
     /// Returns the row of successive ticks, in parts.
-    pub(super) fn of(ground: &'static str, label: Label, pieces: &[&[Answer]]) -> Self {
-        let changes: Vec<f64> = pieces
+    pub(super) fn of(ground: &'static str, label: Label, parts: &[&[ContactResult]]) -> Self {
+        let changes: Vec<f64> = parts
             .iter()
-            .flat_map(|answers| answers.windows(2).map(|pair| pair[0].change(&pair[1])))
+            .flat_map(|results| results.windows(2).map(|pair| pair[0].change(&pair[1])))
             .collect();
-        let rendered = pieces.iter().flat_map(|answers| answers.iter());
-        let [p99, largest] = quantiles(changes, [0.99, 1.0]);
+        let rendered = parts.iter().flat_map(|results| results.iter());
+        let [p99, max_change] = quantiles(changes, [0.99, 1.0]);
         Self {
             ground,
             label,
-            largest,
+            max_change,
             p99,
-            missed: part(rendered.map(|answer| !answer.touching)),
+            missed: part(rendered.map(|result| !result.touching)),
         }
     }
 }

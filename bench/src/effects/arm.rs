@@ -19,25 +19,25 @@ use crate::variant::Hip;
 
 /// Reason why a terrain cannot be measured: it is too small, or the arm does not reach it.
 #[derive(Clone, Debug)]
-pub struct NotMeasured(pub(crate) String);
+pub struct MeasureError(pub(crate) String);
 
-impl fmt::Display for NotMeasured {
+impl fmt::Display for MeasureError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
     }
 }
 
-impl std::error::Error for NotMeasured {}
+impl std::error::Error for MeasureError {}
 
 /// Largest distance from home, mm.
-const REACH: f64 = 40.0;
+const MAX_DISTANCE_MM: f64 = 40.0;
 /// Cells kept free at the border of the field.
-const MARGIN: f64 = 4.0;
+const MARGIN_CELLS: f64 = 4.0;
 /// Height at the start of a path, mm, and ticks of its descent.
-const ABOVE: f64 = 2.0;
-const DOWN: usize = 50;
+const START_HEIGHT_MM: f64 = 2.0;
+const DESCENT_TICKS: usize = 50;
 /// Ticks after which arming is complete.
-const ARMING: usize = 6000;
+const MAX_ARMING_TICKS: usize = 6000;
 
 /// An arm over the middle of a terrain.
 pub(super) struct Arm<'g> {
@@ -48,17 +48,17 @@ pub(super) struct Arm<'g> {
 
 /// A position of the tip, mm over the terrain, with its encoder counts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct TipPosition {
     pub(super) tip_mm: Vector,
     pub(super) counts: [i32; 3],
 }
 
 /// A path of the tip that starts and ends above the same point: over the ground, and back.
-pub(super) struct Way {
+pub(super) struct TipPath {
     pub(super) name: &'static str,
-    pub(super) down: Vec<Place>,
+    pub(super) descent: Vec<TipPosition>,
     /// The compared positions.
-    pub(super) there: Vec<Place>,
+    pub(super) over_ground: Vec<TipPosition>,
 }
 
 impl<'g> Arm<'g> {
@@ -75,59 +75,66 @@ impl<'g> Arm<'g> {
     }
 
     /// Returns a slide 0.4 mm deep at 50 mm/s.
-    pub(super) fn slide(&self, ticks: usize) -> Result<Way, NotMeasured> {
-        self.way("arm slides 0.05", 0.05, ticks, |_| -0.4)
+    pub(super) fn slide(&self, ticks: usize) -> Result<TipPath, MeasureError> {
+        self.there_and_back("arm slides 0.05", 0.05, ticks, |_| -0.4)
     }
 
     /// Returns taps of half a millimetre every 100 ticks on a slow path.
-    pub(super) fn tap(&self, ticks: usize) -> Result<Way, NotMeasured> {
+    pub(super) fn tap(&self, ticks: usize) -> Result<TipPath, MeasureError> {
         let phase = |tick: usize| tick as f64 * (std::f64::consts::TAU / 100.0);
-        self.way("arm taps", 0.02, ticks, |tick| 0.5 * phase(tick).cos())
+        self.there_and_back("arm taps", 0.02, ticks, |tick| 0.5 * phase(tick).cos())
     }
 
     /// Returns a path of `step` mm a tick at this height, for half of the ticks, and back.
-    fn way(
+    fn there_and_back(
         &self,
         name: &'static str,
         step: f64,
         ticks: usize,
         height: impl Fn(usize) -> f64,
-    ) -> Result<Way, NotMeasured> {
+    ) -> Result<TipPath, MeasureError> {
         let mut random = Random(21);
-        let (mut off, mut heading) = ([0.0; 2], 0.3_f64);
+        let (mut offset, mut heading) = ([0.0; 2], 0.3_f64);
         let sides = [self.grid.columns, self.grid.rows];
-        let reach = sides.map(|side| 0.5 * side as f64 - MARGIN);
-        let reach = reach.into_iter().fold(REACH, f64::min);
-        let mut there = Vec::with_capacity(ticks);
+        let reach = sides.map(|side| 0.5 * side as f64 - MARGIN_CELLS);
+        let reach = reach.into_iter().fold(MAX_DISTANCE_MM, f64::min);
+        let mut over_ground = Vec::with_capacity(ticks);
         for tick in 0..ticks.div_ceil(2) {
-            there.push(self.above(off, height(tick))?);
+            over_ground.push(self.above(offset, height(tick))?);
             heading += random.between(-0.05, 0.05);
-            if f64::hypot(off[0], off[1]) > reach - 1.0 {
-                heading = f64::atan2(-off[1], -off[0]);
+            if f64::hypot(offset[0], offset[1]) > reach - 1.0 {
+                heading = f64::atan2(-offset[1], -offset[0]);
             }
-            off = [off[0] + step * heading.cos(), off[1] + step * heading.sin()];
+            offset = [
+                offset[0] + step * heading.cos(),
+                offset[1] + step * heading.sin(),
+            ];
         }
         let begin = height(0);
-        let down = (0..DOWN).map(|i| {
-            let part = i as f64 / DOWN as f64;
-            self.above([0.0; 2], ABOVE + part * (begin - ABOVE))
+        let descent = (0..DESCENT_TICKS).map(|i| {
+            let part = i as f64 / DESCENT_TICKS as f64;
+            self.above([0.0; 2], START_HEIGHT_MM + part * (begin - START_HEIGHT_MM))
         });
-        let down = down.collect::<Result<_, _>>()?;
-        there.extend_from_within(..);
-        let half = there.len() / 2;
-        there[half..].reverse();
-        Ok(Way { name, down, there })
+        let descent = descent.collect::<Result<_, _>>()?;
+        over_ground.extend_from_within(..);
+        let half = over_ground.len() / 2;
+        over_ground[half..].reverse();
+        Ok(TipPath {
+            name,
+            descent,
+            over_ground,
+        })
     }
 
-    /// Returns the position at a height above the surface, `off` mm from home.
-    fn above(&self, off: [f64; 2], height: f64) -> Result<Place, NotMeasured> {
+    /// Returns the position at a height above the surface, `offset` mm from home.
+    fn above(&self, offset: [f64; 2], height: f64) -> Result<TipPosition, MeasureError> {
         let home = self.placement.home_mm;
-        let [x, y] = [home[0] + off[0], home[1] + off[1]];
+        let [x, y] = [home[0] + offset[0], home[1] + offset[1]];
         let tip_mm = [x, y, self.grid.height(x, y) + height];
         let angles = self.placement.joints_at(&self.model, tip_mm);
-        let angles = angles.map_err(|why| NotMeasured(why.to_string()))?;
+        let angles = angles.map_err(|why| MeasureError(why.to_string()))?;
         let read = |axis: usize| self.encoder(axis).counts(angles[axis]);
-        Ok(Place {
+        Ok(TipPosition {
             tip_mm,
             counts: [read(0), read(1), read(2)],
         })
@@ -142,13 +149,13 @@ impl<'g> Arm<'g> {
         &self,
         params: SurfaceParams,
         tiles: &'t mut [Tile],
-    ) -> Result<Box<Haptics<'t, WINDOW>>, NotMeasured> {
-        let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5);
-        let mechanism = mechanism.map_err(|why| NotMeasured(why.to_string()))?;
+    ) -> Result<Box<Haptics<'t, WINDOW>>, MeasureError> {
+        let kinematics = Kinematics::new(&Calibration::PREMIUM_1_5);
+        let kinematics = kinematics.map_err(|why| MeasureError(why.to_string()))?;
         let home = Hip::at(self.placement.home_mm).grid;
         let scene = replay::scene(self.grid, params, Source::Encoders, home);
         let mut haptics = replay::open(self.grid, scene, tiles);
-        haptics.configure(mechanism);
+        haptics.configure(kinematics);
         for command in [Command::Zero([0; 3]), Command::Arm] {
             let _ = haptics.accept(command);
         }
@@ -159,14 +166,14 @@ impl<'g> Arm<'g> {
     pub(super) fn render(
         &self,
         params: SurfaceParams,
-        way: &Way,
-    ) -> Result<Vec<EffectTick>, NotMeasured> {
+        path: &TipPath,
+    ) -> Result<Vec<EffectTick>, MeasureError> {
         let mut tiles = replay::tiles();
-        let mut driven = Driven::begin(self, params, way, &mut tiles)?;
-        for place in &way.down {
+        let mut driven = Driven::begin(self, params, path, &mut tiles)?;
+        for place in &path.descent {
             driven.tick(place);
         }
-        let rendered = way.there.iter().map(|place| driven.tick(place));
+        let rendered = path.over_ground.iter().map(|place| driven.tick(place));
         let rendered = rendered
             .map(|outcome| EffectTick::of(&outcome.sample))
             .collect();
@@ -183,20 +190,20 @@ impl<'t> Driven<'t> {
     pub(super) fn begin(
         arm: &Arm<'_>,
         params: SurfaceParams,
-        way: &Way,
+        path: &TipPath,
         tiles: &'t mut [Tile],
-    ) -> Result<Self, NotMeasured> {
+    ) -> Result<Self, MeasureError> {
         let haptics = arm.open(params, tiles)?;
         let mut driven = Self { haptics };
-        let counts = way.down.first().map_or([0; 3], |place| place.counts);
-        for tick in 0..ARMING {
-            let sense = GuardInputs {
+        let counts = path.descent.first().map_or([0; 3], |place| place.counts);
+        for tick in 0..MAX_ARMING_TICKS {
+            let inputs = GuardInputs {
                 counts,
                 // The switch is pressed after a moment.
                 dead_man: tick > 10,
                 ..GuardInputs::default()
             };
-            driven.haptics.tick(&sense, true);
+            driven.haptics.tick(&inputs, true);
             if driven.haptics.report().mode == Mode::Armed {
                 break;
             }
@@ -205,20 +212,20 @@ impl<'t> Driven<'t> {
     }
 
     #[inline]
-    pub(super) fn tick(&mut self, place: &Place) -> Outcome {
-        let sense = GuardInputs {
+    pub(super) fn tick(&mut self, place: &TipPosition) -> Outcome {
+        let inputs = GuardInputs {
             counts: place.counts,
             dead_man: true,
             ..GuardInputs::default()
         };
-        self.haptics.tick(&sense, true)
+        self.haptics.tick(&inputs, true)
     }
 
-    pub(super) fn is_armed(&self) -> Result<(), NotMeasured> {
+    pub(super) fn is_armed(&self) -> Result<(), MeasureError> {
         let report = self.haptics.report();
         match report.mode {
             Mode::Armed => Ok(()),
-            _ => Err(NotMeasured(format!("the arm is not armed: {report:?}"))),
+            _ => Err(MeasureError(format!("the arm is not armed: {report:?}"))),
         }
     }
 }

@@ -2,36 +2,36 @@
 
 use hapterra_core::force::SurfaceParams;
 
-use super::arm::{Arm, NotMeasured};
+use super::arm::{Arm, MeasureError};
 use super::effect::Effect;
 use super::effect_tick::EffectTick;
-use super::row::{Error, Place};
+use super::row::{Error, Origin};
 use super::vector::{degrees, length};
 use crate::compare::Effort;
 use crate::grid::Grid;
 
 /// Largest angle between a force that does not pull and the spring, degrees.
-const MAX_TURN: f64 = 90.0;
+const MAX_ANGLE_DEG: f64 = 90.0;
 /// The bound, percent.
-const WHOLE: f64 = 100.0;
+const MAX_SHARE: f64 = 100.0;
 
-pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, MeasureError> {
     let arm = Arm::over(grid);
     let params = Effect::All.params();
     let mut errors = Vec::new();
-    for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let rendered = arm.render(params, &way)?;
-        let place = Place(&grid.name, way.name, Effect::All.name());
+    for path in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
+        let rendered = arm.render(params, &path)?;
+        let origin = Origin(&grid.name, path.name, Effect::All.name());
         let turn = ("force off the spring's direction", "°");
-        errors.extend(place.error(turn, MAX_TURN, off_degrees(&rendered)));
+        errors.extend(origin.error(turn, MAX_ANGLE_DEG, deviation_degrees(&rendered)));
         let share = ("size of the force", "% of its bound");
-        errors.extend(place.error(share, WHOLE, shares(&params, &rendered)));
+        errors.extend(origin.error(share, MAX_SHARE, shares(&params, &rendered)));
     }
     Ok(errors)
 }
 
 /// Returns the angles between force and displacement; below 90° no force pulls.
-fn off_degrees(rendered: &[EffectTick]) -> Vec<f64> {
+fn deviation_degrees(rendered: &[EffectTick]) -> Vec<f64> {
     let rendered = rendered.iter().filter(|record| record.whole);
     let rendered = rendered.filter(|record| length(record.force_n) > 0.0);
     rendered
@@ -70,13 +70,16 @@ mod tests {
             force_n,
             whole: true,
         };
-        let seen = |force_n| {
+        let checked = |force_n| {
             let rendered = [rendered(force_n)];
-            (off_degrees(&rendered)[0], shares(&params, &rendered)[0])
+            (
+                deviation_degrees(&rendered)[0],
+                shares(&params, &rendered)[0],
+            )
         };
-        let (turn, share) = seen([0.1, 0.0, 0.5]);
-        assert!(turn < MAX_TURN && share < WHOLE);
-        assert!(seen([0.1, 0.0, -0.01]).0 > MAX_TURN);
-        assert!(seen([0.0, 0.0, 1.2]).1 > WHOLE);
+        let (turn, share) = checked([0.1, 0.0, 0.5]);
+        assert!(turn < MAX_ANGLE_DEG && share < MAX_SHARE);
+        assert!(checked([0.1, 0.0, -0.01]).0 > MAX_ANGLE_DEG);
+        assert!(checked([0.0, 0.0, 1.2]).1 > MAX_SHARE);
     }
 }

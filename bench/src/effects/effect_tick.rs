@@ -23,7 +23,7 @@ pub(super) struct EffectTick {
 }
 
 /// Limits that change the scene's force.
-const LESS: Limits = Limits::FORCE_CLAMPED
+const FORCE_LIMITS: Limits = Limits::FORCE_CLAMPED
     .union(Limits::SLEW_LIMITED)
     .union(Limits::SPEED_LIMITED)
     .union(Limits::RAMPING)
@@ -38,7 +38,7 @@ impl EffectTick {
             hip: wide(&sample.hip),
             proxy: wide(&sample.proxy),
             force_n: sample.force_n.to_array().map(f64::from),
-            whole: touches && !sample.limits.intersects(LESS),
+            whole: touches && !sample.limits.intersects(FORCE_LIMITS),
         }
     }
 

@@ -4,36 +4,36 @@
 /// Longest window: readings before the newest.
 const WINDOW: usize = 15;
 /// Error of two readings together, counts.
-const NOISE: f64 = 1.0;
+const NOISE_COUNTS: f64 = 1.0;
 /// Tolerance of the bound for a slope, by rounding.
 const TIE: f64 = 1e-5;
 
 /// Returns the rates of change from readings, newest last, in counts a reading: with ties accepted,
 /// and with ties rejected.
 pub(super) fn slopes(readings: &[f64]) -> [f64; 2] {
-    [TIE, -TIE].map(|tie| slope(readings, NOISE + tie))
+    [TIE, -TIE].map(|tie| slope(readings, NOISE_COUNTS + tie))
 }
 
 fn slope(readings: &[f64], noise: f64) -> f64 {
     let newest = readings.len() - 1;
-    let longest = newest.min(WINDOW);
-    let tried = (1..=longest).map_while(|length| {
+    let max_length = newest.min(WINDOW);
+    let tried = (1..=max_length).map_while(|length| {
         let window = &readings[newest - length..];
-        let (low, high) = allowed(window, noise);
+        let (low, high) = slope_range(window, noise);
         (low <= high).then(|| best_fit(window).clamp(low, high))
     });
     tried.last().unwrap_or(0.0)
 }
 
 /// Returns the range of slopes through the newest reading that fit all readings within the noise.
-fn allowed(window: &[f64], noise: f64) -> (f64, f64) {
+fn slope_range(window: &[f64], noise: f64) -> (f64, f64) {
     let newest = window[window.len() - 1];
-    let ago = window.iter().rev().enumerate().skip(1);
-    ago.fold((f64::MIN, f64::MAX), |(low, high), (ago, reading)| {
-        let (rise, ago) = (newest - reading, ago as f64);
+    let age = window.iter().rev().enumerate().skip(1);
+    age.fold((f64::MIN, f64::MAX), |(low, high), (age, reading)| {
+        let (rise, age) = (newest - reading, age as f64);
         (
-            low.max((rise - noise) / ago),
-            high.min((rise + noise) / ago),
+            low.max((rise - noise) / age),
+            high.min((rise + noise) / age),
         )
     })
 }
@@ -42,9 +42,9 @@ fn allowed(window: &[f64], noise: f64) -> (f64, f64) {
 fn best_fit(window: &[f64]) -> f64 {
     let middle = 0.5 * (window.len() - 1) as f64;
     let mean = window.iter().sum::<f64>() / window.len() as f64;
-    let off = |i: usize| i as f64 - middle;
+    let offset = |i: usize| i as f64 - middle;
     let sum = |of: &dyn Fn(usize) -> f64| (0..window.len()).map(of).sum::<f64>();
-    sum(&|i| off(i) * (window[i] - mean)) / sum(&|i| off(i) * off(i))
+    sum(&|i| offset(i) * (window[i] - mean)) / sum(&|i| offset(i) * offset(i))
 }
 
 #[cfg(test)]

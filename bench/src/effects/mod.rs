@@ -28,7 +28,7 @@ mod vector;
 use crate::compare::Effort;
 use crate::grid::Grid;
 
-pub use arm::NotMeasured;
+pub use arm::MeasureError;
 pub use effect::Effect;
 pub use row::{Error, Measured, Spread, Time};
 
@@ -36,13 +36,13 @@ pub use row::{Error, Measured, Spread, Time};
 /// than the arm reaches.
 pub const SIDE: usize = 256;
 /// Fewest cells along the side of a terrain with room for the paths.
-pub const LEAST_SIDE: usize = 48;
+pub const MIN_SIDE: usize = 48;
 
 /// Returns times and errors on the middle of one terrain.
 ///
 /// # Errors
 /// If the terrain is too small, or the arm cannot reach the surface.
-pub fn measure(grid: &Grid, effort: Effort) -> Result<Measured, NotMeasured> {
+pub fn measure(grid: &Grid, effort: Effort) -> Result<Measured, MeasureError> {
     let errors = errors(grid, effort)?;
     let times = time::measure(&grid.middle(SIDE), effort)?;
     Ok(Measured { times, errors })
@@ -52,12 +52,12 @@ pub fn measure(grid: &Grid, effort: Effort) -> Result<Measured, NotMeasured> {
 ///
 /// # Errors
 /// If the terrain is too small, or the arm cannot reach the surface.
-pub fn errors(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
+pub fn errors(grid: &Grid, effort: Effort) -> Result<Vec<Error>, MeasureError> {
     let size = [grid.columns, grid.rows];
-    if size.iter().any(|side| *side < LEAST_SIDE) {
+    if size.iter().any(|side| *side < MIN_SIDE) {
         let [columns, rows] = size;
-        let has = format!("{columns} × {rows} cells; the paths need {LEAST_SIDE} each way");
-        return Err(NotMeasured(has));
+        let has = format!("{columns} × {rows} cells; the paths need {MIN_SIDE} each way");
+        return Err(MeasureError(has));
     }
     let grid = &grid.middle(SIDE);
     let mut errors = friction::measure(grid, effort);
@@ -75,7 +75,7 @@ mod tests {
     use crate::tick_states;
 
     #[test]
-    fn a_terrain_that_is_too_small_or_too_high_is_refused() {
+    fn terrain_too_small_or_too_high_is_refused() {
         let small = Grid::from_fn("small", [200, 47], |_, _| 0.0);
         let why = errors(&small, Effort::QUICK).expect_err("too small");
         assert!(why.to_string().starts_with("200 × 47 cells"), "{why}");
@@ -85,14 +85,14 @@ mod tests {
     }
 
     #[test]
-    fn every_error_is_below_its_documented_bound() {
+    fn errors_are_below_their_documented_bounds() {
         let errors = errors(&tick_states::terrain(), Effort::QUICK).expect("in reach");
-        assert!(errors.iter().all(|error| error.judged > 0));
-        let is_above = |error: &&Error| error.bound.is_some_and(|most| error.spread.worst > most);
+        assert!(errors.iter().all(|error| error.compared > 0));
+        let is_above = |error: &&Error| error.bound.is_some_and(|max| error.spread.worst > max);
         let wrong: Vec<_> = errors.iter().filter(is_above).collect();
         assert!(wrong.is_empty(), "{wrong:#?}");
-        let judged = |effect: &Effect| errors.iter().any(|error| error.effect == effect.name());
+        let compared = |effect: &Effect| errors.iter().any(|error| error.effect == effect.name());
         let all = &Effect::ALL[1..];
-        assert!(all.iter().all(judged));
+        assert!(all.iter().all(compared));
     }
 }

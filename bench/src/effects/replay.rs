@@ -70,12 +70,12 @@ pub(super) fn render(grid: &Grid, params: SurfaceParams, hips: &[Hip]) -> Vec<Ef
     let mut tiles = tiles();
     let scene = scene(grid, params, Source::Points, GridPoint::default());
     let mut haptics = open(grid, scene, &mut tiles);
-    let mut answer = |(seq, hip): (u32, &Hip)| {
+    let mut result = |(seq, hip): (u32, &Hip)| {
         let point = HipCommand { seq, hip: hip.grid };
         let _ = haptics.accept(Command::Hip(point));
         let mut ticks = (0..MAX_TICKS).map(|_| haptics.tick(&Default::default(), true));
-        let answered = ticks.find(|outcome| outcome.answers.is_some());
-        answered.map(|outcome| EffectTick::of(&outcome.sample))
+        let ended = ticks.find(|outcome| outcome.answers.is_some());
+        ended.map(|outcome| EffectTick::of(&outcome.sample))
     };
-    (0..).zip(hips).map_while(&mut answer).collect()
+    (0..).zip(hips).map_while(&mut result).collect()
 }

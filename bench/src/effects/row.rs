@@ -52,7 +52,7 @@ pub struct Error {
     /// Largest permitted error, if docs/explanation/effects.md has one.
     pub bound: Option<f64>,
     /// Number of checked errors.
-    pub judged: usize,
+    pub compared: usize,
 }
 
 /// Distribution of errors; larger is worse.
@@ -78,9 +78,9 @@ impl Spread {
 
 /// Origin of errors: terrain, path and effect.
 #[derive(Clone, Copy)]
-pub(super) struct Place<'a>(pub &'a str, pub &'static str, pub &'static str);
+pub(super) struct Origin<'a>(pub &'a str, pub &'static str, pub &'static str);
 
-impl Place<'_> {
+impl Origin<'_> {
     /// Returns a row of these errors; `None` if nothing could be checked.
     pub(super) fn error(
         &self,
@@ -88,7 +88,7 @@ impl Place<'_> {
         bound: impl Into<Option<f64>>,
         values: Vec<f64>,
     ) -> Option<Error> {
-        let judged = values.len();
+        let compared = values.len();
         let bound = bound.into();
         Spread::of(values).map(|spread| Error {
             terrain: self.0.to_owned(),
@@ -98,7 +98,7 @@ impl Place<'_> {
             unit,
             spread,
             bound,
-            judged,
+            compared,
         })
     }
 }

@@ -4,7 +4,7 @@
 use super::effect::Effect;
 use super::effect_tick::EffectTick;
 use super::replay::render;
-use super::row::{Error, Place};
+use super::row::{Error, Origin};
 use super::vector::{Vector, cross, degrees, length, minus, normal, plus, unit};
 use crate::compare::Effort;
 use crate::grid::Grid;
@@ -16,11 +16,11 @@ const DEPTH: f64 = 0.02;
 /// Tolerance of a direction by rounding, degrees: that of the stress test's oracle.
 const ROUNDING: f64 = 0.06;
 /// Largest turn of a shaded force where an unshaded one turns by 60°, degrees.
-const MAX_TURN: f64 = 6.0;
+const MAX_TICK_TURN_DEG: f64 = 6.0;
 /// Largest motion of the proxy in a tick for which this holds, cells.
-const FARTHEST: f64 = 0.05;
+const MAX_PROXY_STEP: f64 = 0.05;
 /// Largest angle by which a force is turned, degrees.
-const TURNED: f64 = 60.0;
+const MAX_TURN_DEG: f64 = 60.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
@@ -28,51 +28,51 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
         |effect: Effect| render(grid, effect.params(), &slide.hips).split_off(slide.approach);
     let (plain, shaded) = (rendered(Effect::None), rendered(Effect::Shading));
     let [none, own] =
-        [Effect::None, Effect::Shading].map(|of| Place(&grid.name, slide.name, of.name()));
+        [Effect::None, Effect::Shading].map(|of| Origin(&grid.name, slide.name, of.name()));
     let turn = ("turn of the force from one tick to the next", "°");
     let rows = [
         own.error(
             ("direction off the documented normal", "°"),
             ROUNDING,
-            off(grid, &shaded),
+            deviation(grid, &shaded),
         ),
-        own.error(turn, MAX_TURN, turns(&shaded)),
-        none.error(turn, None, turns(&plain)),
+        own.error(turn, MAX_TICK_TURN_DEG, turn_angles(&shaded)),
+        none.error(turn, None, turn_angles(&plain)),
     ];
     rows.into_iter().flatten().collect()
 }
 
 /// Returns the angle of each force to its expected direction, degrees.
-fn off(grid: &Grid, rendered: &[EffectTick]) -> Vec<f64> {
-    let off = rendered
+fn deviation(grid: &Grid, rendered: &[EffectTick]) -> Vec<f64> {
+    let deviation = rendered
         .iter()
         .filter(|record| record.whole)
         .filter_map(|record| {
             let own = normal(record.slopes(grid)?);
             let [x, y, _] = record.proxy;
-            let wanted = turned(own, normal(smoothed(grid, [x, y])?));
-            Some(degrees(record.force_n, wanted))
+            let expected = turn_toward(own, normal(smoothed(grid, [x, y])?));
+            Some(degrees(record.force_n, expected))
         });
-    off.collect()
+    deviation.collect()
 }
 
 /// Returns the angles between successive forces while the proxy moves evenly, degrees: shading does
 /// not move a proxy that leaves a ridge.
-fn turns(rendered: &[EffectTick]) -> Vec<f64> {
-    let goes = |pair: &[EffectTick]| length(minus(pair[1].proxy, pair[0].proxy));
+fn turn_angles(rendered: &[EffectTick]) -> Vec<f64> {
+    let step = |pair: &[EffectTick]| length(minus(pair[1].proxy, pair[0].proxy));
     let pairs = rendered.windows(2);
-    let pairs = pairs.filter(|pair| pair[0].whole && pair[1].whole && goes(pair) <= FARTHEST);
+    let pairs = pairs.filter(|pair| pair[0].whole && pair[1].whole && step(pair) <= MAX_PROXY_STEP);
     let turn = |pair: &[EffectTick]| degrees(pair[0].force_n, pair[1].force_n);
     pairs.map(turn).collect()
 }
 
 /// Returns a direction, turned toward another.
-fn turned(from: Vector, to: Vector) -> Vector {
-    if degrees(from, to) <= TURNED {
+fn turn_toward(from: Vector, to: Vector) -> Vector {
+    if degrees(from, to) <= MAX_TURN_DEG {
         return to;
     }
     let axis = unit(cross(from, to));
-    let (sin, cos) = TURNED.to_radians().sin_cos();
+    let (sin, cos) = MAX_TURN_DEG.to_radians().sin_cos();
     plus(from.map(|x| x * cos), cross(axis, from), sin)
 }
 
@@ -86,8 +86,8 @@ fn smoothed(grid: &Grid, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     }
     let (u, v) = (x - x.floor(), y - y.floor());
     let post = |column: usize, row: usize| f64::from(grid.post(column, row));
-    let east = |row: usize| along([0, 1, 2, 3].map(|i| post(column + i - 1, row)), u);
-    let north = |column: usize| along([0, 1, 2, 3].map(|i| post(column, row + i - 1)), v);
+    let east = |row: usize| edge_slope([0, 1, 2, 3].map(|i| post(column + i - 1, row)), u);
+    let north = |column: usize| edge_slope([0, 1, 2, 3].map(|i| post(column, row + i - 1)), v);
     let mixed = |a: f64, b: f64, share: f64| a * (1.0 - share) + b * share;
     Some([
         mixed(east(row), east(row + 1), v),
@@ -96,16 +96,16 @@ fn smoothed(grid: &Grid, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 /// Returns the smoothed slope at a point s of the edge between the middle two of four samples.
-fn along(posts: [f64; 4], s: f64) -> f64 {
+fn edge_slope(posts: [f64; 4], s: f64) -> f64 {
     let direction = |i: usize| {
         let rise = posts[i + 1] - posts[i];
         let length = rise.hypot(1.0);
         [1.0 / length, rise / length]
     };
     let [before, own, after] = [direction(0), direction(1), direction(2)];
-    let share = |beside: [f64; 2], from: f64| {
-        let bend = (own[0] * beside[0] + own[1] * beside[1]).clamp(-1.0, 1.0);
-        0.5 * (1.0 - from / reach(bend)).max(0.0)
+    let share = |neighbour: [f64; 2], from: f64| {
+        let bend = (own[0] * neighbour[0] + own[1] * neighbour[1]).clamp(-1.0, 1.0);
+        0.5 * (1.0 - from / blend_length(bend)).max(0.0)
     };
     let (start, end) = (share(before, s), share(after, 1.0 - s));
     let [run, rise] =
@@ -114,7 +114,7 @@ fn along(posts: [f64; 4], s: f64) -> f64 {
 }
 
 /// Returns the fraction of an edge along which the direction changes, from the cosine of the bend.
-fn reach(bend: f64) -> f64 {
+fn blend_length(bend: f64) -> f64 {
     let (gentle, sharp) = (45_f64.to_radians().cos(), 75_f64.to_radians().cos());
     let even = (bend - sharp) / (gentle - sharp);
     0.2 + 0.8 * even.clamp(0.0, 1.0)
@@ -130,7 +130,8 @@ mod tests {
     fn shading_error_of_one_degree_or_no_shading_is_detected() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
-        let worst = |rendered: &[EffectTick]| off(&grid, rendered).into_iter().fold(0.0, f64::max);
+        let worst =
+            |rendered: &[EffectTick]| deviation(&grid, rendered).into_iter().fold(0.0, f64::max);
         let shaded = render(&grid, Effect::Shading.params(), &slide.hips);
         assert!(worst(&shaded) < ROUNDING);
         let (sin, cos) = 1_f64.to_radians().sin_cos();
@@ -140,11 +141,13 @@ mod tests {
             rendered.force_n = [x * cos + z * sin, y, z * cos - x * sin];
         }
         // A force along the axis of the turn does not change.
-        let least = off(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
-        assert!(worst(&wrong) > 0.9 && least > ROUNDING, "{least}");
+        let min = deviation(&grid, &wrong)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        assert!(worst(&wrong) > 0.9 && min > ROUNDING, "{min}");
         let plain = render(&grid, Effect::None.params(), &slide.hips);
         assert!(worst(&plain) > 1.0);
-        assert!(turns(&plain).into_iter().fold(0.0, f64::max) > 1.0);
+        assert!(turn_angles(&plain).into_iter().fold(0.0, f64::max) > 1.0);
     }
 
     /// Bends of all sizes, and turns of more than 60°.
@@ -154,31 +157,31 @@ mod tests {
         let rough = Grid::from_fn("rough", [64, 64], |_, _| random.between(0.0, 6.0) as f32);
         let slide = path::slide_at(&rough, "", [STEP, DEPTH], 8000);
         let shaded = render(&rough, Effect::Shading.params(), &slide.hips);
-        let off = off(&rough, &shaded);
-        let worst = off.iter().copied().fold(0.0, f64::max);
-        let most = shaded.iter().filter_map(|record| {
+        let deviation = deviation(&rough, &shaded);
+        let worst = deviation.iter().copied().fold(0.0, f64::max);
+        let max = shaded.iter().filter_map(|record| {
             let own = normal(record.slopes(&rough)?);
             Some(degrees(own, record.force_n))
         });
-        let most = most.fold(0.0, f64::max);
+        let max = max.fold(0.0, f64::max);
         assert!(
-            off.len() > 2000 && most > TURNED - 1.0,
-            "{}: {most}",
-            off.len()
+            deviation.len() > 2000 && max > MAX_TURN_DEG - 1.0,
+            "{}: {max}",
+            deviation.len()
         );
         assert!(worst < ROUNDING, "{worst}");
     }
 
     #[test]
-    fn a_mean_at_a_sample_and_a_cliff_that_stays() {
+    fn slopes_are_blended_at_samples_but_cliffs_stay() {
         // Directions of 0 and 45° are blended at the sample to 22.5°.
-        let slope = along([0.0, 0.0, 1.0, 2.0], 0.0);
+        let slope = edge_slope([0.0, 0.0, 1.0, 2.0], 0.0);
         assert!((slope - 22.5_f64.to_radians().tan()).abs() < 1e-12);
         // A wall of 84°: a fifth of an edge from its foot, the ground is level.
-        assert!(along([0.0, 0.0, 0.0, 10.0], 0.799).abs() < 1e-12);
-        assert!(along([0.0, 0.0, 0.0, 10.0], 0.9) > 0.0);
-        assert!(length(turned([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])) - 1.0 < 1e-12);
-        let most = turned([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
-        assert!((dot(most, [0.0, 0.0, 1.0]) - 0.5).abs() < 1e-12);
+        assert!(edge_slope([0.0, 0.0, 0.0, 10.0], 0.799).abs() < 1e-12);
+        assert!(edge_slope([0.0, 0.0, 0.0, 10.0], 0.9) > 0.0);
+        assert!(length(turn_toward([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])) - 1.0 < 1e-12);
+        let max = turn_toward([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        assert!((dot(max, [0.0, 0.0, 1.0]) - 0.5).abs() < 1e-12);
     }
 }

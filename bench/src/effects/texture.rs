@@ -6,9 +6,9 @@ use hapterra_core::force::{SurfaceParams, Texture};
 
 use super::effect::Effect;
 use super::effect_tick::EffectTick;
-use super::relief::rise;
+use super::relief::height_and_slopes;
 use super::replay::render;
-use super::row::{Error, Place};
+use super::row::{Error, Origin};
 use super::vector::{Vector, dot, length, minus, plus};
 use crate::compare::Effort;
 use crate::grid::Grid;
@@ -19,11 +19,11 @@ use crate::path;
 const STEPS: [(&str, f64); 2] = [("slide 0.05", 0.05), ("slide 0.18", 0.18)];
 const DEPTH: f64 = 0.3;
 /// Bound, percent of the amplitude: the product's sine is off by 0.05, and positions are rounded.
-const MAX_HIGH: f64 = 0.06;
+const MAX_HEIGHT_PERCENT: f64 = 0.06;
 /// Bound, percent of the steepest slope's force, as in the stress test's oracle.
-const MAX_ALONG: f64 = 1.0;
+const MAX_TANGENTIAL_PERCENT: f64 = 1.0;
 /// Share of an earlier, higher speed that remains after a tick of 1 ms.
-const KEEPS: f64 = 0.9;
+const SPEED_DECAY: f64 = 0.9;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let mut errors = Vec::new();
@@ -31,12 +31,17 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
         let slide = path::slide_at(grid, name, [step, DEPTH], effort.ticks);
         for effect in [Effect::Grain, Effect::Grating] {
             let params = effect.params();
-            let off = off_percent(&params, &render(grid, params, &slide.hips));
-            let place = Place(&grid.name, name, effect.name());
-            let [high, along] = [0, 1].map(|i| off.iter().map(|off| off[i]).collect());
-            errors.extend(place.error(("rendered height off", "% of A"), MAX_HIGH, high));
+            let deviation = deviation_percent(&params, &render(grid, params, &slide.hips));
+            let origin = Origin(&grid.name, name, effect.name());
+            let [high, along] =
+                [0, 1].map(|i| deviation.iter().map(|deviation| deviation[i]).collect());
+            errors.extend(origin.error(
+                ("rendered height off", "% of A"),
+                MAX_HEIGHT_PERCENT,
+                high,
+            ));
             let what = ("force along the surface off", "% of the steepest");
-            errors.extend(place.error(what, MAX_ALONG, along));
+            errors.extend(origin.error(what, MAX_TANGENTIAL_PERCENT, along));
         }
     }
     errors
@@ -44,7 +49,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// Returns the difference of the force from the formula in each tick: along the untextured force,
 /// percent of the amplitude, and across it, percent of the steepest slope's force.
-fn off_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]> {
+fn deviation_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]> {
     let texture = &params.texture;
     let (amplitude, stiffness) = (
         f64::from(texture.amplitude_mm),
@@ -56,35 +61,39 @@ fn off_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]>
         .iter()
         .map(|record| (record, fade.share(record.proxy)));
     let whole = shares.filter(|(rendered, _)| rendered.whole);
-    let off = whole.map(|(rendered, share)| {
+    let deviation = whole.map(|(rendered, share)| {
         let spring = rendered.spring();
         let depth = length(spring);
         let added = minus(rendered.force_n.map(|x| x / stiffness), spring);
-        let off = minus(added, wanted(texture, rendered.proxy, spring, share));
+        let deviation = minus(
+            added,
+            expected_addition(texture, rendered.proxy, spring, share),
+        );
         let normal = spring.map(|x| x / depth);
-        let high = dot(off, normal);
+        let high = dot(deviation, normal);
         let steepest = TAU * amplitude / f64::from(texture.wavelength_mm);
-        let along = length(plus(off, normal, -high)) / (steepest * depth.min(deepest(texture)));
+        let along =
+            length(plus(deviation, normal, -high)) / (steepest * depth.min(max_depth_mm(texture)));
         [high.abs() / amplitude, along].map(|part| 100.0 * part)
     });
-    off.collect()
+    deviation.collect()
 }
 
 /// Returns the depth from which the force along the surface is constant, mm.
-fn deepest(texture: &Texture) -> f64 {
+fn max_depth_mm(texture: &Texture) -> f64 {
     f64::from(texture.wavelength_mm).powi(2) / (48.0 * f64::from(texture.amplitude_mm))
 }
 
 /// Returns the addition of a texture to the spring's displacement at a proxy, mm.
-fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vector {
+fn expected_addition(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vector {
     let amplitude = f64::from(texture.amplitude_mm);
-    let (height, [east, north]) = rise(texture, [proxy[0], proxy[1]]);
+    let (height, [east, north]) = height_and_slopes(texture, [proxy[0], proxy[1]]);
     let depth = length(spring);
     let normal = spring.map(|x| x / depth);
     let slope = [east * amplitude, north * amplitude, 0.0];
     let across = plus(slope, normal, -dot(slope, normal));
     let high = spring.map(|x| x * share * amplitude * height / depth.max(amplitude));
-    plus(high, across, -share * depth.min(deepest(texture)))
+    plus(high, across, -share * depth.min(max_depth_mm(texture)))
 }
 
 /// Rendered share of a texture, from the proxy's path over the map.
@@ -92,7 +101,7 @@ struct Fade {
     wavelength: f64,
     /// Wavelengths a tick, decaying.
     speed: f64,
-    before: Option<Vector>,
+    previous: Option<Vector>,
 }
 
 impl Fade {
@@ -100,21 +109,21 @@ impl Fade {
         Self {
             wavelength,
             speed: 0.0,
-            before: None,
+            previous: None,
         }
     }
 
     fn share(&mut self, proxy: Vector) -> f64 {
         // The first position counts as a jump.
-        let now = self.before.map_or(1.0, |before| {
-            let way = minus(proxy, before);
-            (way[0].hypot(way[1]) / self.wavelength).min(1.0)
+        let now = self.previous.map_or(1.0, |previous| {
+            let displacement = minus(proxy, previous);
+            (displacement[0].hypot(displacement[1]) / self.wavelength).min(1.0)
         });
-        self.before = Some(proxy);
+        self.previous = Some(proxy);
         self.speed = if now > self.speed {
             now
         } else {
-            now + (self.speed - now) * KEEPS
+            now + (self.speed - now) * SPEED_DECAY
         };
         let s = ((0.25 - self.speed) / 0.125).clamp(0.0, 1.0);
         s * s * (3.0 - 2.0 * s)
@@ -127,8 +136,13 @@ mod tests {
     use crate::tick_states::terrain;
 
     fn worst(params: &SurfaceParams, rendered: &[EffectTick]) -> [f64; 2] {
-        let off = off_percent(params, rendered);
-        [0, 1].map(|i| off.iter().map(|off| off[i]).fold(0.0, f64::max))
+        let deviation = deviation_percent(params, rendered);
+        [0, 1].map(|i| {
+            deviation
+                .iter()
+                .map(|deviation| deviation[i])
+                .fold(0.0, f64::max)
+        })
     }
 
     #[test]
@@ -139,7 +153,10 @@ mod tests {
             let params = effect.params();
             let rendered = render(&grid, params, &slide.hips);
             let [high, along] = worst(&params, &rendered);
-            assert!(high < MAX_HIGH && along < MAX_ALONG, "{high} {along}");
+            assert!(
+                high < MAX_HEIGHT_PERCENT && along < MAX_TANGENTIAL_PERCENT,
+                "{high} {along}"
+            );
             let wrong: [fn(&mut Texture); 3] = [
                 |texture| texture.seed += 1,
                 |texture| texture.amplitude_mm *= 1.01,
@@ -149,7 +166,7 @@ mod tests {
                 let mut other = params;
                 change(&mut other.texture);
                 let [high, _] = worst(&other, &rendered);
-                assert!(high > 10.0 * MAX_HIGH, "{other:?}: {high}");
+                assert!(high > 10.0 * MAX_HEIGHT_PERCENT, "{other:?}: {high}");
             }
             // A hundredth of a wave to the east.
             let mut shifted = rendered.clone();
@@ -157,7 +174,7 @@ mod tests {
                 rendered.hip[0] += 0.01;
                 rendered.proxy[0] += 0.01;
             }
-            assert!(worst(&params, &shifted)[0] > 10.0 * MAX_HIGH);
+            assert!(worst(&params, &shifted)[0] > 10.0 * MAX_HEIGHT_PERCENT);
             // Valleys in place of ridges.
             let mut inverse = rendered.clone();
             for rendered in &mut inverse {
@@ -173,9 +190,9 @@ mod tests {
         let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
         let params = Effect::Grating.params();
         let mut rendered = render(&grid, params, &slide.hips);
-        assert!(worst(&params, &rendered)[0] < MAX_HIGH);
+        assert!(worst(&params, &rendered)[0] < MAX_HEIGHT_PERCENT);
         for rendered in &mut rendered {
-            let added = wanted(&params.texture, rendered.proxy, rendered.spring(), 1.0);
+            let added = expected_addition(&params.texture, rendered.proxy, rendered.spring(), 1.0);
             rendered.force_n = plus(rendered.spring(), added, 1.0).map(|x| x * 0.5);
         }
         assert!(worst(&params, &rendered)[0] > 10.0);

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use super::arm::{Arm, Driven, NotMeasured, Way};
+use super::arm::{Arm, Driven, MeasureError, TipPath};
 use super::effect::Effect;
 use super::replay;
 use super::row::Time;
@@ -11,20 +11,20 @@ use crate::compare::Effort;
 use crate::grid::Grid;
 use crate::stats::{interleave, timing};
 
-pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Time>, NotMeasured> {
+pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Time>, MeasureError> {
     let arm = Arm::over(grid);
-    let mut times = along(&arm, &arm.slide(effort.ticks)?, effort)?;
-    times.extend(along(&arm, &arm.tap(effort.ticks)?, effort)?);
+    let mut times = measure_path(&arm, &arm.slide(effort.ticks)?, effort)?;
+    times.extend(measure_path(&arm, &arm.tap(effort.ticks)?, effort)?);
     Ok(times)
 }
 
-fn along(arm: &Arm<'_>, way: &Way, effort: Effort) -> Result<Vec<Time>, NotMeasured> {
+fn measure_path(arm: &Arm<'_>, path: &TipPath, effort: Effort) -> Result<Vec<Time>, MeasureError> {
     let mut tiles = Effect::ALL.map(|_| replay::tiles());
-    let begun = Effect::ALL.iter().zip(&mut tiles);
-    let begun = begun.map(|(effect, tiles)| Driven::begin(arm, effect.params(), way, tiles));
-    let mut driven = begun.collect::<Result<Vec<_>, _>>()?;
+    let started = Effect::ALL.iter().zip(&mut tiles);
+    let started = started.map(|(effect, tiles)| Driven::begin(arm, effect.params(), path, tiles));
+    let mut driven = started.collect::<Result<Vec<_>, _>>()?;
     let times = interleave(driven.len(), effort.rounds, |index| {
-        round(&mut driven[index], way)
+        round(&mut driven[index], path)
     });
     driven.iter().try_for_each(Driven::is_armed)?;
     // The first has no effect.
@@ -32,7 +32,7 @@ fn along(arm: &Arm<'_>, way: &Way, effort: Effort) -> Result<Vec<Time>, NotMeasu
         let (ns, ratio) = timing(own, &times[0]);
         Time {
             terrain: arm.grid.name.clone(),
-            path: way.name,
+            path: path.name,
             effect: effect.name(),
             ns,
             ratio,
@@ -42,17 +42,17 @@ fn along(arm: &Arm<'_>, way: &Way, effort: Effort) -> Result<Vec<Time>, NotMeasu
 }
 
 /// Returns nanoseconds a tick over the ground, without the approach and the departure.
-fn round(driven: &mut Driven<'_>, way: &Way) -> f64 {
-    for place in &way.down {
+fn round(driven: &mut Driven<'_>, path: &TipPath) -> f64 {
+    for place in &path.descent {
         driven.tick(place);
     }
-    let watch = Stopwatch::start();
-    for place in &way.there {
+    let stopwatch = Stopwatch::start();
+    for place in &path.over_ground {
         black_box(driven.tick(black_box(place)));
     }
-    let elapsed = watch.elapsed();
-    for place in way.down.iter().rev() {
+    let elapsed = stopwatch.elapsed();
+    for place in path.descent.iter().rev() {
         driven.tick(place);
     }
-    elapsed.as_secs_f64() * 1e9 / way.there.len().max(1) as f64
+    elapsed.as_secs_f64() * 1e9 / path.over_ground.len().max(1) as f64
 }

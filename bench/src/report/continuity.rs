@@ -14,7 +14,10 @@ pub fn continuity(rows: &[Row]) -> String {
         if !grounds.contains(&row.ground) {
             grounds.push(row.ground);
         }
-        if !variants.iter().any(|known| known.name == row.label.name) {
+        if !variants
+            .iter()
+            .any(|variant| variant.name == row.label.name)
+        {
             variants.push(&row.label);
         }
     }
@@ -28,7 +31,7 @@ pub fn continuity(rows: &[Row]) -> String {
     for ground in grounds {
         let cell = |name: &&str| {
             let is = |row: &&Row| row.ground == ground && row.label.name == *name;
-            rows.iter().find(is).map_or(String::new(), shown)
+            rows.iter().find(is).map_or(String::new(), formatted)
         };
         let cells: Vec<String> = names.iter().map(cell).collect();
         let _ = writeln!(text, "| {ground} | {} |", cells.join(" | "));
@@ -36,12 +39,12 @@ pub fn continuity(rows: &[Row]) -> String {
     text
 }
 
-fn shown(row: &Row) -> String {
+fn formatted(row: &Row) -> String {
     let missed = match row.missed {
         0.0 => String::new(),
         part => format!(", no contact in {:.0} %", 100.0 * part),
     };
-    format!("{}, {}{missed}", number(row.largest), number(row.p99))
+    format!("{}, {}{missed}", number(row.max_change), number(row.p99))
 }
 
 fn number(cells: f64) -> String {

@@ -75,7 +75,7 @@ fn error(row: &Error) -> String {
         short(spread.median),
         short(spread.p99),
         short(spread.worst),
-        row.judged
+        row.compared
     )
 }
 
@@ -126,7 +126,7 @@ pub fn write_effects(path: &Path, measured: &Measured) -> Result<(), csv::Error>
             .into();
         record.extend([row.spread.median, row.spread.p99, row.spread.worst].map(digits));
         record.push(row.bound.map_or(String::new(), digits));
-        record.push(row.judged.to_string());
+        record.push(row.compared.to_string());
         record.resize(EFFECTS_HEADER.len(), String::new());
         writer.write_record(&record)?;
     }
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn four_digits_count() {
-        for (value, shown) in [
+        for (value, formatted) in [
             (0.0, "0"),
             (1.0, "1"),
             (3.1, "3.1"),
@@ -149,7 +149,7 @@ mod tests {
             (-0.012_345_6, "-0.01235"),
             (5.513e-5, "0.00005513"),
         ] {
-            assert_eq!(digits(value), shown);
+            assert_eq!(digits(value), formatted);
         }
     }
 }

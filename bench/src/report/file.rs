@@ -64,7 +64,7 @@ pub fn write_csv(path: &Path, rows: &[Row], changes: &[continuity::Row]) -> Resu
         record[1] = "force".to_owned();
         record[2] = row.label.name.to_owned();
         record[3] = format!("{:?}", row.label.family).to_lowercase();
-        record[13] = row.largest.to_string();
+        record[13] = row.max_change.to_string();
         record[14] = row.missed.to_string();
         record[16] = row.label.extra_bytes.to_string();
         writer.write_record(&record)?;

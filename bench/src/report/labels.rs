@@ -24,12 +24,12 @@ impl Named {
     /// farther and farther down and up.
     fn places(&self, gap: i32) -> impl Iterator<Item = Rect> + use<> {
         let ((x, y), (width, height)) = (self.at, self.size);
-        let aside = self.radius + gap;
+        let offset = self.radius + gap;
         let rows = (0..60).flat_map(move |i| [i * gap, -i * gap]);
         rows.flat_map(move |down| {
             let top = y + down - height / 2;
             let at = move |left: i32| [left, top, left + width, top + height];
-            [at(x + aside), at(x - aside - width)]
+            [at(x + offset), at(x - offset - width)]
         })
     }
 }
@@ -38,7 +38,7 @@ impl Named {
 /// as few of the `dots` as nearby places allow.
 pub(super) fn place(named: &[Named], dots: &[Rect], frame: Rect, gap: i32) -> Vec<(i32, i32)> {
     let marks: Vec<Rect> = named.iter().map(Named::mark).collect();
-    let mut taken: Vec<Rect> = Vec::new();
+    let mut placed: Vec<Rect> = Vec::new();
     for own in named {
         let free: Vec<Rect> = own
             .places(gap)
@@ -46,7 +46,7 @@ pub(super) fn place(named: &[Named], dots: &[Rect], frame: Rect, gap: i32) -> Ve
             .filter(|place| {
                 !marks
                     .iter()
-                    .chain(&taken)
+                    .chain(&placed)
                     .any(|other| overlap(place, other))
             })
             .take(8)
@@ -54,9 +54,9 @@ pub(super) fn place(named: &[Named], dots: &[Rect], frame: Rect, gap: i32) -> Ve
         let hidden = |place: &&Rect| dots.iter().filter(|dot| overlap(place, dot)).count();
         let best = free.iter().min_by_key(hidden).copied();
         // Without any room in the frame, the name overlaps.
-        taken.push(best.or_else(|| own.places(gap).next()).unwrap_or_default());
+        placed.push(best.or_else(|| own.places(gap).next()).unwrap_or_default());
     }
-    taken.iter().map(|[left, top, ..]| (*left, *top)).collect()
+    placed.iter().map(|[left, top, ..]| (*left, *top)).collect()
 }
 
 fn is_inside(a: &Rect, frame: &Rect) -> bool {
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lone_name_stands_right_of_its_mark() {
+    fn single_name_is_placed_right_of_its_mark() {
         let own = Named {
             at: (100, 100),
             radius: 14,

@@ -122,8 +122,8 @@ fn line(columns: [String; 18]) -> String {
 pub fn streaming(row: &Row) -> String {
     let sum = |a: Option<u64>, b: Option<u64>| Some(a? + b.unwrap_or(0));
     let kb = sum(row.open_bytes, row.way_bytes).map(|bytes| bytes as f64 / 1e3);
-    let counts = |ways: [[Option<u32>; 3]; 2]| {
-        let counts = ways.map(|way| way.map(|count| shown(count, 0)).join(" "));
+    let counts = |paths: [[Option<u32>; 3]; 2]| {
+        let counts = paths.map(|path| path.map(|count| formatted(count, 0)).join(" "));
         counts.join(" / ")
     };
     line([
@@ -131,25 +131,25 @@ pub fn streaming(row: &Row) -> String {
         row.reading.name().to_owned(),
         row.latency_ms.to_string(),
         row.link_kb_per_s.to_string(),
-        shown(Some(row.open_ms), 1),
-        shown(Some(row.first_force_ms), 1),
-        shown(row.peak_mb, 0),
-        shown(sum(row.open_requests, row.way_requests), 0),
-        shown(kb, 0),
-        shown(row.tile_bytes_mean, 0),
-        shown(row.tile_bytes_p99, 0),
-        shown(row.tiles_per_s, 0),
-        shown(row.host_ms_mean, 2),
-        shown(row.held_straight, 0),
-        shown(row.held_turning, 0),
+        formatted(Some(row.open_ms), 1),
+        formatted(Some(row.first_force_ms), 1),
+        formatted(row.peak_mb, 0),
+        formatted(sum(row.open_requests, row.way_requests), 0),
+        formatted(kb, 0),
+        formatted(row.tile_bytes_mean, 0),
+        formatted(row.tile_bytes_p99, 0),
+        formatted(row.tiles_per_s, 0),
+        formatted(row.host_ms_mean, 2),
+        formatted(row.held_straight, 0),
+        formatted(row.held_turning, 0),
         counts(row.missing()),
         counts(row.coarse()),
-        shown(row.no_data_over_fallback, 0),
+        formatted(row.no_data_over_fallback, 0),
     ])
 }
 
 /// Formats a figure with this many decimals, or a dash if there is none.
-fn shown<T: Figure>(value: Option<T>, decimals: usize) -> String {
+fn formatted<T: Figure>(value: Option<T>, decimals: usize) -> String {
     value.map_or("–".to_owned(), |value| {
         format!("{:.decimals$}", value.number())
     })
@@ -185,7 +185,7 @@ mod tests {
     use crate::streaming::Reading;
 
     #[test]
-    fn the_file_has_the_columns_that_are_promised() {
+    fn file_has_the_documented_columns() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("streaming.csv");
         let row = Row {

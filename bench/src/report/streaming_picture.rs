@@ -127,8 +127,8 @@ fn draw(area: &Area<'_>, panel: &Panel, rows: &[Row]) -> Result<(), PictureError
         };
         let points = rows.iter().filter(is).filter_map(|row| {
             let value = (panel.figure)(row)?;
-            let shown = value.clamp(panel.range.start, panel.range.end);
-            Some((row.samples as f64, shown))
+            let formatted = value.clamp(panel.range.start, panel.range.end);
+            Some((row.samples as f64, formatted))
         });
         let mut points: Vec<(f64, f64)> = points.collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::compare::{PLAIN, Row};
 
 /// The product's default.
-const OURS: &str = "hapterra swept";
+const DEFAULT_LABEL: &str = "hapterra swept";
 /// The paper's Table 1: average haptic updates a second, and for the closest point or the collision
 /// alone, on a 2.4 GHz Pentium 4.
 const TABLE_1: [(&str, f64); 2] = [("average update", 968e3), ("closest point alone", 200e3)];
@@ -29,7 +29,7 @@ pub fn summary(rows: &[Row]) -> String {
         let faster: Vec<String> = terrains(rows)
             .filter_map(|terrain| {
                 let ns = |name| median(rows, terrain, path, name);
-                Some(format!("{:.2}", ns(opponent)? / ns(OURS)?))
+                Some(format!("{:.2}", ns(opponent)? / ns(DEFAULT_LABEL)?))
             })
             .collect();
         if !faster.is_empty() {
@@ -42,8 +42,9 @@ pub fn summary(rows: &[Row]) -> String {
         }
     }
     let worst = |is_sweep: bool| {
-        let ours = rows.iter().filter(|row| row.label.name == OURS);
-        ours.filter(|row| row.path.starts_with("sweep") == is_sweep)
+        let default_rows = rows.iter().filter(|row| row.label.name == DEFAULT_LABEL);
+        default_rows
+            .filter(|row| row.path.starts_with("sweep") == is_sweep)
             .filter_map(|row| row.error)
             .fold(0.0, |worst: f64, error| worst.max(error.max))
     };
@@ -60,7 +61,7 @@ pub fn summary(rows: &[Row]) -> String {
     );
     for (what, rate) in TABLE_1 {
         let slide: Vec<String> = terrains(rows)
-            .filter_map(|terrain| median(rows, terrain, "slide 0.01", OURS))
+            .filter_map(|terrain| median(rows, terrain, "slide 0.01", DEFAULT_LABEL))
             .map(|ns| format!("{:.0}", 1e9 / ns / rate))
             .collect();
         if !slide.is_empty() {
@@ -77,13 +78,13 @@ pub fn summary(rows: &[Row]) -> String {
 
 /// Returns the terrains in the order of measurement.
 fn terrains(rows: &[Row]) -> impl Iterator<Item = &str> {
-    let mut seen: Vec<&str> = Vec::new();
+    let mut names: Vec<&str> = Vec::new();
     for row in rows {
-        if !seen.contains(&row.terrain.as_str()) {
-            seen.push(&row.terrain);
+        if !names.contains(&row.terrain.as_str()) {
+            names.push(&row.terrain);
         }
     }
-    seen.into_iter()
+    names.into_iter()
 }
 
 fn median(rows: &[Row], terrain: &str, path: &str, name: &str) -> Option<f64> {

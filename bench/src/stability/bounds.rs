@@ -25,8 +25,8 @@ impl AtTip {
         let joints = HOME.joints_at(model, home_mm).unwrap_or_default();
         let up = jacobian(model, joints)[2];
         // The joint that moves the tip vertically; the others hardly do in this pose.
-        let most = (0..3).max_by(|a, b| up[*a].abs().total_cmp(&up[*b].abs()));
-        let joint = most.unwrap_or_default();
+        let strongest = (0..3).max_by(|a, b| up[*a].abs().total_cmp(&up[*b].abs()));
+        let joint = strongest.unwrap_or_default();
         let lever_m = up[joint].abs();
         let drive = &model.drive[joint];
         let count_rad = std::f64::consts::TAU / (drive.ratio * drive.counts_per_rev);

@@ -28,16 +28,16 @@ pub(super) const HOME: ArmFrame = ArmFrame {
 const MAX_N: f32 = SurfaceParams::PREMIUM.max_force_n;
 
 /// Record of one tick.
-pub(super) struct Step {
+pub(super) struct LoopTick {
     /// Report of the tick.
     pub(super) sample: TickRecord,
     /// Height of the tip by its encoders at the start of the tick, mm.
-    pub(super) read_up_mm: f64,
+    pub(super) encoder_height_mm: f64,
     /// True position of the tip after the tick, east, north and up, mm.
     pub(super) tip_mm: [f64; 3],
     /// Energy from the surface to the arm in the tick, mJ: the work of its part of the motors'
     /// torques.
-    pub(super) given_mj: f64,
+    pub(super) gained_mj: f64,
 }
 
 /// Settings of a loop and its surface.
@@ -52,12 +52,12 @@ pub(super) struct LoopSettings {
     pub(super) clutch_s: Option<[f64; 2]>,
 }
 
-/// Runs an arm in an arming hand until its script ends, and calls `look` for every tick with the
-/// time since the script's start, s. Ends early if `look` requests it.
+/// Runs an arm in an arming hand until its script ends, and calls `observe` for every tick with the
+/// time since the script's start, s. Ends early if `observe` requests it.
 pub(super) fn run(
     settings: &LoopSettings,
     mut arm: HeldPhantom,
-    look: &mut dyn FnMut(f64, &Step) -> bool,
+    observe: &mut dyn FnMut(f64, &LoopTick) -> bool,
 ) {
     let mut tiles = vec![Tile::VACANT; WINDOW * WINDOW + 1];
     let mut spare: Vec<_> = tiles.iter_mut().collect();
@@ -73,9 +73,9 @@ pub(super) fn run(
         fault: None,
     };
     let mut haptics = Haptics::<WINDOW>::on_board(slots, &board);
-    let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).ok();
-    if let Some(mechanism) = mechanism {
-        haptics.configure(mechanism);
+    let kinematics = Kinematics::new(&Calibration::PREMIUM_1_5).ok();
+    if let Some(kinematics) = kinematics {
+        haptics.configure(kinematics);
     }
     let scene = scene(settings);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
@@ -86,22 +86,22 @@ pub(super) fn run(
 
     let begin_s = arm.begin_s();
     let tick_s = 1.0 / f64::from(settings.rate.hz());
-    let mut wire = Wire::new(settings.delay_s, tick_s, arm.plant().model());
+    let mut command_delay = CommandDelay::new(settings.delay_s, tick_s, arm.plant().model());
     let ticks = ((begin_s + arm.script_s()) / tick_s) as u32;
     let at = |s: f64| ((begin_s + s) / tick_s) as u32;
     for tick in 0..ticks {
-        if let Some([held_s, let_go_s]) = settings.clutch_s {
+        if let Some([held_s, release_s]) = settings.clutch_s {
             let hold = [
                 (held_s, ClutchHold::WithHand),
-                (let_go_s, ClutchHold::LetGo),
+                (release_s, ClutchHold::LetGo),
             ];
             for (_, hold) in hold.into_iter().filter(|(s, _)| at(*s) == tick) {
                 let _ = haptics.accept(Command::Clutch(hold));
             }
         }
-        let sense = arm.sense();
-        let read_up_mm = read_up_mm(&arm, sense.counts);
-        let outcome = haptics.tick(&sense, true);
+        let inputs = arm.sense();
+        let encoder_height_mm = encoder_height_mm(&arm, inputs.counts);
+        let outcome = haptics.tick(&inputs, true);
         let sample = outcome.sample;
         let demand = RequestHint {
             missing_tile: sample.missing_tile,
@@ -115,26 +115,26 @@ pub(super) fn run(
             requester.received(key);
             spare.extend(haptics.accept(Command::Tile(tile)).ok().flatten());
         }
-        let weight_a = mechanism.map_or(Vec3::ZERO, |mechanism| {
-            let pose = mechanism.pose(sense.counts, [0; 3]);
-            mechanism.currents_a(mechanism.gravity_nm(&pose))
+        let weight_a = kinematics.map_or(Vec3::ZERO, |kinematics| {
+            let pose = kinematics.pose(inputs.counts, [0; 3]);
+            kinematics.currents_a(kinematics.gravity_nm(&pose))
         });
         let currents_a = outcome.drive.currents_a;
-        let sent = Sent {
+        let commands = MotorCommands {
             currents_a: currents_a.to_array().map(f64::from),
-            of_surface_a: match sample.force_n == Vec3::ZERO {
+            surface_currents_a: match sample.force_n == Vec3::ZERO {
                 true => [0.0; 3],
                 false => (currents_a - weight_a).to_array().map(f64::from),
             },
         };
-        let given_mj = wire.carry(sent, &mut arm);
-        let step = Step {
+        let gained_mj = command_delay.advance(commands, &mut arm);
+        let step = LoopTick {
             sample,
-            read_up_mm,
+            encoder_height_mm,
             tip_mm: tip_mm(&arm),
-            given_mj,
+            gained_mj,
         };
-        if !look(f64::from(tick) * tick_s - begin_s, &step) {
+        if !observe(f64::from(tick) * tick_s - begin_s, &step) {
             return;
         }
     }
@@ -142,28 +142,28 @@ pub(super) fn run(
 
 /// Currents from a tick to the motors, A.
 #[derive(Clone, Copy, Default)]
-struct Sent {
+struct MotorCommands {
     currents_a: [f64; 3],
     /// The surface's part of them; the rest holds the arm's weight.
-    of_surface_a: [f64; 3],
+    surface_currents_a: [f64; 3],
 }
 
 /// The delay of a board from its encoders to its amplifiers.
-struct Wire {
+struct CommandDelay {
     /// Commands in transit: the motors' present ones, then later ones.
-    sent: VecDeque<Sent>,
+    commands: VecDeque<MotorCommands>,
     /// Part of a tick during which the motors still have the previous commands, s.
-    late_s: f64,
+    partial_delay_s: f64,
     tick_s: f64,
     work: SurfaceWork,
 }
 
-impl Wire {
+impl CommandDelay {
     fn new(delay_s: f64, tick_s: f64, model: &PhantomModel) -> Self {
         let whole = (delay_s / tick_s).floor();
         Self {
-            sent: VecDeque::from(vec![Sent::default(); whole as usize + 1]),
-            late_s: delay_s - whole * tick_s,
+            commands: VecDeque::from(vec![MotorCommands::default(); whole as usize + 1]),
+            partial_delay_s: delay_s - whole * tick_s,
             tick_s,
             work: SurfaceWork::new(model),
         }
@@ -171,18 +171,24 @@ impl Wire {
 
     /// Sends a tick's commands, and moves the arm for the duration of the tick. Returns the energy
     /// from the surface to the arm, mJ.
-    fn carry(&mut self, sent: Sent, arm: &mut HeldPhantom) -> f64 {
-        self.sent.push_back(sent);
-        let before = self.sent.pop_front().unwrap_or(sent);
-        let now = self.sent.front().copied().unwrap_or(sent);
-        let parts = [(before, self.late_s), (now, self.tick_s - self.late_s)];
-        let given_mj = parts.map(|(sent, for_s)| match for_s > 0.0 {
-            true => self
-                .work
-                .step(sent.currents_a, sent.of_surface_a, for_s, arm),
+    fn advance(&mut self, commands: MotorCommands, arm: &mut HeldPhantom) -> f64 {
+        self.commands.push_back(commands);
+        let before = self.commands.pop_front().unwrap_or(commands);
+        let now = self.commands.front().copied().unwrap_or(commands);
+        let parts = [
+            (before, self.partial_delay_s),
+            (now, self.tick_s - self.partial_delay_s),
+        ];
+        let gained_mj = parts.map(|(commands, duration_s)| match duration_s > 0.0 {
+            true => self.work.step(
+                commands.currents_a,
+                commands.surface_currents_a,
+                duration_s,
+                arm,
+            ),
             false => 0.0,
         });
-        given_mj.iter().sum()
+        gained_mj.iter().sum()
     }
 }
 
@@ -215,7 +221,7 @@ fn fill(tile: &mut Tile, key: TileKey, size: FieldSize) {
 }
 
 /// Returns the height of the tip by its encoders, mm.
-fn read_up_mm(arm: &HeldPhantom, counts: [i32; 3]) -> f64 {
+fn encoder_height_mm(arm: &HeldPhantom, counts: [i32; 3]) -> f64 {
     let model = arm.plant().model();
     let q = std::array::from_fn(|axis| Encoder::new(&model.drive[axis]).angle_rad(counts[axis]));
     HOME.to_terrain_mm(model, kinematics::tip(model, q))[2]

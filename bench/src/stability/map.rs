@@ -8,10 +8,10 @@ use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
 
 use super::bounds::AtTip;
-use super::entry::Entered;
+use super::entry::EntryOutcome;
 use super::grasp::Grasp;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
-use super::trial::{Press, Setting, Trial, Verdict};
+use super::trial::{PressOutcome, Setting, Trial, Verdict};
 use hapterra::phantom::{OutOfReach, PhantomModel};
 
 /// A rate, a damping, and the arm's friction as a fraction of the model's.
@@ -82,7 +82,7 @@ impl Plan {
         on_trial: &(dyn Fn(usize) -> bool + Sync),
     ) -> Result<Option<Map>, OutOfReach> {
         let settings = self.settings();
-        let (next, goes_on) = (AtomicUsize::new(0), Mutex::new(true));
+        let (next, is_continued) = (AtomicUsize::new(0), Mutex::new(true));
         let work = || {
             let mut done = Vec::new();
             loop {
@@ -90,10 +90,12 @@ impl Plan {
                 let Some(setting) = settings.get(at) else {
                     return done;
                 };
-                done.push((at, setting.tried()));
-                let mut goes_on = goes_on.lock().unwrap_or_else(|broken| broken.into_inner());
-                *goes_on = *goes_on && on_trial(settings.len());
-                if !*goes_on {
+                done.push((at, setting.run_trial()));
+                let mut is_continued = is_continued
+                    .lock()
+                    .unwrap_or_else(|broken| broken.into_inner());
+                *is_continued = *is_continued && on_trial(settings.len());
+                if !*is_continued {
                     return done;
                 }
             }
@@ -149,21 +151,22 @@ impl Map {
     /// Returns the highest stiffness up to which every press was at least this good, N/mm; `None`
     /// if the lowest was worse.
     #[must_use]
-    pub fn up_to(&self, column: Column, grasp: Grasp, verdict: Verdict) -> Option<f64> {
+    pub fn max_stiffness(&self, column: Column, grasp: Grasp, verdict: Verdict) -> Option<f64> {
         let count_mm = self.at_tip.count_mm;
-        self.while_it(column, grasp, |trial| {
+        self.last_while(column, grasp, |trial| {
             trial.press.verdict(count_mm) <= verdict
         })
     }
 
     /// Returns the highest stiffness up to which every ramp of the force was good, N/mm.
     #[must_use]
-    pub fn enters_up_to(&self, column: Column, grasp: Grasp) -> Option<f64> {
-        let is_good = |entered: &Option<Entered>| entered.is_some_and(|entered| entered.is_good());
-        self.while_it(column, grasp, |trial| trial.entries.iter().all(is_good))
+    pub fn max_entry_stiffness(&self, column: Column, grasp: Grasp) -> Option<f64> {
+        let is_good =
+            |entered: &Option<EntryOutcome>| entered.is_some_and(|entered| entered.is_good());
+        self.last_while(column, grasp, |trial| trial.entries.iter().all(is_good))
     }
 
-    fn while_it(
+    fn last_while(
         &self,
         column: Column,
         grasp: Grasp,
@@ -203,22 +206,25 @@ impl Map {
             } = trial.setting;
             let verdict = trial.press.verdict(self.at_tip.count_mm).name();
             let press = match trial.press {
-                Press::Held {
+                PressOutcome::Held {
                     swing_mm,
                     swings_hz,
                 } => format!("{swing_mm:.6},{swings_hz:.1},"),
-                Press::Tripped(fault) => format!(",,{fault:?}"),
+                PressOutcome::Tripped(fault) => format!(",,{fault:?}"),
             };
             let taps = trial.taps.map(|taps| {
                 let row =
                     |Taps {
-                         given_mj,
-                         touched_m_s: [slowest, fastest],
-                     }| { format!("{given_mj:.6},{slowest:.4},{fastest:.4}") };
+                         gained_mj,
+                         contact_speed_m_s: [slowest, fastest],
+                     }| { format!("{gained_mj:.6},{slowest:.4},{fastest:.4}") };
                 taps.map_or_else(|| ",,".to_owned(), row)
             });
             let entries = trial.entries.map(|entered| {
-                let row = |Entered { swing_mm, given_mj }| format!("{swing_mm:.6},{given_mj:.6}");
+                let row = |EntryOutcome {
+                               swing_mm,
+                               gained_mj,
+                           }| format!("{swing_mm:.6},{gained_mj:.6}");
                 entered.map_or_else(|| ",".to_owned(), row)
             });
             writeln!(
@@ -251,10 +257,10 @@ impl Map {
         };
         for column @ (rate, damping, part) in self.columns() {
             let limits = Grasp::ALL.map(|grasp| {
-                let limit = |verdict| reported(self.up_to(column, grasp, verdict));
+                let limit = |verdict| reported(self.max_stiffness(column, grasp, verdict));
                 let (still, held) = (limit(Verdict::Still), limit(Verdict::LimitCycle));
-                let enters = reported(self.enters_up_to(column, grasp));
-                format!("{} {still} / {held} / {enters}", grasp.name())
+                let entry_limit = reported(self.max_entry_stiffness(column, grasp));
+                format!("{} {still} / {held} / {entry_limit}", grasp.name())
             });
             lines.push(format!(
                 "{:>6} Hz, {:<26} {} of the arm's friction: {}",

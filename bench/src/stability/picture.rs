@@ -20,9 +20,9 @@ const HEADER_PX: i32 = 110;
 const CHART_PX: i32 = 420;
 const MARGIN_PX: i32 = 30;
 /// Range of energy in the drawing, mJ: values outside lie on the edge.
-const GIVEN_MJ: std::ops::Range<f64> = 0.01..100.0;
+const GAINED_MJ: std::ops::Range<f64> = 0.01..100.0;
 /// Speed of the taps in the drawing, as an index into [`TAP_SPEEDS_M_S`].
-const DRAWN: usize = 1;
+const DRAWN_SPEED: usize = 1;
 const COLOURS: [RGBColor; 3] = [SERIES[1], SERIES[0], SERIES[2]];
 
 /// Draws the table.
@@ -66,7 +66,7 @@ fn header(area: &Area<'_>) -> Result<(), PictureError> {
     axes::write(area, name, (0, px(34)), title, HPos::Left)?;
     let lines = format!(
         "taps at {} m/s; dot: a press with 1 N is still, ring: limit cycle, cross: unstable; grey: 2b/T (Colgate & Schenkel) and 2fc/Δ (Abbott & Okamura) of the arm alone",
-        TAP_SPEEDS_M_S[DRAWN]
+        TAP_SPEEDS_M_S[DRAWN_SPEED]
     );
     axes::write(area, &lines, (0, px(68)), text, HPos::Left)?;
     let mut left = 0;
@@ -92,11 +92,11 @@ fn chart(
         (low.min(stiffness), high.max(stiffness))
     });
     let range = 0.8 * low..1.25 * high;
-    let named = map::name(damping);
+    let title = map::name(damping);
     let x = format!(
         "stiffness (N/mm) at {} Hz, {}, {part} of the arm's friction",
         rate.hz(),
-        named.trim_end_matches(':')
+        title.trim_end_matches(':')
     );
     let titles = Titles {
         x: &x,
@@ -105,12 +105,12 @@ fn chart(
     let mut chart = axes::chart(
         area,
         range.clone().log_scale(),
-        GIVEN_MJ.log_scale(),
+        GAINED_MJ.log_scale(),
         titles,
     )?;
     for bound in [map.at_tip.by_damping(rate), map.at_tip.by_friction()] {
         if range.contains(&bound) {
-            let upright = vec![(bound, GIVEN_MJ.start), (bound, GIVEN_MJ.end)];
+            let upright = vec![(bound, GAINED_MJ.start), (bound, GAINED_MJ.end)];
             line::draw(&mut chart, &[upright], stroke(&SOFT_INK, 1.2))?;
         }
     }
@@ -132,7 +132,7 @@ fn chart(
 
 /// Returns the position of a trial in the chart: at the top if the guard switched the force off.
 fn place(trial: &Trial) -> (f64, f64) {
-    let given_mj = trial.taps[DRAWN].map_or(GIVEN_MJ.end, |taps| taps.given_mj);
-    let given_mj = given_mj.clamp(GIVEN_MJ.start, GIVEN_MJ.end);
-    (trial.setting.stiffness_n_per_mm, given_mj)
+    let gained_mj = trial.taps[DRAWN_SPEED].map_or(GAINED_MJ.end, |taps| taps.gained_mj);
+    let gained_mj = gained_mj.clamp(GAINED_MJ.start, GAINED_MJ.end);
+    (trial.setting.stiffness_n_per_mm, gained_mj)
 }

@@ -9,7 +9,7 @@ use super::entry::Entry;
 use super::grasp::Grasp;
 use super::map::Plan;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
-use super::trial::{Press, Setting, Trial, Verdict};
+use super::trial::{PressOutcome, Setting, Trial, Verdict};
 use hapterra::phantom::PhantomModel;
 use hapterra::stability::{
     ENTERS_LATE_N_PER_MM, ENTERS_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LEFT_WITH_TEXTURE, LONG_US,
@@ -30,18 +30,18 @@ const CONTROLLED: Damping = Damping {
     ..UNDAMPED
 };
 
-fn tried(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp) -> Trial {
-    tried_damped(hz, stiffness_n_per_mm, grasp, 0.0, UNDAMPED)
+fn run_trial(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp) -> Trial {
+    run_damped_trial(hz, stiffness_n_per_mm, grasp, 0.0, UNDAMPED)
 }
 
-fn tried_damped(
+fn run_damped_trial(
     hz: u32,
     stiffness_n_per_mm: f64,
     grasp: Grasp,
     delay_s: f64,
     damping: Damping,
 ) -> Trial {
-    tried_on(
+    run_textured_trial(
         Texture::NONE,
         hz,
         stiffness_n_per_mm,
@@ -51,7 +51,7 @@ fn tried_damped(
     )
 }
 
-fn tried_on(
+fn run_textured_trial(
     texture: Texture,
     hz: u32,
     stiffness_n_per_mm: f64,
@@ -61,12 +61,18 @@ fn tried_on(
 ) -> Trial {
     let setting = Setting {
         texture,
-        ..set(hz, stiffness_n_per_mm, grasp, delay_s, damping)
+        ..setting_for(hz, stiffness_n_per_mm, grasp, delay_s, damping)
     };
-    setting.tried().expect("in reach")
+    setting.run_trial().expect("in reach")
 }
 
-fn set(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64, damping: Damping) -> Setting {
+fn setting_for(
+    hz: u32,
+    stiffness_n_per_mm: f64,
+    grasp: Grasp,
+    delay_s: f64,
+    damping: Damping,
+) -> Setting {
     Setting {
         rate: TickRate::new(hz).expect("a rate"),
         stiffness_n_per_mm,
@@ -79,7 +85,7 @@ fn set(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64, damping: Da
 }
 
 /// Returns the results of taps at a speed.
-fn tapped(setting: Setting, speed_m_s: f64) -> Taps {
+fn run_taps(setting: Setting, speed_m_s: f64) -> Taps {
     let taps = setting.taps(speed_m_s).expect("in reach");
     taps.expect("it is held")
 }
@@ -108,20 +114,20 @@ fn tip_parameters_match_the_data_of_the_arm() {
 #[test]
 fn stiff_surface_is_unstable_in_light_grasp_until_rate_rises() {
     for grasp in Grasp::ALL {
-        let soft = tried(1000, 0.5, grasp);
+        let soft = run_trial(1000, 0.5, grasp);
         assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
         // A check for contact: an arm that is not armed is still as well.
         let is_rendered =
-            { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.given_mj > 0.0));
+            { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.gained_mj > 0.0));
         assert!(is_rendered, "{soft:?}");
     }
-    let shaken = tried(1000, 6.0, Grasp::Light);
+    let shaken = run_trial(1000, 6.0, Grasp::Light);
     assert_eq!(verdict(&shaken), Verdict::Unstable, "{shaken:?}");
-    let Press::Held { swings_hz, .. } = shaken.press else {
+    let PressOutcome::Held { swings_hz, .. } = shaken.press else {
         panic!("{shaken:?}")
     };
     assert!((2.0..200.0).contains(&swings_hz), "{swings_hz}");
-    let faster = tried(4000, 6.0, Grasp::Light);
+    let faster = run_trial(4000, 6.0, Grasp::Light);
     assert_eq!(verdict(&faster), Verdict::Still, "{faster:?}");
 }
 
@@ -129,22 +135,24 @@ fn stiff_surface_is_unstable_in_light_grasp_until_rate_rises() {
 const LAG_S: f64 = 0.238e-3 / 2.18;
 
 #[test]
-fn a_tap_touches_the_surface_at_the_speed_that_it_is_called_by() {
+fn tap_touches_the_surface_at_its_nominal_speed() {
     for grasp in Grasp::ALL {
         // The arm's friction at rest holds a light grasp back by a varying amount.
-        let off = match grasp {
+        let tolerance = match grasp {
             Grasp::Light => 0.05,
             Grasp::Normal | Grasp::Firm => 0.015,
         };
         for (hz, stiffness) in [(1000, 0.5), (1000, 2.0), (10_000, 1.0)] {
             for speed_m_s in TAP_SPEEDS_M_S {
-                let setting = set(hz, stiffness, grasp, 80e-6, CONTROLLED);
-                let Taps { touched_m_s, .. } = tapped(setting, speed_m_s);
+                let setting = setting_for(hz, stiffness, grasp, 80e-6, CONTROLLED);
+                let Taps {
+                    contact_speed_m_s, ..
+                } = run_taps(setting, speed_m_s);
                 assert!(
-                    touched_m_s
+                    contact_speed_m_s
                         .iter()
-                        .all(|touched| (touched / speed_m_s - 1.0).abs() < off),
-                    "{}, {hz} Hz, {stiffness} N/mm, {speed_m_s} m/s: {touched_m_s:?} m/s",
+                        .all(|touched| (touched / speed_m_s - 1.0).abs() < tolerance),
+                    "{}, {hz} Hz, {stiffness} N/mm, {speed_m_s} m/s: {contact_speed_m_s:?} m/s",
                     grasp.name()
                 );
             }
@@ -157,13 +165,14 @@ fn tap_energy_is_proportional_to_age_of_the_force() {
     // The force of a tick is half a tick old on average, plus the delay to the amplifiers and the
     // lag of the current loops. In proportion to this age it is too small on the way in and too
     // large on the way out.
-    let given = |hz: u32, delay_s| {
+    let gained = |hz: u32, delay_s| {
         let age_s = 0.5 / f64::from(hz) + delay_s + LAG_S;
-        let given_mj = tapped(set(hz, 1.0, Grasp::Normal, delay_s, UNDAMPED), 0.2).given_mj;
-        assert!(given_mj > 0.05, "{given_mj} mJ");
-        given_mj / age_s
+        let gained_mj =
+            run_taps(setting_for(hz, 1.0, Grasp::Normal, delay_s, UNDAMPED), 0.2).gained_mj;
+        assert!(gained_mj > 0.05, "{gained_mj} mJ");
+        gained_mj / age_s
     };
-    let once = given(1000, 0.0);
+    let once = gained(1000, 0.0);
     for (hz, delay_s) in [
         (4000, 0.0),
         (10_000, 0.0),
@@ -172,7 +181,7 @@ fn tap_energy_is_proportional_to_age_of_the_force() {
         (2000, 0.2e-3),
         (4000, 1e-3),
     ] {
-        let share = given(hz, delay_s) / once;
+        let share = gained(hz, delay_s) / once;
         assert!((share - 1.0).abs() < 0.15, "{hz} Hz, {delay_s} s: {share}");
     }
 }
@@ -190,17 +199,17 @@ fn passivity_controller_prevents_tap_energy_and_limit_cycle() {
     ] {
         for grasp in Grasp::ALL {
             for speed_m_s in speeds {
-                let setting = set(hz, stiffness, grasp, delay_s, CONTROLLED);
-                let given_mj = tapped(setting, *speed_m_s).given_mj;
+                let setting = setting_for(hz, stiffness, grasp, delay_s, CONTROLLED);
+                let gained_mj = run_taps(setting, *speed_m_s).gained_mj;
                 assert!(
-                    given_mj < 1e-3,
-                    "{}, {hz} Hz, {stiffness} N/mm, {delay_s} s, {speed_m_s} m/s: {given_mj} mJ",
+                    gained_mj < 1e-3,
+                    "{}, {hz} Hz, {stiffness} N/mm, {delay_s} s, {speed_m_s} m/s: {gained_mj} mJ",
                     grasp.name()
                 );
             }
         }
     }
-    let stiff = tried_damped(1000, 6.0, Grasp::Light, 80e-6, CONTROLLED);
+    let stiff = run_damped_trial(1000, 6.0, Grasp::Light, 80e-6, CONTROLLED);
     assert_eq!(verdict(&stiff), Verdict::Still, "{stiff:?}");
 }
 
@@ -222,7 +231,7 @@ fn warning_before_a_surface_agrees_with_the_trials() {
         for (hz, without, with) in table {
             for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
                 let at = |stiffness| {
-                    let press = set(hz, stiffness, Grasp::Light, delay_s, damping).press();
+                    let press = setting_for(hz, stiffness, Grasp::Light, delay_s, damping).press();
                     press.expect("in reach").verdict(count_mm)
                 };
                 let name = format!("{hz} Hz, {delay_s} s, {still} N/mm");
@@ -236,7 +245,7 @@ fn warning_before_a_surface_agrees_with_the_trials() {
 /// The highest and steepest grain there is, which moves a light grasp more than any other in the
 /// trials.
 #[test]
-fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
+fn textured_surface_is_still_up_to_a_share_of_the_stiffness() {
     let texture = Texture {
         pattern: Pattern::Grain,
         amplitude_mm: Texture::MAX_AMPLITUDE_MM,
@@ -245,16 +254,16 @@ fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
     };
     assert!(texture.is_valid());
     let at = |hz, stiffness, delay_s, damping| {
-        let trial = tried_on(texture, hz, stiffness, Grasp::Light, delay_s, damping);
+        let trial = run_textured_trial(texture, hz, stiffness, Grasp::Light, delay_s, damping);
         verdict(&trial)
     };
-    for (table, left, delay_s) in [
+    for (table, share_left, delay_s) in [
         (STILL_N_PER_MM, LEFT_WITH_TEXTURE, SHORT_S),
         (STILL_LATE_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LONG_S),
     ] {
         for (hz, without, with) in table {
             for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
-                let share = f64::from(left * still);
+                let share = f64::from(share_left * still);
                 assert_eq!(
                     at(hz, share, delay_s, damping),
                     Verdict::Still,
@@ -270,13 +279,14 @@ fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
 }
 
 #[test]
-fn damping_takes_from_what_a_tap_gives() {
+fn damping_reduces_the_energy_gained_in_a_tap() {
     let damped = Damping {
         ns_per_m: 2.0,
         ..UNDAMPED
     };
-    let given = |damping| tapped(set(1000, 1.0, Grasp::Normal, 80e-6, damping), 0.2).given_mj;
-    let (with, without) = (given(damped), given(UNDAMPED));
+    let gained =
+        |damping| run_taps(setting_for(1000, 1.0, Grasp::Normal, 80e-6, damping), 0.2).gained_mj;
+    let (with, without) = (gained(damped), gained(UNDAMPED));
     assert!(with < without, "{with} and {without} mJ");
 }
 
@@ -298,12 +308,12 @@ fn map_lists_each_trial_once_and_limits_are_last_good_stiffness() {
     assert_eq!(rows.len(), 1 + 6);
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
     let begins: Vec<_> = rows[1..].iter().map(|row| row[..5].join(",")).collect();
-    let wanted = Grasp::ALL.map(|grasp| {
+    let expected = Grasp::ALL.map(|grasp| {
         ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
     });
-    assert_eq!(begins, wanted.concat());
+    assert_eq!(begins, expected.concat());
     let limit = |grasp| {
-        map.up_to(
+        map.max_stiffness(
             (TickRate::DEFAULT, UNDAMPED, 1.0),
             grasp,
             Verdict::LimitCycle,
@@ -318,22 +328,25 @@ fn map_lists_each_trial_once_and_limits_are_last_good_stiffness() {
 }
 
 /// Stiffnesses of the trials with a ramp of the force, N/mm.
-const ENTERED_N_PER_MM: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 4.0];
+const ENTRY_STIFFNESS_N_PER_MM: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 4.0];
 
 /// Checks a table of the tick rate and the stiffnesses up to which the force ramps up well, after
 /// arming and as the clutch closes, N/mm.
-fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
+fn check_entry_limits(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
     for (hz, ramp, clutch) in table {
-        for stiffness in ENTERED_N_PER_MM {
-            for (entry, up_to) in [(Entry::Ramp, ramp), (Entry::Clutch, clutch)] {
+        for stiffness in ENTRY_STIFFNESS_N_PER_MM {
+            for (entry, max_stiffness) in [(Entry::Ramp, ramp), (Entry::Clutch, clutch)] {
                 let setting = Setting {
                     arm_friction,
-                    ..set(hz, stiffness, Grasp::Light, delay_s, CONTROLLED)
+                    ..setting_for(hz, stiffness, Grasp::Light, delay_s, CONTROLLED)
                 };
-                let entered = setting.enters(entry).expect("in reach").expect("no fault");
+                let entered = setting
+                    .run_entry(entry)
+                    .expect("in reach")
+                    .expect("no fault");
                 assert_eq!(
                     entered.is_good(),
-                    stiffness <= up_to,
+                    stiffness <= max_stiffness,
                     "{hz} Hz, {delay_s} s, {stiffness} N/mm, {entry:?}: {entered:?}"
                 );
             }
@@ -344,13 +357,13 @@ fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
 #[test]
 fn force_ramps_up_without_swing_or_energy_gain() {
     let all = |hz| (hz, 4.0, 4.0);
-    enters_up_to(1.0, SHORT_S, [1000, 2000, 4000, 10_000].map(all));
+    check_entry_limits(1.0, SHORT_S, [1000, 2000, 4000, 10_000].map(all));
 }
 
 #[test]
 fn force_ramps_up_cleanly_with_one_millisecond_delay() {
     let all = |hz| (hz, 4.0, 4.0);
-    enters_up_to(1.0, LONG_S, [1000, 2000, 4000, 10_000].map(all));
+    check_entry_limits(1.0, LONG_S, [1000, 2000, 4000, 10_000].map(all));
 }
 
 #[test]
@@ -361,16 +374,16 @@ fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
         (4000, 3.0, 2.0),
         (10_000, 3.0, 2.0),
     ];
-    enters_up_to(0.1, SHORT_S, little);
+    check_entry_limits(0.1, SHORT_S, little);
     let late = [
         (1000, 1.0, 1.0),
         (2000, 1.0, 1.0),
         (4000, 1.0, 1.0),
         (10_000, 1.0, 0.5),
     ];
-    enters_up_to(0.1, LONG_S, late);
-    for (table, stated) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
-        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(stated) {
+    check_entry_limits(0.1, LONG_S, late);
+    for (table, expected) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
+        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(expected) {
             assert_eq!((hz, ramp.min(clutch)), (of_hz, f64::from(n_per_mm)));
         }
     }
@@ -378,14 +391,17 @@ fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
 
 /// Beyond the limits in energy, no swing exceeds 0.3 mm on a board with converters.
 #[test]
-fn little_friction_makes_small_swings_only() {
+fn swings_are_small_with_little_arm_friction() {
     for hz in [1000, 10_000] {
         for entry in [Entry::Ramp, Entry::Clutch] {
             let setting = Setting {
                 arm_friction: 0.1,
-                ..set(hz, 4.0, Grasp::Light, SHORT_S, CONTROLLED)
+                ..setting_for(hz, 4.0, Grasp::Light, SHORT_S, CONTROLLED)
             };
-            let entered = setting.enters(entry).expect("in reach").expect("no fault");
+            let entered = setting
+                .run_entry(entry)
+                .expect("in reach")
+                .expect("no fault");
             assert!(entered.swing_mm < 0.16, "{hz} Hz, {entry:?}: {entered:?}");
         }
     }
@@ -395,12 +411,15 @@ fn little_friction_makes_small_swings_only() {
 fn tip_swings_during_ramp_up_without_passivity_controller() {
     let setting = Setting {
         arm_friction: 0.1,
-        ..set(1000, 3.0, Grasp::Light, 0.1e-3, UNDAMPED)
+        ..setting_for(1000, 3.0, Grasp::Light, 0.1e-3, UNDAMPED)
     };
     for entry in [Entry::Ramp, Entry::Clutch] {
-        let entered = setting.enters(entry).expect("in reach").expect("no fault");
+        let entered = setting
+            .run_entry(entry)
+            .expect("in reach")
+            .expect("no fault");
         assert!(
-            entered.swing_mm > 3.0 && entered.given_mj > 100.0,
+            entered.swing_mm > 3.0 && entered.gained_mj > 100.0,
             "{entered:?}"
         );
     }

@@ -5,16 +5,16 @@ use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
 use super::contact_loop::{self, HOME, LoopSettings, PLANE_MM};
-use super::entry::{Entered, Entry};
+use super::entry::{Entry, EntryOutcome};
 use super::grasp::Grasp;
 use super::map::Column;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use hapterra::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
 
 /// The press, N, and its duration; only its last second counts.
-const PRESS_N: f64 = 1.0;
-const HELD_S: f64 = 2.5;
-const LOOKED_AT_S: f64 = 1.0;
+const PRESS_FORCE_N: f64 = 1.0;
+const PRESS_S: f64 = 2.5;
+const OBSERVED_S: f64 = 1.0;
 /// Swing of the tip from which it counts as unstable, mm: no hand holds it.
 const UNSTABLE_MM: f64 = 1.0;
 
@@ -39,7 +39,7 @@ pub struct Setting {
 
 /// Outcome of a press.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Press {
+pub enum PressOutcome {
     /// Swing of the tip in the last second, along the axis with the largest: eastward, northward or
     /// up.
     Held {
@@ -58,12 +58,12 @@ pub struct Trial {
     /// Its setting.
     pub setting: Setting,
     /// The press.
-    pub press: Press,
+    pub press: PressOutcome,
     /// Taps at each of [`TAP_SPEEDS_M_S`]; `None` if the guard switched the force off.
     pub taps: [Option<Taps>; 3],
     /// A press from the start of the ramp, and one from the closing of the clutch; `None` if the
     /// guard switched the force off.
-    pub entries: [Option<Entered>; 2],
+    pub entries: [Option<EntryOutcome>; 2],
 }
 
 /// Verdict on a press.
@@ -89,7 +89,7 @@ impl Verdict {
     }
 }
 
-impl Press {
+impl PressOutcome {
     /// Returns the verdict; an encoder count is `count_mm` of the tip's path.
     #[must_use]
     pub fn verdict(&self, count_mm: f64) -> Verdict {
@@ -104,7 +104,7 @@ impl Press {
 impl Setting {
     /// Returns the delay of a force after the start of its tick, with the lag of the amplifiers'
     /// current loops, s.
-    pub(super) fn late_s(self) -> f64 {
+    pub(super) fn force_delay_s(self) -> f64 {
         self.delay_s + PhantomModel::premium_1_5().drive[0].motor.current_lag_s
     }
 
@@ -117,7 +117,7 @@ impl Setting {
     ///
     /// # Errors
     /// [`OutOfReach`] if the hand would have to leave the arm's reach.
-    pub fn tried(self) -> Result<Trial, OutOfReach> {
+    pub fn run_trial(self) -> Result<Trial, OutOfReach> {
         let press = self.press()?;
         let mut taps = [None; 3];
         for (taps, speed_m_s) in taps.iter_mut().zip(TAP_SPEEDS_M_S) {
@@ -127,16 +127,16 @@ impl Setting {
             setting: self,
             press,
             taps,
-            entries: [self.enters(Entry::Ramp)?, self.enters(Entry::Clutch)?],
+            entries: [self.run_entry(Entry::Ramp)?, self.run_entry(Entry::Clutch)?],
         })
     }
 
-    pub(super) fn press(self) -> Result<Press, OutOfReach> {
+    pub(super) fn press(self) -> Result<PressOutcome, OutOfReach> {
         let (hand, wall) = (self.grasp.hand(), self.stiffness_n_per_mm);
         let [east, north, _] = HOME.home_mm;
         let above = Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, [east, north], 10.0);
-        let arm = self.arm(above.press(PRESS_N, HELD_S).finish())?;
-        let from_s = arm.script_s() - LOOKED_AT_S;
+        let arm = self.arm(above.press(PRESS_FORCE_N, PRESS_S).finish())?;
+        let from_s = arm.script_s() - OBSERVED_S;
         let (mut places, mut fault) = (Vec::new(), None);
         self.run(arm, &mut |t_s, step| {
             fault = step.sample.fault;
@@ -146,7 +146,7 @@ impl Setting {
             fault.is_none()
         });
         Ok(match fault {
-            Some(fault) => Press::Tripped(fault),
+            Some(fault) => PressOutcome::Tripped(fault),
             None => swings(&places),
         })
     }
@@ -160,16 +160,16 @@ impl Setting {
     pub(super) fn run(
         self,
         arm: HeldPhantom,
-        look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
+        observe: &mut dyn FnMut(f64, &contact_loop::LoopTick) -> bool,
     ) {
-        self.run_with_clutch(arm, None, look);
+        self.run_with_clutch(arm, None, observe);
     }
 
     pub(super) fn run_with_clutch(
         self,
         arm: HeldPhantom,
         clutch_s: Option<[f64; 2]>,
-        look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
+        observe: &mut dyn FnMut(f64, &contact_loop::LoopTick) -> bool,
     ) {
         let settings = LoopSettings {
             rate: self.rate,
@@ -179,13 +179,13 @@ impl Setting {
             delay_s: self.delay_s,
             clutch_s,
         };
-        contact_loop::run(&settings, arm, look);
+        contact_loop::run(&settings, arm, observe);
     }
 }
 
 /// Returns the amplitude and frequency of the positions of a second along the axis of the largest
 /// swing.
-fn swings(places_mm: &[[f64; 3]]) -> Press {
+fn swings(places_mm: &[[f64; 3]]) -> PressOutcome {
     let along = |axis: usize| {
         let coordinates = places_mm.iter().map(move |place| place[axis]);
         let low = coordinates.clone().fold(f64::INFINITY, f64::min);
@@ -198,9 +198,9 @@ fn swings(places_mm: &[[f64; 3]]) -> Press {
     };
     let widest = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
     let (swing_mm, crossings) = [along(0), along(1)].into_iter().fold(along(2), widest);
-    Press::Held {
+    PressOutcome::Held {
         swing_mm,
-        swings_hz: 0.5 * crossings as f64 / LOOKED_AT_S,
+        swings_hz: 0.5 * crossings as f64 / OBSERVED_S,
     }
 }
 
@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tip_swings_along_whichever_axis() {
+    fn tip_swing_is_measured_along_the_widest_axis() {
         for axis in 0..3 {
             let places: Vec<_> = (0..1000)
                 .map(|tick| {
@@ -220,7 +220,7 @@ mod tests {
                     place
                 })
                 .collect();
-            let Press::Held {
+            let PressOutcome::Held {
                 swing_mm,
                 swings_hz,
             } = swings(&places)

@@ -9,13 +9,13 @@ use heightfield::{OpenOptions, Raster};
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Pace, SentTile, board};
-use super::hand::{Hand, Late};
+use super::hand::{Hand, LateTile};
 use super::hip_path::{HipPath, HipPaths};
 use super::measurement::{Reading, Row};
 use super::meter::{Meter, Traffic, peak_bytes};
 use super::run::{self, fastest};
 use super::tick_counts::TickCounts;
-use super::{CELL_MM, NotMeasured, RATES, SPEEDS, USUAL};
+use super::{CELL_MM, DEFAULT_SPEED, MeasureError, RATES, SPEEDS};
 
 /// Case of a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub(super) struct Case {
     /// The file: a path, or a URL.
     pub(super) source: String,
     /// File of the HIP's paths.
-    pub(super) ways: String,
+    pub(super) paths_file: String,
     /// Reading of the file.
     pub(super) reading: Reading,
     /// Delay of the server, ms.
@@ -40,7 +40,7 @@ impl Case {
     /// Returns the options of a terrain.
     pub(super) fn options(reading: Reading) -> OpenOptions {
         OpenOptions {
-            most_in_memory_bytes: match reading {
+            max_in_memory_bytes: match reading {
                 Reading::Blocks => 0,
                 Reading::Whole => u64::MAX,
             },
@@ -51,7 +51,7 @@ impl Case {
     /// Returns the pace of this case in place of `pace`.
     const fn pace(&self, pace: Pace) -> Pace {
         match self.stands_while_reading {
-            true => Pace::Standing,
+            true => Pace::Paused,
             false => pace,
         }
     }
@@ -60,24 +60,24 @@ impl Case {
         self.source.contains("://")
     }
 
-    fn open(&self) -> Result<Raster, NotMeasured> {
+    fn open(&self) -> Result<Raster, MeasureError> {
         if !self.is_remote() {
-            forget(Path::new(&self.source));
+            drop_page_cache(Path::new(&self.source));
         }
         let options = Self::options(self.reading);
-        Raster::open(&self.source, &options).map_err(|error| NotMeasured(error.to_string()))
+        Raster::open(&self.source, &options).map_err(|error| MeasureError(error.to_string()))
     }
 
     /// Measures everything, and calls `done` with a row for each link.
     ///
     /// # Errors
     /// If the file cannot be read, the arm does not reach the paths, or a session ends.
-    pub(super) fn measure(&self, mut done: impl FnMut(Row)) -> Result<(), NotMeasured> {
-        let ways = HipPaths::read(Path::new(&self.ways))?;
-        let hand = Hand::over(&ways);
+    pub(super) fn measure(&self, mut done: impl FnMut(Row)) -> Result<(), MeasureError> {
+        let paths = HipPaths::read(Path::new(&self.paths_file))?;
+        let hand = Hand::over(&paths);
         let benches = RATES.map(|kb_per_s| Bench {
             case: self,
-            ways: &ways,
+            paths: &paths,
             hand: &hand,
             kb_per_s,
         });
@@ -97,18 +97,18 @@ impl Case {
 ///
 /// # Errors
 /// If it cannot be rendered at this scale.
-pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
+pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, MeasureError> {
     let grid = HapticGrid::new(raster, HapticCells::default());
     let scale = grid
         .true_scale(CELL_MM)
-        .map_err(|error| NotMeasured(error.to_string()))?;
-    Terrain::over(grid, scale, 0).map_err(|error| NotMeasured(error.to_string()))
+        .map_err(|error| MeasureError(error.to_string()))?;
+    Terrain::over(grid, scale, 0).map_err(|error| MeasureError(error.to_string()))
 }
 
 /// One link's measurements of a case.
 struct Bench<'c> {
     case: &'c Case,
-    ways: &'c HipPaths,
+    paths: &'c HipPaths,
     hand: &'c Hand,
     kb_per_s: u32,
 }
@@ -118,14 +118,14 @@ struct Motion {
     counts: TickCounts,
     tiles: Vec<SentTile>,
     /// The ticks in which the motion began and ended.
-    moved: [u64; 2],
+    motion_ticks: [u64; 2],
     host_ms: Vec<f64>,
 }
 
 impl Bench<'_> {
     /// Opens the file, touches it in real time, and if it is read in blocks moves over the straight
     /// path once: the row's times, memory and traffic.
-    fn first(&self) -> Result<Row, NotMeasured> {
+    fn first(&self) -> Result<Row, MeasureError> {
         let case = self.case;
         let meter = match case.is_remote() {
             true => Meter::Server,
@@ -133,24 +133,24 @@ impl Bench<'_> {
         };
         let board = board();
         let before = meter.traffic()?;
-        let began = Instant::now();
+        let started = Instant::now();
         let raster = case.open()?;
-        let open_ms = ms_since(began);
+        let open_ms = ms_since(started);
         let opened = meter.traffic()?;
-        let began = Instant::now();
+        let started = Instant::now();
         let terrain = terrain(&raster)?;
-        let scene = self.hand.scene(&terrain, Late::Fallback)?;
+        let scene = self.hand.scene(&terrain, LateTile::Fallback)?;
         let terrain = terrain.non_blocking();
         let pace = case.pace(Pace::Real);
         let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), pace);
-        run::touch(&mut chain, self.hand, &self.ways.straight)?;
-        let first_force_ms = ms_since(began);
+        run::touch(&mut chain, self.hand, &self.paths.straight)?;
+        let first_force_ms = ms_since(started);
         let mut row = Row::of_opening(case, self.kb_per_s, &terrain, [open_ms, first_force_ms]);
         if case.reading == Reading::Blocks {
             chain.set_pace(case.pace(Pace::Virtual));
-            let (way, speed) = (&self.ways.straight, f64::from(USUAL));
-            let (counts, moved) = run::travel(&mut chain, self.hand, way, speed, false)?;
-            row.set_tiles(&Motion::of(chain, counts, moved));
+            let (path, speed) = (&self.paths.straight, f64::from(DEFAULT_SPEED));
+            let (counts, motion_ticks) = run::travel(&mut chain, self.hand, path, speed, false)?;
+            row.set_tiles(&Motion::of(chain, counts, motion_ticks));
         }
         row.peak_mb = peak_bytes().map(|bytes| round(bytes as f64 / 1e6));
         row.set_traffic(before, opened, meter.traffic()?);
@@ -158,18 +158,21 @@ impl Bench<'_> {
     }
 
     /// Measures speeds without missing tiles, and missing tiles.
-    fn motions(&self, row: &mut Row) -> Result<(), NotMeasured> {
-        let HipPaths { straight, turning } = self.ways;
+    fn motions(&self, row: &mut Row) -> Result<(), MeasureError> {
+        let HipPaths { straight, turning } = self.paths;
         row.straight_cells = Some(straight.cells() as u32);
         row.turning_cells = Some(turning.cells() as u32);
-        let top = self.motion(straight, run::SPEEDS[1], Late::NoData, false)?;
-        let moved = top.moved;
-        let inside = |tile: &&SentTile| (moved[0]..moved[1]).contains(&tile.tick);
-        let tiles = top.tiles.iter().filter(inside).count() as f64;
-        row.tiles_per_s = Some(round(1e3 * tiles / (moved[1] - moved[0]) as f64));
-        let missing = |way, speed: u32| {
-            let motion = self.motion(way, speed.into(), Late::NoData, false)?;
-            Ok::<_, NotMeasured>(Some(motion.counts.missing))
+        let top = self.motion(straight, run::SPEEDS[1], LateTile::NoData, false)?;
+        let motion_ticks = top.motion_ticks;
+        let is_in_motion =
+            |tile: &&SentTile| (motion_ticks[0]..motion_ticks[1]).contains(&tile.tick);
+        let tiles = top.tiles.iter().filter(is_in_motion).count() as f64;
+        row.tiles_per_s = Some(round(
+            1e3 * tiles / (motion_ticks[1] - motion_ticks[0]) as f64,
+        ));
+        let missing = |path, speed: u32| {
+            let motion = self.motion(path, speed.into(), LateTile::NoData, false)?;
+            Ok::<_, MeasureError>(Some(motion.counts.missing))
         };
         row.missing_straight_500 = missing(straight, SPEEDS[0])?;
         row.missing_straight_2000 = missing(straight, SPEEDS[1])?;
@@ -177,27 +180,32 @@ impl Bench<'_> {
         row.missing_turning_500 = missing(turning, SPEEDS[0])?;
         row.missing_turning_2000 = missing(turning, SPEEDS[1])?;
         row.missing_turning_5000 = missing(turning, SPEEDS[2])?;
-        let held = |way| {
-            let holds =
-                |speed| Ok(self.motion(way, speed, Late::NoData, true)?.counts.missing == 0);
-            Ok::<_, NotMeasured>(Some(fastest(self.case.halvings, holds)?.round()))
+        let max_speed = |path| {
+            let is_complete = |speed| {
+                Ok(self
+                    .motion(path, speed, LateTile::NoData, true)?
+                    .counts
+                    .missing
+                    == 0)
+            };
+            Ok::<_, MeasureError>(Some(fastest(self.case.halvings, is_complete)?.round()))
         };
-        row.held_straight = held(straight)?;
-        row.held_turning = held(turning)?;
+        row.held_straight = max_speed(straight)?;
+        row.held_turning = max_speed(turning)?;
         self.underlaid(row)
     }
 
     /// Measures ticks over a fallback, and ticks without terrain.
-    fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
-        let HipPaths { straight, turning } = self.ways;
-        let fastest = self.motion(straight, run::SPEEDS[1], Late::Fallback, false)?;
-        let mut holes = fastest.counts.missing;
-        let mut coarse = |way, speed: u32| {
+    fn underlaid(&self, row: &mut Row) -> Result<(), MeasureError> {
+        let HipPaths { straight, turning } = self.paths;
+        let fastest = self.motion(straight, run::SPEEDS[1], LateTile::Fallback, false)?;
+        let mut no_data = fastest.counts.missing;
+        let mut coarse = |path, speed: u32| {
             let counts = self
-                .motion(way, speed.into(), Late::Fallback, false)?
+                .motion(path, speed.into(), LateTile::Fallback, false)?
                 .counts;
-            holes += counts.missing;
-            Ok::<_, NotMeasured>(Some(counts.coarse))
+            no_data += counts.missing;
+            Ok::<_, MeasureError>(Some(counts.coarse))
         };
         row.coarse_straight_500 = coarse(straight, SPEEDS[0])?;
         row.coarse_straight_2000 = coarse(straight, SPEEDS[1])?;
@@ -205,7 +213,7 @@ impl Bench<'_> {
         row.coarse_turning_500 = coarse(turning, SPEEDS[0])?;
         row.coarse_turning_2000 = coarse(turning, SPEEDS[1])?;
         row.coarse_turning_5000 = coarse(turning, SPEEDS[2])?;
-        row.no_data_over_fallback = Some(holes);
+        row.no_data_over_fallback = Some(no_data);
         Ok(())
     }
 
@@ -217,29 +225,30 @@ impl Bench<'_> {
     /// Runs a motion in a session of its own, with no data of the file cached.
     fn motion(
         &self,
-        way: &HipPath,
+        path: &HipPath,
         speed: f64,
-        late: Late,
-        to_no_data: bool,
-    ) -> Result<Motion, NotMeasured> {
+        late_tile: LateTile,
+        stop_at_no_data: bool,
+    ) -> Result<Motion, MeasureError> {
         let raster = self.case.open()?;
         let terrain = terrain(&raster)?;
-        let scene = self.hand.scene(&terrain, late)?;
+        let scene = self.hand.scene(&terrain, late_tile)?;
         let terrain = terrain.non_blocking();
         let pace = self.case.pace(Pace::Virtual);
         let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
-        run::touch(&mut chain, self.hand, way)?;
-        let (counts, moved) = run::travel(&mut chain, self.hand, way, speed, to_no_data)?;
-        Ok(Motion::of(chain, counts, moved))
+        run::touch(&mut chain, self.hand, path)?;
+        let (counts, motion_ticks) =
+            run::travel(&mut chain, self.hand, path, speed, stop_at_no_data)?;
+        Ok(Motion::of(chain, counts, motion_ticks))
     }
 }
 
 impl Motion {
-    fn of(chain: Chain<'_>, counts: TickCounts, moved: [u64; 2]) -> Self {
+    fn of(chain: Chain<'_>, counts: TickCounts, motion_ticks: [u64; 2]) -> Self {
         let host = chain.host.iter().map(|spent| 1e3 * spent.as_secs_f64());
         Self {
             counts,
-            moved,
+            motion_ticks,
             host_ms: host.collect(),
             tiles: chain.tiles,
         }
@@ -258,7 +267,7 @@ impl Row {
         Self {
             terrain: case.terrain.clone(),
             // Some formats are always read as a whole.
-            reading: match raster.is_known_whole() {
+            reading: match raster.is_summary_complete() {
                 true => Reading::Whole,
                 false => case.reading,
             },
@@ -301,8 +310,8 @@ impl Row {
     }
 }
 
-fn ms_since(began: Instant) -> f64 {
-    1e3 * began.elapsed().as_secs_f64()
+fn ms_since(started: Instant) -> f64 {
+    1e3 * started.elapsed().as_secs_f64()
 }
 
 /// Rounds to a hundredth.
@@ -313,7 +322,7 @@ fn round(value: f64) -> f64 {
 /// Requests that the system drops its cache of a file, so that it is read from the disk. If the
 /// system keeps the cache, the file is read from memory.
 #[cfg(unix)]
-fn forget(path: &Path) {
+fn drop_page_cache(path: &Path) {
     use rustix::fs::{Advice, fadvise};
     if let Ok(file) = std::fs::File::open(path) {
         let _ = fadvise(&file, 0, None, Advice::DontNeed);
@@ -321,4 +330,4 @@ fn forget(path: &Path) {
 }
 
 #[cfg(not(unix))]
-fn forget(_: &Path) {}
+fn drop_page_cache(_: &Path) {}

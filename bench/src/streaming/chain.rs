@@ -19,7 +19,7 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use super::NotMeasured;
+use super::MeasureError;
 use super::link::Line;
 
 /// Tiles along the side of the device's window, as on the emulated board.
@@ -27,7 +27,7 @@ const WINDOW: usize = 16;
 /// A tick.
 const TICK: Duration = Duration::from_millis(1);
 /// Interval between two checks for a block.
-const LOOK: Duration = Duration::from_micros(100);
+const POLL_INTERVAL: Duration = Duration::from_micros(100);
 
 /// A device in this program's memory, which is never freed.
 pub(super) type Board = Device<StoppedClock, WINDOW>;
@@ -62,7 +62,7 @@ pub(super) enum Pace {
     Virtual,
     /// As fast as this machine runs; time stops while a block is read, so that counts do not depend
     /// on the machine.
-    Standing,
+    Paused,
 }
 
 /// The host, its line to a device, and the device.
@@ -73,7 +73,7 @@ pub(super) struct Chain<'t> {
     line: Line,
     pace: Pace,
     now: u64,
-    began: Instant,
+    started: Instant,
     reader: Box<FrameReader<MAX_FRAME>>,
     /// Tiles sent up to now.
     pub(super) tiles: Vec<SentTile>,
@@ -102,7 +102,7 @@ impl<'t> Chain<'t> {
             line,
             pace,
             now: 0,
-            began: Instant::now(),
+            started: Instant::now(),
             reader: Box::default(),
             tiles: vec![],
             host: vec![],
@@ -124,50 +124,51 @@ impl<'t> Chain<'t> {
         self.client.stats()
     }
 
-    /// Runs a tick with these inputs, and calls `take` with the samples that arrive at the host.
+    /// Runs a tick with these inputs, and calls `on_sample` with the samples that arrive at the
+    /// host.
     ///
     /// # Errors
     /// If host and device do not understand each other.
     pub(super) fn tick(
         &mut self,
-        sense: GuardInputs,
-        take: &mut dyn FnMut(&TickRecord),
-    ) -> Result<(), NotMeasured> {
+        inputs: GuardInputs,
+        on_sample: &mut dyn FnMut(&TickRecord),
+    ) -> Result<(), MeasureError> {
         self.now += 1;
         let board = &mut self.board;
         self.line.carry(|bytes| board.receive(bytes));
-        board.tick(sense);
-        let received = self.hear();
+        board.tick(inputs);
+        let received = self.receive_bytes();
         let (now, mut out) = (TICK * self.now as u32, vec![]);
-        let began = Instant::now();
+        let started = Instant::now();
         let mut on = |event: Event<'_>| {
             if let Event::Sample(sample) = event {
-                take(sample);
+                on_sample(sample);
             }
         };
-        let answered = self.client.receive(now, &received, &mut out, &mut on);
-        let spent = began.elapsed();
-        answered
+        let result = self.client.receive(now, &received, &mut out, &mut on);
+        let spent = started.elapsed();
+        result
             .and_then(|()| self.client.due(now, &mut out, &mut on))
-            .map_err(|error| NotMeasured(format!("the session ended: {error}")))?;
+            .map_err(|error| MeasureError(format!("the session ended: {error}")))?;
         if self.count_tiles(&out) > 0 {
             self.host.push(spent);
         }
         self.line.send(&out);
-        self.wait();
+        self.pace_tick();
         Ok(())
     }
 
     /// Returns the bytes from the device in a tick.
-    fn hear(&mut self) -> Vec<u8> {
+    fn receive_bytes(&mut self) -> Vec<u8> {
         let mut received = vec![0; self.line.bytes_a_tick()];
         let mut length = 0;
         while length < received.len() {
-            let stated = self.board.link.transmit(&mut received[length..]);
-            if stated == 0 {
+            let count = self.board.link.transmit(&mut received[length..]);
+            if count == 0 {
                 break;
             }
-            length += stated;
+            length += count;
         }
         received.truncate(length);
         received
@@ -177,7 +178,7 @@ impl<'t> Chain<'t> {
     fn count_tiles(&mut self, mut bytes: &[u8]) -> usize {
         let before = self.tiles.len();
         while !bytes.is_empty() {
-            let (taken, frame) = self.reader.push(bytes);
+            let (consumed, frame) = self.reader.push(bytes);
             let content = frame.and_then(Result::ok);
             let message = content.map(decode::<InSession<ToDevice<'_>>>);
             if let Some(Ok(InSession {
@@ -188,24 +189,24 @@ impl<'t> Chain<'t> {
             {
                 self.tiles.push(SentTile {
                     tick: self.now,
-                    bytes: taken,
+                    bytes: consumed,
                 });
             }
-            bytes = &bytes[taken..];
+            bytes = &bytes[consumed..];
         }
         self.tiles.len() - before
     }
 
     /// Lets a tick last a millisecond, if necessary.
-    fn wait(&mut self) {
+    fn pace_tick(&mut self) {
         let is_reading = || self.terrain.raster().is_reading();
-        if self.pace == Pace::Standing {
+        if self.pace == Pace::Paused {
             while is_reading() {
-                std::thread::sleep(LOOK);
+                std::thread::sleep(POLL_INTERVAL);
             }
         } else if self.pace == Pace::Real || is_reading() {
-            std::thread::sleep(TICK.saturating_sub(self.began.elapsed()));
+            std::thread::sleep(TICK.saturating_sub(self.started.elapsed()));
         }
-        self.began = Instant::now();
+        self.started = Instant::now();
     }
 }

@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(std::fs::metadata(&path).expect("there").len(), bytes);
         assert!(bytes <= max_bytes(side), "{bytes}");
         let options = OpenOptions {
-            most_in_memory_bytes: 0,
+            max_in_memory_bytes: 0,
             ..OpenOptions::default()
         };
         let raster = Raster::open(&path, &options).expect("opens");

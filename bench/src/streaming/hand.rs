@@ -9,7 +9,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Scene, Source};
 
 use super::hip_path::HipPaths;
-use super::{CELL_MM, NotMeasured};
+use super::{CELL_MM, MeasureError};
 
 /// Depth of the HIP below the surface, cells: half a millimetre of the tip.
 const DEPTH: f64 = 10.0;
@@ -18,7 +18,7 @@ const ABOVE: f64 = 30.0;
 
 /// Replacement for a late tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Late {
+pub(super) enum LateTile {
     /// None: it is no-data.
     NoData,
     /// The fallback of the whole reach of the arm.
@@ -34,13 +34,13 @@ pub(super) struct Hand {
 
 impl Hand {
     /// Creates an arm whose tip in the home pose is at the middle of the paths.
-    pub(super) fn over(ways: &HipPaths) -> Self {
+    pub(super) fn over(paths: &HipPaths) -> Self {
         let model = PhantomModel::premium_1_5();
         let encoders = std::array::from_fn(|joint| Encoder::new(&model.drive[joint]));
         Self {
             model,
             placement: ArmFrame {
-                home_mm: ways.middle().map(|cells| cells * CELL_MM),
+                home_mm: paths.middle().map(|cells| cells * CELL_MM),
             },
             encoders,
         }
@@ -50,17 +50,21 @@ impl Hand {
     ///
     /// # Errors
     /// If the home is beyond the range of positions.
-    pub(super) fn scene(&self, terrain: &Terrain<'_>, late: Late) -> Result<Scene, NotMeasured> {
+    pub(super) fn scene(
+        &self,
+        terrain: &Terrain<'_>,
+        late_tile: LateTile,
+    ) -> Result<Scene, MeasureError> {
         let home = terrain.scale().to_grid(self.placement.home_mm);
-        let home = home.ok_or_else(|| NotMeasured("it is farther than positions reach".into()))?;
+        let home = home.ok_or_else(|| MeasureError("it is farther than positions reach".into()))?;
         let scene = Scene {
             hold_clock: false,
             materials: None,
             ..terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
         };
-        Ok(match late {
-            Late::NoData => scene,
-            Late::Fallback => {
+        Ok(match late_tile {
+            LateTile::NoData => scene,
+            LateTile::Fallback => {
                 let reach = Reach::of(&Calibration::PREMIUM_1_5);
                 terrain.underlaid(scene, reach.sides_mm())
             }
@@ -71,22 +75,26 @@ impl Hand {
     ///
     /// # Errors
     /// If the arm does not reach it.
-    pub(super) fn below(&self, place: [f64; 3]) -> Result<GuardInputs, NotMeasured> {
-        self.sense(place, -DEPTH)
+    pub(super) fn below(&self, place: [f64; 3]) -> Result<GuardInputs, MeasureError> {
+        self.inputs(place, -DEPTH)
     }
 
     /// Returns the inputs with the HIP above a point of the surface.
     ///
     /// # Errors
     /// If the arm does not reach it.
-    pub(super) fn above(&self, place: [f64; 3]) -> Result<GuardInputs, NotMeasured> {
-        self.sense(place, ABOVE)
+    pub(super) fn above(&self, place: [f64; 3]) -> Result<GuardInputs, MeasureError> {
+        self.inputs(place, ABOVE)
     }
 
-    fn sense(&self, [east, north, height]: [f64; 3], up: f64) -> Result<GuardInputs, NotMeasured> {
+    fn inputs(
+        &self,
+        [east, north, height]: [f64; 3],
+        up: f64,
+    ) -> Result<GuardInputs, MeasureError> {
         let at_mm = [east, north, height + up].map(|cells| cells * CELL_MM);
         let joints = self.placement.joints_at(&self.model, at_mm);
-        let joints = joints.map_err(|error| NotMeasured(error.to_string()))?;
+        let joints = joints.map_err(|error| MeasureError(error.to_string()))?;
         Ok(GuardInputs {
             counts: std::array::from_fn(|joint| self.encoders[joint].counts(joints[joint])),
             ..GuardInputs::default()

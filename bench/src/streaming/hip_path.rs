@@ -6,20 +6,20 @@ use std::path::Path;
 use hapterra::terrain::Terrain;
 
 use super::relief::PERIOD;
-use super::{CELL_MM, NotMeasured};
+use super::{CELL_MM, MeasureError};
 
 /// Cells between a path and the border of a field, or of the square that repeats: more than a tile
 /// and the margin around the HIP.
-const FROM_BORDER: u32 = 130;
+const BORDER_MARGIN: u32 = 130;
 /// Cells of the straight path, if the field has room for it.
-const STRAIGHT: u32 = 2800;
+const STRAIGHT_CELLS: u32 = 2800;
 /// Side of the square that the turning path crosses, cells, if there is room.
-const TURNING: u32 = 1400;
+const TURNING_SIDE: u32 = 1400;
 /// Fewest cells of a path.
-const LEAST: u32 = 200;
+const MIN_CELLS: u32 = 200;
 /// Cells after which the turning path turns by a right angle: fewer than a HIP at 2,000 cells a
 /// second covers in the time of the device's prediction.
-const LEG: u32 = 150;
+const LEG_CELLS: u32 = 150;
 /// Names of the paths in files.
 const NAMES: [&str; 2] = ["straight", "turning"];
 
@@ -35,7 +35,7 @@ pub(super) struct HipPath {
 pub(super) struct HipPaths {
     /// Along a row of tiles, from west to east.
     pub(super) straight: HipPath,
-    /// In steps: east, north, east, each [`LEG`] cells long.
+    /// In steps: east, north, east, each [`LEG_CELLS`] cells long.
     pub(super) turning: HipPath,
 }
 
@@ -58,13 +58,13 @@ impl HipPath {
     fn over(
         terrain: &Terrain<'_>,
         places: impl Iterator<Item = [u32; 2]>,
-    ) -> Result<Self, NotMeasured> {
+    ) -> Result<Self, MeasureError> {
         let on_surface = |[east, north]: [u32; 2]| {
             let [east, north] = [east, north].map(f64::from);
             let height = terrain.height_mm(east * CELL_MM, north * CELL_MM);
             let why = || {
                 let place = format!("at column {east} and row {north} from the south-west");
-                NotMeasured(format!("it has no data {place}, where the HIP would move"))
+                MeasureError(format!("it has no data {place}, where the HIP would move"))
             };
             Ok([east, north, height.ok_or_else(why)? / CELL_MM])
         };
@@ -80,24 +80,24 @@ impl HipPaths {
     ///
     /// # Errors
     /// If the terrain is too small, or has no data there.
-    pub(super) fn over(terrain: &Terrain<'_>, is_made: bool) -> Result<Self, NotMeasured> {
+    pub(super) fn over(terrain: &Terrain<'_>, is_synthetic: bool) -> Result<Self, MeasureError> {
         let size = terrain.size().map(|patches| patches as u32 + 1);
-        let room = size[0].min(size[1]).saturating_sub(2 * FROM_BORDER);
-        if room < LEAST {
-            let least = LEAST + 2 * FROM_BORDER;
+        let space = size[0].min(size[1]).saturating_sub(2 * BORDER_MARGIN);
+        if space < MIN_CELLS {
+            let min = MIN_CELLS + 2 * BORDER_MARGIN;
             let [columns, rows] = size;
-            let has = format!("{columns} × {rows} samples; the paths need {least} along each side");
-            return Err(NotMeasured(has));
+            let has = format!("{columns} × {rows} samples; the paths need {min} along each side");
+            return Err(MeasureError(has));
         }
-        let (long, side) = (STRAIGHT.min(room), TURNING.min(room));
-        let [west, south] = match is_made {
-            true => in_the_square(size, long),
+        let (long, side) = (STRAIGHT_CELLS.min(space), TURNING_SIDE.min(space));
+        let [west, south] = match is_synthetic {
+            true => corner_in_square(size, long),
             false => size.map(|samples| (samples - long) / 2),
         };
         let middle = south + long / 2;
         let steps = (0..2 * side).scan([west, south], |at, step| {
             let now = *at;
-            at[(step / LEG % 2) as usize] += 1;
+            at[(step / LEG_CELLS % 2) as usize] += 1;
             Some(now)
         });
         let inside = |at: &[u32; 2]| at[0] <= west + side && at[1] <= south + side;
@@ -122,8 +122,8 @@ impl HipPaths {
     /// If the file cannot be written.
     pub(super) fn write(&self, path: &Path) -> std::io::Result<()> {
         let mut text = String::new();
-        for (name, way) in NAMES.iter().zip([&self.straight, &self.turning]) {
-            for [east, north, height] in &way.places {
+        for (name, path) in NAMES.iter().zip([&self.straight, &self.turning]) {
+            for [east, north, height] in &path.places {
                 // Writing to a String cannot fail.
                 let _ = writeln!(text, "{name} {east} {north} {height}");
             }
@@ -135,21 +135,21 @@ impl HipPaths {
     ///
     /// # Errors
     /// If the file is missing or invalid.
-    pub(super) fn read(path: &Path) -> Result<Self, NotMeasured> {
-        let wrong = |why: String| NotMeasured(format!("{}: {why}", path.display()));
+    pub(super) fn read(path: &Path) -> Result<Self, MeasureError> {
+        let wrong = |why: String| MeasureError(format!("{}: {why}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         let place = |line: &str| {
             let mut numbers = line.split(' ').map(str::parse::<f64>);
             let mut next = || numbers.next()?.ok();
             Some([next()?, next()?, next()?])
         };
-        let ways = NAMES.map(|name| {
+        let paths = NAMES.map(|name| {
             let lines = text.lines().filter_map(|line| line.strip_prefix(name));
             let places: Option<Vec<_>> = lines.map(|line| place(line.trim_start())).collect();
             let places = places.filter(|places| places.len() > 1);
             places.map(|places| HipPath { places })
         });
-        let [Some(straight), Some(turning)] = ways else {
+        let [Some(straight), Some(turning)] = paths else {
             return Err(wrong("it has no room for two paths".into()));
         };
         Ok(Self { straight, turning })
@@ -158,8 +158,8 @@ impl HipPaths {
 
 /// Returns the south-west corner of the paths around the middle of a synthetic terrain, whose rows
 /// count from the north: the same samples in a terrain of any size with room for them.
-fn in_the_square([columns, rows]: [u32; 2], long: u32) -> [u32; 2] {
-    let first = |count: u32| count / 2 / PERIOD * PERIOD + FROM_BORDER;
+fn corner_in_square([columns, rows]: [u32; 2], long: u32) -> [u32; 2] {
+    let first = |count: u32| count / 2 / PERIOD * PERIOD + BORDER_MARGIN;
     [first(columns), rows - 1 - first(rows) - long]
 }
 
@@ -169,39 +169,39 @@ mod tests {
     use hapterra::terrain::Scale;
     use heightfield::Raster;
 
-    fn ways(columns: u32, rows: u32, is_made: bool) -> Result<HipPaths, NotMeasured> {
+    fn paths(columns: u32, rows: u32, is_synthetic: bool) -> Result<HipPaths, MeasureError> {
         let raster = Raster::from_fn(columns, rows, |x, y| x as f32 + 2.0 * y as f32);
         let raster = raster.expect("a field");
         let terrain = Terrain::new(&raster, Scale::new(CELL_MM, 1.0).expect("valid"), 0);
-        HipPaths::over(&terrain.expect("a terrain"), is_made)
+        HipPaths::over(&terrain.expect("a terrain"), is_synthetic)
     }
 
     #[test]
-    fn ways_stay_inside_and_are_read_as_they_were_written() {
-        let ways = ways(700, 640, false).expect("room");
+    fn paths_stay_inside_and_round_trip_through_a_file() {
+        let paths = paths(700, 640, false).expect("room");
         assert_eq!(
-            (ways.straight.cells(), ways.turning.cells()),
+            (paths.straight.cells(), paths.turning.cells()),
             (380.0, 680.0)
         );
-        let all = ways.straight.places.iter().chain(&ways.turning.places);
+        let all = paths.straight.places.iter().chain(&paths.turning.places);
         for [east, north, height] in all {
             assert!((130.0..=570.0).contains(east) && (130.0..=510.0).contains(north));
             assert!((height - (east + 2.0 * north) / CELL_MM).abs() < 1e-6);
         }
-        let near = ways.straight.at(7.25);
-        assert!((near[0] - ways.straight.at(7.0)[0] - 0.25).abs() < 1e-9);
-        assert_eq!(ways.straight.at(1e9), ways.straight.at(380.0));
+        let near = paths.straight.at(7.25);
+        assert!((near[0] - paths.straight.at(7.0)[0] - 0.25).abs() < 1e-9);
+        assert_eq!(paths.straight.at(1e9), paths.straight.at(380.0));
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("ways");
-        ways.write(&path).expect("written");
-        assert_eq!(HipPaths::read(&path).expect("read"), ways);
+        paths.write(&path).expect("written");
+        assert_eq!(HipPaths::read(&path).expect("read"), paths);
         std::fs::write(&path, "straight 1 2 3\nstraight 2 2").expect("written");
         assert!(HipPaths::read(&path).is_err());
     }
 
     #[test]
     fn terrain_without_room_for_the_path_is_refused_by_place() {
-        let why = ways(700, 300, false).expect_err("too narrow").to_string();
+        let why = paths(700, 300, false).expect_err("too narrow").to_string();
         assert!(why.contains("700 × 300 samples"), "{why}");
         let raster = Raster::from_fn(640, 640, |x, y| if x + y == 700 { f32::NAN } else { 1.0 });
         let raster = raster.expect("a field");
@@ -213,10 +213,10 @@ mod tests {
     #[test]
     fn straight_path_crosses_same_samples_at_every_terrain_size() {
         for side in [3168, 10_016, 31_648, 100_000] {
-            let [west, south] = in_the_square([side; 2], STRAIGHT);
-            let top = side - 1 - south - STRAIGHT;
-            assert_eq!([west % PERIOD, top % PERIOD], [FROM_BORDER; 2]);
-            assert!(top + STRAIGHT + FROM_BORDER <= side);
+            let [west, south] = corner_in_square([side; 2], STRAIGHT_CELLS);
+            let top = side - 1 - south - STRAIGHT_CELLS;
+            assert_eq!([west % PERIOD, top % PERIOD], [BORDER_MARGIN; 2]);
+            assert!(top + STRAIGHT_CELLS + BORDER_MARGIN <= side);
             // Tiles count from the south: their borders are at the same samples.
             assert_eq!(side % 32, 0);
         }

@@ -29,16 +29,16 @@ impl Line {
 
     /// Sends a tick's bytes to a reader, which returns the number of bytes it accepted; the rest
     /// waits.
-    pub(super) fn carry(&mut self, mut take: impl FnMut(&[u8]) -> usize) {
-        let mut left = self.bytes_a_tick.min(self.waiting.len());
-        while left > 0 {
+    pub(super) fn carry(&mut self, mut accept: impl FnMut(&[u8]) -> usize) {
+        let mut remaining = self.bytes_a_tick.min(self.waiting.len());
+        while remaining > 0 {
             let (chunk, _) = self.waiting.as_slices();
-            let taken = take(&chunk[..left.min(chunk.len())]);
-            if taken == 0 {
+            let accepted = accept(&chunk[..remaining.min(chunk.len())]);
+            if accepted == 0 {
                 return;
             }
-            self.waiting.drain(..taken);
-            left -= taken;
+            self.waiting.drain(..accepted);
+            remaining -= accepted;
         }
     }
 }
@@ -48,31 +48,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tick_carries_no_more_than_its_bytes_and_loses_none() {
+    fn tick_carries_at_most_its_bytes_and_loses_none() {
         let mut line = Line::new(10);
         let sent: Vec<u8> = (0..95).collect();
-        let mut came: Vec<u8> = vec![];
+        let mut received: Vec<u8> = vec![];
         let mut ticks = 0;
         line.send(&sent[..40]);
-        while came.len() < sent.len() {
-            let before = came.len();
+        while received.len() < sent.len() {
+            let before = received.len();
             // Accepts seven at a time, and nothing in every third tick.
             line.carry(|bytes| {
-                let taken = if ticks % 3 == 2 {
+                let accepted = if ticks % 3 == 2 {
                     0
                 } else {
                     bytes.len().min(7)
                 };
-                came.extend(&bytes[..taken]);
-                taken
+                received.extend(&bytes[..accepted]);
+                accepted
             });
-            assert!(came.len() - before <= 10);
+            assert!(received.len() - before <= 10);
             if ticks == 2 {
                 line.send(&sent[40..]);
             }
             ticks += 1;
         }
-        assert_eq!(came, sent);
+        assert_eq!(received, sent);
         assert_eq!(ticks, 14);
     }
 }

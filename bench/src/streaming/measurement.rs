@@ -27,9 +27,10 @@ pub struct Row {
     pub open_requests: Option<u64>,
     /// Bytes of these.
     pub open_bytes: Option<u64>,
-    /// Requests or reads from then on: a touch, and the straight path at [`USUAL`] cells a second.
+    /// Requests or reads from then on: a touch, and the straight path at [`DEFAULT_SPEED`] cells a
+    /// second.
     ///
-    /// [`USUAL`]: super::USUAL
+    /// [`DEFAULT_SPEED`]: super::DEFAULT_SPEED
     pub way_requests: Option<u64>,
     /// Bytes of these.
     pub way_bytes: Option<u64>,
@@ -37,7 +38,8 @@ pub struct Row {
     pub straight_cells: Option<u32>,
     /// Cells of the turning path.
     pub turning_cells: Option<u32>,
-    /// Tiles sent for a touch and the straight path at [`USUAL`](super::USUAL) cells a second.
+    /// Tiles sent for a touch and the straight path at [`DEFAULT_SPEED`](super::DEFAULT_SPEED)
+    /// cells a second.
     pub tiles: Option<u64>,
     /// Mean bytes of their frames.
     pub tile_bytes_mean: Option<f64>,

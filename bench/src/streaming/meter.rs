@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead as _, Write as _};
 
-use super::NotMeasured;
+use super::MeasureError;
 
 /// Requests or reads, and their bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub(super) struct Traffic {
 }
 
 /// Query on standard output, which is answered on standard input.
-pub(super) const QUESTION: &str = "seen?";
+pub(super) const TRAFFIC_QUERY: &str = "seen?";
 
 /// Counter of the traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,29 +30,29 @@ impl Meter {
     ///
     /// # Errors
     /// If the parent process does not answer.
-    pub(super) fn traffic(self) -> Result<Option<Traffic>, NotMeasured> {
+    pub(super) fn traffic(self) -> Result<Option<Traffic>, MeasureError> {
         match self {
             Self::System => Ok(read_by_this_process()),
-            Self::Server => asked().map(Some),
+            Self::Server => query_server().map(Some),
         }
     }
 }
 
-fn asked() -> Result<Traffic, NotMeasured> {
-    let ask = || -> io::Result<String> {
+fn query_server() -> Result<Traffic, MeasureError> {
+    let send_query = || -> io::Result<String> {
         let mut out = io::stdout().lock();
-        writeln!(out, "{QUESTION}")?;
+        writeln!(out, "{TRAFFIC_QUERY}")?;
         out.flush()?;
         let mut line = String::new();
         io::stdin().lock().read_line(&mut line)?;
         Ok(line)
     };
-    let line =
-        ask().map_err(|error| NotMeasured(format!("the counter does not answer: {error}")))?;
+    let line = send_query()
+        .map_err(|error| MeasureError(format!("the counter does not answer: {error}")))?;
     let mut numbers = line.split_whitespace().map(str::parse);
     match (numbers.next(), numbers.next()) {
         (Some(Ok(requests)), Some(Ok(bytes))) => Ok(Traffic { requests, bytes }),
-        _ => Err(NotMeasured(format!(
+        _ => Err(MeasureError(format!(
             "the counter does not answer: {line:?} was answered"
         ))),
     }
@@ -62,18 +62,18 @@ fn asked() -> Result<Traffic, NotMeasured> {
 fn read_by_this_process() -> Option<Traffic> {
     let text = std::fs::read_to_string("/proc/self/io").ok()?;
     Some(Traffic {
-        requests: number_behind(&text, "syscr:")?,
-        bytes: number_behind(&text, "rchar:")?,
+        requests: number_after(&text, "syscr:")?,
+        bytes: number_after(&text, "rchar:")?,
     })
 }
 
 /// Returns the peak memory of this process, bytes, as reported by Linux.
 pub(super) fn peak_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    Some(1024 * number_behind(&text, "VmHWM:")?)
+    Some(1024 * number_after(&text, "VmHWM:")?)
 }
 
-fn number_behind(text: &str, name: &str) -> Option<u64> {
+fn number_after(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     line.split_whitespace().next()?.parse().ok()
 }
@@ -83,11 +83,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_systems_tables_are_read() {
+    fn numbers_of_the_systems_tables_are_parsed() {
         let text = "Name:\tbench\nVmPeak:\t  900 kB\nVmHWM:\t   123456 kB\n";
-        assert_eq!(number_behind(text, "VmHWM:"), Some(123_456));
-        assert_eq!(number_behind(text, "VmSwap:"), None);
-        assert_eq!(number_behind("VmHWM:", "VmHWM:"), None);
+        assert_eq!(number_after(text, "VmHWM:"), Some(123_456));
+        assert_eq!(number_after(text, "VmSwap:"), None);
+        assert_eq!(number_after("VmHWM:", "VmHWM:"), None);
     }
 
     #[test]

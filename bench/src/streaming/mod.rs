@@ -25,7 +25,7 @@ mod run;
 mod server;
 mod tick_counts;
 
-pub use crate::effects::NotMeasured;
+pub use crate::effects::MeasureError;
 pub use measurement::{Reading, Row};
 pub use processes::{measure, measure_case};
 
@@ -42,7 +42,7 @@ pub const RATES: [u32; 2] = [1000, 200];
 /// Speeds at which missing ticks are counted, cells a second.
 pub const SPEEDS: [u32; 3] = [500, 2_000, 5_000];
 /// The speed of the run in which tiles and bytes are counted, cells a second.
-pub const USUAL: u32 = SPEEDS[1];
+pub const DEFAULT_SPEED: u32 = SPEEDS[1];
 
 /// Plan of the measurements.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,29 +9,29 @@ use heightfield::Raster;
 use super::case::{Case, terrain};
 use super::hip_path::HipPaths;
 use super::measurement::{Reading, Row};
-use super::meter::{QUESTION, Traffic};
+use super::meter::{TRAFFIC_QUERY, Traffic};
 use super::relief::Relief;
-use super::{NotMeasured, Plan, SIDES, cog};
+use super::{MeasureError, Plan, SIDES, cog};
 
 #[cfg(feature = "remote")]
 use super::server::Server;
 
 /// Most samples of a file that is also measured as a whole: 800 MB of them.
-const MAX_WHOLE: u64 = 200_000_000;
+const MAX_WHOLE_SAMPLES: u64 = 200_000_000;
 /// Prefix of a row on standard output of a case's process.
-const ROW: &str = "row ";
+const ROW_PREFIX: &str = "row ";
 /// Prefix of the reason for a failure.
-const WHY: &str = "why ";
+const FAILURE_PREFIX: &str = "why ";
 
 /// A measured terrain.
 struct Subject<'p> {
     name: String,
     path: PathBuf,
-    is_made: bool,
+    is_synthetic: bool,
     plan: &'p Plan,
 }
 
-/// Measures the synthetic terrains of a plan and some files. `tell` receives each start, `done`
+/// Measures the synthetic terrains of a plan and some files. `on_start` receives each start, `done`
 /// each row. A terrain that cannot be measured is reported to `warn`, and the next one is measured.
 ///
 /// # Errors
@@ -39,41 +39,41 @@ struct Subject<'p> {
 pub fn measure(
     plan: &Plan,
     files: &[PathBuf],
-    tell: &mut dyn FnMut(&str),
+    on_start: &mut dyn FnMut(&str),
     warn: &mut dyn FnMut(&str),
     done: &mut dyn FnMut(Row),
-) -> Result<(), NotMeasured> {
+) -> Result<(), MeasureError> {
     let folder = tempfile::Builder::new().prefix("hapterra-lab-").tempdir();
-    let failed = |error: std::io::Error| NotMeasured(format!("a folder for terrains: {error}"));
+    let failed = |error: std::io::Error| MeasureError(format!("a folder for terrains: {error}"));
     let folder = folder.map_err(failed)?;
     for file in files {
         let name = file.file_stem().unwrap_or(file.as_os_str());
         let subject = Subject {
             name: name.to_string_lossy().into_owned(),
             path: file.clone(),
-            is_made: false,
+            is_synthetic: false,
             plan,
         };
-        if let Err(why) = subject.measure(folder.path(), tell, done) {
+        if let Err(why) = subject.measure(folder.path(), on_start, done) {
             warn(&format!("{}: {why}", file.display()));
         }
     }
     let mut relief = None;
     for exponent in &plan.exponents {
-        let side = SIDES[(exponent - SIDES_FROM) as usize];
+        let side = SIDES[(exponent - MIN_EXPONENT) as usize];
         let path = folder.path().join(format!("made-{side}.tif"));
-        tell(&format!("{side} × {side}: made"));
-        room_for(&path, side)?;
+        on_start(&format!("{side} × {side}: made"));
+        check_free_space(&path, side)?;
         let relief = relief.get_or_insert_with(Relief::new);
-        let failed = |error| NotMeasured(format!("{}: {error}", path.display()));
+        let failed = |error| MeasureError(format!("{}: {error}", path.display()));
         cog::write(&path, side, relief).map_err(failed)?;
         let subject = Subject {
             name: format!("{side} × {side}"),
             path,
-            is_made: true,
+            is_synthetic: true,
             plan,
         };
-        if let Err(why) = subject.measure(folder.path(), tell, done) {
+        if let Err(why) = subject.measure(folder.path(), on_start, done) {
             warn(&format!("{}: {why}", subject.name));
         }
         // The next one needs its room.
@@ -83,11 +83,11 @@ pub fn measure(
 }
 
 /// The exponent of ten of the smallest synthetic terrain.
-const SIDES_FROM: u32 = 6;
+const MIN_EXPONENT: u32 = 6;
 
 /// Checks that the disk has room for a synthetic terrain. If the system does not report it, the
 /// write will show.
-fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
+fn check_free_space(path: &Path, side: u32) -> Result<(), MeasureError> {
     let needed = cog::max_bytes(side);
     let folder = path.parent().unwrap_or(path);
     match fs4::available_space(folder) {
@@ -97,7 +97,7 @@ fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
             let text = format!(
                 "a made terrain takes up to {needed:.0} MB, and {free:.0} MB are free in {folder}"
             );
-            Err(NotMeasured(text))
+            Err(MeasureError(text))
         }
         _ => Ok(()),
     }
@@ -108,32 +108,33 @@ impl Subject<'_> {
     fn measure(
         &self,
         folder: &Path,
-        tell: &mut dyn FnMut(&str),
+        on_start: &mut dyn FnMut(&str),
         done: &mut dyn FnMut(Row),
-    ) -> Result<(), NotMeasured> {
+    ) -> Result<(), MeasureError> {
         let path =
-            std::path::absolute(&self.path).map_err(|error| NotMeasured(error.to_string()))?;
-        let (ways, samples, is_whole) = self.ways()?;
+            std::path::absolute(&self.path).map_err(|error| MeasureError(error.to_string()))?;
+        let (paths, samples, is_whole) = self.paths()?;
         let file = folder.join("ways");
-        ways.write(&file)
-            .map_err(|error| NotMeasured(format!("{}: {error}", file.display())))?;
+        paths
+            .write(&file)
+            .map_err(|error| MeasureError(format!("{}: {error}", file.display())))?;
         let case = |reading, latency_ms, source: String| Case {
             terrain: self.name.clone(),
             source,
-            ways: file.display().to_string(),
+            paths_file: file.display().to_string(),
             reading,
             latency_ms,
             halvings: self.plan.halvings,
             stands_while_reading: self.plan.stands_while_reading && latency_ms == 0,
         };
         let on_disk = path.display().to_string();
-        if samples <= MAX_WHOLE && !is_whole {
-            tell(&format!("{}: read as a whole", self.name));
+        if samples <= MAX_WHOLE_SAMPLES && !is_whole {
+            on_start(&format!("{}: read as a whole", self.name));
             let whole = case(Reading::Whole, 0, on_disk.clone());
             run(&whole, &mut || None, done)?;
         }
         for latency_ms in &self.plan.latencies_ms {
-            tell(&format!("{}: {latency_ms} ms", self.name));
+            on_start(&format!("{}: {latency_ms} ms", self.name));
             if *latency_ms == 0 {
                 run(
                     &case(Reading::Blocks, 0, on_disk.clone()),
@@ -154,8 +155,8 @@ impl Subject<'_> {
         latency_ms: u32,
         case: &dyn Fn(Reading, u32, String) -> Case,
         done: &mut dyn FnMut(Row),
-    ) -> Result<(), NotMeasured> {
-        let failed = |error: std::io::Error| NotMeasured(format!("a server: {error}"));
+    ) -> Result<(), MeasureError> {
+        let failed = |error: std::io::Error| MeasureError(format!("a server: {error}"));
         let server = Server::of(path.parent().unwrap_or(path)).map_err(failed)?;
         server.set_latency_ms(latency_ms);
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -170,84 +171,84 @@ impl Subject<'_> {
         latency_ms: u32,
         _: &dyn Fn(Reading, u32, String) -> Case,
         _: &mut dyn FnMut(Row),
-    ) -> Result<(), NotMeasured> {
+    ) -> Result<(), MeasureError> {
         let text = format!(
             "{latency_ms} ms need a web server, which this build has not: build it with --features remote"
         );
-        Err(NotMeasured(text))
+        Err(MeasureError(text))
     }
 
     /// Returns the paths over the terrain, its number of samples, and true if it is always read as
     /// a whole.
-    fn ways(&self) -> Result<(HipPaths, u64, bool), NotMeasured> {
+    fn paths(&self) -> Result<(HipPaths, u64, bool), MeasureError> {
         let options = Case::options(Reading::Blocks);
         let raster = Raster::open(&self.path, &options);
-        let raster = raster.map_err(|error| NotMeasured(error.to_string()))?;
+        let raster = raster.map_err(|error| MeasureError(error.to_string()))?;
         let samples = u64::from(raster.columns()) * u64::from(raster.rows());
-        let ways = HipPaths::over(&terrain(&raster)?, self.is_made)?;
-        Ok((ways, samples, raster.is_known_whole()))
+        let paths = HipPaths::over(&terrain(&raster)?, self.is_synthetic)?;
+        Ok((paths, samples, raster.is_summary_complete()))
     }
 }
 
 /// Runs a case in a process of its own.
 fn run(
     case: &Case,
-    seen: &mut dyn FnMut() -> Option<Traffic>,
+    traffic: &mut dyn FnMut() -> Option<Traffic>,
     done: &mut dyn FnMut(Row),
-) -> Result<(), NotMeasured> {
-    let failed = |error: std::io::Error| NotMeasured(format!("a process of its own: {error}"));
+) -> Result<(), MeasureError> {
+    let failed = |error: std::io::Error| MeasureError(format!("a process of its own: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
     let mut child = Command::new(program)
-        .args(["streaming", "--case", &written(case)?])
+        .args(["streaming", "--case", &to_line(case)?])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
         .map_err(failed)?;
     let (mut to, from) = (child.stdin.take(), child.stdout.take());
     let mut why = None;
-    for line in BufReader::new(from.ok_or_else(|| NotMeasured("no pipe".into()))?).lines() {
+    for line in BufReader::new(from.ok_or_else(|| MeasureError("no pipe".into()))?).lines() {
         let line = line.map_err(failed)?;
-        if line == QUESTION {
-            answer(to.as_mut(), seen().unwrap_or_default()).map_err(failed)?;
-        } else if let Some(row) = line.strip_prefix(ROW) {
-            done(read(row)?);
-        } else if let Some(text) = line.strip_prefix(WHY) {
+        if line == TRAFFIC_QUERY {
+            answer(to.as_mut(), traffic().unwrap_or_default()).map_err(failed)?;
+        } else if let Some(row) = line.strip_prefix(ROW_PREFIX) {
+            done(from_line(row)?);
+        } else if let Some(text) = line.strip_prefix(FAILURE_PREFIX) {
             why = Some(text.to_owned());
         }
     }
     let status = child.wait().map_err(failed)?;
     match (status.success(), why) {
         (true, None) => Ok(()),
-        (_, Some(why)) => Err(NotMeasured(why)),
-        (false, None) => Err(NotMeasured(format!("its process ended with {status}"))),
+        (_, Some(why)) => Err(MeasureError(why)),
+        (false, None) => Err(MeasureError(format!("its process ended with {status}"))),
     }
 }
 
-fn answer(to: Option<&mut ChildStdin>, seen: Traffic) -> std::io::Result<()> {
+fn answer(to: Option<&mut ChildStdin>, traffic: Traffic) -> std::io::Result<()> {
     let Some(to) = to else {
         return Ok(());
     };
-    writeln!(to, "{} {}", seen.requests, seen.bytes)
+    writeln!(to, "{} {}", traffic.requests, traffic.bytes)
 }
 
 /// Measures the case of this process, and writes the rows or the failure to standard output.
 ///
 /// # Errors
 /// If the case cannot be parsed; a failed measurement is written instead.
-pub fn measure_case(case: &str) -> Result<(), NotMeasured> {
-    let case: Case = read(case)?;
-    let measured = case.measure(|row| match written(&row) {
-        Ok(row) => println!("{ROW}{row}"),
-        Err(why) => println!("{WHY}{why}"),
+pub fn measure_case(case: &str) -> Result<(), MeasureError> {
+    let case: Case = from_line(case)?;
+    let measured = case.measure(|row| match to_line(&row) {
+        Ok(row) => println!("{ROW_PREFIX}{row}"),
+        Err(why) => println!("{FAILURE_PREFIX}{why}"),
     });
     if let Err(why) = measured {
-        println!("{WHY}{}", why.to_string().replace('\n', " "));
+        println!("{FAILURE_PREFIX}{}", why.to_string().replace('\n', " "));
     }
     Ok(())
 }
 
 /// Returns a value as a line of CSV.
-fn written(value: &impl serde::Serialize) -> Result<String, NotMeasured> {
+fn to_line(value: &impl serde::Serialize) -> Result<String, MeasureError> {
     let mut writer = csv::WriterBuilder::new()
         .has_headers(false)
         .from_writer(vec![]);
@@ -257,18 +258,18 @@ fn written(value: &impl serde::Serialize) -> Result<String, NotMeasured> {
             .into_inner()
             .map_err(|error| error.into_error().into())
     });
-    let line = line.map_err(|error| NotMeasured(error.to_string()))?;
+    let line = line.map_err(|error| MeasureError(error.to_string()))?;
     Ok(String::from_utf8_lossy(&line).trim_end().to_owned())
 }
 
-/// Parses a line from [`written`].
-fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, NotMeasured> {
+/// Parses a line from [`to_line`].
+fn from_line<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, MeasureError> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .from_reader(line.as_bytes());
     let row = reader.deserialize().next();
-    let row = row.ok_or_else(|| NotMeasured("an empty line".into()))?;
-    row.map_err(|error| NotMeasured(format!("{line:?}: {error}")))
+    let row = row.ok_or_else(|| MeasureError("an empty line".into()))?;
+    row.map_err(|error| MeasureError(format!("{line:?}: {error}")))
 }
 
 #[cfg(test)]
@@ -284,20 +285,20 @@ mod tests {
             missing_turning_5000: Some(7),
             ..Row::default()
         };
-        let line = written(&row).expect("a line");
+        let line = to_line(&row).expect("a line");
         assert_eq!(line.lines().count(), 1);
-        assert_eq!(read::<Row>(&line).expect("a row"), row);
+        assert_eq!(from_line::<Row>(&line).expect("a row"), row);
         let case = Case {
             terrain: "x".into(),
             source: "/a folder/b,c.tif".into(),
-            ways: "ways".into(),
+            paths_file: "ways".into(),
             reading: Reading::Whole,
             latency_ms: 20,
             halvings: 7,
             stands_while_reading: true,
         };
-        let line = written(&case).expect("a line");
-        assert_eq!(read::<Case>(&line).expect("a case"), case);
-        assert!(read::<Case>("nothing").is_err());
+        let line = to_line(&case).expect("a line");
+        assert_eq!(from_line::<Case>(&line).expect("a case"), case);
+        assert!(from_line::<Case>("nothing").is_err());
     }
 }

@@ -115,14 +115,14 @@ impl Shared {
         }
         let mut file = File::open(self.folder.join(name))?;
         let len = file.metadata()?.len();
-        let asked = request
+        let requested = request
             .headers()
             .iter()
             .find(|header| header.field.equiv("Range"));
-        let asked = asked
+        let requested = requested
             .map(|header| range(header.value.as_str(), len))
             .transpose()?;
-        let [from, to] = asked.unwrap_or([0, len]);
+        let [from, to] = requested.unwrap_or([0, len]);
         let mut bytes = vec![];
         if *request.method() != Method::Head {
             file.seek(SeekFrom::Start(from))?;
@@ -133,11 +133,11 @@ impl Shared {
             header("Accept-Ranges", "bytes"),
             header("ETag", &format!("\"{len}\"")),
         ];
-        if asked.is_some() {
+        if requested.is_some() {
             let place = format!("bytes {from}-{}/{len}", to.saturating_sub(1));
             headers.push(header("Content-Range", &place));
         }
-        let status = if asked.is_some() { 206 } else { 200 };
+        let status = if requested.is_some() { 206 } else { 200 };
         let length = Some((to - from) as usize);
         let body = Cursor::new(bytes);
         let response = Response::new(
@@ -156,9 +156,9 @@ fn header(name: &str, value: &str) -> Option<Header> {
 }
 
 /// Returns the range in `bytes=FROM-TO` or `bytes=FROM-`, of `len` bytes, without its end.
-fn range(asked: &str, len: u64) -> io::Result<[u64; 2]> {
+fn range(requested: &str, len: u64) -> io::Result<[u64; 2]> {
     let wrong = || io::Error::from(io::ErrorKind::InvalidInput);
-    let ends = asked.strip_prefix("bytes=").ok_or_else(wrong)?;
+    let ends = requested.strip_prefix("bytes=").ok_or_else(wrong)?;
     let (from, to) = ends.split_once('-').ok_or_else(wrong)?;
     let from: u64 = from.parse().map_err(|_| wrong())?;
     let to = match to {
@@ -178,7 +178,7 @@ mod tests {
     use std::io::Write as _;
     use std::net::TcpStream;
 
-    fn asked(server: &Server, request: &str) -> String {
+    fn send_request(server: &Server, request: &str) -> String {
         let address = server.url.trim_start_matches("http://");
         let mut stream = TcpStream::connect(address).expect("it listens");
         write!(
@@ -196,24 +196,24 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("a.tif"), "0123456789").expect("written");
         let server = Server::of(folder.path()).expect("a port");
-        let part = asked(&server, "GET /a.tif HTTP/1.1\r\nRange: bytes=2-4");
+        let part = send_request(&server, "GET /a.tif HTTP/1.1\r\nRange: bytes=2-4");
         assert!(
             part.starts_with("HTTP/1.1 206") && part.ends_with("\r\n\r\n234"),
             "{part}"
         );
         assert!(part.contains("Content-Range: bytes 2-4/10"), "{part}");
-        let end = asked(&server, "GET /a.tif HTTP/1.1\r\nRange: bytes=8-99");
+        let end = send_request(&server, "GET /a.tif HTTP/1.1\r\nRange: bytes=8-99");
         assert!(end.ends_with("\r\n\r\n89"), "{end}");
         let counted = Traffic {
             requests: 2,
             bytes: 5,
         };
         assert_eq!(server.traffic(), counted);
-        let beyond = asked(&server, "GET /a.tif HTTP/1.1\r\nRange: bytes=10-11");
+        let beyond = send_request(&server, "GET /a.tif HTTP/1.1\r\nRange: bytes=10-11");
         assert!(beyond.starts_with("HTTP/1.1 416"), "{beyond}");
         for name in ["/b.tif", "/../a.tif", "/.hidden"] {
-            let gone = asked(&server, &format!("GET {name} HTTP/1.1"));
-            assert!(gone.starts_with("HTTP/1.1 404"), "{gone}");
+            let missing = send_request(&server, &format!("GET {name} HTTP/1.1"));
+            assert!(missing.starts_with("HTTP/1.1 404"), "{missing}");
         }
     }
 }

@@ -10,7 +10,7 @@ use hapterra_tests::timeouts::end_of;
 use super::{Line, lines, pages, words};
 
 /// Words of lines that a test cannot run.
-const ELSEWHERE: [&str; 8] = [
+const PATHS_OUTSIDE: [&str; 8] = [
     "usb",
     "tcp:",
     "://",
@@ -83,7 +83,7 @@ fn run(folder: &Path, words: &[String]) -> Result<(), String> {
 /// Returns the words to run a line with; `None` if a test cannot run it.
 fn runnable(line: &Line) -> Option<Vec<String>> {
     let mut words = words(&line.text);
-    let is_elsewhere = |word: &String| ELSEWHERE.iter().any(|part| word.contains(part));
+    let is_elsewhere = |word: &String| PATHS_OUTSIDE.iter().any(|part| word.contains(part));
     let command = words
         .get(1)
         .filter(|word| RUN.contains(&word.as_str()))?

@@ -11,7 +11,7 @@ use hapterra_lab::{report, tick_states};
 /// machines round sines differently.
 const OFF: f64 = 0.02;
 
-fn kept() -> Vec<csv::StringRecord> {
+fn recorded() -> Vec<csv::StringRecord> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/effects.csv");
     let mut table = csv::Reader::from_path(file).expect("it is kept");
     assert_eq!(
@@ -26,10 +26,10 @@ fn number(text: &str) -> f64 {
 }
 
 #[test]
-fn the_kept_errors_are_those_of_the_code_as_it_is() {
-    let kept = kept();
+fn recorded_errors_match_the_code() {
+    let recorded = recorded();
     let measured = errors(&tick_states::terrain(), Effort::FULL).expect("in reach");
-    let count = kept.iter().filter(|row| &row[3] != "tick").count();
+    let count = recorded.iter().filter(|row| &row[3] != "tick").count();
     assert_eq!(
         count,
         measured.len(),
@@ -37,7 +37,7 @@ fn the_kept_errors_are_those_of_the_code_as_it_is() {
     );
     let is_kept = |error: &Error| {
         let names = [&error.terrain, error.path, error.effect, error.what];
-        let row = kept.iter().find(|row| row.iter().take(4).eq(names));
+        let row = recorded.iter().find(|row| row.iter().take(4).eq(names));
         let Some(row) = row else {
             return false;
         };
@@ -56,8 +56,8 @@ fn the_kept_errors_are_those_of_the_code_as_it_is() {
 }
 
 #[test]
-fn the_kept_errors_are_below_what_they_may_be() {
-    let rows = kept();
+fn recorded_errors_are_below_their_bounds() {
+    let rows = recorded();
     let is_kept = |effect: &Effect| {
         let is = |row: &&csv::StringRecord| &row[2] == effect.name() && &row[3] == "tick";
         rows.iter().filter(is).count() == 2
@@ -74,7 +74,7 @@ fn effects_csv_has_every_measured_row() {
     let effort = Effort {
         ticks: 400,
         rounds: 1,
-        judged: 0,
+        compared: 0,
     };
     let measured = measure(&grid, effort).expect("in reach");
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("effects.csv");

@@ -6,7 +6,7 @@ use hapterra_lab::compare::{Error, Family, Label, Row};
 use hapterra_lab::report;
 
 /// Returns the stored figures as measured; names live as long as the program.
-fn kept() -> Vec<Row> {
+fn recorded() -> Vec<Row> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bench.csv");
     let mut table = csv::Reader::from_path(file).expect("it is kept");
     assert_eq!(table.headers().expect("a header"), &report::HEADER[..]);
@@ -50,9 +50,9 @@ fn kept() -> Vec<Row> {
 }
 
 #[test]
-fn it_is_drawn_from_the_kept_figures() {
+fn picture_is_drawn_from_recorded_figures() {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bench.png");
-    report::draw(&kept(), &file).expect("it is drawn");
+    report::draw(&recorded(), &file).expect("it is drawn");
     let written = std::fs::read(file).expect("it is there");
     assert!(written.starts_with(b"\x89PNG") && written.len() > 20_000);
 }

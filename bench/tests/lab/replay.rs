@@ -22,7 +22,7 @@ fn rows(recording: &str) -> Vec<&str> {
 }
 
 #[test]
-fn rule_of_the_paper_is_stated_recorded_and_replayed() {
+fn paper_rule_is_printed_recorded_and_replayed() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     terrain_file(&folder.join("hills.tif"), Kind::Fractal, 64, 1);
@@ -43,8 +43,8 @@ fn rule_of_the_paper_is_stated_recorded_and_replayed() {
     assert_ne!(rows(&swept), rows(&paper));
     assert!(paper.contains("paper") && !swept.contains("paper"));
     // A recording has its own rule, and a stated one has priority.
-    let again = replay(folder, "paper.csv", "again.csv", &[]);
-    assert_eq!(rows(&again), rows(&paper));
+    let repeated = replay(folder, "paper.csv", "again.csv", &[]);
+    assert_eq!(rows(&repeated), rows(&paper));
     let other = replay(folder, "paper.csv", "other.csv", &["--contact", "swept"]);
     assert_eq!(rows(&other), rows(&swept));
 }

@@ -16,7 +16,7 @@ fn rows(path: &Path) -> Vec<Row> {
     table.deserialize().map(|row| row.expect("a row")).collect()
 }
 
-fn kept() -> Vec<Row> {
+fn recorded() -> Vec<Row> {
     rows(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/streaming.csv"))
 }
 
@@ -41,8 +41,8 @@ fn streaming_cost_is_independent_of_terrain_size() {
     let rows = rows(&csv);
     let of = |samples: u64, link: u32| {
         let is = |row: &&Row| {
-            let shown = (row.samples, row.link_kb_per_s, row.reading);
-            shown == (samples, link, Reading::Blocks)
+            let key = (row.samples, row.link_kb_per_s, row.reading);
+            key == (samples, link, Reading::Blocks)
         };
         rows.iter().find(is).expect("measured")
     };
@@ -67,8 +67,8 @@ fn streaming_cost_is_independent_of_terrain_size() {
         // A fallback avoids no-data at any speed, and a slow hand never needs it.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.coarse();
-            let seen = [straight, turning, row.no_data_over_fallback];
-            assert_eq!(seen, [Some(0); 3], "{row:?}");
+            let shares = [straight, turning, row.no_data_over_fallback];
+            assert_eq!(shares, [Some(0); 3], "{row:?}");
         }
         let held = |row: &Row| [row.held_straight, row.held_turning];
         assert_eq!(held(small), held(large));
@@ -146,8 +146,8 @@ fn latencies_without_remote_feature_are_refused_with_hint() {
 }
 
 #[test]
-fn kept_figures_cover_all_sizes_and_latencies_within_bounds() {
-    let rows = kept();
+fn recorded_figures_cover_all_sizes_and_latencies() {
+    let rows = recorded();
     for side in SIDES {
         for latency in LATENCIES_MS {
             for link in RATES {
@@ -172,9 +172,9 @@ fn kept_figures_cover_all_sizes_and_latencies_within_bounds() {
 }
 
 #[test]
-fn the_picture_is_drawn_from_the_kept_figures() {
+fn picture_is_drawn_from_recorded_figures() {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("streaming.png");
-    report::draw_streaming(&kept(), &file).expect("it is drawn");
+    report::draw_streaming(&recorded(), &file).expect("it is drawn");
     let written = std::fs::read(file).expect("it is there");
     assert!(written.starts_with(b"\x89PNG") && written.len() > 20_000);
 }

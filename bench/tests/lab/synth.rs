@@ -20,7 +20,7 @@ fn output_text(output: &Output) -> String {
 }
 
 #[test]
-fn file_is_that_of_the_library() {
+fn file_equals_that_of_the_library() {
     let folder = tempfile::tempdir().expect("a folder");
     let [here, there] = ["a.tif", "b.tif"].map(|name| folder.path().join(name));
     let made = synth(&["crater", "--size", "40", "--seed", "3"], &here);
@@ -31,15 +31,15 @@ fn file_is_that_of_the_library() {
 }
 
 #[test]
-fn terrain_that_no_disk_holds_is_refused_before_it_is_written() {
+fn terrain_too_large_for_the_disk_is_refused_before_writing() {
     let folder = tempfile::tempdir().expect("a folder");
     let huge = ["plane", "--size", "4000000000x4000000000"];
     let refused = synth(&huge, &folder.path().join("huge.tif"));
-    let stated = output_text(&refused);
-    assert_eq!(refused.status.code(), Some(1), "{stated}");
+    let output = output_text(&refused);
+    assert_eq!(refused.status.code(), Some(1), "{output}");
     assert!(
-        stated.contains("GB are free") && stated.contains("hint:"),
-        "{stated}"
+        output.contains("GB are free") && output.contains("hint:"),
+        "{output}"
     );
     assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
 }
@@ -50,18 +50,18 @@ fn file_name_reaches_the_terminal_without_control_characters() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("x\u{1b}]0;owned\u{7}\u{202e}.tif");
     let made = synth(&["plane", "--size", "8"], &file);
-    let stated = output_text(&made);
+    let output = output_text(&made);
     assert!(
-        made.status.success() && stated.contains("wrote"),
-        "{stated}"
+        made.status.success() && output.contains("wrote"),
+        "{output}"
     );
     let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-    assert!(!stated.contains(controls), "{stated:?}");
+    assert!(!output.contains(controls), "{output:?}");
 }
 
 #[cfg(unix)]
 #[test]
-fn report_that_cannot_be_printed_is_a_failure() {
+fn unprintable_report_is_a_failure() {
     let folder = tempfile::tempdir().expect("a folder");
     let full = std::fs::File::options().write(true).open("/dev/full");
     let mut command = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"));
@@ -76,7 +76,7 @@ fn report_that_cannot_be_printed_is_a_failure() {
 /// Its name is that of a killed command's partial file: no step waits for a writer of the pipe.
 #[cfg(unix)]
 #[test]
-fn pipe_named_as_a_partial_file_holds_nothing_up() {
+fn pipe_named_as_a_partial_file_does_not_block() {
     let folder = tempfile::tempdir().expect("a folder");
     let pipe = folder.path().join("out.tif.a1B2c3.partial");
     let made = Command::new("mkfifo").arg(&pipe).status();

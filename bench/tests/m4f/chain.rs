@@ -22,11 +22,11 @@ use super::table::{Row, Target, Tick};
 const APPROACH: usize = 50;
 
 /// The tick before which tiles arrive and begin to blend.
-const LATE: Option<usize> = Some(APPROACH);
+const ARRIVAL: Option<usize> = Some(APPROACH);
 /// Height of the fallback above the tiles, motion of the surface in a tick, and ticks of a blend.
-const UNDER_MM: f64 = 3.0;
+const FALLBACK_HEIGHT_MM: f64 = 3.0;
 const STEP_MM: f64 = 0.05;
-const SETTLES: usize = 60;
+const BLEND_TICKS: usize = 60;
 /// Number of blends.
 const RUNS: u32 = 20;
 
@@ -39,7 +39,7 @@ impl Samples for Under<'_> {
     }
 
     fn under(&self, column: i32, row: i32) -> f32 {
-        self.sample(column, row) + UNDER_MM as f32
+        self.sample(column, row) + FALLBACK_HEIGHT_MM as f32
     }
 }
 
@@ -231,13 +231,13 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             board,
             "chain, sliding, settling",
             in_the_air,
-            (arm.scene(), LATE),
+            (arm.scene(), ARRIVAL),
         ),
         arm.settling(
             board,
             "chain, sliding, settling, all effects",
             in_the_air,
-            (all.1, LATE),
+            (all.1, ARRIVAL),
         ),
         row(
             "chain, resting",
@@ -286,7 +286,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             board,
             "chain, sliding, settling, controller",
             in_the_air,
-            (controlled(arm.scene()), LATE),
+            (controlled(arm.scene()), ARRIVAL),
         ),
         each_controlled(
             "chain, resting, controller",
@@ -348,9 +348,9 @@ impl<'g> Arm<'g> {
         with_params(arm, |params| with_controller(params, Controller::Off))
     }
 
-    /// Slides over the fallback, which is [`UNDER_MM`] off, at half a cell a tick, once in each of
-    /// several directions. Counts the ticks from the arrival of tiles to the end of the blend, or
-    /// as many without tiles.
+    /// Slides over the fallback, which is [`FALLBACK_HEIGHT_MM`] off, at half a cell a tick, once
+    /// in each of several directions. Counts the ticks from the arrival of tiles to the end of the
+    /// blend, or as many without tiles.
     fn settling(
         &self,
         board: &CountingBoard,
@@ -374,13 +374,13 @@ impl<'g> Arm<'g> {
             ..scene
         };
         let field = Under(GridSamples(self.grid));
-        let counted = APPROACH..APPROACH + SETTLES;
+        let counted = APPROACH..APPROACH + BLEND_TICKS;
         let runs = (0..RUNS).flat_map(|run| {
             let heading = f64::from(run) * 0.7;
             let along = |tick: usize| 0.5 * (tick as f64 - 0.5 * counted.end as f64);
             let surface = |tick: usize| match late {
-                Some(late) => UNDER_MM - STEP_MM * tick.saturating_sub(late) as f64,
-                None => UNDER_MM,
+                Some(late) => FALLBACK_HEIGHT_MM - STEP_MM * tick.saturating_sub(late) as f64,
+                None => FALLBACK_HEIGHT_MM,
             };
             let above = |tick: usize| 2.0 * (1.0 - tick as f64 / APPROACH as f64) - 0.4;
             let counts: Vec<_> = (0..counted.end)
@@ -397,7 +397,7 @@ impl<'g> Arm<'g> {
         let there = runs.filter(|(_, tick)| tick.state == touching && tick.converged);
         let there: Vec<Tick> = there.map(|(index, tick)| Tick::of(&tick, index)).collect();
         assert!(
-            there.len() > RUNS as usize * SETTLES * 9 / 10,
+            there.len() > RUNS as usize * BLEND_TICKS * 9 / 10,
             "{name}: {}",
             there.len()
         );

@@ -71,7 +71,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     );
     // As far as a device's window reaches.
     let wide = Grid::fractal("512 × 512", [512, 512], 6, 1.0);
-    let sweeps = path::sweeps(&wide, "", 500.0, TICKS).expect("500 cells fit");
+    let sweeps = path::sweep(&wide, "", 500.0, TICKS).expect("500 cells fit");
     let sweeps: Vec<Step> = every(&sweeps.hips);
     rows.push(row(
         board,
@@ -84,7 +84,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     // Beyond it the tiles are missing, and the path stops.
     let long = Grid::fractal("5120 × 64", [5120, 64], 6, 1.0);
     let near = tiles(FieldSize::new(512, 64));
-    let (state, steps) = ("sweep 5000, held up", far(&long));
+    let (state, steps) = ("sweep 5000, held up", sweep_5000(&long));
     rows.push(row(board, &long, state, &steps, near, scene(&long)));
     rows
 }
@@ -137,7 +137,7 @@ fn every(hips: &[Hip]) -> Vec<Step> {
 }
 
 /// Returns a path down at the western end, then 5,000 cells east at once, and back.
-fn far(grid: &Grid) -> Vec<Step> {
+fn sweep_5000(grid: &Grid) -> Vec<Step> {
     let sky = f64::from(grid.top()) + 2.0;
     let mut random = path::Random(16);
     let mut steps = Vec::new();

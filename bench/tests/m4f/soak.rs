@@ -22,7 +22,7 @@ pub(crate) const PART: u64 = 1000;
 /// Scenes that the emulated processor replays in one run.
 const BATCH: usize = 20;
 /// Least number of scenes of every kind of terrain.
-const OF_EACH: usize = 30;
+const MIN_SCENES: usize = 30;
 /// Most instructions of a tick of the contact on any scene: with the chain around it, a tick at 10
 /// kHz then fits a processor of 168 MHz.
 const MAX: u32 = 12_000;
@@ -40,9 +40,9 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
         max: Some(MAX),
         ..Target::default()
     };
-    let row = |name: &str, wanted: &dyn Fn(&CountedScene) -> bool| {
-        let own: Vec<&CountedScene> = counted.iter().filter(|scene| wanted(scene)).collect();
-        assert!(own.len() >= OF_EACH, "{name}: {} scenes", own.len());
+    let row = |name: &str, requested: &dyn Fn(&CountedScene) -> bool| {
+        let own: Vec<&CountedScene> = counted.iter().filter(|scene| requested(scene)).collect();
+        assert!(own.len() >= MIN_SCENES, "{name}: {} scenes", own.len());
         let ticks = own.iter().flat_map(|scene| scene.ticks.iter().copied());
         let row = Row::new(name, target, ticks.collect());
         if scenes < ALL { row.of_a_part() } else { row }
@@ -91,7 +91,7 @@ fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
 
 /// Replays the scenes on all cores, and those with the costliest known ticks.
 fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedScene> {
-    let [smooth, rough] = Table::kept_scenes();
+    let [smooth, rough] = Table::recorded_scenes();
     let mut costliest = match surface {
         Surface::Smooth => smooth,
         Surface::Rough => rough,

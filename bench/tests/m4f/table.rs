@@ -8,10 +8,10 @@ use hapterra_tests::repository;
 
 /// The stored table, in the repository.
 const TABLE: &str = "bench/instructions-m4f.csv";
-/// A count above the stored one by more than this share, and by more than [`LEEWAY`] instructions,
-/// is a regression: another compiler may need a few more.
+/// A count above the stored one by more than this share, and by more than [`TOLERANCE_COUNT`]
+/// instructions, is a regression: another compiler may need a few more.
 const TOLERANCE: f64 = 0.05;
-const LEEWAY: f64 = 10.0;
+const TOLERANCE_COUNT: f64 = 10.0;
 /// Least work of the ticks from which the cost of a unit is computed: in shorter ones the constant
 /// part would weigh as much as the units.
 const UNITS: u32 = 8;
@@ -123,8 +123,8 @@ impl Row {
         assert!(ticks.len() >= 100, "{state}: {} ticks", ticks.len());
         let long = || ticks.iter().filter(|tick| tick.units >= UNITS).copied();
         let by_cost = |a: &Tick, b: &Tick| a.per_unit().total_cmp(&b.per_unit());
-        let (least, most) = (long().min_by(by_cost), long().max_by(by_cost));
-        let per_unit = least.zip(most).map(|(least, most)| [least, most]);
+        let (min, max) = (long().min_by(by_cost), long().max_by(by_cost));
+        let per_unit = min.zip(max).map(|(min, max)| [min, max]);
         let of_cycles = |of: fn(&Cycles) -> u32| {
             let mut cycles: Vec<u32> = ticks.iter().map(|tick| of(&tick.cycles)).collect();
             cycles.sort_unstable();
@@ -180,14 +180,14 @@ impl fmt::Display for Row {
                 write!(f, " {name} ≤ {target} {verdict}")?;
             }
         }
-        let Some([least, most]) = self.per_unit else {
+        let Some([min, max]) = self.per_unit else {
             return Ok(());
         };
         write!(f, "\n        worst: {}", self.worst)?;
-        let [from, to] = [least, most].map(|tick| tick.per_unit());
+        let [from, to] = [min, max].map(|tick| tick.per_unit());
         write!(
             f,
-            "\n        a unit: {from:.0} to {to:.0} instructions, most: {most}"
+            "\n        a unit: {from:.0} to {to:.0} instructions, most: {max}"
         )
     }
 }
@@ -202,7 +202,7 @@ pub(crate) struct Table(Vec<(String, [f64; 3])>);
 
 impl Table {
     /// Reads the stored table.
-    pub(crate) fn kept() -> Self {
+    pub(crate) fn recorded() -> Self {
         let mut table =
             csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
         let rows = table.records().map(|row| {
@@ -215,7 +215,7 @@ impl Table {
 
     /// Returns the scenes of the stress test with the costliest ticks of all and of each kind:
     /// without friction, and with.
-    pub(crate) fn kept_scenes() -> [Vec<u64>; 2] {
+    pub(crate) fn recorded_scenes() -> [Vec<u64>; 2] {
         let mut table =
             csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
         let rows = table.records().map(|row| row.expect("a row"));
@@ -239,26 +239,28 @@ impl Table {
 
     /// Returns a message for each count above the table's allowance, or above a target that the
     /// table meets.
-    pub(crate) fn worse(&self, rows: &[Row]) -> Vec<String> {
-        rows.iter().flat_map(|row| self.worse_row(row)).collect()
+    pub(crate) fn regressions(&self, rows: &[Row]) -> Vec<String> {
+        rows.iter()
+            .flat_map(|row| self.row_regressions(row))
+            .collect()
     }
 
-    fn worse_row(&self, row: &Row) -> Vec<String> {
-        let kept = self.0.iter().find(|(state, _)| *state == row.state);
-        let Some((_, kept)) = kept else {
+    fn row_regressions(&self, row: &Row) -> Vec<String> {
+        let recorded = self.0.iter().find(|(state, _)| *state == row.state);
+        let Some((_, recorded)) = recorded else {
             return vec![format!("{}: not in the table", row.state)];
         };
         let binding = if row.is_part { 2..3 } else { 0..3 };
         let is_worse = |i: &usize| {
-            let (count, kept) = (f64::from(row.counts[*i]), kept[*i]);
+            let (count, recorded) = (f64::from(row.counts[*i]), recorded[*i]);
             let target = row.target[*i].map_or(f64::INFINITY, f64::from);
-            let misses = kept <= target && count > target;
-            misses || (count > kept * (1.0 + TOLERANCE) && count > kept + LEEWAY)
+            let misses = recorded <= target && count > target;
+            misses || (count > recorded * (1.0 + TOLERANCE) && count > recorded + TOLERANCE_COUNT)
         };
         let reported = |i: usize| {
-            let (name, count, kept) = (COUNTS[i], row.counts[i], kept[i]);
+            let (name, count, recorded) = (COUNTS[i], row.counts[i], recorded[i]);
             format!(
-                "{}: {name} {count} instructions, {kept} in the table",
+                "{}: {name} {count} instructions, {recorded} in the table",
                 row.state
             )
         };

@@ -17,17 +17,17 @@ use crate::remote::{is_missing, neighbour};
 pub(super) use pam::Notes;
 pub(super) use prj::reference_system;
 pub(super) use unused_files::remark_unread;
-pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
+pub(super) use world_file::{apply_world_file, remark_other_place};
 
 /// Max size of a neighbour that is text; a longer file is something else.
 const MAX_TEXT: u64 = 1 << 20;
 
 /// First bytes of GDAL's metadata files.
-const NOTES: &[u8] = b"<PAMDataset";
+const PAM_ROOT: &[u8] = b"<PAMDataset";
 
 /// Extensions of all neighbours that a format reads: [`find`] accepts no others, so an output
 /// cannot replace a file that [`files_read_with`] does not list.
-const NEIGHBOURS: [&str; 13] = [
+const NEIGHBOUR_EXTENSIONS: [&str; 13] = [
     "hdr", "prj", "msk", "ovr", "aux.xml", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw",
     "pgwx",
 ];
@@ -35,11 +35,11 @@ const NEIGHBOURS: [&str; 13] = [
 /// Returns a terrain file and the files beside it that are read with it.
 #[must_use]
 pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
-    let beside = NEIGHBOURS
+    let neighbours = NEIGHBOUR_EXTENSIONS
         .iter()
         .flat_map(|extension| candidates(path, extension));
-    let there = beside.filter(|other| other != path && other.is_file());
-    std::iter::once(path.to_owned()).chain(there).collect()
+    let existing = neighbours.filter(|other| other != path && other.is_file());
+    std::iter::once(path.to_owned()).chain(existing).collect()
 }
 
 /// Returns the names of the files beside a URL that belong to it. For a TIFF, only three are tried,
@@ -47,31 +47,31 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
 pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, RasterError> {
     let ends = match input.extension() {
         "tif" | "tiff" => &["msk", "ovr", "aux.xml"][..],
-        _ => &NEIGHBOURS[..],
+        _ => &NEIGHBOUR_EXTENSIONS[..],
     };
-    look_for(input, ends.iter().copied());
+    prefetch_files(input, ends.iter().copied());
     let mut names = Vec::new();
-    for beside in ends.iter().flat_map(|end| neighbour(url, end)) {
-        let found = elsewhere(url, &[beside], input)?;
+    for name in ends.iter().flat_map(|end| neighbour(url, end)) {
+        let found = find_at_url(url, &[name], input)?;
         names.extend(found.map(|found| found.name().to_owned()));
     }
     Ok(names)
 }
 
 /// Prefetches files with these extensions: on a server, all at once.
-fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
+fn prefetch_files(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
     if let Data::Remote(_, url) = input.data() {
         let urls: Vec<String> = extensions.flat_map(|end| neighbour(url, end)).collect();
-        input.elsewhere().look_for(&urls);
+        input.fetcher().prefetch_files(&urls);
     }
 }
 
 /// Finds the file beside `input` with an extension, in lower or upper case: `hills.hdr` beside
 /// `hills.flt`, or `hills.flt.hdr`.
 fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, RasterError> {
-    match (input.data(), known(extension)) {
+    match (input.data(), known_extension(extension)) {
         (Data::File(_, path), Some(known)) => on_disk(path, &candidates(path, known), input),
-        (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known), input),
+        (Data::Remote(_, url), Some(known)) => find_at_url(url, &neighbour(url, known), input),
         _ => Ok(None),
     }
 }
@@ -82,16 +82,18 @@ pub(super) fn find_appended(
     input: &FileBytes,
     extension: &str,
 ) -> Result<Option<FileBytes>, RasterError> {
-    match (input.data(), known(extension)) {
+    match (input.data(), known_extension(extension)) {
         (Data::File(_, path), Some(known)) => on_disk(path, &[appended(path, known)], input),
-        (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known)[1..], input),
+        (Data::Remote(_, url), Some(known)) => find_at_url(url, &neighbour(url, known)[1..], input),
         _ => Ok(None),
     }
 }
 
-/// Returns the extension if it is in `NEIGHBOURS`.
-fn known(extension: &str) -> Option<&'static str> {
-    let known = NEIGHBOURS.iter().find(|known| **known == extension);
+/// Returns the extension if it is in `NEIGHBOUR_EXTENSIONS`.
+fn known_extension(extension: &str) -> Option<&'static str> {
+    let known = NEIGHBOUR_EXTENSIONS
+        .iter()
+        .find(|known| **known == extension);
     known.copied()
 }
 
@@ -103,19 +105,19 @@ fn on_disk(
 ) -> Result<Option<FileBytes>, RasterError> {
     let mut others = others.iter().filter(|other| *other != path);
     let found = others.find(|other| other.is_file());
-    let open = |other: &PathBuf| FileBytes::open(other, input.elsewhere());
+    let open = |other: &PathBuf| FileBytes::open(other, input.fetcher());
     found.map(open).transpose()
 }
 
 /// Returns the first URL with a file. If that cannot be determined, the whole file cannot be read:
 /// masked samples would be read as heights.
-fn elsewhere(
+fn find_at_url(
     own: &str,
     urls: &[String],
     input: &FileBytes,
 ) -> Result<Option<FileBytes>, RasterError> {
     for url in urls.iter().filter(|url| *url != own) {
-        match FileBytes::open(Path::new(url), input.elsewhere()) {
+        match FileBytes::open(Path::new(url), input.fetcher()) {
             Err(RasterError::Remote(error)) if is_missing(&error) => {}
             Ok(found) if is_page(&found)? => {}
             other => return other.map(Some),
@@ -129,7 +131,7 @@ fn elsewhere(
 fn is_page(found: &FileBytes) -> Result<bool, RasterError> {
     let head = found.head(256)?;
     let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
-    let is_note = || head.windows(NOTES.len()).any(|part| part == NOTES);
+    let is_note = || head.windows(PAM_ROOT.len()).any(|part| part == PAM_ROOT);
     Ok(first.is_none_or(|first| *first == b'<' && !is_note()))
 }
 
@@ -168,9 +170,9 @@ fn text_appended(
     find_appended(input, extension)?.map(whole_text).transpose()
 }
 
-fn whole_text(beside: FileBytes) -> Result<(String, String), RasterError> {
-    let name = beside.name().to_owned();
-    let bytes = beside.head(MAX_TEXT + 1)?;
+fn whole_text(file: FileBytes) -> Result<(String, String), RasterError> {
+    let name = file.name().to_owned();
+    let bytes = file.head(MAX_TEXT + 1)?;
     if bytes.len() as u64 > MAX_TEXT {
         return Err(RasterError::AbsurdSize(format!(
             "{name} beside it is larger than {MAX_TEXT} bytes: no such text is"

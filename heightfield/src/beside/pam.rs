@@ -38,7 +38,7 @@ impl Notes {
         let (text, name) = match super::text_appended(input, "aux.xml") {
             Ok(Some(found)) => found,
             Ok(None) => return Ok(Self::default()),
-            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) if fault.is_connection_error() => return Err(fault),
             Err(fault) => return Ok(Self::unread(&fault.to_string())),
         };
         let mut notes = Self::of(&text, band).unwrap_or_else(|fault| {
@@ -76,9 +76,9 @@ impl Notes {
     fn set(&mut self, key: &str, text: &str) {
         match key {
             "NoDataValue" => {
-                let stated = no_data(text, 0, 1);
-                self.no_data = stated.value;
-                self.remarks.extend(stated.remark);
+                let parsed = no_data(text, 0, 1);
+                self.no_data = parsed.value;
+                self.remarks.extend(parsed.remark);
             }
             "Scale" => self.scale = number(text),
             "Offset" => self.offset = number(text),
@@ -187,7 +187,7 @@ impl Decoded {
             None => self.place.filter(|_| has_system).map(|place| place.map),
         };
         if let Some(map) = map {
-            self.lay_out(map, unit.filter(|_| !has_system));
+            self.set_layout(map, unit.filter(|_| !has_system));
         }
     }
 }

@@ -43,7 +43,7 @@ fn notes_beside_a_file_are_used() {
     let raster = noted(&notes, &OpenOptions::default());
     let summary = raster.summary();
     assert_eq!(
-        (summary.lowest, summary.highest, summary.holes),
+        (summary.lowest, summary.highest, summary.no_data),
         (3.0, 11.0, 1)
     );
     assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));
@@ -77,7 +77,7 @@ fn notes_that_contradict_the_file_are_reported() {
     );
     let stated = raster.remarks().join(" ");
     assert!(
-        stated.contains("the file says -9999") && raster.summary().holes == 1,
+        stated.contains("the file says -9999") && raster.summary().no_data == 1,
         "{stated}"
     );
 }

@@ -7,7 +7,7 @@ use crate::decoded::Decoded;
 use crate::input::FileBytes;
 
 /// Sets the reference system from a `.prj` beside the file, if there is one; call it before
-/// `lay_out`.
+/// `set_layout`.
 ///
 /// # Errors
 /// If it is remote and cannot be read at present.
@@ -17,7 +17,7 @@ pub(crate) fn reference_system(
 ) -> Result<(), RasterError> {
     let (wkt, name) = match text(input, "prj") {
         Ok(Some(found)) => found,
-        Err(error) if error.is_of_the_line() => return Err(error),
+        Err(error) if error.is_connection_error() => return Err(error),
         // If the neighbour cannot be read, only the place is lost, not the heights.
         Ok(None) | Err(_) => return Ok(()),
     };

@@ -11,14 +11,14 @@ use crate::input::{Data, FileBytes};
 ///
 /// The numbers, one per line, are: x per column, y per column, x per row, y per row, x and y of the
 /// centre of the first sample.
-pub(crate) fn lay_out_by_world_file(
+pub(crate) fn apply_world_file(
     input: &FileBytes,
     own: &[&'static str],
     decoded: &mut Decoded,
 ) -> Result<(), RasterError> {
     if let Some((map, name)) = find(input, own)? {
         super::reference_system(input, decoded)?;
-        decoded.lay_out(map, None);
+        decoded.set_layout(map, None);
         decoded.format += &format!(", placed by {name}");
     }
     Ok(())
@@ -42,7 +42,7 @@ fn find(
     own: &[&'static str],
 ) -> Result<Option<(GroundMap, String)>, RasterError> {
     let extensions = || own.iter().copied().chain(["wld"]);
-    super::look_for(input, extensions());
+    super::prefetch_files(input, extensions());
     for extension in extensions() {
         let Some((text, name)) = text(input, extension)? else {
             continue;

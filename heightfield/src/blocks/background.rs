@@ -8,15 +8,15 @@ use super::cache::Key;
 
 /// Max queued jobs: more than the blocks under a coarse tile (33 × 33). The oldest job is dropped,
 /// and is requested again if it is still needed.
-const MAX: usize = 2048;
+const MAX_JOBS: usize = 2048;
 
 /// A job for a background thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Job {
     /// Search the disk for a piece of a computed image.
-    Seek(Key),
+    LoadPiece(Key),
     /// Decode a block of the full image for its coarse samples.
-    Pass([u32; 2]),
+    Coarsen([u32; 2]),
     /// Read a block into the cache.
     Fetch(Key),
 }
@@ -32,8 +32,8 @@ pub(super) struct Queue {
 struct State {
     waiting: VecDeque<Job>,
     /// The queued jobs, and the running one.
-    known: HashSet<Job>,
-    is_over: bool,
+    unfinished: HashSet<Job>,
+    is_closed: bool,
 }
 
 impl Queue {
@@ -43,9 +43,10 @@ impl Queue {
     }
 
     /// Adds a job at the front of the queue. Returns true if it is new.
-    pub(super) fn want_first(&self, job: Job) -> bool {
+    pub(super) fn push_front(&self, job: Job) -> bool {
         let mut state = self.state();
-        let is_new = !state.is_over && state.waiting.len() < MAX && state.known.insert(job);
+        let is_new =
+            !state.is_closed && state.waiting.len() < MAX_JOBS && state.unfinished.insert(job);
         if is_new {
             state.waiting.push_front(job);
             drop(state);
@@ -55,15 +56,15 @@ impl Queue {
     }
 
     /// Adds a job at the end of the queue. Returns true if it is new.
-    pub(super) fn want(&self, job: Job) -> bool {
+    pub(super) fn push_back(&self, job: Job) -> bool {
         let mut state = self.state();
-        if state.is_over || !state.known.insert(job) {
+        if state.is_closed || !state.unfinished.insert(job) {
             return false;
         }
-        if state.waiting.len() >= MAX
-            && let Some(left_out) = state.waiting.pop_front()
+        if state.waiting.len() >= MAX_JOBS
+            && let Some(dropped) = state.waiting.pop_front()
         {
-            state.known.remove(&left_out);
+            state.unfinished.remove(&dropped);
         }
         state.waiting.push_back(job);
         drop(state);
@@ -74,52 +75,55 @@ impl Queue {
     /// Returns the next job; `None` if the queue is empty or closed.
     pub(super) fn next(&self) -> Option<Job> {
         let mut state = self.state();
-        match state.is_over {
+        match state.is_closed {
             true => None,
             false => state.waiting.pop_front(),
         }
     }
 
-    /// Returns up to `most` blocks of the full image that will be decoded next.
-    pub(super) fn coming(&self, most: usize) -> Vec<[u32; 2]> {
+    /// Returns up to `max` blocks of the full image that will be decoded next.
+    pub(super) fn next_blocks(&self, max: usize) -> Vec<[u32; 2]> {
         let state = self.state();
         let blocks = state.waiting.iter().filter_map(|job| match job {
-            Job::Pass(at) => Some(*at),
+            Job::Coarsen(at) => Some(*at),
             _ => None,
         });
-        blocks.take(most).collect()
+        blocks.take(max).collect()
     }
 
     /// Marks a job as done.
-    pub(super) fn done(&self, job: &Job) {
-        self.state().known.remove(job);
+    pub(super) fn finish(&self, job: &Job) {
+        self.state().unfinished.remove(job);
         self.wake.notify_all();
     }
 
     /// Returns true if no job is queued or running.
     pub(super) fn is_idle(&self) -> bool {
-        self.state().known.is_empty()
+        self.state().unfinished.is_empty()
     }
 
     /// Waits for a job; returns false if the queue is closed.
     pub(super) fn wait(&self) -> bool {
         let state = self.state();
-        let is_idle = |state: &mut State| state.waiting.is_empty() && !state.is_over;
+        let is_idle = |state: &mut State| state.waiting.is_empty() && !state.is_closed;
         let state = self.wake.wait_while(state, is_idle);
-        !state.unwrap_or_else(PoisonError::into_inner).is_over
+        !state.unwrap_or_else(PoisonError::into_inner).is_closed
     }
 
     /// Closes the queue: no further job starts. Returns true if the running job ends within a time.
-    pub(super) fn end(&self, within: Duration) -> bool {
+    pub(super) fn close(&self, within: Duration) -> bool {
         let mut state = self.state();
-        state.is_over = true;
-        for left_out in std::mem::take(&mut state.waiting) {
-            state.known.remove(&left_out);
+        state.is_closed = true;
+        for dropped in std::mem::take(&mut state.waiting) {
+            state.unfinished.remove(&dropped);
         }
         self.wake.notify_all();
-        let is_busy = |state: &mut State| !state.known.is_empty();
-        let ended = self.wake.wait_timeout_while(state, within, is_busy);
-        !ended.unwrap_or_else(PoisonError::into_inner).1.timed_out()
+        let is_busy = |state: &mut State| !state.unfinished.is_empty();
+        let drained = self.wake.wait_timeout_while(state, within, is_busy);
+        !drained
+            .unwrap_or_else(PoisonError::into_inner)
+            .1
+            .timed_out()
     }
 }
 
@@ -128,34 +132,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_job_is_done_once_and_the_oldest_of_too_many_is_left_out() {
+    fn queue_has_no_duplicates_and_drops_the_oldest_excess_job() {
         let queue = Queue::default();
-        queue.want(Job::Pass([0, 0]));
-        queue.want(Job::Pass([0, 0]));
+        queue.push_back(Job::Coarsen([0, 0]));
+        queue.push_back(Job::Coarsen([0, 0]));
         let first = queue.next().expect("one");
         assert_eq!(queue.next(), None);
-        queue.want(first);
+        queue.push_back(first);
         assert_eq!(queue.next(), None, "it is being done");
         assert!(!queue.is_idle());
-        queue.done(&first);
+        queue.finish(&first);
         assert!(queue.is_idle());
-        for number in 0..=MAX as u32 {
-            queue.want(Job::Pass([number, 0]));
+        for number in 0..=MAX_JOBS as u32 {
+            queue.push_back(Job::Coarsen([number, 0]));
         }
-        assert_eq!(queue.next(), Some(Job::Pass([1, 0])));
+        assert_eq!(queue.next(), Some(Job::Coarsen([1, 0])));
         // A dropped job may be requested again.
-        queue.want(Job::Pass([0, 0]));
-        assert_eq!(queue.coming(2), [[2, 0], [3, 0]]);
+        queue.push_back(Job::Coarsen([0, 0]));
+        assert_eq!(queue.next_blocks(2), [[2, 0], [3, 0]]);
         assert!(queue.next().is_some());
-        queue.want_first(Job::Pass([5000, 0]));
-        assert_eq!(queue.next(), Some(Job::Pass([5000, 0])));
+        queue.push_front(Job::Coarsen([5000, 0]));
+        assert_eq!(queue.next(), Some(Job::Coarsen([5000, 0])));
         let mut last = None;
         while let Some(job) = queue.next() {
             last = Some(job);
         }
-        assert_eq!(last, Some(Job::Pass([0, 0])));
-        assert!(!queue.end(Duration::ZERO), "some are being done");
-        queue.want(Job::Pass([9, 9]));
+        assert_eq!(last, Some(Job::Coarsen([0, 0])));
+        assert!(!queue.close(Duration::ZERO), "some are being done");
+        queue.push_back(Job::Coarsen([9, 9]));
         assert!(queue.next().is_none() && !queue.wait());
     }
 }

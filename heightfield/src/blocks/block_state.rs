@@ -6,20 +6,20 @@ use std::time::{Duration, Instant};
 
 use super::super::RasterError;
 use super::cache::{Cache, Key};
-use super::{Block, NotHere};
+use super::{Block, NotLoaded};
 
 /// Time after which a pending block is tried again.
-const AGAIN: Duration = Duration::from_millis(20);
+const RETRY_AFTER: Duration = Duration::from_millis(20);
 /// Max pending blocks that are stored.
-const MAX_AWAITED: usize = 1024;
+const MAX_PENDING: usize = 1024;
 
 /// State of the blocks of a file.
 pub(super) struct BlockState {
     pub(super) cache: Cache,
     /// Blocks that could not be read.
-    pub(super) unread: u32,
+    pub(super) unreadable: u32,
     /// Pending blocks, and when they were last tried.
-    awaited: HashMap<Key, Instant>,
+    pending: HashMap<Key, Instant>,
     /// Last error of the connection.
     pub(super) outage: Option<RasterError>,
 }
@@ -29,44 +29,44 @@ impl BlockState {
     pub(super) fn new(max_bytes: usize) -> Self {
         Self {
             cache: Cache::new(max_bytes),
-            unread: 0,
-            awaited: HashMap::new(),
+            unreadable: 0,
+            pending: HashMap::new(),
             outage: None,
         }
     }
 
     /// Sets the number of unreadable blocks that were reported before.
-    pub(super) fn after(self, unread: u32) -> Self {
-        Self { unread, ..self }
+    pub(super) fn after(self, unreadable: u32) -> Self {
+        Self { unreadable, ..self }
     }
 
     /// Returns the state of a block without reading: in memory, or pending and tried a moment ago.
-    pub(super) fn known(&mut self, key: &Key) -> Option<Result<Option<Arc<Block>>, NotHere>> {
+    pub(super) fn get(&mut self, key: &Key) -> Option<Result<Option<Arc<Block>>, NotLoaded>> {
         if let Some(block) = self.cache.get(key) {
             return Some(Ok(block));
         }
-        let looked = self.awaited.get(key);
-        looked.filter(|looked| looked.elapsed() < AGAIN)?;
-        Some(Err(NotHere))
+        let tried = self.pending.get(key);
+        tried.filter(|tried| tried.elapsed() < RETRY_AFTER)?;
+        Some(Err(NotLoaded))
     }
 
     /// Stores a block that was read; `None` if the file has no samples there.
     pub(super) fn put(&mut self, key: Key, block: Option<Arc<Block>>) {
-        self.awaited.remove(&key);
+        self.pending.remove(&key);
         self.cache.put(key, block);
     }
 
     /// Marks a block as pending.
-    pub(super) fn wait_for(&mut self, key: Key) {
-        if self.awaited.len() >= MAX_AWAITED {
-            self.awaited.clear();
+    pub(super) fn mark_pending(&mut self, key: Key) {
+        if self.pending.len() >= MAX_PENDING {
+            self.pending.clear();
         }
-        self.awaited.insert(key, Instant::now());
+        self.pending.insert(key, Instant::now());
     }
 
     /// Counts an unreadable block, and returns the count.
-    pub(super) fn count_unread(&mut self) -> u32 {
-        self.unread = self.unread.saturating_add(1);
-        self.unread
+    pub(super) fn count_unreadable(&mut self) -> u32 {
+        self.unreadable = self.unreadable.saturating_add(1);
+        self.unreadable
     }
 }

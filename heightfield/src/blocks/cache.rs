@@ -60,17 +60,21 @@ impl Cache {
             self.bytes -= bytes(replaced.as_deref());
         }
         while self.bytes > self.max_bytes && self.blocks.len() > 1 {
-            let Some((_, gone)) = self.blocks.pop_lru() else {
+            let Some((_, evicted)) = self.blocks.pop_lru() else {
                 return;
             };
-            self.bytes -= bytes(gone.as_deref());
+            self.bytes -= bytes(evicted.as_deref());
         }
     }
 }
 
 fn bytes(block: Option<&Block>) -> usize {
-    let held = block.map_or(0, |block| {
-        block.samples.bytes() + block.holes.as_ref().map_or(0, |holes| holes.len() / 8)
+    let samples = block.map_or(0, |block| {
+        block.samples.bytes()
+            + block
+                .no_data_mask
+                .as_ref()
+                .map_or(0, |no_data_mask| no_data_mask.len() / 8)
     });
-    ENTRY_BYTES + held
+    ENTRY_BYTES + samples
 }

@@ -17,14 +17,14 @@ use super::{Block, BlockImage, Part};
 /// levels use samples of these images directly.
 pub(super) const STEPS: [u32; 3] = [8, 64, 512];
 /// Side of a piece, samples.
-const PIECE: u32 = 64;
-const SAMPLES: usize = (PIECE * PIECE) as usize;
+const PIECE_SIDE: u32 = 64;
+const PIECE_SAMPLES: usize = (PIECE_SIDE * PIECE_SIDE) as usize;
 /// Max pieces in memory: 17 MB.
 const MAX_PIECES: usize = 512;
 /// Time between two saves of all new samples: pieces grow block by block.
-const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
+const SAVE_INTERVAL: Duration = Duration::from_secs(5);
 /// Max memory of the pieces, bytes.
-pub(super) const MAX_BYTES: usize = MAX_PIECES * SAMPLES * (size_of::<f64>() + 1);
+pub(super) const MAX_BYTES: usize = MAX_PIECES * PIECE_SAMPLES * (size_of::<f64>() + 1);
 
 /// A square of samples of a coarse image, row after row; those beyond its edges are unknown.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,34 +59,34 @@ impl Piece {
 }
 
 /// A piece in memory.
-struct Held {
+struct CachedPiece {
     piece: Piece,
     /// Samples that count as no-data for now, because their block cannot be read.
-    lacking: FixedBitSet,
+    unreadable: FixedBitSet,
     /// True if the disk was searched for it.
-    was_sought: bool,
+    is_searched: bool,
     /// True if it has samples that are not on disk.
-    is_new: bool,
+    is_unsaved: bool,
 }
 
-impl Held {
-    fn nothing() -> Self {
+impl CachedPiece {
+    fn empty() -> Self {
         Self {
-            piece: Piece::unknown(SAMPLES),
-            lacking: FixedBitSet::with_capacity(SAMPLES),
-            was_sought: false,
-            is_new: false,
+            piece: Piece::unknown(PIECE_SAMPLES),
+            unreadable: FixedBitSet::with_capacity(PIECE_SAMPLES),
+            is_searched: false,
+            is_unsaved: false,
         }
     }
 }
 
 /// State of a coarse sample.
 #[derive(Debug, PartialEq)]
-pub(super) enum Found {
+pub(super) enum SampleState {
     /// Its stored value; NaN for no-data.
     Value(f64),
-    /// Unknown; `was_sought` is true if the disk was searched for its piece.
-    Nothing { was_sought: bool },
+    /// Unknown; `is_searched` is true if the disk was searched for its piece.
+    Unknown { is_searched: bool },
 }
 
 /// The coarse images that are computed from one full image.
@@ -94,11 +94,11 @@ pub(super) struct Coarse {
     /// Number of the first coarse image among the file's images.
     first: usize,
     images: Vec<BlockImage>,
-    pieces: LruCache<Key, Held>,
+    pieces: LruCache<Key, CachedPiece>,
     /// Evicted pieces with samples that are not on disk.
     outgoing: Vec<(Key, Piece)>,
     /// Time of the last save of all new samples.
-    kept: Instant,
+    last_save: Instant,
 }
 
 impl Coarse {
@@ -109,7 +109,7 @@ impl Coarse {
             images: vec![],
             pieces: LruCache::unbounded(),
             outgoing: vec![],
-            kept: Instant::now(),
+            last_save: Instant::now(),
         }
     }
 
@@ -118,15 +118,15 @@ impl Coarse {
     pub(super) fn of(full: &BlockImage, south_up: bool, east_first: bool) -> Self {
         let image = |every: u32| {
             let last = [full.columns, full.rows].map(|count| count.max(1) - 1);
-            let left_over = |last: u32, turned: bool| if turned { last % every } else { 0 };
+            let remainder = |last: u32, turned: bool| if turned { last % every } else { 0 };
             BlockImage {
                 columns: last[0] / every + 1,
                 rows: last[1] / every + 1,
-                block: [PIECE; 2],
+                block: [PIECE_SIDE; 2],
                 every: Some(every),
                 first: [
-                    left_over(last[0], east_first),
-                    left_over(last[1], !south_up),
+                    remainder(last[0], east_first),
+                    remainder(last[1], !south_up),
                 ],
             }
         };
@@ -144,23 +144,23 @@ impl Coarse {
     }
 
     /// Returns the state of a sample of an image.
-    pub(super) fn sample(&mut self, image: usize, [column, row]: [u32; 2]) -> Found {
-        let (key, index) = place(image, [column, row]);
+    pub(super) fn sample(&mut self, image: usize, [column, row]: [u32; 2]) -> SampleState {
+        let (key, index) = locate(image, [column, row]);
         match self.pieces.get(&key) {
-            Some(held) if held.piece.known.contains(index) => {
-                Found::Value(held.piece.values[index])
+            Some(cached) if cached.piece.known.contains(index) => {
+                SampleState::Value(cached.piece.values[index])
             }
-            Some(held) if held.lacking.contains(index) => Found::Value(f64::NAN),
-            Some(held) => Found::Nothing {
-                was_sought: held.was_sought,
+            Some(cached) if cached.unreadable.contains(index) => SampleState::Value(f64::NAN),
+            Some(cached) => SampleState::Unknown {
+                is_searched: cached.is_searched,
             },
-            None => Found::Nothing { was_sought: false },
+            None => SampleState::Unknown { is_searched: false },
         }
     }
 
     /// Stores the coarse samples of a block of the full image; `None` if the file has no samples
     /// there.
-    pub(super) fn leave(&mut self, part: &Part, block: Option<&Block>, is_lacking: bool) {
+    pub(super) fn add_block(&mut self, part: &Part, block: Option<&Block>, is_incomplete: bool) {
         let last = [part.column + (part.columns - 1), part.row + (part.rows - 1)];
         for number in 0..self.images.len() {
             let image = self.images[number];
@@ -178,13 +178,13 @@ impl Coarse {
                     let inner = (at(1, row) - part.row) as usize * part.columns as usize
                         + (at(0, column) - part.column) as usize;
                     let value = block.and_then(|block| block.stored(inner));
-                    let (key, index) = place(self.first + number, [column, row]);
-                    let held = self.held(key);
-                    if is_lacking {
-                        held.lacking.insert(index);
-                    } else if !held.piece.known.contains(index) {
-                        held.piece.set(index, value.unwrap_or(f64::NAN));
-                        held.is_new = true;
+                    let (key, index) = locate(self.first + number, [column, row]);
+                    let cached = self.cached(key);
+                    if is_incomplete {
+                        cached.unreadable.insert(index);
+                    } else if !cached.piece.known.contains(index) {
+                        cached.piece.set(index, value.unwrap_or(f64::NAN));
+                        cached.is_unsaved = true;
                     }
                 }
             }
@@ -192,30 +192,30 @@ impl Coarse {
     }
 
     /// Stores the result of the disk search for a piece.
-    pub(super) fn sought(&mut self, key: Key, found: Option<&Piece>) {
-        let held = self.held(key);
-        held.was_sought = true;
-        if let Some(found) = found.filter(|found| found.values.len() == SAMPLES) {
-            held.piece.join(found);
+    pub(super) fn add_loaded(&mut self, key: Key, found: Option<&Piece>) {
+        let cached = self.cached(key);
+        cached.is_searched = true;
+        if let Some(found) = found.filter(|found| found.values.len() == PIECE_SAMPLES) {
+            cached.piece.join(found);
         }
     }
 
     /// Returns the pieces to save now: evicted ones, and periodically copies of all with new
     /// samples, so that little is lost if the program is killed.
     pub(super) fn take_due(&mut self) -> Vec<(Key, Piece)> {
-        match self.kept.elapsed() >= BETWEEN_KEEPING {
-            true => self.take_new(),
+        match self.last_save.elapsed() >= SAVE_INTERVAL {
+            true => self.take_unsaved(),
             false => std::mem::take(&mut self.outgoing),
         }
     }
 
     /// Returns all pieces with samples that are not on disk.
-    pub(super) fn take_new(&mut self) -> Vec<(Key, Piece)> {
-        self.kept = Instant::now();
+    pub(super) fn take_unsaved(&mut self) -> Vec<(Key, Piece)> {
+        self.last_save = Instant::now();
         let mut taken = std::mem::take(&mut self.outgoing);
-        for (key, held) in &mut self.pieces {
-            if std::mem::take(&mut held.is_new) {
-                taken.push((*key, held.piece.clone()));
+        for (key, cached) in &mut self.pieces {
+            if std::mem::take(&mut cached.is_unsaved) {
+                taken.push((*key, cached.piece.clone()));
             }
         }
         taken
@@ -227,26 +227,29 @@ impl Coarse {
         self.pieces.len()
     }
 
-    fn held(&mut self, key: Key) -> &mut Held {
+    fn cached(&mut self, key: Key) -> &mut CachedPiece {
         if !self.pieces.contains(&key) && self.pieces.len() >= MAX_PIECES {
-            let gone = self.pieces.pop_lru();
-            if let Some((key, held)) = gone.filter(|(_, held)| held.is_new) {
+            let evicted = self.pieces.pop_lru();
+            if let Some((key, cached)) = evicted.filter(|(_, cached)| cached.is_unsaved) {
                 // If the disk is too slow, older pieces are dropped in favour of new ones.
                 if self.outgoing.len() >= MAX_PIECES / 2 {
                     self.outgoing.clear();
                 }
-                self.outgoing.push((key, held.piece));
+                self.outgoing.push((key, cached.piece));
             }
         }
-        self.pieces.get_or_insert_mut(key, Held::nothing)
+        self.pieces.get_or_insert_mut(key, CachedPiece::empty)
     }
 }
 
 /// Returns the piece that contains a sample of an image, and the sample's index there.
-pub(super) fn place(image: usize, [column, row]: [u32; 2]) -> (Key, usize) {
+pub(super) fn locate(image: usize, [column, row]: [u32; 2]) -> (Key, usize) {
     let key = Key {
         image,
-        at: [column / PIECE, row / PIECE],
+        at: [column / PIECE_SIDE, row / PIECE_SIDE],
     };
-    (key, (row % PIECE * PIECE + column % PIECE) as usize)
+    (
+        key,
+        (row % PIECE_SIDE * PIECE_SIDE + column % PIECE_SIDE) as usize,
+    )
 }

@@ -10,11 +10,11 @@ use super::{Block, BlockImage, BlockReader};
 use crate::disk_cache::{DiskCache, Name};
 
 /// Min step of native images that are saved: the samples of finer ones are adjacent in the file.
-const COARSE: u32 = 8;
+const MIN_SAVED_STEP: u32 = 8;
 
 /// Returns true if blocks of an image are saved on disk, and read in the background.
 pub(super) fn is_coarse(image: &BlockImage) -> bool {
-    image.every.is_some_and(|every| every >= COARSE)
+    image.every.is_some_and(|every| every >= MIN_SAVED_STEP)
 }
 
 /// Returns the name of a piece of a coarse image in the present state of the file; `None` if
@@ -34,13 +34,13 @@ pub(super) fn load(cache: &DiskCache, name: &Name, samples: usize) -> Option<Pie
 }
 
 /// Saves a piece, merged with the one on disk.
-pub(super) fn keep(cache: &DiskCache, name: &Name, mut piece: Piece) {
+pub(super) fn save(cache: &DiskCache, name: &Name, mut piece: Piece) {
     let samples = piece.values.len();
-    if let Some(before) = load(cache, name, samples) {
-        if piece.known.is_subset(&before.known) {
+    if let Some(on_disk) = load(cache, name, samples) {
+        if piece.known.is_subset(&on_disk.known) {
             return;
         }
-        piece.join(&before);
+        piece.join(&on_disk);
     }
     cache.put(name, &encoded(&piece));
 }
@@ -60,8 +60,8 @@ pub(super) fn piece_of(block: Option<&Block>, samples: usize) -> Piece {
 pub(super) fn block_of(piece: Piece) -> Option<Block> {
     piece.known.is_full().then(|| Block {
         samples: piece.values.into(),
-        holes: None,
-        is_lacking: false,
+        no_data_mask: None,
+        is_incomplete: false,
     })
 }
 

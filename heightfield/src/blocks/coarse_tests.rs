@@ -30,7 +30,7 @@ fn value(column: u32, row: u32) -> f64 {
 
 /// State of the reader that a test can inspect.
 #[derive(Clone)]
-struct Seen {
+struct ReaderState {
     reads: Arc<AtomicU64>,
     threads: Arc<Mutex<Vec<ThreadId>>>,
     is_damaged: Arc<AtomicBool>,
@@ -38,7 +38,7 @@ struct Seen {
     stamp: Arc<Mutex<Option<String>>>,
 }
 
-impl Seen {
+impl ReaderState {
     fn new(stamp: &str) -> Self {
         Self {
             reads: Arc::default(),
@@ -56,7 +56,7 @@ impl Seen {
 
 struct Full {
     images: Vec<BlockImage>,
-    seen: Seen,
+    reader_state: ReaderState,
 }
 
 impl BlockReader for Full {
@@ -78,16 +78,16 @@ impl BlockReader for Full {
 
     fn read(&self, _: usize, part: &Part) -> Result<Block, RasterError> {
         let at = [part.column / BLOCK[0], part.row / BLOCK[1]];
-        self.seen.reads.fetch_add(1, Ordering::Relaxed);
-        self.seen
+        self.reader_state.reads.fetch_add(1, Ordering::Relaxed);
+        self.reader_state
             .threads
             .lock()
             .expect("alone")
             .push(thread::current().id());
-        if at == BAD && self.seen.is_damaged.load(Ordering::Relaxed) {
+        if at == BAD && self.reader_state.is_damaged.load(Ordering::Relaxed) {
             return Err(RasterError::Damaged("test".into()));
         }
-        if at == LATE && self.seen.is_late.load(Ordering::Relaxed) {
+        if at == LATE && self.reader_state.is_late.load(Ordering::Relaxed) {
             return Err(RasterError::Remote(crate::remote::outage()));
         }
         let rows = part.row..part.row + part.rows;
@@ -96,19 +96,19 @@ impl BlockReader for Full {
             .collect();
         Ok(Block {
             samples: samples.into(),
-            holes: None,
-            is_lacking: false,
+            no_data_mask: None,
+            is_incomplete: false,
         })
     }
 
     fn stamp(&self, _: usize, _: &Part) -> Option<String> {
-        self.seen.stamp.lock().expect("alone").clone()
+        self.reader_state.stamp.lock().expect("alone").clone()
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         // One part is enough to find a height.
         let parts = vec![Part::whole(2, 2)];
-        Some(Looks { image: 0, parts })
+        Some(SurveyParts { image: 0, parts })
     }
 
     fn index(&self) -> u64 {
@@ -116,7 +116,11 @@ impl BlockReader for Full {
     }
 }
 
-fn raster(seen: &Seen, disk: &DiskCache, [south_up, east_first]: [bool; 2]) -> Raster {
+fn raster(
+    reader_state: &ReaderState,
+    disk: &DiskCache,
+    [south_up, east_first]: [bool; 2],
+) -> Raster {
     let full = BlockImage {
         columns: SIZE[0],
         rows: SIZE[1],
@@ -126,13 +130,13 @@ fn raster(seen: &Seen, disk: &DiskCache, [south_up, east_first]: [bool; 2]) -> R
     };
     let reader = Full {
         images: vec![full],
-        seen: seen.clone(),
+        reader_state: reader_state.clone(),
     };
     let mut decoded = Decoded::new("test".into(), (SIZE[0], SIZE[1]), Storage::from(reader));
     (decoded.south_up, decoded.east_first) = (south_up, east_first);
     decoded.storage.set_disk_cache(disk);
     let raster = Raster::checked(decoded, Some(NO_DATA)).expect("a field");
-    seen.reads();
+    reader_state.reads();
     raster
 }
 
@@ -176,14 +180,18 @@ fn check(raster: &Raster, level: u8, order: [bool; 2]) {
 }
 
 #[test]
-fn coarse_levels_have_the_files_own_samples_whatever_its_order() {
+fn coarse_levels_have_the_files_own_samples_in_any_order() {
     for order in [[true, false], [false, false], [true, true], [false, true]] {
-        let seen = Seen::new("");
+        let reader_state = ReaderState::new("");
         for level in [2, 3, 5, 6, 8, 9, 10] {
             // Each level in a new raster, then all in the same one.
-            check(&raster(&seen, &DiskCache::off(), order), level, order);
+            check(
+                &raster(&reader_state, &DiskCache::off(), order),
+                level,
+                order,
+            );
         }
-        let all = raster(&seen, &DiskCache::off(), order);
+        let all = raster(&reader_state, &DiskCache::off(), order);
         for level in [9, 6, 3, 4, 5, 7, 8, 10, 2] {
             check(&all, level, order);
         }
@@ -192,32 +200,32 @@ fn coarse_levels_have_the_files_own_samples_whatever_its_order() {
 
 #[test]
 fn repeated_read_is_cached_and_fine_level_fills_coarse_levels() {
-    let seen = Seen::new("");
-    let raster = raster(&seen, &DiskCache::off(), USUAL);
+    let reader_state = ReaderState::new("");
+    let raster = raster(&reader_state, &DiskCache::off(), USUAL);
     check(&raster, 8, USUAL);
-    let first = seen.reads();
+    let first = reader_state.reads();
     // Every 256th sample is in another block.
     assert!((1..=9 * 5).contains(&first), "{first}");
     check(&raster, 8, USUAL);
-    assert_eq!(seen.reads(), 0);
+    assert_eq!(reader_state.reads(), 0);
     // Blocks that are read contribute their coarse samples, too.
     check(&raster, 0, USUAL);
     assert_eq!(
-        seen.reads(),
+        reader_state.reads(),
         33 * 27 - 1 - first,
         "all but those in memory, and the one that is not stored"
     );
     for level in 3..=10 {
         check(&raster, level, USUAL);
     }
-    assert_eq!(seen.reads(), 0);
+    assert_eq!(reader_state.reads(), 0);
     assert_eq!(raster.blocks_read(), 1 + 33 * 27 - 1);
 }
 
 #[test]
-fn between_coarse_samples_a_surface_is_linear() {
-    let seen = Seen::new("");
-    let raster = raster(&seen, &DiskCache::off(), [true, false]);
+fn surface_is_linear_between_coarse_samples() {
+    let reader_state = ReaderState::new("");
+    let raster = raster(&reader_state, &DiskCache::off(), [true, false]);
     // None of them is no-data.
     let [a, b] = [560, 568].map(|column| height(column, 808, [true, false]));
     assert!(a > 0.0 && b > 0.0);
@@ -225,7 +233,7 @@ fn between_coarse_samples_a_surface_is_linear() {
 }
 
 /// Reads the level's rows as a tile does; `None` while they are pending.
-fn look(raster: &Raster, level: u8, wait: Wait) -> Option<Vec<f64>> {
+fn read_tile(raster: &Raster, level: u8, wait: Wait) -> Option<Vec<f64>> {
     let reads = ReadTracker::default();
     let mut heights = vec![0.0; 9 * 7];
     for (row, heights) in (0..).zip(heights.chunks_exact_mut(9)) {
@@ -234,8 +242,8 @@ fn look(raster: &Raster, level: u8, wait: Wait) -> Option<Vec<f64>> {
     reads.status().is_complete().then_some(heights)
 }
 
-fn comes(raster: &Raster, level: u8) -> Vec<f64> {
-    wait_for("the level", || look(raster, level, Wait::Never))
+fn wait_for_level(raster: &Raster, level: u8) -> Vec<f64> {
+    wait_for("the level", || read_tile(raster, level, Wait::Never))
 }
 
 fn same(one: &[f64], other: &[f64]) {
@@ -250,35 +258,40 @@ fn same(one: &[f64], other: &[f64]) {
 
 #[test]
 fn nonblocking_read_loads_coarse_level_in_background() {
-    let seen = Seen::new("");
-    let waited = look(&raster(&seen, &DiskCache::off(), USUAL), 8, Wait::UntilRead).expect("here");
-    let raster = raster(&seen, &DiskCache::off(), USUAL);
-    seen.threads.lock().expect("alone").clear();
+    let reader_state = ReaderState::new("");
+    let waited = read_tile(
+        &raster(&reader_state, &DiskCache::off(), USUAL),
+        8,
+        Wait::UntilRead,
+    )
+    .expect("here");
+    let raster = raster(&reader_state, &DiskCache::off(), USUAL);
+    reader_state.threads.lock().expect("alone").clear();
     assert_eq!(
-        look(&raster, 8, Wait::Never),
+        read_tile(&raster, 8, Wait::Never),
         None,
         "nothing is known yet, and nobody waits"
     );
-    same(&comes(&raster, 8), &waited);
+    same(&wait_for_level(&raster, 8), &waited);
     let this = thread::current().id();
-    let threads = seen.threads.lock().expect("alone").clone();
+    let threads = reader_state.threads.lock().expect("alone").clone();
     assert!(!threads.is_empty() && !threads.contains(&this));
 }
 
 #[test]
 fn nonblocking_read_loads_fine_block_in_background() {
-    let seen = Seen::new("");
-    let raster = raster(&seen, &DiskCache::off(), USUAL);
-    let there = |column| raster.read_height(column, 1000, Wait::Never);
+    let reader_state = ReaderState::new("");
+    let raster = raster(&reader_state, &DiskCache::off(), USUAL);
+    let height_at = |column| raster.read_height(column, 1000, Wait::Never);
     assert!(raster.height(300, 1000) > 0.0, "a read that may wait does");
-    seen.threads.lock().expect("alone").clear();
+    reader_state.threads.lock().expect("alone").clear();
     let mut columns = 1000..1010;
-    let far = columns.find(|column| height(*column, 1000, USUAL) > 0.0);
-    let far = far.expect("no hole");
-    assert_eq!(there(far).1, ReadStatus::Pending);
-    assert!(there(300).0 > 0.0, "it is in memory");
-    wait_until("the block", || there(far).0 > 0.0);
-    let threads = seen.threads.lock().expect("alone").clone();
+    let uncached = columns.find(|column| height(*column, 1000, USUAL) > 0.0);
+    let uncached = uncached.expect("no hole");
+    assert_eq!(height_at(uncached).1, ReadStatus::Pending);
+    assert!(height_at(300).0 > 0.0, "it is in memory");
+    wait_until("the block", || height_at(uncached).0 > 0.0);
+    let threads = reader_state.threads.lock().expect("alone").clone();
     assert!(threads.len() == 1 && threads[0] != thread::current().id());
 }
 
@@ -286,11 +299,11 @@ fn nonblocking_read_loads_fine_block_in_background() {
 fn late_block_is_pending_and_damaged_block_is_not_cached() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 26);
-    let seen = Seen::new("one");
-    seen.is_late.store(true, Ordering::Relaxed);
-    seen.is_damaged.store(true, Ordering::Relaxed);
+    let reader_state = ReaderState::new("one");
+    reader_state.is_late.store(true, Ordering::Relaxed);
+    reader_state.is_damaged.store(true, Ordering::Relaxed);
     {
-        let raster = raster(&seen, &disk, [true, false]);
+        let raster = raster(&reader_state, &disk, [true, false]);
         // Level 3: the late block covers columns 448 to 511, rows 288 to 335.
         let late = |raster: &Raster| {
             let mut heights = [0.0; 8];
@@ -301,7 +314,7 @@ fn late_block_is_pending_and_damaged_block_is_not_cached() {
             assert_eq!(late(&raster), None);
             pass(Duration::from_millis(5));
         }
-        seen.is_late.store(false, Ordering::Relaxed);
+        reader_state.is_late.store(false, Ordering::Relaxed);
         let heights = wait_for("the late block", || late(&raster));
         let expected: Vec<f64> = (56..64)
             .map(|c| height(c * 8, 37 * 8, [true, false]))
@@ -317,16 +330,20 @@ fn late_block_is_pending_and_damaged_block_is_not_cached() {
         assert!(bad.iter().all(|height| height.is_nan()), "{bad:?}");
     }
     // It was damaged in that run only.
-    seen.is_damaged.store(false, Ordering::Relaxed);
-    check(&raster(&seen, &disk, [true, false]), 3, [true, false]);
+    reader_state.is_damaged.store(false, Ordering::Relaxed);
+    check(
+        &raster(&reader_state, &disk, [true, false]),
+        3,
+        [true, false],
+    );
 }
 
 #[test]
 fn disk_cache_serves_next_run_only_for_the_same_file_stamp() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 26);
-    let seen = Seen::new("one");
-    for (stamp, off, again) in [
+    let reader_state = ReaderState::new("one");
+    for (stamp, is_off, is_cached) in [
         (Some("one"), false, false),
         (Some("one"), false, true),
         (Some("two"), false, false),
@@ -335,39 +352,43 @@ fn disk_cache_serves_next_run_only_for_the_same_file_stamp() {
         (None, false, false),
         (Some("two"), false, true),
     ] {
-        *seen.stamp.lock().expect("alone") = stamp.map(Into::into);
-        let disk = if off { DiskCache::off() } else { disk.clone() };
-        let raster = raster(&seen, &disk, USUAL);
+        *reader_state.stamp.lock().expect("alone") = stamp.map(Into::into);
+        let disk = if is_off {
+            DiskCache::off()
+        } else {
+            disk.clone()
+        };
+        let raster = raster(&reader_state, &disk, USUAL);
         for level in [8, 5, 9] {
             check(&raster, level, USUAL);
         }
-        assert_eq!(seen.reads() == 0, again, "{stamp:?}");
+        assert_eq!(reader_state.reads() == 0, is_cached, "{stamp:?}");
     }
     // In another order, other samples are coarse ones.
-    *seen.stamp.lock().expect("alone") = Some("one".into());
-    check(&raster(&seen, &disk, [true, true]), 8, [true, true]);
+    *reader_state.stamp.lock().expect("alone") = Some("one".into());
+    check(&raster(&reader_state, &disk, [true, true]), 8, [true, true]);
 }
 
 #[test]
 fn samples_of_a_file_changed_while_open_are_not_cached() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 26);
-    let seen = Seen::new("one");
-    let before = raster(&seen, &disk, USUAL);
+    let reader_state = ReaderState::new("one");
+    let before = raster(&reader_state, &disk, USUAL);
     check(&before, 8, USUAL);
     // The reader detects that the file has changed.
-    *seen.stamp.lock().expect("alone") = None;
+    *reader_state.stamp.lock().expect("alone") = None;
     drop(before);
-    *seen.stamp.lock().expect("alone") = Some("one".into());
-    check(&raster(&seen, &disk, USUAL), 8, USUAL);
-    assert!(seen.reads() > 0);
+    *reader_state.stamp.lock().expect("alone") = Some("one".into());
+    check(&raster(&reader_state, &disk, USUAL), 8, USUAL);
+    assert!(reader_state.reads() > 0);
 }
 
 #[test]
 fn coarse_memory_is_bounded_and_evicted_samples_stay_on_disk() {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1 << 30);
-    let seen = Seen::new("one");
+    let reader_state = ReaderState::new("one");
     let size = [1 << 14, 1 << 14];
     let full = BlockImage {
         columns: size[0],
@@ -378,7 +399,7 @@ fn coarse_memory_is_bounded_and_evicted_samples_stay_on_disk() {
     };
     let reader = || Full {
         images: vec![full],
-        seen: seen.clone(),
+        reader_state: reader_state.clone(),
     };
     let blocks = || {
         let mut blocks = Blocks::new(Box::new(reader()));
@@ -400,30 +421,30 @@ fn coarse_memory_is_bounded_and_evicted_samples_stay_on_disk() {
     for [column, row] in places() {
         let _ = first.stored(image, column, row, Wait::UntilRead);
     }
-    let reads = seen.reads();
+    let reads = reader_state.reads();
     assert_eq!(reads, 32 * 32);
     assert!(first.coarse().pieces() <= 512 && first.coarse().pieces() > 400);
     drop(first);
-    let again = blocks();
+    let is_cached = blocks();
     for [column, row] in places() {
-        let found = again.stored(image, column, row, Wait::UntilRead);
+        let found = is_cached.stored(image, column, row, Wait::UntilRead);
         let found = found.expect("complete");
         let expected = value(column * step, row * step);
         let is_same = found.is_some_and(|found| found.to_bits() == expected.to_bits());
         assert!(is_same || expected.is_nan());
     }
-    assert_eq!(seen.reads(), 0);
+    assert_eq!(reader_state.reads(), 0);
 }
 
 #[test]
 fn prefetch_reads_in_background_and_skips_oversized_areas() {
     for order in [[true, false], [false, true]] {
-        let seen = Seen::new("");
-        let raster = raster(&seen, &DiskCache::off(), order);
-        seen.threads.lock().expect("alone").clear();
+        let reader_state = ReaderState::new("");
+        let raster = raster(&reader_state, &DiskCache::off(), order);
+        reader_state.threads.lock().expect("alone").clear();
         raster.prefetch(0, [0, 2100], [0, 1249]);
         raster.prefetch(0, [1000, 1100], [600, 650]);
-        let there = |raster: &Raster| {
+        let height_at = |raster: &Raster| {
             let mut heights = [0.0; 101];
             let is_all = |row: u32, heights: &mut [f64; 101]| {
                 assert!(
@@ -442,18 +463,18 @@ fn prefetch_reads_in_background_and_skips_oversized_areas() {
             panic!("it stays in its file");
         };
         let keys = [12, 13].map(|row| [15, 16, 17].map(|column| [column, row]));
-        let has = |at: &[u32; 2]| blocks.kept().cache.has(&Key { image: 0, at: *at });
+        let has = |at: &[u32; 2]| blocks.state().cache.has(&Key { image: 0, at: *at });
         wait_until("the blocks", || keys.as_flattened().iter().all(has));
-        assert!(there(&raster));
-        assert_eq!(seen.reads(), 6);
+        assert!(height_at(&raster));
+        assert_eq!(reader_state.reads(), 6);
         let this = thread::current().id();
-        assert!(!seen.threads.lock().expect("alone").contains(&this));
+        assert!(!reader_state.threads.lock().expect("alone").contains(&this));
     }
 }
 
 #[test]
 fn windows_hold_their_rows_and_report_pending_heights() {
-    let raster = raster(&Seen::new(""), &DiskCache::off(), USUAL);
+    let raster = raster(&ReaderState::new(""), &DiskCache::off(), USUAL);
     let window = Window {
         column: 700,
         row: 500,

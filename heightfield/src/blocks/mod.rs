@@ -7,7 +7,7 @@
 //! disk (`coarse_on_disk`). `block_state` tracks the blocks in memory and the pending ones.
 //!
 //! A block that cannot be read is no-data, with a warning: one damaged part must not make the rest
-//! of a large file unusable. Remote data that has not arrived is pending ([`NotHere`]), and is
+//! of a large file unusable. Remote data that has not arrived is pending ([`NotLoaded`]), and is
 //! requested again. With [`Wait::Never`], so is everything that is not in memory: one thread makes
 //! coarse samples, another reads fine ones (`background`), and only they wait for data.
 //!
@@ -40,17 +40,17 @@ use crate::remote::without_key;
 use background::{Job, Queue};
 use block_state::BlockState;
 use cache::Key;
-use coarse::{Coarse, Found};
+use coarse::{Coarse, SampleState};
 pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
-pub(super) use survey::{Looks, Survey, stored_parts};
+pub(super) use survey::{Survey, SurveyParts, stored_parts};
 
 /// Max size of a block that can be read alone, bytes.
 pub(super) const MAX_BLOCK_BYTES: u64 = 32 << 20;
 /// Max wait for the running read when the file is closed.
-const END_WITHIN: Duration = Duration::from_secs(1);
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 /// An image serves a level that is coarser than it, or equal within this ratio: overviews of a
 /// field of odd size are coarser than a power of two by up to a sample.
-const AS_COARSE: f64 = 1.01;
+const COARSENESS_TOLERANCE: f64 = 1.01;
 
 /// The blocks of a file; the last used are in memory.
 pub(super) struct Blocks {
@@ -65,27 +65,27 @@ pub(super) struct Shared {
     /// The reader's images, and the coarse images computed from them.
     images: Vec<BlockImage>,
     /// Never locked while a block is read.
-    kept: Mutex<BlockState>,
+    state: Mutex<BlockState>,
     /// Locked by a thread that reads a block for a waiting reader.
-    turn: Mutex<()>,
+    read_lock: Mutex<()>,
     coarse: Mutex<Coarse>,
     disk: DiskCache,
     /// Queue for coarse samples.
-    queue: Queue,
+    coarse_queue: Queue,
     /// Queue for fine samples, which are urgent.
-    fine: Queue,
+    fine_queue: Queue,
     /// Blocks that were read from the file.
-    read: AtomicU64,
+    blocks_read: AtomicU64,
     /// The file's path, for warnings.
     path: OnceLock<PathBuf>,
 }
 
 /// A sample that is not in memory yet, or cannot be read at present.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct NotHere;
+pub(super) struct NotLoaded;
 
 /// A stored sample; `None` for no-data that no value marks.
-pub(super) type Stored = Result<Option<f64>, NotHere>;
+pub(super) type Stored = Result<Option<f64>, NotLoaded>;
 
 impl Blocks {
     /// Returns the blocks of a reader, without reading any.
@@ -93,13 +93,13 @@ impl Blocks {
         let shared = Shared {
             images: reader.images().to_vec(),
             reader,
-            kept: Mutex::new(BlockState::new(cache::MAX_BYTES)),
-            turn: Mutex::new(()),
+            state: Mutex::new(BlockState::new(cache::MAX_BYTES)),
+            read_lock: Mutex::new(()),
             coarse: Mutex::new(Coarse::none()),
             disk: DiskCache::off(),
-            queue: Queue::default(),
-            fine: Queue::default(),
-            read: AtomicU64::new(0),
+            coarse_queue: Queue::default(),
+            fine_queue: Queue::default(),
+            blocks_read: AtomicU64::new(0),
             path: OnceLock::new(),
         };
         Self {
@@ -132,15 +132,15 @@ impl Blocks {
     }
 
     /// Starts the threads for reads that do not wait. If that fails, such a read waits.
-    fn possible(&self, wait: Wait) -> Wait {
+    fn effective_wait(&self, wait: Wait) -> Wait {
         let start = |name: &str, queue: fn(&Shared) -> &Queue| {
             let shared = self.shared.clone();
             let builder = thread::Builder::new().name(name.into());
             builder.spawn(move || shared.work(queue(&shared)))
         };
         let start_both = || {
-            let coarse = start("coarse samples", |shared| &shared.queue);
-            let fine = start("fine samples", |shared| &shared.fine);
+            let coarse = start("coarse samples", |shared| &shared.coarse_queue);
+            let fine = start("fine samples", |shared| &shared.fine_queue);
             match (coarse, fine) {
                 (Ok(coarse), Ok(fine)) => Some([coarse, fine]),
                 (Err(error), _) | (_, Err(error)) => {
@@ -160,7 +160,7 @@ impl Blocks {
     /// Returns a stored sample at a column and row of an image, in the file's order.
     pub(super) fn stored(&self, image: usize, column: u32, row: u32, wait: Wait) -> Stored {
         self.shared
-            .sample(image, [column, row], self.possible(wait))
+            .sample(image, [column, row], self.effective_wait(wait))
     }
 
     /// Returns the height at a column and row of an image, in the file's order; `height` converts a
@@ -174,14 +174,14 @@ impl Blocks {
     ) -> (f64, ReadStatus) {
         match self.stored(image, column, row, wait) {
             Ok(stored) => (height(stored), ReadStatus::Complete),
-            Err(NotHere) => (f64::NAN, ReadStatus::Pending),
+            Err(NotLoaded) => (f64::NAN, ReadStatus::Pending),
         }
     }
 
     /// Prefetches blocks of the image that serves a level, in a range of columns and of rows of the
     /// full image.
     pub(super) fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
-        if self.possible(Wait::Never) == Wait::Never {
+        if self.effective_wait(Wait::Never) == Wait::Never {
             self.shared.prefetch_full(level, columns, rows);
         }
     }
@@ -198,15 +198,16 @@ impl Deref for Blocks {
 impl Drop for Blocks {
     fn drop(&mut self) {
         // A thread that waits for a server ends when the server answers.
-        let are_done = [&self.shared.queue, &self.shared.fine].map(|queue| queue.end(END_WITHIN));
+        let are_drained = [&self.shared.coarse_queue, &self.shared.fine_queue]
+            .map(|queue| queue.close(CLOSE_TIMEOUT));
         let threads = self.threads.take().flatten().into_iter().flatten();
-        for (thread, is_done) in threads.zip(are_done) {
-            if is_done {
+        for (thread, is_drained) in threads.zip(are_drained) {
+            if is_drained {
                 let _ = thread.join();
             }
         }
-        let new = self.coarse().take_new();
-        self.keep(new);
+        let new = self.coarse().take_unsaved();
+        self.save(new);
         if let Some(path) = self.path.get() {
             let (read, name) = (self.blocks_read(), without_key(path));
             tracing::debug!("{read} blocks of {name} were read");
@@ -223,44 +224,44 @@ impl Shared {
 
     /// Sets the max size of the cache, and the number of unreadable blocks that were reported
     /// before.
-    pub(super) fn set_share(&self, max_bytes: usize, unread: u32) {
-        *self.kept() = BlockState::new(max_bytes).after(unread);
+    pub(super) fn reset_cache(&self, max_bytes: usize, unreadable: u32) {
+        *self.state() = BlockState::new(max_bytes).after(unreadable);
     }
 
     /// Returns the memory of the cached blocks, bytes, and the number of unreadable blocks.
-    pub(super) fn share(&self) -> (usize, u32) {
-        let kept = self.kept();
-        (kept.cache.bytes(), kept.unread)
+    pub(super) fn cache_use(&self) -> (usize, u32) {
+        let state = self.state();
+        (state.cache.bytes(), state.unreadable)
     }
 
     /// Returns the number of blocks that were read from the file.
     pub(super) fn blocks_read(&self) -> u64 {
-        self.read.load(Ordering::Relaxed)
+        self.blocks_read.load(Ordering::Relaxed)
     }
 
     /// Returns the number of blocks of the full image.
-    pub(super) fn count(&self) -> u64 {
+    pub(super) fn block_count(&self) -> u64 {
         let counts = self.images.first().map_or([0; 2], BlockImage::counts);
         counts.map(u64::from).iter().product()
     }
 
     /// Returns true if a block of the file is being read in the background, or is queued.
     pub(super) fn is_reading(&self) -> bool {
-        !self.fine.is_idle()
+        !self.fine_queue.is_idle()
     }
 
     /// Returns the last error of the connection, if a block is missing.
     pub(super) fn take_outage(&self) -> Option<RasterError> {
-        self.kept().outage.take()
+        self.state().outage.take()
     }
 
-    fn kept(&self) -> MutexGuard<'_, BlockState> {
+    fn state(&self) -> MutexGuard<'_, BlockState> {
         // No code that panics runs while the lock is held.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn coarse(&self) -> MutexGuard<'_, Coarse> {
-        // See `kept`.
+        // See `state`.
         self.coarse.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -280,12 +281,12 @@ impl Shared {
             false => 0,
         };
         let blocks = 2 * block.min(MAX_BLOCK_BYTES) as usize;
-        cache::MAX_BYTES + blocks + pieces + self.reader.kept_bytes()
+        cache::MAX_BYTES + blocks + pieces + self.reader.max_memory_bytes()
     }
 
     /// Returns the image that serves a level: the coarsest that is no coarser than the level.
     pub(super) fn image_of(&self, level: u8) -> usize {
-        let step = f64::from(level).exp2() * AS_COARSE;
+        let step = f64::from(level).exp2() * COARSENESS_TOLERANCE;
         let serves = |image: &BlockImage| self.coarseness(image).iter().all(|times| *times <= step);
         self.images.iter().rposition(serves).unwrap_or(0)
     }
@@ -320,17 +321,17 @@ impl Shared {
         let Some(of) = self.images.get(image) else {
             return Ok(None);
         };
-        let key = coarse::place(image, at).0;
+        let key = coarse::locate(image, at).0;
         let mut found = self.coarse().sample(image, at);
-        if found == (Found::Nothing { was_sought: false }) && self.disk.is_on() {
+        if found == (SampleState::Unknown { is_searched: false }) && self.disk.is_on() {
             if wait == Wait::Never {
-                self.queue.want(Job::Seek(key));
-                return Err(NotHere);
+                self.coarse_queue.push_back(Job::LoadPiece(key));
+                return Err(NotLoaded);
             }
-            self.seek(key);
+            self.load_piece(key);
             found = self.coarse().sample(image, at);
         }
-        if let Found::Value(value) = found {
+        if let SampleState::Value(value) = found {
             return Ok(Some(value));
         }
         let every = of.every.unwrap_or(1);
@@ -339,18 +340,18 @@ impl Shared {
         let block = [column / full.block[0], row / full.block[1]];
         let part = full.part(block);
         if !self.reader.is_stored(0, &part) {
-            self.coarse().leave(&part, None, false);
+            self.coarse().add_block(&part, None, false);
             return Ok(None);
         }
-        let is_here = self.kept().cache.get(&Key {
+        let cached = self.state().cache.get(&Key {
             image: 0,
             at: block,
         });
-        if wait == Wait::UntilRead || is_here.is_some() {
+        if wait == Wait::UntilRead || cached.is_some() {
             return self.sample(0, [column, row], wait);
         }
-        self.queue.want(Job::Pass(block));
-        Err(NotHere)
+        self.coarse_queue.push_back(Job::Coarsen(block));
+        Err(NotLoaded)
     }
 
     /// Returns the columns and rows of an image.

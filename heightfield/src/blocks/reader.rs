@@ -2,7 +2,7 @@
 
 use super::super::RasterError;
 use super::super::samples::{NoDataMask, SampleType, SampleValue, Samples, with_samples};
-use super::survey::Looks;
+use super::survey::SurveyParts;
 
 /// Side of a usual block: smaller blocks of a file are read several at once.
 const USUAL_BLOCK: u32 = 256;
@@ -35,7 +35,7 @@ pub(crate) trait BlockReader: Send + Sync {
     }
 
     /// Announces parts that will be read one after another, so that remote parts are prefetched.
-    fn want(&self, image: usize, parts: &[Part]) {
+    fn prefetch(&self, image: usize, parts: &[Part]) {
         let _ = (image, parts);
     }
 
@@ -43,7 +43,7 @@ pub(crate) trait BlockReader: Send + Sync {
     fn index(&self) -> u64;
 
     /// Returns the parts that are read at opening; `None` for the coarsest image.
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         None
     }
 
@@ -56,7 +56,7 @@ pub(crate) trait BlockReader: Send + Sync {
     }
 
     /// Returns the reader's own max memory, bytes, without the blocks that it returns.
-    fn kept_bytes(&self) -> usize {
+    fn max_memory_bytes(&self) -> usize {
         0
     }
 }
@@ -96,16 +96,16 @@ pub(crate) struct Block {
     /// Row after row.
     pub(crate) samples: Samples,
     /// No-data that no value marks.
-    pub(crate) holes: Option<NoDataMask>,
+    pub(crate) no_data_mask: Option<NoDataMask>,
     /// True if some samples are no-data only because a part of the file could not be read.
-    pub(crate) is_lacking: bool,
+    pub(crate) is_incomplete: bool,
 }
 
 impl Block {
     /// Returns a sample by its index in the block; `None` for no-data that no value marks.
     pub(crate) fn stored(&self, index: usize) -> Option<f64> {
-        let hole = (self.holes.as_ref()).is_some_and(|mask| mask.contains(index));
-        (!hole).then(|| with_samples!(&self.samples, values => values[index].widen()))
+        let is_no_data = (self.no_data_mask.as_ref()).is_some_and(|mask| mask.contains(index));
+        (!is_no_data).then(|| with_samples!(&self.samples, values => values[index].widen()))
     }
 }
 
@@ -122,9 +122,9 @@ impl Part {
 
     /// Returns the intersection with another part, which must not be empty.
     pub(crate) fn within(&self, other: &Self) -> Self {
-        let cut = |first: u32, count: u32, from: u32, most: u32| {
+        let cut = |first: u32, count: u32, from: u32, max: u32| {
             let begin = first.max(from);
-            (begin, (first + count).min(from + most) - begin)
+            (begin, (first + count).min(from + max) - begin)
         };
         let (column, columns) = cut(self.column, self.columns, other.column, other.columns);
         let (row, rows) = cut(self.row, self.rows, other.row, other.rows);
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_block_is_as_few_chunks_as_make_a_usual_one() {
+    fn block_has_the_fewest_chunks_of_a_usual_block() {
         assert_eq!(usual_block([256, 256]), [256, 256]);
         assert_eq!(usual_block([100, 300]), [300, 300]);
         assert_eq!(usual_block([1000, 1000]), [1000, 1000]);

@@ -12,7 +12,7 @@ use crate::remote::without_key;
 /// An image of at most this many samples is read whole.
 const FEW_SAMPLES: u64 = 1 << 20;
 /// Number of stored blocks, evenly spread, that are read of a larger image.
-const LOOKS: usize = 32;
+const MAX_PARTS: usize = 32;
 /// Max listed blocks, evenly spread over those that are stored: a full list could need more memory
 /// than the terrain.
 const MAX_LISTED: usize = 1 << 20;
@@ -39,7 +39,7 @@ impl Survey {
 
 /// Parts of a raster that are read at opening.
 #[derive(Debug)]
-pub(crate) struct Looks {
+pub(crate) struct SurveyParts {
     /// The image to read.
     pub(crate) image: usize,
     /// Parts of it, of which a few are read.
@@ -47,12 +47,12 @@ pub(crate) struct Looks {
 }
 
 /// The heights that have been read.
-struct Seen {
+struct SurveyedHeights {
     hasher: XxHash64,
     summary: HeightSummary,
 }
 
-impl Seen {
+impl SurveyedHeights {
     /// Counts a height; NaN is no-data.
     fn add(&mut self, height: f64) {
         let bits = if height.is_nan() { f64::NAN } else { height };
@@ -66,60 +66,60 @@ impl Shared {
     /// `height` converts a stored sample. The summary's range is empty if the whole file has no
     /// height.
     pub(crate) fn survey(&self, height: impl Fn(Option<f64>) -> f64) -> Survey {
-        let mut seen = Seen {
+        let mut surveyed = SurveyedHeights {
             hasher: XxHash64::with_seed(0),
             summary: HeightSummary::EMPTY,
         };
-        seen.hasher.write_u64(self.reader.index());
-        let chosen = self.reader.looks();
-        let (is_chosen, Looks { image, parts }) = match chosen {
-            Some(looks) => (true, looks),
+        surveyed.hasher.write_u64(self.reader.index());
+        let chosen = self.reader.survey_parts();
+        let (is_chosen, SurveyParts { image, parts }) = match chosen {
+            Some(parts) => (true, parts),
             None => (false, self.coarsest()),
         };
-        let look_once = |part: &Part, seen: &mut Seen| {
-            self.look_once(image, part, |stored| seen.add(height(stored)));
+        let add_part = |part: &Part, surveyed: &mut SurveyedHeights| {
+            self.add_part(image, part, |stored| surveyed.add(height(stored)));
         };
-        let look = |part: &Part, seen: &mut Seen| match is_chosen {
-            true => look_once(part, seen),
-            false => self.look_at_block(image, part, |stored| seen.add(height(stored))),
+        let add_samples = |part: &Part, surveyed: &mut SurveyedHeights| match is_chosen {
+            true => add_part(part, surveyed),
+            false => self.add_block(image, part, |stored| surveyed.add(height(stored))),
         };
         let is_small = !is_chosen && self.samples(image) <= FEW_SAMPLES;
-        let looks = match is_small || parts.len() <= LOOKS {
+        let count = match is_small || parts.len() <= MAX_PARTS {
             true => parts.len(),
-            false => LOOKS,
+            false => MAX_PARTS,
         };
-        let chosen = (0..looks).map(|index| parts[index * (parts.len() - 1) / (looks - 1).max(1)]);
+        let chosen = (0..count).map(|index| parts[index * (parts.len() - 1) / (count - 1).max(1)]);
         let chosen: Vec<Part> = chosen.collect();
-        self.reader.want(image, &chosen);
+        self.reader.prefetch(image, &chosen);
         for part in &chosen {
-            look(part, &mut seen);
+            add_samples(part, &mut surveyed);
         }
-        if looks < parts.len() && seen.summary.has_none() {
-            self.tell_of_search(looks, parts.len());
+        if count < parts.len() && surveyed.summary.has_none() {
+            self.warn_of_search(count, parts.len());
             // Most of the file may be no-data: then the first height anywhere is enough.
             for part in &parts {
-                look_once(part, &mut seen);
-                if !seen.summary.has_none() {
+                add_part(part, &mut surveyed);
+                if !surveyed.summary.has_none() {
                     break;
                 }
             }
         }
         Survey {
-            summary: seen.summary,
-            print: Some(seen.hasher.finish()),
+            summary: surveyed.summary,
+            print: Some(surveyed.hasher.finish()),
         }
     }
 
     /// Warns that opening the file may take long, and why.
-    fn tell_of_search(&self, looks: usize, parts: usize) {
+    fn warn_of_search(&self, count: usize, parts: usize) {
         let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
         tracing::warn!(
-            "{looks} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
+            "{count} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
         );
     }
 
     /// Reads the samples of a block, which is cached.
-    fn look_at_block(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
+    fn add_block(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
         for row in part.row..part.row + part.rows {
             for column in part.column..part.column + part.columns {
                 let stored = self.sample(image, [column, row], Wait::UntilRead);
@@ -130,21 +130,21 @@ impl Shared {
 
     /// Reads the samples of a part that is not a block: it is not cached, and nothing around it is
     /// read.
-    fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
+    fn add_part(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
         let block = self.read(image, part).ok().and_then(|read| read.block);
         for index in 0..part.columns as usize * part.rows as usize {
             add(block.as_ref().and_then(|block| block.stored(index)));
         }
     }
 
-    fn coarsest(&self) -> Looks {
+    fn coarsest(&self) -> SurveyParts {
         let image = self.reader.images().len().saturating_sub(1);
         let images = self.reader.images();
         let parts = images.get(image).map(|of| {
             let is_stored = |part: &Part| self.reader.is_stored(image, part);
             stored_parts(of, is_stored)
         });
-        Looks {
+        SurveyParts {
             image,
             parts: parts.unwrap_or_default(),
         }

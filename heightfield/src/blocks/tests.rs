@@ -82,8 +82,8 @@ impl BlockReader for Field {
             .collect();
         Ok(Block {
             samples: samples.into(),
-            holes: None,
-            is_lacking: false,
+            no_data_mask: None,
+            is_incomplete: false,
         })
     }
 
@@ -101,13 +101,13 @@ fn raster(field: Field, south_up: bool, east_first: bool) -> Raster {
 }
 
 #[test]
-fn a_touched_place_reads_its_block_once_and_nothing_else() {
+fn read_fetches_only_its_block_once() {
     let (field, read) = Field::new();
     let raster = raster(field, true, false);
     let survey = read.swap(0, Ordering::Relaxed);
     assert_eq!(survey, 250 * 175, "the overview, all of it");
-    assert_eq!(raster.summary().looked_at, survey);
-    assert!(!raster.is_known_whole());
+    assert_eq!(raster.summary().examined, survey);
+    assert!(!raster.is_summary_complete());
     for _ in 0..2 {
         assert_eq!(raster.height(300, 200), plane(300.0, 200.0));
         assert_eq!(raster.height(301, 210), plane(301.0, 210.0));
@@ -120,7 +120,7 @@ fn a_touched_place_reads_its_block_once_and_nothing_else() {
 }
 
 #[test]
-fn missing_or_damaged_blocks_are_no_data_and_others_are_read() {
+fn missing_or_damaged_blocks_are_no_data() {
     let (field, _) = Field::new();
     let raster = raster(field, true, false);
     for (column, row, is_no_data) in [
@@ -185,7 +185,7 @@ fn coarse_levels_use_the_overview_in_any_file_orientation() {
 }
 
 #[test]
-fn the_memory_that_blocks_take_is_bounded() {
+fn block_memory_is_bounded() {
     let mut field = Field::new().0;
     let read = field.read.clone();
     field.images = vec![image([20_000, 20_000])];
@@ -200,11 +200,11 @@ fn the_memory_that_blocks_take_is_bounded() {
             let _ = blocks.stored(0, block * 64, 4800 + row * 480, Wait::UntilRead);
         }
     }
-    let kept = blocks.kept.lock().expect("alone");
+    let state = blocks.state.lock().expect("alone");
     assert!(8 * read.load(Ordering::Relaxed) > 2 * MAX_BYTES as u64);
-    assert!(kept.cache.bytes() <= MAX_BYTES, "{}", kept.cache.bytes());
-    assert!(kept.cache.bytes() > MAX_BYTES / 2);
-    drop(kept);
+    assert!(state.cache.bytes() <= MAX_BYTES, "{}", state.cache.bytes());
+    assert!(state.cache.bytes() > MAX_BYTES / 2);
+    drop(state);
     // The block used last is still cached.
     let before = read.load(Ordering::Relaxed);
     let _ = blocks.stored(0, (20_000 / 64 - 1) * 64, 4800 + 19 * 480, Wait::UntilRead);
@@ -214,7 +214,7 @@ fn the_memory_that_blocks_take_is_bounded() {
 /// Concurrent reads of the same field by several threads, as for several devices, each with its own
 /// terrain.
 #[test]
-fn a_block_that_one_thread_read_is_not_read_again_for_another() {
+fn block_is_read_once_for_all_threads() {
     let (mut field, read) = Field::new();
     field.fault = false;
     let raster = raster(field, true, false);
@@ -239,17 +239,20 @@ fn a_block_that_one_thread_read_is_not_read_again_for_another() {
     };
     // The overview was read at opening.
     let overview = samples / 16;
-    let held = blocks.share().0 as u64;
-    assert!(held >= 8 * (samples + overview), "{held}");
-    assert!(held < 9 * (samples + overview), "{held}: kept once");
+    let cached_bytes = blocks.cache_use().0 as u64;
+    assert!(cached_bytes >= 8 * (samples + overview), "{cached_bytes}");
+    assert!(
+        cached_bytes < 9 * (samples + overview),
+        "{cached_bytes}: kept once"
+    );
 }
 
 /// A field of blocks of one row each; reading the second one waits for the test.
 struct Slow {
     images: Vec<BlockImage>,
-    begun: Arc<std::sync::Barrier>,
-    go_on: Arc<std::sync::Barrier>,
-    elsewhere: bool,
+    started: Arc<std::sync::Barrier>,
+    resume: Arc<std::sync::Barrier>,
+    is_offline: bool,
 }
 
 impl BlockReader for Slow {
@@ -271,17 +274,17 @@ impl BlockReader for Slow {
 
     fn read(&self, _: usize, part: &Part) -> Result<Block, RasterError> {
         if part.column == BLOCK[0] {
-            if self.elsewhere {
+            if self.is_offline {
                 return Err(RasterError::Remote(crate::remote::outage()));
             }
-            self.begun.wait();
-            self.go_on.wait();
+            self.started.wait();
+            self.resume.wait();
         }
         let count = (part.columns * part.rows) as usize;
         Ok(Block {
             samples: vec![1.0; count].into(),
-            holes: None,
-            is_lacking: false,
+            no_data_mask: None,
+            is_incomplete: false,
         })
     }
 
@@ -290,20 +293,20 @@ impl BlockReader for Slow {
     }
 }
 
-fn slow(elsewhere: bool) -> Slow {
+fn slow(is_offline: bool) -> Slow {
     let barrier = || Arc::new(std::sync::Barrier::new(2));
     Slow {
         images: vec![image([BLOCK[0] * 2, BLOCK[1]])],
-        begun: barrier(),
-        go_on: barrier(),
-        elsewhere,
+        started: barrier(),
+        resume: barrier(),
+        is_offline,
     }
 }
 
 #[test]
 fn cached_block_is_read_while_another_block_loads() {
     let field = slow(false);
-    let (begun, go_on) = (field.begun.clone(), field.go_on.clone());
+    let (started, resume) = (field.started.clone(), field.resume.clone());
     let blocks = Blocks::new(Box::new(field));
     assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
     std::thread::scope(|scope| {
@@ -313,26 +316,26 @@ fn cached_block_is_read_while_another_block_loads() {
                 Ok(Some(1.0))
             );
         });
-        begun.wait();
+        started.wait();
         // The other thread is reading until it gets the signal.
-        let is_free = blocks.kept.try_lock().is_ok();
+        let is_free = blocks.state.try_lock().is_ok();
         let sample = is_free.then(|| blocks.stored(0, 1, 1, Wait::UntilRead));
-        go_on.wait();
+        resume.wait();
         assert_eq!(sample, Some(Ok(Some(1.0))));
     });
 }
 
 #[test]
-fn a_missing_block_is_reported_at_each_read() {
+fn missing_block_is_reported_at_each_read() {
     let blocks = Blocks::new(Box::new(slow(true)));
     let missing = || blocks.stored(0, BLOCK[0], 0, Wait::UntilRead);
     // The second time, its state is known without a read.
-    assert_eq!((missing(), missing()), (Err(NotHere), Err(NotHere)));
+    assert_eq!((missing(), missing()), (Err(NotLoaded), Err(NotLoaded)));
     assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
 }
 
 #[test]
-fn a_field_without_a_height_anywhere_is_refused() {
+fn field_without_any_height_is_refused() {
     let (mut field, _) = Field::new();
     field.fault = false;
     let size = (SIZE[0], SIZE[1]);
@@ -341,5 +344,5 @@ fn a_field_without_a_height_anywhere_is_refused() {
     // All heights but zero are too large.
     let fault = Raster::checked(decoded, Some(0.0)).expect_err("no height");
     assert!(matches!(fault, RasterError::AllNoData { .. }), "{fault}");
-    assert_eq!(OpenOptions::default().most_in_memory_bytes, 128 << 20);
+    assert_eq!(OpenOptions::default().max_in_memory_bytes, 128 << 20);
 }

@@ -115,7 +115,7 @@ impl Datum {
     pub(super) fn to_lonlat(&self, own: (f64, f64)) -> Option<(f64, f64)> {
         match &self.shift {
             None | Some(Shift::None) => Some(own),
-            Some(shift) => Some(moved(own, shift.to_wgs84(sensible(own))?)),
+            Some(shift) => Some(moved(own, shift.to_wgs84(clamped(own))?)),
         }
     }
 
@@ -123,7 +123,7 @@ impl Datum {
     pub(super) fn of_lonlat(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
         match &self.shift {
             None | Some(Shift::None) => Some(lonlat),
-            Some(shift) => Some(moved(lonlat, shift.of_wgs84(sensible(lonlat))?)),
+            Some(shift) => Some(moved(lonlat, shift.of_wgs84(clamped(lonlat))?)),
         }
     }
 }
@@ -135,13 +135,13 @@ fn is_wgs84(name: &str) -> bool {
 }
 
 /// Limits degrees to the globe: fields of cells extend half a cell beyond the poles.
-fn sensible((longitude, latitude): (f64, f64)) -> (f64, f64) {
+fn clamped((longitude, latitude): (f64, f64)) -> (f64, f64) {
     (wrapped(longitude), latitude.clamp(-90.0, 90.0))
 }
 
 /// Applies the shift of the limited degrees to the original ones.
 fn moved(place: (f64, f64), to: (f64, f64)) -> (f64, f64) {
-    let from = sensible(place);
+    let from = clamped(place);
     let east = wrapped(to.0 - from.0);
     (place.0 + east, place.1 + to.1 - from.1)
 }

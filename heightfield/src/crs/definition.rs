@@ -49,9 +49,9 @@ pub(crate) fn vertical(code: u16) -> Option<Vertical> {
 }
 
 /// Returns the vertical part of a compound system with a code.
-pub(crate) fn vertical_beside(code: u16) -> Option<Vertical> {
+pub(crate) fn vertical_of_compound(code: u16) -> Option<Vertical> {
     let root = Node::parse(crs_definitions::from_code(code)?.wkt)?;
-    Vertical::beside(&root)
+    Vertical::of_compound(&root)
 }
 
 fn defined(code: u16) -> Option<ReferenceSystem> {

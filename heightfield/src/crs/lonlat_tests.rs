@@ -14,9 +14,9 @@ pub(super) fn has_libgdal() -> bool {
     library.is_ok()
 }
 
-fn off_m(found: (f64, f64), wanted: (f64, f64)) -> f64 {
-    let east = (found.0 - wanted.0) * wanted.1.to_radians().cos();
-    DEGREE_M * east.hypot(found.1 - wanted.1)
+fn off_m(found: (f64, f64), expected: (f64, f64)) -> f64 {
+    let east = (found.0 - expected.0) * expected.1.to_radians().cos();
+    DEGREE_M * east.hypot(found.1 - expected.1)
 }
 
 /// Against PROJ 9's best transformation without grids (pyproj's TransformerGroup), x and y
@@ -37,7 +37,7 @@ fn longitudes_and_latitudes_are_those_of_wgs_84() {
         (4326, (10.0, 60.0), (10.0, 60.0)),
         (2229, (6.49e6, 1.87e6), (-118.236_814_3, 34.130_615_3)),
     ];
-    for (code, place, wanted) in cases {
+    for (code, place, expected) in cases {
         let system = ReferenceSystem::from_code(code).expect("known");
         let within_m = match system.lonlat() {
             LonLat::Wgs84 => 0.01,
@@ -45,18 +45,18 @@ fn longitudes_and_latitudes_are_those_of_wgs_84() {
             other => panic!("{code}: {other:?}"),
         };
         let found = system.to_lonlat(place).expect("in reach");
-        let off = off_m(found, wanted);
+        let off = off_m(found, expected);
         assert!(off < within_m, "{code}: {off} m off, {within_m} m said");
         let back = system.from_lonlat(found).expect("in reach");
         let off = (back.0 - place.0).hypot(back.1 - place.1);
-        let least = if place.0 > 1e3 { 1e-2 } else { 1e-7 };
-        assert!(off < least, "{code}: {back:?} for {place:?}");
+        let tolerance = if place.0 > 1e3 { 1e-2 } else { 1e-7 };
+        assert!(off < tolerance, "{code}: {back:?} for {place:?}");
     }
 }
 
 /// Esri's texts have no codes: the datum is found by its name.
 #[test]
-fn a_text_without_a_code_is_shifted_by_its_datum() {
+fn wkt_without_a_code_is_shifted_by_its_datum() {
     if !has_libgdal() {
         return;
     }
@@ -68,15 +68,15 @@ fn a_text_without_a_code_is_shifted_by_its_datum() {
     };
     let found = |text: &str| {
         let system = ReferenceSystem::from_wkt(text).0.expect("a system");
-        let way = match system.lonlat() {
+        let projection = match system.lonlat() {
             LonLat::ShiftedToWgs84 { within_m } => Some(within_m),
             LonLat::OfOwnDatum { .. } => None,
             other => panic!("{other:?}"),
         };
-        (system.to_lonlat((10.0, 50.0)).expect("degrees"), way)
+        (system.to_lonlat((10.0, 50.0)).expect("degrees"), projection)
     };
     let ed50 = (9.998_864_6, 49.999_198_6);
-    for (text, way) in [
+    for (text, error_m) in [
         (text("D_European_1950", ""), Some(45.0)),
         (
             text("D_Somewhere", ",TOWGS84[-87,-98,-121,0,0,0,0]"),
@@ -87,16 +87,16 @@ fn a_text_without_a_code_is_shifted_by_its_datum() {
             Some(10.0),
         ),
     ] {
-        let (place, found_way) = found(&text);
-        assert_eq!(found_way, way, "{text}");
-        assert!(off_m(place, ed50) < way.unwrap_or(0.0), "{place:?}");
+        let (place, found_error_m) = found(&text);
+        assert_eq!(found_error_m, error_m, "{text}");
+        assert!(off_m(place, ed50) < error_m.unwrap_or(0.0), "{place:?}");
     }
-    let (place, way) = found(&text("D_Somewhere", ""));
-    assert_eq!((place, way), ((10.0, 50.0), None), "nothing is made up");
+    let (place, error_m) = found(&text("D_Somewhere", ""));
+    assert_eq!((place, error_m), ((10.0, 50.0), None), "nothing is made up");
 }
 
 #[test]
-fn another_meridian_and_grads_of_a_text_count_too() {
+fn wkt_meridian_and_grads_are_used() {
     if !has_libgdal() {
         return;
     }
@@ -112,7 +112,7 @@ fn another_meridian_and_grads_of_a_text_count_too() {
 }
 
 #[test]
-fn the_moon_has_its_own_longitudes() {
+fn moon_has_its_own_longitudes() {
     if !has_libgdal() {
         return;
     }
@@ -133,8 +133,8 @@ fn the_moon_has_its_own_longitudes() {
 
 /// At a pole, all longitudes are the same position.
 #[test]
-fn the_poles_of_polar_maps_are_places() {
-    for (code, latitude, wanted) in [
+fn poles_of_polar_maps_are_valid_positions() {
+    for (code, latitude, expected) in [
         (3031, -90.0, (0.0, 0.0)),
         (3413, 90.0, (0.0, 0.0)),
         (32661, 90.0, (2e6, 2e6)),
@@ -145,7 +145,7 @@ fn the_poles_of_polar_maps_are_places() {
         for longitude in [0.0, 45.0, -123.4, 180.0] {
             let found = system.from_lonlat((longitude, latitude));
             let found = found.unwrap_or_else(|| panic!("{code}: the pole at {longitude}°"));
-            let off = (found.0 - wanted.0).hypot(found.1 - wanted.1);
+            let off = (found.0 - expected.0).hypot(found.1 - expected.1);
             assert!(off < 1e-3, "{code}: {found:?}");
         }
         assert_eq!(system.from_lonlat((0.0, -latitude)), None, "{code}");

@@ -48,7 +48,7 @@ impl Projection {
     pub(super) fn of_degrees(&self, degrees: (f64, f64)) -> Option<(f64, f64)> {
         let place = self
             .0
-            .back((degrees.0.to_radians(), degrees.1.to_radians()))?;
+            .inverse((degrees.0.to_radians(), degrees.1.to_radians()))?;
         // Far outside their range, a projection's formulas still return numbers.
         are_same(degrees, self.degrees(place)?).then_some(place)
     }

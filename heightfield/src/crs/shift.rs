@@ -12,7 +12,7 @@ pub(super) enum Shift {
     /// A shift with its ellipsoid, in PROJ's syntax.
     Parameters {
         /// From longitude and latitude of the datum to WGS 84.
-        way: Transform,
+        transform: Transform,
         /// Usual max error, m.
         within_m: f64,
     },
@@ -29,7 +29,7 @@ const SEVEN_WITHIN_M: f64 = 10.0;
 const NAD27: [f64; 3] = [-8.0, 160.0, 176.0];
 
 /// Geographic systems whose shift in `crs-definitions` differs from PROJ's by more than 100 m.
-const NOT_TRUSTED: [u16; 5] = [4161, 4240, 4688, 4805, 4751];
+const UNTRUSTED: [u16; 5] = [4161, 4240, 4688, 4805, 4751];
 
 impl Shift {
     /// Creates a shift from three or seven parameters for an ellipsoid: metres, seconds of arc, and
@@ -54,13 +54,16 @@ impl Shift {
 
     fn by(words: &str, within_m: f64) -> Option<Self> {
         let from = format!("+proj=longlat {words}");
-        let way = Transform::new(from, "+proj=longlat +datum=WGS84".into())?;
-        Some(Self::Parameters { way, within_m })
+        let transform = Transform::new(from, "+proj=longlat +datum=WGS84".into())?;
+        Some(Self::Parameters {
+            transform,
+            within_m,
+        })
     }
 
     /// Returns the shift of the system with an EPSG code.
     pub(super) fn of_code(code: u16) -> Option<Self> {
-        if NOT_TRUSTED.contains(&code) {
+        if UNTRUSTED.contains(&code) {
             return None;
         }
         let text = crs_definitions::from_code(code)?.proj4;
@@ -116,7 +119,7 @@ impl Shift {
     pub(super) fn to_wgs84(&self, own: (f64, f64)) -> Option<(f64, f64)> {
         match self {
             Self::None => Some(own),
-            Self::Parameters { way, .. } => in_degrees(own, |place| way.forward(place)),
+            Self::Parameters { transform, .. } => in_degrees(own, |place| transform.forward(place)),
         }
     }
 
@@ -124,7 +127,9 @@ impl Shift {
     pub(super) fn of_wgs84(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
         match self {
             Self::None => Some(lonlat),
-            Self::Parameters { way, .. } => in_degrees(lonlat, |place| way.back(place)),
+            Self::Parameters { transform, .. } => {
+                in_degrees(lonlat, |place| transform.inverse(place))
+            }
         }
     }
 }

@@ -44,13 +44,13 @@ impl ReferenceSystem {
     /// projection comes from libgdal, if it is installed.
     pub(crate) fn from_wkt(text: &str) -> (Option<Self>, Option<Vertical>) {
         let text = text.trim().trim_end_matches('\0');
-        let Some((root, beside)) = Node::parse_both(text) else {
+        let Some((root, second)) = Node::parse_both(text) else {
             return (None, None);
         };
-        let up = beside.as_ref().and_then(Vertical::of);
+        let up = second.as_ref().and_then(Vertical::of);
         (
             root.horizontal().and_then(|node| Self::of_node(node, text)),
-            up.or_else(|| Vertical::beside(&root)),
+            up.or_else(|| Vertical::of_compound(&root)),
         )
     }
 

@@ -30,7 +30,7 @@ impl Transform {
     }
 
     /// Converts a position of the second system to the first.
-    pub(super) fn back(&self, place: (f64, f64)) -> Option<(f64, f64)> {
+    pub(super) fn inverse(&self, place: (f64, f64)) -> Option<(f64, f64)> {
         let [from, to] = &*self.systems;
         moved(to, from, place)
     }

@@ -38,7 +38,7 @@ pub(super) struct Node {
 
 /// A parser that consumes a text.
 struct Reader<'t> {
-    left: &'t str,
+    remaining: &'t str,
     /// Number of nodes that may still be read.
     nodes: usize,
 }
@@ -48,7 +48,7 @@ impl<'t> Reader<'t> {
     fn node(&mut self, levels: usize) -> Option<Node> {
         let keyword = self.word();
         self.nodes = self.nodes.checked_sub(1)?;
-        if keyword.is_empty() || !self.takes(&['[', '(']) {
+        if keyword.is_empty() || !self.skip(&['[', '(']) {
             return None;
         }
         let mut node = Node {
@@ -57,42 +57,42 @@ impl<'t> Reader<'t> {
             children: Vec::new(),
         };
         loop {
-            let before = self.left;
-            if self.takes(&['"']) {
+            let before = self.remaining;
+            if self.skip(&['"']) {
                 node.values.push(self.quoted()?);
             } else {
                 let word = self.word();
-                if self.left.starts_with(['[', '(']) {
-                    self.left = before;
+                if self.remaining.starts_with(['[', '(']) {
+                    self.remaining = before;
                     node.children.push(self.node(levels.checked_sub(1)?)?);
                 } else if !word.is_empty() {
                     node.values.push(word.to_owned());
                 }
             }
-            if self.takes(&[']', ')']) {
+            if self.skip(&[']', ')']) {
                 let is_empty = node.values.is_empty() && node.children.is_empty();
                 return (!is_empty).then_some(node);
             }
-            if !self.takes(&[',']) {
+            if !self.skip(&[',']) {
                 return None;
             }
         }
     }
 
     /// Consumes one of some characters, after spaces.
-    fn takes(&mut self, characters: &[char]) -> bool {
-        let left = self.left.trim_start();
-        let rest = left.strip_prefix(characters);
-        self.left = rest.unwrap_or(left);
-        rest.is_some()
+    fn skip(&mut self, characters: &[char]) -> bool {
+        let left = self.remaining.trim_start();
+        let remaining = left.strip_prefix(characters);
+        self.remaining = remaining.unwrap_or(left);
+        remaining.is_some()
     }
 
     /// Consumes a keyword or a number.
     fn word(&mut self) -> &'t str {
-        let left = self.left.trim_start();
+        let left = self.remaining.trim_start();
         let end = left.find(['[', ']', '(', ')', ',', '"']);
-        let (word, rest) = left.split_at(end.unwrap_or(left.len()));
-        self.left = rest;
+        let (word, remaining) = left.split_at(end.unwrap_or(left.len()));
+        self.remaining = remaining;
         word.trim_end()
     }
 
@@ -100,11 +100,11 @@ impl<'t> Reader<'t> {
     fn quoted(&mut self) -> Option<String> {
         let mut text = String::new();
         loop {
-            let (part, rest) = self.left.split_once('"')?;
+            let (part, remaining) = self.remaining.split_once('"')?;
             text += part;
-            self.left = rest;
-            match rest.strip_prefix('"') {
-                Some(rest) => self.left = rest,
+            self.remaining = remaining;
+            match remaining.strip_prefix('"') {
+                Some(remaining) => self.remaining = remaining,
                 None => return Some(text),
             }
             text.push('"');
@@ -122,14 +122,14 @@ impl Node {
     /// one, after a comma.
     pub(super) fn parse_both(text: &str) -> Option<(Self, Option<Self>)> {
         let mut reader = Reader {
-            left: text,
+            remaining: text,
             nodes: MAX_NODES,
         };
         if text.len() > MAX_BYTES {
             return None;
         }
         let first = reader.node(MAX_LEVELS)?;
-        let second = reader.takes(&[',']).then(|| reader.node(MAX_LEVELS));
+        let second = reader.skip(&[',']).then(|| reader.node(MAX_LEVELS));
         Some((first, second.flatten()))
     }
 
@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_that_is_no_reference_system_is_none() {
+    fn invalid_wkt_is_no_reference_system() {
         for text in [
             "",
             "metres",
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn the_code_is_that_of_the_system_and_not_of_its_parts() {
+    fn code_is_that_of_the_system_not_of_its_parts() {
         let text = r#"PROJCS["mine",GEOGCS["b",AUTHORITY["EPSG","4326"]],UNIT["foot",0.3048]]"#;
         let node = Node::parse(text).expect("a tree");
         assert_eq!(

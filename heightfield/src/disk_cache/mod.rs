@@ -37,11 +37,11 @@ pub(crate) use temporary_files::TemporaryFile;
 use crate::regular_file;
 
 /// Version of the record format, and the name of its folder.
-const FORM: &str = "v1";
+const VERSION: &str = "v1";
 /// Max size of a record, bytes.
 const MAX_RECORD: usize = 1 << 20;
 /// Time after which a read marks a record as used again.
-const USED_AGAIN: Duration = Duration::from_secs(3600);
+const MARK_USED_AFTER: Duration = Duration::from_secs(3600);
 
 /// A folder of records; clones share it. The default stores nothing.
 #[derive(Clone, Default)]
@@ -54,7 +54,7 @@ struct Folder {
     /// Size reserved for unnamed files, bytes.
     unnamed: AtomicU64,
     /// Size of its content; `None` after a failed write.
-    room: Mutex<Option<SizeLimit>>,
+    size_limit: Mutex<Option<SizeLimit>>,
     /// Set after the warning that the folder is not used.
     warned: OnceLock<()>,
 }
@@ -76,13 +76,13 @@ impl DiskCache {
         if max_bytes == 0 {
             return Self::off();
         }
-        let path = folder.join(FORM);
-        let room = Mutex::new(Some(SizeLimit::new(max_bytes)));
+        let path = folder.join(VERSION);
+        let size_limit = Mutex::new(Some(SizeLimit::new(max_bytes)));
         Self(Some(Arc::new(Folder {
             path,
             max_bytes,
             unnamed: AtomicU64::new(0),
-            room,
+            size_limit,
             warned: OnceLock::new(),
         })))
     }
@@ -120,14 +120,17 @@ impl DiskCache {
             return;
         };
         // No code that panics runs while the lock is held.
-        let mut room = folder.room.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(open) = room.as_mut() else {
+        let mut size_limit = folder
+            .size_limit
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let Some(open) = size_limit.as_mut() else {
             return;
         };
         if let Err(error) = folder.write(open, name, bytes) {
             let path = folder.path.display();
             tracing::debug!("nothing more is kept in {path}: {error}");
-            *room = None;
+            *size_limit = None;
         }
     }
 }
@@ -153,28 +156,28 @@ impl Folder {
     ///
     /// # Errors
     /// It cannot be created, or must not be used.
-    fn make(&self) -> io::Result<()> {
+    fn create(&self) -> io::Result<()> {
         match self.check() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             checked => return checked,
         }
-        private::make(&self.path)?;
+        private::create(&self.path)?;
         self.check()
     }
 
-    fn write(&self, room: &mut SizeLimit, name: &Name, bytes: &[u8]) -> io::Result<()> {
-        self.make()?;
-        room.look(&self.path);
+    fn write(&self, size_limit: &mut SizeLimit, name: &Name, bytes: &[u8]) -> io::Result<()> {
+        self.create()?;
+        size_limit.scan_once(&self.path);
         let path = self.path.join(name.path());
         let parent = path.parent().unwrap_or(&self.path);
-        private::make(parent)?;
-        let record = record::made(name, bytes);
+        private::create(parent)?;
+        let record = record::encode(name, bytes);
         let mut file = tempfile::Builder::new()
-            .prefix(size_limit::UNFINISHED)
+            .prefix(size_limit::INCOMPLETE_PREFIX)
             .tempfile_in(parent)?;
         file.write_all(&record)?;
         file.persist(&path)?;
-        room.add(&self.path, record.len() as u64);
+        size_limit.add(&self.path, record.len() as u64);
         Ok(())
     }
 }
@@ -182,20 +185,20 @@ impl Folder {
 fn read(path: &Path, name: &Name) -> io::Result<Vec<u8>> {
     let file = regular_file::open(path)?;
     let metadata = file.metadata()?;
-    let most = (MAX_RECORD + record::HEAD) as u64;
-    if metadata.len() > most {
+    let max = (MAX_RECORD + record::HEADER_BYTES) as u64;
+    if metadata.len() > max {
         return Err(io::Error::other("it is no record"));
     }
     let mut bytes = Vec::new();
-    (&file).take(most).read_to_end(&mut bytes)?;
-    let held = record::held(name, bytes).ok_or_else(|| io::Error::other("it is damaged"))?;
+    (&file).take(max).read_to_end(&mut bytes)?;
+    let content = record::decode(name, bytes).ok_or_else(|| io::Error::other("it is damaged"))?;
     let used = metadata.modified().ok();
     let is_old = used.and_then(|used| used.elapsed().ok());
-    if is_old.is_some_and(|since| since >= USED_AGAIN) {
+    if is_old.is_some_and(|since| since >= MARK_USED_AFTER) {
         // If the time cannot be written, the record counts as unused.
         let _ = file.set_modified(SystemTime::now());
     }
-    Ok(held)
+    Ok(content)
 }
 
 impl fmt::Debug for DiskCache {

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// Creates a folder and its parents, unreadable for other users: a server's file may have needed a
 /// key.
-pub(super) fn make(folder: &Path) -> Result<()> {
+pub(super) fn create(folder: &Path) -> Result<()> {
     let mut builder = fs::DirBuilder::new();
     builder.recursive(true);
     #[cfg(unix)]

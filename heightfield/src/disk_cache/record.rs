@@ -7,9 +7,9 @@ use twox_hash::XxHash64;
 
 use super::Name;
 
-const BEGINS: &[u8; 8] = b"hapterr1";
+const SIGNATURE: &[u8; 8] = b"hapterr1";
 /// Size of the header, bytes.
-pub(super) const HEAD: usize = 8 + 16 + 8 + 8;
+pub(super) const HEADER_BYTES: usize = 8 + 16 + 8 + 8;
 
 fn sum(bytes: &[u8]) -> u64 {
     let mut hasher = XxHash64::with_seed(0);
@@ -18,17 +18,18 @@ fn sum(bytes: &[u8]) -> u64 {
 }
 
 /// Returns a record with some content.
-pub(super) fn made(name: &Name, bytes: &[u8]) -> Vec<u8> {
+pub(super) fn encode(name: &Name, bytes: &[u8]) -> Vec<u8> {
     let length = (bytes.len() as u64).to_le_bytes();
     let sum = sum(bytes).to_le_bytes();
-    [BEGINS, &name.bytes()[..], &length, &sum, bytes].concat()
+    [SIGNATURE, &name.bytes()[..], &length, &sum, bytes].concat()
 }
 
 /// Returns the content of a record; `None` if the name differs or it is incomplete.
-pub(super) fn held(name: &Name, mut record: Vec<u8>) -> Option<Vec<u8>> {
-    let head = record.get(..HEAD)?;
-    let length = (record.len() - HEAD) as u64;
-    let expected = [BEGINS, &name.bytes()[..], &length.to_le_bytes()].concat();
-    let is_whole = head[..32] == expected && head[32..] == sum(&record[HEAD..]).to_le_bytes();
-    is_whole.then(|| record.split_off(HEAD))
+pub(super) fn decode(name: &Name, mut record: Vec<u8>) -> Option<Vec<u8>> {
+    let head = record.get(..HEADER_BYTES)?;
+    let length = (record.len() - HEADER_BYTES) as u64;
+    let expected = [SIGNATURE, &name.bytes()[..], &length.to_le_bytes()].concat();
+    let is_whole =
+        head[..32] == expected && head[32..] == sum(&record[HEADER_BYTES..]).to_le_bytes();
+    is_whole.then(|| record.split_off(HEADER_BYTES))
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 /// Unit of disk space, bytes.
-const PIECE: u64 = 4096;
+const DISK_UNIT: u64 = 4096;
 /// Beginning of the name of an incomplete record.
-pub(super) const UNFINISHED: &str = ".new-";
+pub(super) const INCOMPLETE_PREFIX: &str = ".new-";
 /// Age at which an incomplete record counts as abandoned: writing never takes that long.
-const LEFT_BEHIND: Duration = Duration::from_secs(3600);
+const ABANDONED_AFTER: Duration = Duration::from_secs(3600);
 
 /// Tracks the size of a folder.
 pub(super) struct SizeLimit {
@@ -35,27 +35,27 @@ impl SizeLimit {
     }
 
     /// Scans the folder, if that has not been done.
-    pub(super) fn look(&mut self, folder: &Path) {
+    pub(super) fn scan_once(&mut self, folder: &Path) {
         if self.used.is_none() {
-            self.make(folder);
+            self.evict(folder);
         }
     }
 
     /// Counts a written record, and frees space if needed. The folder is scanned for other
     /// programs' records after writes of an eighth of the bound.
     pub(super) fn add(&mut self, folder: &Path, bytes: u64) {
-        let bytes = bytes.next_multiple_of(PIECE);
+        let bytes = bytes.next_multiple_of(DISK_UNIT);
         self.written += bytes;
         let used = self.used.get_or_insert(0);
         *used += bytes;
         if *used > self.max_bytes || self.written > self.max_bytes / 8 {
-            self.make(folder);
+            self.evict(folder);
         }
     }
 
     /// Deletes the least recently used records until they fit in seven eighths of the bound, if
     /// they exceed the bound.
-    fn make(&mut self, folder: &Path) {
+    fn evict(&mut self, folder: &Path) {
         let mut records = records(folder);
         let mut used: u64 = records.iter().map(|record| record.bytes).sum();
         if used > self.max_bytes {
@@ -92,9 +92,9 @@ fn records(folder: &Path) -> Vec<Record> {
                 found.push(Record {
                     path: entry.path(),
                     used,
-                    bytes: metadata.len().next_multiple_of(PIECE),
+                    bytes: metadata.len().next_multiple_of(DISK_UNIT),
                 });
-            } else if is_left_behind(&entry, used) {
+            } else if is_abandoned(&entry, used) {
                 let _ = fs::remove_file(entry.path());
             }
         }
@@ -102,8 +102,10 @@ fn records(folder: &Path) -> Vec<Record> {
     found
 }
 
-fn is_left_behind(entry: &DirEntry, written: SystemTime) -> bool {
+fn is_abandoned(entry: &DirEntry, written: SystemTime) -> bool {
     let name = entry.file_name();
-    let begins = name.as_encoded_bytes().starts_with(UNFINISHED.as_bytes());
-    begins && written.elapsed().is_ok_and(|since| since > LEFT_BEHIND)
+    let begins = name
+        .as_encoded_bytes()
+        .starts_with(INCOMPLETE_PREFIX.as_bytes());
+    begins && written.elapsed().is_ok_and(|since| since > ABANDONED_AFTER)
 }

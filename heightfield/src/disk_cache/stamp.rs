@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 
 /// Age below which a file may be written again without a change of its times, because file systems
 /// round them.
-const SETTLED: Duration = Duration::from_secs(2);
+const SETTLE_TIME: Duration = Duration::from_secs(2);
 
 /// A file on disk in one state: its path, size, times and, if the system has them, its numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,9 +41,9 @@ impl FileStamp {
     }
 
     /// Returns the stamp as text, unless the file was written a moment ago.
-    pub(crate) fn settled(&self) -> Option<&str> {
+    pub(crate) fn stable_text(&self) -> Option<&str> {
         let since = self.modified?.elapsed().ok()?;
-        (since >= SETTLED).then_some(&*self.text)
+        (since >= SETTLE_TIME).then_some(&*self.text)
     }
 }
 

@@ -7,8 +7,8 @@ use std::sync::atomic::Ordering;
 
 use super::{DiskCache, Folder};
 
-/// Their total size is at most 1/`PARTS` of the free space.
-const PARTS: u64 = 2;
+/// Their total size is at most 1/`FREE_SHARE` of the free space.
+const FREE_SHARE: u64 = 2;
 
 /// A file without a name, with a max size.
 pub(crate) struct TemporaryFile {
@@ -29,23 +29,23 @@ impl DiskCache {
     ///
     /// # Errors
     /// The cache is off, too little space is free, or the folder cannot be written.
-    pub(crate) fn file_without_name(&self, bytes: u64) -> Result<TemporaryFile> {
+    pub(crate) fn create_unnamed(&self, bytes: u64) -> Result<TemporaryFile> {
         let Some(folder) = &self.0 else {
             return Err(Error::other("nothing may be kept on disk (--cache off)"));
         };
-        folder.make()?;
+        folder.create()?;
         // If the free space is unknown, the writes decide.
         let free = fs4::available_space(&folder.path).unwrap_or(u64::MAX);
         let file = tempfile::tempfile_in(&folder.path)?;
         // Space that is reserved but not yet filled is not free.
-        let before = folder.unnamed.fetch_add(bytes, Ordering::Relaxed);
+        let reserved = folder.unnamed.fetch_add(bytes, Ordering::Relaxed);
         let folder = folder.clone();
         let unnamed = TemporaryFile {
             file,
             bytes,
             folder,
         };
-        if before.saturating_add(bytes) > free / PARTS {
+        if reserved.saturating_add(bytes) > free / FREE_SHARE {
             let [needed, free] = [bytes.div_ceil(1_000_000), free / 1_000_000];
             return Err(Error::new(
                 ErrorKind::StorageFull,
@@ -70,12 +70,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unnamed_file_leaves_nothing_and_takes_half_the_free_space() {
+    fn unnamed_file_disappears_and_takes_half_the_free_space() {
         let folder = tempfile::tempdir().expect("a folder");
         let disk = DiskCache::at(folder.path(), 1);
-        let mut first = disk.file_without_name(1 << 20).expect("a file");
+        let mut first = disk.create_unnamed(1 << 20).expect("a file");
         first.file.write_all(&[1; 4096]).expect("written");
-        let within = folder.path().join(super::super::FORM);
+        let within = folder.path().join(super::super::VERSION);
         let names = || std::fs::read_dir(&within).expect("listed").count();
         if cfg!(unix) {
             assert_eq!(names(), 0, "it has a name");
@@ -83,12 +83,12 @@ mod tests {
         drop(first);
         assert_eq!(names(), 0);
         let third = fs4::available_space(&within).expect("told") / 3;
-        let refused = |bytes: u64| disk.file_without_name(bytes).err().map(|e| e.to_string());
+        let refused = |bytes: u64| disk.create_unnamed(bytes).err().map(|e| e.to_string());
         assert!(refused(2 * third).is_some_and(|why| why.contains("--cache")));
         assert_eq!(refused(third), None, "nothing is left of what was refused");
-        let _one = disk.file_without_name(third).expect("a third");
+        let _one = disk.create_unnamed(third).expect("a third");
         assert!(refused(third).is_some(), "two thirds are more than half");
-        let off = DiskCache::off().file_without_name(1).err();
+        let off = DiskCache::off().create_unnamed(1).err();
         assert!(off.is_some_and(|error| error.to_string().contains("--cache off")));
     }
 }

@@ -25,7 +25,7 @@ fn cache(max_bytes: u64) -> (tempfile::TempDir, DiskCache) {
 
 /// Returns the path of a record.
 fn path(folder: &tempfile::TempDir, number: usize) -> PathBuf {
-    folder.path().join(FORM).join(name(number).path())
+    folder.path().join(VERSION).join(name(number).path())
 }
 
 /// Returns the size of all files, bytes.
@@ -39,7 +39,7 @@ fn used(folder: &Path) -> u64 {
 }
 
 #[test]
-fn a_record_is_found_again_by_its_name_alone() {
+fn record_is_found_by_its_name() {
     let (folder, cache) = cache(1 << 20);
     assert_eq!(cache.get(&name(1)), None);
     cache.put(&name(1), &bytes(1));
@@ -55,7 +55,7 @@ fn a_record_is_found_again_by_its_name_alone() {
 }
 
 #[test]
-fn a_record_that_is_not_whole_or_another_is_as_if_absent() {
+fn damaged_or_foreign_record_counts_as_absent() {
     let (folder, cache) = cache(1 << 20);
     cache.put(&name(1), &bytes(1));
     cache.put(&name(2), &bytes(2));
@@ -88,7 +88,7 @@ fn a_record_that_is_not_whole_or_another_is_as_if_absent() {
 fn only_least_recently_used_records_are_evicted() {
     const MAX: u64 = 400 << 10;
     let (folder, cache) = cache(MAX);
-    let foreign = folder.path().join(FORM).join("ab").join("mine.txt");
+    let foreign = folder.path().join(VERSION).join("ab").join("mine.txt");
     fs::create_dir_all(foreign.parent().expect("it has one")).expect("made");
     fs::write(&foreign, [1; 100]).expect("written");
     let beside = folder.path().join("other");
@@ -135,7 +135,7 @@ fn concurrent_caches_read_only_whole_records() {
                     }
                     if round % 100 == 99 {
                         // Another program deletes the folder in between.
-                        let _ = fs::remove_dir_all(folder.path().join(FORM));
+                        let _ = fs::remove_dir_all(folder.path().join(VERSION));
                     }
                 }
             });
@@ -166,11 +166,11 @@ fn disabled_or_unusable_folder_stores_nothing_without_error() {
 
 #[cfg(unix)]
 #[test]
-fn folder_that_others_may_write_is_neither_read_nor_written() {
+fn folder_writable_by_others_is_not_used() {
     use std::os::unix::fs::PermissionsExt;
     let (folder, cache) = cache(1 << 20);
     cache.put(&name(1), &bytes(1));
-    let own = folder.path().join(FORM);
+    let own = folder.path().join(VERSION);
     for open in [folder.path(), &own] {
         for (mode, is_used) in [(0o757, false), (0o770, false), (0o755, true)] {
             fs::set_permissions(open, fs::Permissions::from_mode(mode)).expect("set");
@@ -179,7 +179,7 @@ fn folder_that_others_may_write_is_neither_read_nor_written() {
             assert_eq!(cache.get(&name(1)).is_some(), is_used, "{mode:o}");
             cache.put(&name(2), &bytes(2));
             assert_eq!(path(&folder, 2).exists(), is_used, "{mode:o}");
-            assert_eq!(cache.file_without_name(1).is_ok(), is_used, "{mode:o}");
+            assert_eq!(cache.create_unnamed(1).is_ok(), is_used, "{mode:o}");
             let _ = fs::remove_file(path(&folder, 2));
         }
     }
@@ -193,18 +193,18 @@ fn folder_that_others_may_write_is_neither_read_nor_written() {
 #[test]
 fn linked_folder_is_refused_and_its_files_are_kept() {
     use std::os::unix::fs::symlink;
-    let elsewhere = tempfile::tempdir().expect("a folder");
-    let foreign = elsewhere.path().join(name(1).path());
+    let target = tempfile::tempdir().expect("a folder");
+    let foreign = target.path().join(name(1).path());
     fs::create_dir_all(foreign.parent().expect("it has one")).expect("made");
     fs::write(&foreign, vec![1; 1 << 19]).expect("written");
-    let (folder, linked) = (tempfile::tempdir().expect("a folder"), elsewhere.path());
-    symlink(linked, folder.path().join(FORM)).expect("linked");
+    let (folder, linked) = (tempfile::tempdir().expect("a folder"), target.path());
+    symlink(linked, folder.path().join(VERSION)).expect("linked");
     symlink(linked, folder.path().join("link")).expect("linked");
     for named in [folder.path().to_owned(), folder.path().join("link")] {
         let cache = DiskCache::at(&named, 64 << 10);
         cache.put(&name(2), &bytes(2));
         assert_eq!(cache.get(&name(2)), None);
-        let why = cache.file_without_name(1).err().expect("refused");
+        let why = cache.create_unnamed(1).err().expect("refused");
         assert!(why.to_string().contains("is a link"), "{why}");
         assert!(foreign.exists(), "{}", named.display());
         assert_eq!(fs::read_dir(linked).expect("listed").count(), 1);
@@ -214,7 +214,7 @@ fn linked_folder_is_refused_and_its_files_are_kept() {
 #[test]
 fn leftover_file_of_a_killed_program_is_deleted() {
     let (folder, cache) = cache(64 << 10);
-    let inner = folder.path().join(FORM).join("00");
+    let inner = folder.path().join(VERSION).join("00");
     fs::create_dir_all(&inner).expect("made");
     let left = inner.join(".new-killed");
     fs::write(&left, [0; 50]).expect("written");
@@ -230,10 +230,10 @@ fn file_stamp_differs_between_files_and_after_a_change() {
     fs::write(&a, [1; 9]).expect("written");
     set_just_changed(&a);
     let first = FileStamp::at(&a).expect("there");
-    assert_eq!(first.settled(), None, "it was written a moment ago");
+    assert_eq!(first.stable_text(), None, "it was written a moment ago");
     set_age(&a, Duration::from_secs(100));
     let aged = FileStamp::at(&a).expect("there");
-    assert!(aged.settled().is_some() && aged != first);
+    assert!(aged.stable_text().is_some() && aged != first);
     assert_eq!(FileStamp::at(&a).as_ref(), Some(&aged));
     fs::copy(&a, &b).expect("copied");
     assert_ne!(FileStamp::at(&b).as_ref(), Some(&aged));

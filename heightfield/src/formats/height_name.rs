@@ -2,8 +2,9 @@
 
 use crate::RasterError;
 
-/// Returns the index in `names` of `asked`; by default, of the first name in `usual` (words, the
-/// likeliest first), or of the only name. `kind` is the file's word for its parts, for messages.
+/// Returns the index in `names` of `requested`; by default, of the first name in `usual` (words,
+/// the likeliest first), or of the only name. `kind` is the file's word for its parts, for
+/// messages.
 ///
 /// # Errors
 /// If there are no names, several unusual ones, or not the requested one.
@@ -11,22 +12,22 @@ pub(super) fn choose(
     kind: &'static str,
     names: &[&str],
     usual: &str,
-    asked: Option<&str>,
+    requested: Option<&str>,
 ) -> Result<usize, RasterError> {
-    if let Some(asked) = asked {
-        let exact = names.iter().position(|name| *name == asked);
-        let there = match names {
+    if let Some(requested) = requested {
+        let exact = names.iter().position(|name| *name == requested);
+        let available = match names {
             [] => format!("it has no {kind} of numbers"),
             names => format!("its {kind}s are {}", names.join(", ")),
         };
         return exact.ok_or_else(|| RasterError::NoSuchPart {
-            asked: format!("{kind} {asked}"),
-            there,
+            requested: format!("{kind} {requested}"),
+            available,
         });
     }
-    let place = |wanted: &str| {
+    let place = |word: &str| {
         let mut names = names.iter();
-        names.position(|name| name.eq_ignore_ascii_case(wanted))
+        names.position(|name| name.eq_ignore_ascii_case(word))
     };
     match (usual.split_whitespace().find_map(place), names) {
         (Some(place), _) => Ok(place),

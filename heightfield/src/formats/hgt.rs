@@ -2,13 +2,13 @@
 //! file's length and name.
 
 use crate::decoded::Decoded;
-use crate::file_layout::SamplesAre;
+use crate::file_layout::RasterType;
 use crate::format::{Claim, Format, Parts};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::placed::GroundUnit;
 use crate::raw_samples::RawSamples;
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{
     CellSize, CellUnit, Certainty, Endian, OpenOptions, RasterError, ReferenceSystem, SampleType,
 };
@@ -17,7 +17,7 @@ use crate::{
 pub(super) const FORMAT: Format = Format {
     name: "SRTM",
     begins: |_| false,
-    extensions: &[("hgt", Claim::Decides)],
+    extensions: &[("hgt", Claim::Certain)],
     parts: Parts::One,
     decode,
 };
@@ -29,12 +29,12 @@ const VOID: f64 = -32768.0;
 /// neighbours.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let (columns, rows) = size(input.len())?;
-    let stored = Stored::Held(SampleType::I16);
+    let stored = StoredType::Held(SampleType::I16);
     let plain = RawSamples::packed((columns, rows), stored, Endian::Big, 0);
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), plain.storage(input, options)?);
     decoded.no_data = Some(VOID);
-    decoded.file_layout.samples_are = Some(SamplesAre::Points);
+    decoded.file_layout.raster_type = Some(RasterType::Point);
     decoded.metres_per_vertical_unit = Some(1.0);
     // SRTM's heights are above the geoid EGM96, its coordinates in WGS 84.
     decoded.set_vertical_datum(5773);
@@ -45,7 +45,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
         GroundMap::from_centre([west, east, 0.0], [south + 1.0, 0.0, -north])
     });
     if let Some(map) = map {
-        decoded.lay_out(map, Some(GroundUnit::DEGREE));
+        decoded.set_layout(map, Some(GroundUnit::DEGREE));
     } else {
         decoded.cell = Some(CellSize {
             certainty: Certainty::Assumed,

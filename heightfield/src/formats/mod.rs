@@ -37,6 +37,6 @@ pub(super) fn claim_of(name: &str) -> Option<Claim> {
     let extension = name.rsplit_once('.')?.1.to_lowercase();
     let claims = FORMATS.iter().filter_map(|format| format.claim(&extension));
     let by_gdal = BY_GDAL.contains(&extension.as_str());
-    let claims = claims.chain(by_gdal.then_some(Claim::Promises));
-    claims.min_by_key(|claim| *claim == Claim::Suggests)
+    let claims = claims.chain(by_gdal.then_some(Claim::Expected));
+    claims.min_by_key(|claim| *claim == Claim::Possible)
 }

@@ -3,7 +3,7 @@
 use crate::decoded::Decoded;
 use crate::input::FileBytes;
 use crate::raw_samples::RawSamples;
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{OpenOptions, RasterError, RawLayout};
 
 /// Extensions of files with samples only.
@@ -32,7 +32,7 @@ pub(crate) fn decode(
             "the stated size is not its size: {what}"
         )));
     }
-    let stored = Stored::Held(layout.sample);
+    let stored = StoredType::Held(layout.sample);
     let plain = RawSamples::packed((columns, rows), stored, layout.endian, 0);
     let format = format!("raw {}", layout.sample.none().type_name());
     let storage = plain.storage(input, options)?;

@@ -38,7 +38,7 @@ pub(super) struct Spot {
 impl Grid {
     /// Returns the grid of a file.
     pub(super) fn of(path: &Path, first: Decoded) -> Result<Self, RasterError> {
-        let (bounds, step) = laid_out(path, &first)?;
+        let (bounds, step) = bounds_and_step(path, &first)?;
         Ok(Self {
             path: path.to_owned(),
             first,
@@ -58,7 +58,7 @@ impl Grid {
             why,
         };
         self.same_system(file).map_err(differs)?;
-        let (bounds, step) = laid_out(path, file)?;
+        let (bounds, step) = bounds_and_step(path, file)?;
         let size = [file.columns, file.rows].map(f64::from);
         let corner = [bounds.west, bounds.south];
         let mut at = [0; 2];
@@ -71,13 +71,13 @@ impl Grid {
                 )));
             }
             let cells = (corner[axis] - self.corner[axis]) / self.step[axis];
-            let beside = (cells - cells.round()).abs();
+            let offset = (cells - cells.round()).abs();
             if cells.is_nan() || cells.abs() >= MAX {
                 return Err(differs("it is too far away for one grid".into()));
             }
-            if beside > TOLERANCE {
+            if offset > TOLERANCE {
                 return Err(differs(format!(
-                    "its samples lie {beside:.2} cells beside the common grid"
+                    "its samples lie {offset:.2} cells beside the common grid"
                 )));
             }
             at[axis] = cells.round() as i64;
@@ -160,7 +160,7 @@ fn same_places(ours: &Decoded, theirs: &Decoded) -> bool {
 }
 
 /// Returns bounds and cell size of a file whose rows and columns are along its coordinates.
-fn laid_out(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), RasterError> {
+fn bounds_and_step(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), RasterError> {
     let in_tile = |fault| RasterError::in_tile(path, fault);
     let map = file
         .place
@@ -209,15 +209,15 @@ fn after_widest_gap(spots: &[Spot], around: i64) -> Option<i64> {
         .collect();
     arcs.sort_unstable();
     let first = arcs.first()?.0;
-    let mut reach = first;
+    let mut end = first;
     let (mut from, mut widest) = (first, i64::MIN);
     for (start, columns) in arcs {
-        if start - reach > widest && start != first {
-            (from, widest) = (start, start - reach);
+        if start - end > widest && start != first {
+            (from, widest) = (start, start - end);
         }
-        reach = reach.max(start + columns);
+        end = end.max(start + columns);
     }
-    let last_gap = first + around - reach;
+    let last_gap = first + around - end;
     Some(if last_gap >= widest { first } else { from })
 }
 
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn files_on_both_sides_of_a_meridian_become_neighbours() {
+    fn files_on_both_sides_of_180_degrees_become_neighbours() {
         // 179° E and 180° W, counted from the first.
         assert_eq!(unwrapped(&[(0, 2), (-359, 2)]), [0, 1]);
         assert_eq!(

@@ -41,7 +41,7 @@ pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Deco
         unwrap_turns(&mut index.spots, around);
     }
     let mut decoded = index.decoded(options)?;
-    decoded.remarks.extend(layers::left_out(&layers));
+    decoded.remarks.extend(layers::remark_ignored(&layers));
     Ok(decoded)
 }
 
@@ -152,7 +152,7 @@ impl Index {
         let ([x, y], [east, north]) = (self.grid.corner_of(west, south), self.grid.step);
         let map = GroundMap::new([x, east, 0.0], [y, 0.0, north]);
         let map = map.ok_or_else(|| RasterError::damaged("its files lie nowhere"))?;
-        decoded.lay_out(map, first.ground_unit());
+        decoded.set_layout(map, first.ground_unit());
         Ok(decoded)
     }
 }

@@ -101,8 +101,8 @@ fn words(path: &Path) -> Vec<String> {
 }
 
 /// Returns folder and name without one of its words.
-fn without(path: &Path, words: &[String], left_out: usize) -> (PathBuf, String) {
-    let others = words.iter().enumerate().filter(|(at, _)| *at != left_out);
+fn without(path: &Path, words: &[String], omitted: usize) -> (PathBuf, String) {
+    let others = words.iter().enumerate().filter(|(at, _)| *at != omitted);
     let others: Vec<&str> = others.map(|(_, word)| word.as_str()).collect();
     (
         path.parent().unwrap_or(Path::new("")).to_owned(),
@@ -112,8 +112,10 @@ fn without(path: &Path, words: &[String], left_out: usize) -> (PathBuf, String) 
 
 /// Returns the positions of a list's words in a name.
 fn places(words: &[String], list: &[&str]) -> Vec<usize> {
-    let known = |word: &String| list.contains(&word.as_str());
-    (0..words.len()).filter(|at| known(&words[*at])).collect()
+    let is_listed = |word: &String| list.contains(&word.as_str());
+    (0..words.len())
+        .filter(|at| is_listed(&words[*at]))
+        .collect()
 }
 
 /// Splits files by name into heights, and layers beside them.
@@ -139,8 +141,8 @@ pub(super) fn split_by_name(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>)
 pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
     let all: Vec<Vec<String>> = files.iter().map(|(path, _)| words(path)).collect();
     let is_shared = |word: &String| all.iter().all(|words| words.contains(word));
-    let only = |holds: &dyn Fn(usize) -> bool| {
-        let mut found = (0..files.len()).filter(|index| holds(*index));
+    let only = |accepts: &dyn Fn(usize) -> bool| {
+        let mut found = (0..files.len()).filter(|index| accepts(*index));
         found.next().filter(|_| found.next().is_none())
     };
     let is_named = |index: usize| {
@@ -152,7 +154,7 @@ pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
 }
 
 /// Returns the remark on ignored layers.
-pub(super) fn left_out(layers: &[PathBuf]) -> Option<String> {
+pub(super) fn remark_ignored(layers: &[PathBuf]) -> Option<String> {
     const MAX_NAMED: usize = 4;
     let name = |path: &PathBuf| {
         path.file_name()

@@ -44,7 +44,7 @@ pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Dec
     }
     let (files, layers) = layers::split_by_name(files);
     let mut decoded = index::decoded(files, options)?;
-    decoded.remarks.extend(layers::left_out(&layers));
+    decoded.remarks.extend(layers::remark_ignored(&layers));
     Ok(decoded)
 }
 

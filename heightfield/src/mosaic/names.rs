@@ -63,12 +63,12 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     let found = glob::glob(pattern).map_err(wrong)?;
     // Files in folders without permission cannot be read.
     let found = found.filter_map(Result::ok);
-    let asked = |path: &PathBuf| {
+    let requested = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let others = ["png", "zip", "gz"];
         is_tile(path) || others.iter().any(|other| extension == *other)
     };
-    let tiles = found.filter(|path| asked(path) && path.is_file());
+    let tiles = found.filter(|path| requested(path) && path.is_file());
     let mut files: Vec<_> = tiles.take(MAX_FILES + 1).collect();
     files.sort();
     Ok(files)
@@ -83,7 +83,7 @@ pub(super) fn is_tile(path: &Path) -> bool {
     let unpacked = unpacked.unwrap_or(&lower);
     let is_hidden = lower.starts_with('.');
     let is_placed = !unpacked.ends_with(".png");
-    let claims = claim_of(unpacked).is_some_and(|claim| claim != Claim::Suggests);
+    let claims = claim_of(unpacked).is_some_and(|claim| claim != Claim::Possible);
     claims && is_placed && !is_hidden
 }
 

@@ -12,11 +12,11 @@ use crate::remote::is_url;
 /// compared.
 const MAX_PAIRS: usize = 8;
 /// Max number of comparisons in the search for pairs.
-const MAX_LOOKS: usize = 1 << 22;
-/// Overlaps of up to `FEW_SAMPLES` are compared whole, larger ones at `PLACES` positions per
-/// direction.
+const MAX_COMPARISONS: usize = 1 << 22;
+/// Overlaps of up to `FEW_SAMPLES` are compared whole, larger ones at `MAX_PLACES_PER_AXIS`
+/// positions per direction.
 const FEW_SAMPLES: u64 = 4096;
-const PLACES: u32 = 5;
+const MAX_PLACES_PER_AXIS: u32 = 5;
 /// Max difference of equal heights, in the file's unit, and as a share of the height.
 const SAME: f64 = 1e-3;
 const SAME_SHARE: f64 = 1e-5;
@@ -31,7 +31,7 @@ struct Disagreement {
     compared: u32,
     different: u32,
     /// The max difference.
-    most: f64,
+    max_difference: f64,
 }
 
 impl Mosaic {
@@ -46,7 +46,7 @@ impl Mosaic {
         if let Some(same) = found.iter().find(|it| it.is_on_same_samples) {
             return Err(RasterError::SamePlace {
                 files: same.files.map(|number| path(number).clone()),
-                difference: same.most,
+                difference: same.max_difference,
             });
         }
         let named = found.iter().take(MAX_NAMED);
@@ -58,7 +58,7 @@ impl Mosaic {
             });
             format!(
                 "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is taken",
-                it.most, it.different, it.compared
+                it.max_difference, it.different, it.compared
             )
         })
         .collect())
@@ -86,12 +86,12 @@ impl Mosaic {
             };
             opened.push(file);
         }
-        let mut seen = Disagreement {
+        let mut disagreement = Disagreement {
             files,
             is_on_same_samples: sources[0].covers == sources[1].covers,
             compared: 0,
             different: 0,
-            most: 0.0,
+            max_difference: 0.0,
         };
         let Some(overlap) = sources[0].overlap(0, &sources[1].covers) else {
             return Ok(None);
@@ -104,12 +104,12 @@ impl Mosaic {
             let Some((one, other)) = height(0)?.zip(height(1)?) else {
                 continue;
             };
-            let (apart, size) = ((one - other).abs(), one.abs().max(other.abs()));
-            seen.compared += 1;
-            seen.different += u32::from(apart > SAME.max(SAME_SHARE * size));
-            seen.most = seen.most.max(apart);
+            let (difference, size) = ((one - other).abs(), one.abs().max(other.abs()));
+            disagreement.compared += 1;
+            disagreement.different += u32::from(difference > SAME.max(SAME_SHARE * size));
+            disagreement.max_difference = disagreement.max_difference.max(difference);
         }
-        Ok(Some(seen))
+        Ok(Some(disagreement))
     }
 }
 
@@ -117,7 +117,11 @@ impl Mosaic {
 fn places(overlap: &Part) -> Vec<(u32, u32)> {
     let is_small = u64::from(overlap.columns) * u64::from(overlap.rows) <= FEW_SAMPLES;
     let along = |first: u32, count: u32| -> Vec<u32> {
-        let chosen = if is_small { count } else { count.min(PLACES) };
+        let chosen = if is_small {
+            count
+        } else {
+            count.min(MAX_PLACES_PER_AXIS)
+        };
         let steps = u64::from(chosen.max(2) - 1);
         let at = |index: u32| (u64::from(index) * u64::from(count - 1) / steps) as u32;
         (0..chosen).map(|index| first + at(index)).collect()
@@ -140,17 +144,17 @@ fn chosen_pairs(sources: &[Source]) -> Vec<[usize; 2]> {
     for &number in &order {
         let covers = &sources[number].covers;
         let key = [covers.column, covers.row, covers.columns, covers.rows];
-        chosen.extend(same.insert(key, number).map(|before| [before, number]));
+        chosen.extend(same.insert(key, number).map(|previous| [previous, number]));
     }
     order.sort_by_key(|number| sources[*number].covers.column);
     let mut others = Vec::new();
-    let mut looks = 0;
+    let mut comparisons = 0;
     for (at, &number) in order.iter().enumerate() {
         let covers = &sources[number].covers;
         for &other in &order[at + 1..] {
             let theirs = &sources[other].covers;
-            looks += 1;
-            if theirs.column >= covers.column + covers.columns || looks > MAX_LOOKS {
+            comparisons += 1;
+            if theirs.column >= covers.column + covers.columns || comparisons > MAX_COMPARISONS {
                 break;
             }
             if covers != theirs && sources[number].overlap(0, theirs).is_some() {

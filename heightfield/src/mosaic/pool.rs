@@ -12,7 +12,7 @@ use lru::LruCache;
 use super::super::decoder_panic::guarded;
 use super::super::storage::Storage;
 use super::super::{Decoded, OpenOptions, RasterError};
-use super::source::{Opened, Source};
+use super::source::{OpenFile, Source};
 use super::tile_file;
 use crate::remote::{is_url, without_key};
 
@@ -21,21 +21,21 @@ const MAX_OPEN: usize = 32;
 /// Max memory of open files, bytes; the last used may exceed it alone.
 const MAX_BYTES: usize = 64 << 20;
 /// Part of it for one file's blocks, bytes.
-const SHARE_BYTES: usize = 16 << 20;
+const BLOCK_CACHE_BYTES: usize = 16 << 20;
 /// Max size of a file that cannot be read in blocks, bytes.
 const MAX_WHOLE_BYTES: u64 = 64 << 20;
 
 /// Max time to open a file; after that, it is no-data.
-const OPEN_WITHIN: Duration = Duration::from_secs(20);
+const OPEN_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Open files by their number among the terrain's.
 pub(super) struct Pool {
     options: OpenOptions,
-    open: LruCache<usize, Arc<Opened>>,
+    open: LruCache<usize, Arc<OpenFile>>,
     /// Files that could not be read: each caused one warning, and is not tried again.
     failed: HashSet<usize>,
     /// Number of unreadable blocks of files that were closed since.
-    unread: HashMap<usize, u32>,
+    unreadable: HashMap<usize, u32>,
 }
 
 impl Pool {
@@ -44,7 +44,7 @@ impl Pool {
             options: options_for_tiles(options),
             open: LruCache::unbounded(),
             failed: HashSet::new(),
-            unread: HashMap::new(),
+            unreadable: HashMap::new(),
         }
     }
 
@@ -61,7 +61,7 @@ impl Pool {
         &mut self,
         number: usize,
         source: &Source,
-    ) -> Result<Option<Arc<Opened>>, RasterError> {
+    ) -> Result<Option<Arc<OpenFile>>, RasterError> {
         if let Some(opened) = self.open.get(&number) {
             return Ok(Some(opened.clone()));
         }
@@ -74,7 +74,9 @@ impl Pool {
                 self.open.push(number, opened.clone());
                 Ok(Some(opened))
             }
-            Err(fault) if fault.is_of_the_line() => Err(RasterError::in_tile(&source.path, fault)),
+            Err(fault) if fault.is_connection_error() => {
+                Err(RasterError::in_tile(&source.path, fault))
+            }
             Err(fault) => {
                 self.failed.insert(number);
                 // A file without heights is acceptable among others.
@@ -88,20 +90,20 @@ impl Pool {
     }
 
     /// Returns a file if it is open.
-    pub(super) fn peek(&self, number: usize) -> Option<&Opened> {
+    pub(super) fn peek(&self, number: usize) -> Option<&OpenFile> {
         self.open.peek(&number).map(|opened| &**opened)
     }
 
-    fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, RasterError> {
+    fn opened(&mut self, number: usize, source: &Source) -> Result<OpenFile, RasterError> {
         let options = self.options.clone();
         let stamps = source.stamps();
         let (path, by) = (source.path.clone(), options.clone());
-        let outline = in_time(source, OPEN_WITHIN, move || tile_file::outline(&path, &by))?;
+        let outline = with_timeout(source, OPEN_TIMEOUT, move || tile_file::outline(&path, &by))?;
         let whole = whole_bytes(&outline)?;
         self.make_room(usize::try_from(whole).unwrap_or(usize::MAX));
         let (path, by) = (source.path.clone(), options.clone());
         let decode = move || guarded("terrain", || tile_file::decode(&path, &by));
-        let mut decoded = in_time(source, OPEN_WITHIN, decode)?;
+        let mut decoded = with_timeout(source, OPEN_TIMEOUT, decode)?;
         let found = (decoded.columns, decoded.rows);
         let (columns, rows) = (source.covers.columns, source.covers.rows);
         if found != (columns, rows) {
@@ -110,33 +112,33 @@ impl Pool {
                 found.0, found.1
             )));
         }
-        decoded.settle_no_data(options.no_data);
+        decoded.resolve_no_data(options.no_data);
         if let Storage::Blocks(blocks) = &decoded.storage {
             blocks.set_path(&source.path);
-            let unread = self.unread.get(&number).copied().unwrap_or_default();
-            blocks.set_share(SHARE_BYTES, unread);
+            let unreadable = self.unreadable.get(&number).copied().unwrap_or_default();
+            blocks.reset_cache(BLOCK_CACHE_BYTES, unreadable);
         }
-        Ok(Opened::new(decoded, stamps))
+        Ok(OpenFile::new(decoded, stamps))
     }
 
     /// Closes files until the others and `more` bytes are within bounds. The last one stays open
     /// even if it is too large.
     pub(super) fn make_room(&mut self, more: usize) {
-        let bytes = |open: &LruCache<usize, Arc<Opened>>| {
+        let bytes = |open: &LruCache<usize, Arc<OpenFile>>| {
             open.iter()
-                .map(|(_, opened)| opened.share().0)
+                .map(|(_, opened)| opened.cache_use().0)
                 .sum::<usize>()
         };
-        let fewest = usize::from(more == 0);
-        while self.open.len() > fewest
+        let min_open = usize::from(more == 0);
+        while self.open.len() > min_open
             && (self.open.len() >= MAX_OPEN || bytes(&self.open).saturating_add(more) > MAX_BYTES)
         {
             let Some((number, closed)) = self.open.pop_lru() else {
                 return;
             };
-            let unread = closed.share().1;
-            if unread > 0 {
-                self.unread.insert(number, unread);
+            let unreadable = closed.cache_use().1;
+            if unreadable > 0 {
+                self.unreadable.insert(number, unreadable);
             }
         }
     }
@@ -151,14 +153,14 @@ impl Pool {
 /// Returns the options for one file of many: it is read in blocks, if possible.
 pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
     OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..options.clone()
     }
 }
 
 /// Opens a file in its own thread, which is abandoned after a time: a network disk may never
 /// respond. Requests to servers have their own time-outs.
-fn in_time<T: Send + 'static>(
+fn with_timeout<T: Send + 'static>(
     source: &Source,
     within: Duration,
     open: impl FnOnce() -> Result<T, RasterError> + Send + 'static,
@@ -184,7 +186,7 @@ fn in_time<T: Send + 'static>(
 /// # Errors
 /// [`RasterError::Unsupported`] if that is too large.
 pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, RasterError> {
-    let Storage::Held { samples, .. } = &outline.storage else {
+    let Storage::Memory { samples, .. } = &outline.storage else {
         return Ok(0);
     };
     let (columns, rows) = (outline.columns, outline.rows);
@@ -204,20 +206,20 @@ mod tests {
     use crate::blocks::Part;
 
     #[test]
-    fn file_that_never_opens_is_given_up() {
+    fn opening_is_abandoned_after_its_timeout() {
         let source = Source {
             path: "never.tif".into(),
             bytes: 1,
             covers: Part::whole(2, 2),
             turned: [false; 2],
         };
-        let (ends, never) = sync_channel::<()>(0);
+        let (sender, receiver) = sync_channel::<()>(0);
         let open = move || {
-            let _ = never.recv();
+            let _ = receiver.recv();
             Ok(())
         };
-        let fault = in_time(&source, Duration::ZERO, open).expect_err("never");
+        let fault = with_timeout(&source, Duration::ZERO, open).expect_err("never");
         assert!(fault.to_string().contains("not open after"), "{fault}");
-        drop(ends);
+        drop(sender);
     }
 }

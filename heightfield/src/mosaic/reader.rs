@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
 
-use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
+use super::super::blocks::{Block, BlockImage, BlockReader, Part, SurveyParts};
 use super::super::{OpenOptions, RasterError, SampleType};
 use super::pool::Pool;
-use super::source::{Opened, Source};
+use super::source::{OpenFile, Source};
 use crate::remote::{RemoteFile, is_url};
 
 /// Side of a block, samples; smaller in coarse images, where a block covers many files.
@@ -20,8 +20,8 @@ const FEW_SAMPLES: u64 = 1 << 20;
 const FEW_FILES: usize = 64;
 /// Otherwise parts spread over the terrain, their number at least (or one per file), and their side
 /// in samples.
-const PLACES: usize = 32;
-const PLACE: u32 = 64;
+const MIN_SURVEY_PARTS: usize = 32;
+const SURVEY_PART_SIDE: u32 = 64;
 
 /// The files of a terrain; the last has priority.
 pub(super) struct Mosaic {
@@ -86,7 +86,7 @@ impl Mosaic {
         &self,
         number: usize,
         source: &Source,
-    ) -> Result<Option<Arc<Opened>>, RasterError> {
+    ) -> Result<Option<Arc<OpenFile>>, RasterError> {
         self.pool().get(number, source)
     }
 
@@ -102,7 +102,7 @@ struct Filling<'p> {
     part: &'p Part,
     values: Vec<f64>,
     done: FixedBitSet,
-    left: usize,
+    remaining: usize,
 }
 
 impl<'p> Filling<'p> {
@@ -112,12 +112,12 @@ impl<'p> Filling<'p> {
             part,
             values: vec![f64::NAN; count],
             done: FixedBitSet::with_capacity(count),
-            left: count,
+            remaining: count,
         }
     }
 
     /// Returns the unfilled positions in an overlap: column, row and index.
-    fn open_places(&self, overlap: &Part) -> Vec<[u32; 3]> {
+    fn unfilled_places(&self, overlap: &Part) -> Vec<[u32; 3]> {
         let part = self.part;
         let rows = overlap.row..overlap.row + overlap.rows;
         let places = rows.flat_map(|row| {
@@ -143,7 +143,7 @@ impl<'p> Filling<'p> {
         &mut self,
         level: u8,
         source: &Source,
-        opened: &Opened,
+        opened: &OpenFile,
         places: &[[u32; 3]],
     ) -> Result<(), RasterError> {
         for &[column, row, index] in places {
@@ -152,7 +152,7 @@ impl<'p> Filling<'p> {
             if let Some(height) = opened.height(level, place)? {
                 self.values[index as usize] = height;
                 self.done.insert(index as usize);
-                self.left -= 1;
+                self.remaining -= 1;
             }
         }
         Ok(())
@@ -179,15 +179,15 @@ impl BlockReader for Mosaic {
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let mut filling = Filling::new(part);
-        let mut is_lacking = false;
+        let mut is_incomplete = false;
         for (number, source) in self.sources.iter().enumerate().rev() {
-            if filling.left == 0 {
+            if filling.remaining == 0 {
                 break;
             }
             let Some(overlap) = source.overlap(image as u32, part) else {
                 continue;
             };
-            let places = filling.open_places(&overlap);
+            let places = filling.unfilled_places(&overlap);
             if places.is_empty() {
                 continue;
             }
@@ -197,7 +197,7 @@ impl BlockReader for Mosaic {
             if let Some(opened) = &opened {
                 filling.fill(image as u8, source, opened, &places)?;
             }
-            is_lacking |= opened.is_none_or(|opened| opened.share().1 > 0);
+            is_incomplete |= opened.is_none_or(|opened| opened.cache_use().1 > 0);
             self.pool().make_room(0);
         }
         let values = filling.values;
@@ -210,8 +210,8 @@ impl BlockReader for Mosaic {
                     .into(),
                 _ => values.into(),
             },
-            holes: None,
-            is_lacking,
+            no_data_mask: None,
+            is_incomplete,
         })
     }
 
@@ -230,7 +230,7 @@ impl BlockReader for Mosaic {
             }
             text += &format!(" {number} {source:?}");
             for stamp in &stamps {
-                text += stamp.settled()?;
+                text += stamp.stable_text()?;
             }
         }
         Some(text)
@@ -251,21 +251,21 @@ impl BlockReader for Mosaic {
         hasher.finish()
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         let full = &self.images[0];
         let samples = u64::from(full.columns) * u64::from(full.rows);
         let parts = match samples <= FEW_SAMPLES && self.sources.len() <= FEW_FILES {
             true => vec![Part::whole(full.columns, full.rows)],
-            false => self.places(),
+            false => self.spread_parts(),
         };
-        Some(Looks { image: 0, parts })
+        Some(SurveyParts { image: 0, parts })
     }
 
-    fn kept_bytes(&self) -> usize {
+    fn max_memory_bytes(&self) -> usize {
         let names = self.sources.iter().map(|source| source.path.capacity());
-        let is_elsewhere = |source: &Source| source.path.to_str().is_some_and(is_url);
-        let pages = match self.sources.iter().any(is_elsewhere) {
-            true => RemoteFile::kept_bytes(),
+        let is_remote = |source: &Source| source.path.to_str().is_some_and(is_url);
+        let pages = match self.sources.iter().any(is_remote) {
+            true => RemoteFile::max_memory_bytes(),
             false => 0,
         };
         pages + Pool::max_bytes() + names.sum::<usize>() + self.sources.len() * size_of::<Source>()
@@ -274,16 +274,16 @@ impl BlockReader for Mosaic {
 
 impl Mosaic {
     /// Returns parts spread over the terrain, in the order of the files.
-    fn places(&self) -> Vec<Part> {
-        let each = PLACES.div_ceil(self.sources.len().max(1)).isqrt() as u32 + 1;
-        let each = if self.sources.len() >= PLACES {
+    fn spread_parts(&self) -> Vec<Part> {
+        let each = MIN_SURVEY_PARTS.div_ceil(self.sources.len().max(1)).isqrt() as u32 + 1;
+        let each = if self.sources.len() >= MIN_SURVEY_PARTS {
             1
         } else {
             each
         };
         let along = |first: u32, count: u32, number: u32| {
             let share = count / each;
-            let size = PLACE.min(share).max(1);
+            let size = SURVEY_PART_SIDE.min(share).max(1);
             (first + number * share + (share - size.min(share)) / 2, size)
         };
         let of_source = |source: &Source| {

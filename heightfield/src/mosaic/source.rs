@@ -50,10 +50,10 @@ impl Source {
 
     /// Returns the overlap of the file with `part`, in samples of every 2ᵏ-th of the terrain.
     pub(super) fn overlap(&self, k: u32, part: &Part) -> Option<Part> {
-        let cut = |first: u32, count: u32, from: u32, most: u32| {
+        let cut = |first: u32, count: u32, from: u32, max: u32| {
             let at = |full: u64| u32::try_from(full.div_ceil(1 << k)).unwrap_or(u32::MAX);
             let begin = at(first.into()).max(from);
-            let end = at(u64::from(first) + u64::from(count)).min(from.saturating_add(most));
+            let end = at(u64::from(first) + u64::from(count)).min(from.saturating_add(max));
             (begin < end).then(|| (begin, end - begin))
         };
         let covers = &self.covers;
@@ -69,13 +69,13 @@ impl Source {
 }
 
 /// An open file.
-pub(super) struct Opened {
+pub(super) struct OpenFile {
     decoded: Decoded,
     /// [`Source::stamps`] before it was opened.
     stamps: Option<Vec<FileStamp>>,
 }
 
-impl Opened {
+impl OpenFile {
     pub(super) const fn new(decoded: Decoded, stamps: Option<Vec<FileStamp>>) -> Self {
         Self { decoded, stamps }
     }
@@ -86,13 +86,13 @@ impl Opened {
     }
 
     /// Returns its memory, bytes, and the number of its unreadable blocks.
-    pub(super) fn share(&self) -> (usize, u32) {
+    pub(super) fn cache_use(&self) -> (usize, u32) {
         match &self.decoded.storage {
-            Storage::Held { samples, mask } => {
+            Storage::Memory { samples, mask } => {
                 let mask = mask.as_ref().map_or(0, |mask| mask.len() / 8);
                 (samples.bytes() + mask, 0)
             }
-            Storage::Blocks(blocks) => blocks.share(),
+            Storage::Blocks(blocks) => blocks.cache_use(),
         }
     }
 
@@ -119,13 +119,13 @@ impl Opened {
 
     fn stored(&self, level: u8, column: u32, row: u32) -> (Option<f64>, ReadStatus) {
         match &self.decoded.storage {
-            Storage::Held { samples, mask } => {
+            Storage::Memory { samples, mask } => {
                 let index = row as usize * self.decoded.columns as usize + column as usize;
-                let hole = mask.as_ref().is_some_and(|mask| mask.contains(index));
+                let is_no_data = mask.as_ref().is_some_and(|mask| mask.contains(index));
                 let value = with_samples!(samples, values => {
                     values.get(index).map(|value| value.widen())
                 });
-                (value.filter(|_| !hole), ReadStatus::Complete)
+                (value.filter(|_| !is_no_data), ReadStatus::Complete)
             }
             Storage::Blocks(blocks) => match blocks.overview_of(level) {
                 0 => match blocks.stored(0, column, row, Wait::UntilRead) {
@@ -134,14 +134,14 @@ impl Opened {
                 },
                 image => {
                     let place = [f64::from(column), f64::from(row)];
-                    let known = |stored: Option<f64>| {
+                    let known_height = |stored: Option<f64>| {
                         let is_no_data = |value: &f64| self.decoded.no_data == Some(*value);
                         stored
                             .filter(|value| !is_no_data(value))
                             .unwrap_or(f64::NAN)
                     };
                     let (value, status) = blocks.between(image, place, |at| {
-                        blocks.height(image, at, Wait::UntilRead, known)
+                        blocks.height(image, at, Wait::UntilRead, known_height)
                     });
                     (Some(value).filter(|value| !value.is_nan()), status)
                 }

@@ -52,7 +52,7 @@ fn source(folder: &Path, name: &str, column: u32, row: u32) -> Source {
 }
 
 #[test]
-fn few_files_are_open_at_once_and_all_are_read() {
+fn number_of_open_files_is_bounded() {
     const COUNT: u32 = 9;
     let folder = tempfile::tempdir().expect("a folder");
     tiles(folder.path(), COUNT);
@@ -132,7 +132,7 @@ fn files_outside_the_read_part_are_not_opened() {
 
 /// Each causes one warning, however often it is read.
 #[test]
-fn a_file_that_failed_is_not_tried_again() {
+fn failed_file_is_not_retried() {
     let folder = tempfile::tempdir().expect("a folder");
     let sources = vec![source(folder.path(), "000-000.asc", 0, 0)];
     let options = OpenOptions::default();
@@ -146,7 +146,7 @@ fn a_file_that_failed_is_not_tried_again() {
 
 /// Samples, open files and index of a terrain of many files use at most 256 MB.
 #[test]
-fn the_memory_of_many_files_is_bounded() {
+fn memory_of_many_files_is_bounded() {
     let folder = tempfile::tempdir().expect("a folder");
     tiles(folder.path(), 3);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
@@ -169,7 +169,7 @@ fn the_memory_of_many_files_is_bounded() {
 }
 
 #[test]
-fn the_same_files_are_the_same_terrain_and_changed_ones_another() {
+fn changed_files_are_another_terrain() {
     let prints = [0, 1, 2].map(|change| {
         let folder = tempfile::tempdir().expect("a folder");
         tiles(folder.path(), 2);
@@ -180,9 +180,9 @@ fn the_same_files_are_the_same_terrain_and_changed_ones_another() {
             1 => std::fs::write(path, text.replace(" 500 ", " 501 ")).expect("written"),
             _ => std::fs::remove_file(path).expect("removed"),
         }
-        let again = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+        let reopened = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
         let first = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
-        assert_eq!(again.print_in_file(), first.print_in_file());
+        assert_eq!(reopened.print_in_file(), first.print_in_file());
         first.print_in_file()
     });
     assert!(prints[0].is_some() && prints[0] != prints[1] && prints[0] != prints[2]);
@@ -196,7 +196,7 @@ fn flat(folder: &Path, name: &str, west: u32, height: i32) {
 }
 
 #[test]
-fn layers_beside_heights_are_left_out_and_named() {
+fn layers_beside_heights_are_ignored_and_named() {
     let folder = tempfile::tempdir().expect("a folder");
     flat(folder.path(), "n38_dem.asc", 0, 500);
     flat(folder.path(), "n38_num.asc", 0, 12);
@@ -205,15 +205,15 @@ fn layers_beside_heights_are_left_out_and_named() {
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
     let summary = raster.summary();
     assert_eq!((summary.lowest, summary.highest), (500.0, 500.0));
-    let stated = raster.remarks().join(" ");
+    let remarks = raster.remarks().join(" ");
     assert!(
-        stated.contains("n38_num.asc") && stated.contains("n38_aux.asc"),
-        "{stated}"
+        remarks.contains("n38_num.asc") && remarks.contains("n38_aux.asc"),
+        "{remarks}"
     );
 }
 
 #[test]
-fn rasters_that_differ_at_one_place_are_refused() {
+fn rasters_that_differ_on_the_same_samples_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     flat(folder.path(), "a_2019.asc", 0, 500);
     flat(folder.path(), "a_2020.asc", 0, 503);
@@ -236,10 +236,10 @@ fn tiles_that_differ_where_they_overlap_are_reported() {
     flat(folder.path(), "a.asc", 0, 500);
     flat(folder.path(), "b.asc", 3, 510);
     let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
-    let stated = raster.remarks().join(" ");
+    let remarks = raster.remarks().join(" ");
     assert!(
-        stated.contains("a.asc and b.asc overlap") && stated.contains("up to 10"),
-        "{stated}"
+        remarks.contains("a.asc and b.asc overlap") && remarks.contains("up to 10"),
+        "{remarks}"
     );
     assert_eq!(raster.height(3, 0), 510.0);
 }

@@ -24,17 +24,17 @@ impl RemoteFetcher {
     }
 
     /// Does nothing.
-    pub(crate) fn look_for(&self, _: &[String]) {}
+    pub(crate) fn prefetch_files(&self, _: &[String]) {}
 
     /// Does nothing.
     pub(crate) fn set_disk_cache(&self, _: &DiskCache) {}
 
     /// Does nothing.
-    pub(crate) fn touch(&self) {}
+    pub(crate) fn set_terrain_open(&self) {}
 }
 
 impl RemoteFile {
-    pub(crate) const fn kept_bytes() -> usize {
+    pub(crate) const fn max_memory_bytes() -> usize {
         0
     }
 
@@ -46,7 +46,7 @@ impl RemoteFile {
         match *self {}
     }
 
-    pub(crate) fn want(&self, _: impl Iterator<Item = Range<u64>>) {
+    pub(crate) fn prefetch(&self, _: impl Iterator<Item = Range<u64>>) {
         match *self {}
     }
 

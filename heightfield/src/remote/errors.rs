@@ -6,15 +6,15 @@ use object_store::Error as StoreError;
 
 use super::OUTAGE;
 use super::redirects::RedirectError;
-use super::url::{in_text, is_url};
+use super::url::{is_url, without_credentials};
 use crate::printable_text::printable;
 
 /// Max characters of a server's response in a message.
-const SHOWN: usize = 300;
+const MAX_SHOWN: usize = 300;
 
 /// Parts of the URLs at which a virtual machine of Amazon, Google or Microsoft requests its own
 /// key. Other computers have no such server.
-const KEYS_OF_COMPUTERS: [&str; 4] = [
+const METADATA_PATHS: [&str; 4] = [
     "/latest/api/token",
     "/latest/meta-data/",
     "/computeMetadata/",
@@ -34,7 +34,7 @@ pub(super) fn is_without_ranges(error: &StoreError) -> bool {
 }
 
 /// Returns the error for a wrong URL or a wrong environment variable.
-pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
+pub(super) fn configuration_error(error: &dyn std::error::Error) -> Error {
     let text = error.to_string();
     let why = match text.contains("Account must be specified") {
         true => "the environment names no storage account".into(),
@@ -46,28 +46,30 @@ pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
 /// Returns the error for a server's response at opening, where missing environment variables show
 /// first.
 pub(super) fn at_opening(error: &StoreError) -> Error {
-    let wrong = |why: String| Error::new(ErrorKind::InvalidInput, why);
+    let invalid = |why: String| Error::new(ErrorKind::InvalidInput, why);
     let text = match error {
         StoreError::Generic { store, .. } if *store != "HTTP" => error.to_string(),
         _ => return reported(error),
     };
-    if KEYS_OF_COMPUTERS.iter().any(|part| text.contains(part)) {
-        return wrong("the environment holds no key, and this computer has none of its own".into());
+    if METADATA_PATHS.iter().any(|part| text.contains(part)) {
+        return invalid(
+            "the environment holds no key, and this computer has none of its own".into(),
+        );
     }
     let is_refused = ["400", "401", "403"]
         .iter()
         .any(|status| has_status(error, status));
     if text.contains("token request") && is_refused {
-        return wrong(format!(
+        return invalid(format!(
             "the key of the environment was refused: {}",
             in_short(&text)
         ));
     }
     if text.contains("builder error") {
-        return wrong(in_short(&with_cause(error)));
+        return invalid(in_short(&with_cause(error)));
     }
     if text.contains("incorrectly configured region") {
-        return wrong("the bucket is in another region".into());
+        return invalid("the bucket is in another region".into());
     }
     reported(error)
 }
@@ -174,11 +176,14 @@ fn in_short(text: &str) -> String {
     let end = text[status..].find(':').filter(|_| status > 0);
     let text = end.map_or(text, |end| &text[..status + end]);
     let word = |word: &str| match is_url(word) {
-        true => in_text(word),
+        true => without_credentials(word),
         false => word.to_owned(),
     };
     let words: Vec<String> = text.split_whitespace().map(word).collect();
-    printable(&words.join(" ")).chars().take(SHOWN).collect()
+    printable(&words.join(" "))
+        .chars()
+        .take(MAX_SHOWN)
+        .collect()
 }
 
 #[cfg(test)]
@@ -187,14 +192,14 @@ mod tests {
 
     #[test]
     fn server_text_is_shortened_to_one_line_without_secrets() {
-        let stated =
+        let response =
             "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
-        let reported = in_short(&stated);
+        let reported = in_short(&response);
         assert!(
             reported.starts_with("GET https://h/a.tif 500 \\u{1b}[2J x"),
             "{reported}"
         );
-        assert!(reported.len() <= SHOWN);
+        assert!(reported.len() <= MAX_SHOWN);
         let page = "Server returned status code: 400 Bad Request: <html>?sig=secret";
         assert_eq!(
             in_short(page),
@@ -231,16 +236,16 @@ mod tests {
 
     #[test]
     fn server_error_code_is_reported_only_if_well_formed() {
-        let stated = |body: &str| {
+        let response = |body: &str| {
             let text = format!("Server returned non-2xx status code: 400 Bad Request: {body}");
             reported(&generic(&text)).to_string()
         };
-        let expired = stated("<Error><Code>ExpiredToken</Code></Error>");
+        let expired = response("<Error><Code>ExpiredToken</Code></Error>");
         assert!(
             expired.ends_with("the server says ExpiredToken"),
             "{expired}"
         );
-        let page = stated("<Code>see https://h?sig=secret</Code>");
+        let page = response("<Code>see https://h?sig=secret</Code>");
         assert!(page.ends_with("400 Bad Request"), "{page}");
     }
 }

@@ -11,64 +11,68 @@ use tokio::runtime::Runtime;
 
 use super::pages;
 use super::pages_on_disk::{PagesOnDisk, joined, missing};
-use super::shared_pages::{Held, SharedPages, Trouble, spawn};
+use super::shared_pages::{FileFault, PageState, SharedPages, spawn};
 use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
 use crate::disk_cache::FileStamp;
 
 /// Time before the next request after a failed one.
-const BETWEEN_TRIES: Duration = Duration::from_secs(1);
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 /// Interval at which a page is requested again while too many are being fetched.
-const LOOK: Duration = Duration::from_millis(20);
+const PAGE_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 
 /// A file at a URL.
 pub(crate) struct RemoteFile {
     name: String,
     number: u64,
-    line: Arc<SharedPages>,
+    shared_pages: Arc<SharedPages>,
     background: &'static Runtime,
     object: Object,
     /// The whole file, if it is short or its server does not support ranges.
-    all: Option<Vec<u8>>,
+    whole: Option<Vec<u8>>,
     /// Its pages on disk, if they can be stored.
-    kept: Option<PagesOnDisk>,
+    disk_pages: Option<PagesOnDisk>,
 }
 
 impl RemoteFile {
     /// Returns a file that its server has confirmed.
     pub(super) fn new(
         name: &str,
-        line: &Arc<SharedPages>,
+        shared_pages: &Arc<SharedPages>,
         background: &'static Runtime,
         opened: Opened,
     ) -> Self {
-        let number = line.number();
-        let all = opened.is_all;
-        if !all {
-            line.held().pages.arrived(number, 0..1, &opened.first);
+        let number = shared_pages.number();
+        let whole = opened.is_whole;
+        if !whole {
+            shared_pages
+                .state()
+                .pages
+                .insert(number, 0..1, &opened.first);
         }
-        let kept = line.disk().zip(opened.object.stamp());
-        let kept = kept.map(|(disk, stamp)| PagesOnDisk::new(disk, stamp, opened.object.len()));
+        let disk_pages = shared_pages.disk().zip(opened.object.stamp());
+        let disk_pages =
+            disk_pages.map(|(disk, stamp)| PagesOnDisk::new(disk, stamp, opened.object.len()));
         Self {
-            kept: kept.filter(|_| !all),
+            disk_pages: disk_pages.filter(|_| !whole),
             name: name.to_owned(),
             number,
-            line: line.clone(),
+            shared_pages: shared_pages.clone(),
             background,
             object: opened.object,
-            all: all.then_some(opened.first),
+            whole: whole.then_some(opened.first),
         }
     }
 
     /// Returns the max memory of all files, bytes.
-    pub(crate) const fn kept_bytes() -> usize {
+    pub(crate) const fn max_memory_bytes() -> usize {
         pages::MAX_BYTES
     }
 
     /// Returns the number of bytes.
     pub(crate) fn len(&self) -> u64 {
-        match &self.all {
-            Some(all) => all.len() as u64,
+        match &self.whole {
+            Some(whole) => whole.len() as u64,
             None => self.object.len(),
         }
     }
@@ -80,36 +84,38 @@ impl RemoteFile {
     }
 
     /// Prefetches bytes; does not wait.
-    pub(crate) fn want(self: &Arc<Self>, ranges: impl Iterator<Item = Range<u64>>) {
-        if self.all.is_some() {
+    pub(crate) fn prefetch(self: &Arc<Self>, ranges: impl Iterator<Item = Range<u64>>) {
+        if self.whole.is_some() {
             return;
         }
         for run in self.take_missing(ranges) {
-            let (file, wanted) = (self.clone(), run.clone());
-            let work = async move { file.brought(wanted).await };
+            let (file, needed) = (self.clone(), run.clone());
+            let work = async move { file.load(needed).await };
             let file = self.clone();
-            spawn(self.background, work, move |got| file.arrived(run, got));
+            spawn(self.background, work, move |result| {
+                file.on_received(run, result)
+            });
         }
     }
 
     /// Returns the pages of a run, from disk if they are stored there.
-    async fn brought(&self, run: Range<u64>) -> Result<Vec<u8>> {
-        let Some(kept) = &self.kept else {
-            return self.fetched(run).await;
+    async fn load(&self, run: Range<u64>) -> Result<Vec<u8>> {
+        let Some(disk_pages) = &self.disk_pages else {
+            return self.fetch(run).await;
         };
-        let (disk, wanted) = (kept.clone(), run.clone());
-        let found = self.background.spawn_blocking(move || disk.get(wanted));
+        let (disk, needed) = (disk_pages.clone(), run.clone());
+        let found = self.background.spawn_blocking(move || disk.get(needed));
         let found = found.await.unwrap_or_default();
         if found.is_empty() {
-            return self.fetched(run).await;
+            return self.fetch(run).await;
         }
         let Some(gap) = missing(&found) else {
             return Ok(joined(&found, &(0..0), &[]));
         };
         let pages = run.start + gap.start..run.start + gap.end;
-        let bytes = self.fetched(pages.clone()).await?;
+        let bytes = self.fetch(pages.clone()).await?;
         let run = joined(&found, &gap, &bytes);
-        let disk = kept.clone();
+        let disk = disk_pages.clone();
         // Stored in the background, so that no reader waits.
         self.background
             .spawn_blocking(move || disk.put(pages, &bytes));
@@ -117,23 +123,23 @@ impl RemoteFile {
     }
 
     /// Fetches the pages of a run from the server.
-    async fn fetched(&self, run: Range<u64>) -> Result<Vec<u8>> {
-        let _turn = self.line.turn().await;
+    async fn fetch(&self, run: Range<u64>) -> Result<Vec<u8>> {
+        let _permit = self.shared_pages.request_permit().await;
         self.object.get(pages::bytes(&run, self.len())).await
     }
 
     fn take_missing(&self, ranges: impl Iterator<Item = Range<u64>>) -> Vec<Range<u64>> {
-        let mut held = self.line.held();
-        let has_to_rest = match held.troubles.get(&self.number) {
-            Some(Trouble::Outage(at, _)) => at.elapsed() < BETWEEN_TRIES,
-            Some(Trouble::Lost(_)) => true,
+        let mut state = self.shared_pages.state();
+        let is_blocked = match state.faults.get(&self.number) {
+            Some(FileFault::Outage(at, _)) => at.elapsed() < RETRY_INTERVAL,
+            Some(FileFault::Lost(_)) => true,
             None => false,
         };
-        if has_to_rest {
+        if is_blocked {
             return vec![];
         }
         let pages = ranges.map(|range| pages::of(&range, self.len()));
-        let runs = pages.flat_map(|pages| held.pages.take_missing(self.number, pages));
+        let runs = pages.flat_map(|pages| state.pages.take_missing(self.number, pages));
         runs.collect()
     }
 
@@ -146,13 +152,13 @@ impl RemoteFile {
         let Some(end) = end.filter(|end| *end <= self.len()) else {
             return Err(ErrorKind::UnexpectedEof.into());
         };
-        if let Some(all) = &self.all {
-            return Ok(all[offset as usize..end as usize].to_vec());
+        if let Some(whole) = &self.whole {
+            return Ok(whole[offset as usize..end as usize].to_vec());
         }
-        let wanted = offset..end;
-        self.want(once(wanted.clone()));
+        let needed = offset..end;
+        self.prefetch(once(needed.clone()));
         let mut bytes = Vec::with_capacity(count);
-        for number in pages::of(&wanted, self.len()) {
+        for number in pages::of(&needed, self.len()) {
             let page = self.page(number)?;
             let first = number * pages::PAGE;
             let from = offset.saturating_sub(first) as usize;
@@ -167,83 +173,87 @@ impl RemoteFile {
         let key = (self.number, number);
         let mut has_waited = false;
         loop {
-            let mut held = self.line.held();
-            if let Some(page) = held.pages.get(key) {
+            let mut state = self.shared_pages.state();
+            if let Some(page) = state.pages.get(key) {
                 return Ok(page);
             }
-            match held.troubles.get(&self.number) {
-                Some(Trouble::Lost(why)) => return Err(Error::new(LOST, why.clone())),
-                Some(Trouble::Outage(at, why))
-                    if !held.pages.is_coming(key)
-                        && (has_waited || at.elapsed() < BETWEEN_TRIES) =>
+            match state.faults.get(&self.number) {
+                Some(FileFault::Lost(why)) => return Err(Error::new(LOST, why.clone())),
+                Some(FileFault::Outage(at, why))
+                    if !state.pages.is_fetching(key)
+                        && (has_waited || at.elapsed() < RETRY_INTERVAL) =>
                 {
                     return Err(Error::new(OUTAGE, why.clone()));
                 }
                 _ => {}
             }
-            if !held.pages.is_coming(key) {
-                drop(held);
+            if !state.pages.is_fetching(key) {
+                drop(state);
                 // Too many pages were being fetched, or it was dropped again.
                 let first = number * pages::PAGE;
-                self.want(once(first..first + 1));
-                held = self.line.held();
+                self.prefetch(once(first..first + 1));
+                state = self.shared_pages.state();
             }
-            has_waited |= held.pages.is_coming(key);
-            if held.pages.get(key).is_none() {
-                drop(self.line.arrived.wait_timeout(held, LOOK));
+            has_waited |= state.pages.is_fetching(key);
+            if state.pages.get(key).is_none() {
+                drop(
+                    self.shared_pages
+                        .received
+                        .wait_timeout(state, PAGE_RETRY_INTERVAL),
+                );
             }
         }
     }
 
-    fn arrived(&self, run: Range<u64>, got: Result<Vec<u8>>) {
-        let mut held = self.line.held();
-        match got {
+    fn on_received(&self, run: Range<u64>, result: Result<Vec<u8>>) {
+        let mut state = self.shared_pages.state();
+        match result {
             Ok(bytes) => {
-                held.pages.arrived(self.number, run, &bytes);
-                if let Some(Trouble::Outage(..)) = held.troubles.get(&self.number) {
-                    held.troubles.remove(&self.number);
-                    if self.line.is_touched() {
+                state.pages.insert(self.number, run, &bytes);
+                if let Some(FileFault::Outage(..)) = state.faults.get(&self.number) {
+                    state.faults.remove(&self.number);
+                    if self.shared_pages.is_terrain_open() {
                         tracing::warn!("{} can be read again", self.name);
                     }
                 }
             }
             Err(why) => {
-                held.pages.failed(self.number, run);
-                self.note(&mut held, &why);
+                state.pages.failed(self.number, run);
+                self.record_fault(&mut state, &why);
             }
         }
-        drop(held);
-        self.line.arrived.notify_all();
+        drop(state);
+        self.shared_pages.received.notify_all();
     }
 
     /// Stores a fault, and logs it unless the caller reports it, as the thread that opens the
     /// terrain does.
-    fn note(&self, held: &mut Held, why: &Error) {
+    fn record_fault(&self, state: &mut PageState, why: &Error) {
         let name = &self.name;
-        let trouble = match is_outage(why) {
-            true => Trouble::Outage(Instant::now(), why.to_string()),
-            false => Trouble::Lost(why.to_string()),
+        let fault = match is_outage(why) {
+            true => FileFault::Outage(Instant::now(), why.to_string()),
+            false => FileFault::Lost(why.to_string()),
         };
-        let tells = self.line.is_touched();
-        match (held.troubles.get(&self.number), &trouble) {
+        let is_logged = self.shared_pages.is_terrain_open();
+        match (state.faults.get(&self.number), &fault) {
             // This state is final.
-            (Some(Trouble::Lost(_)), _) => return,
-            (None, Trouble::Outage(..)) if tells => tracing::warn!(
+            (Some(FileFault::Lost(_)), _) => return,
+            (None, FileFault::Outage(..)) if is_logged => tracing::warn!(
                 "{name} cannot be read at present; what was read stays, the rest is asked for again and again: {why}"
             ),
-            (_, Trouble::Lost(_)) if tells => {
+            (_, FileFault::Lost(_)) if is_logged => {
                 tracing::warn!("{name} is not read on; what was read stays: {why}");
             }
             _ => {}
         }
-        held.troubles.insert(self.number, trouble);
+        state.faults.insert(self.number, fault);
     }
 }
 
 impl Drop for RemoteFile {
     fn drop(&mut self) {
         // Its pages are dropped when others need the memory.
-        self.line.held().troubles.remove(&self.number);
+        self.shared_pages.state().faults.remove(&self.number);
     }
 }
 

@@ -53,7 +53,7 @@ pub use fetcher::RemoteFetcher;
 pub(crate) use file::RemoteFile;
 pub(crate) use reader::RemoteReader;
 pub use url::{file_name, is_url, without_key};
-pub(crate) use url::{gdal_names, neighbour, parts, without_rest};
+pub(crate) use url::{gdal_names, neighbour, parts, without_query};
 
 /// A failure of the connection or the server: a retry may succeed.
 const OUTAGE: ErrorKind = ErrorKind::ConnectionAborted;

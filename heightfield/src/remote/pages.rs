@@ -9,29 +9,29 @@ use lru::LruCache;
 /// Size of a page, bytes.
 pub(super) const PAGE: u64 = 64 << 10;
 /// Max pages per request.
-const RUN: u64 = 16;
+const MAX_RUN: u64 = 16;
 /// Max cached pages: 64 MB, besides those being fetched.
-const MAX_KEPT: usize = 1024;
+const MAX_CACHED: usize = 1024;
 /// Max pages being fetched: 32 MB.
-const MAX_COMING: usize = 512;
+const MAX_FETCHING: usize = 512;
 
 /// Max memory of all pages, bytes.
-pub(super) const MAX_BYTES: usize = (MAX_KEPT + MAX_COMING) * PAGE as usize;
+pub(super) const MAX_BYTES: usize = (MAX_CACHED + MAX_FETCHING) * PAGE as usize;
 
 /// The number of a page's file, and its own.
 type Key = (u64, u64);
 
 /// Pages of numbered files.
 pub(super) struct Pages {
-    here: LruCache<Key, Arc<[u8]>>,
-    coming: HashSet<Key>,
+    cached: LruCache<Key, Arc<[u8]>>,
+    fetching: HashSet<Key>,
 }
 
 impl Default for Pages {
     fn default() -> Self {
         Self {
-            here: LruCache::unbounded(),
-            coming: HashSet::new(),
+            cached: LruCache::unbounded(),
+            fetching: HashSet::new(),
         }
     }
 }
@@ -39,29 +39,29 @@ impl Default for Pages {
 impl Pages {
     /// Returns a page in memory, and marks it as used.
     pub(super) fn get(&mut self, key: Key) -> Option<Arc<[u8]>> {
-        self.here.get(&key).cloned()
+        self.cached.get(&key).cloned()
     }
 
     /// Returns true if a page is being fetched.
-    pub(super) fn is_coming(&self, key: Key) -> bool {
-        self.coming.contains(&key)
+    pub(super) fn is_fetching(&self, key: Key) -> bool {
+        self.fetching.contains(&key)
     }
 
-    /// Returns the missing pages of a file in `wanted`, as runs for one request each, and marks
-    /// them as being fetched. Pages beyond `MAX_COMING` are omitted, and must be requested again.
-    pub(super) fn take_missing(&mut self, file: u64, wanted: Range<u64>) -> Vec<Range<u64>> {
+    /// Returns the missing pages of a file in `requested`, as runs for one request each, and marks
+    /// them as being fetched. Pages beyond `MAX_FETCHING` are omitted, and must be requested again.
+    pub(super) fn take_missing(&mut self, file: u64, requested: Range<u64>) -> Vec<Range<u64>> {
         let mut runs: Vec<Range<u64>> = vec![];
-        for page in wanted {
+        for page in requested {
             let key = (file, page);
-            if self.here.contains(&key) || self.coming.contains(&key) {
+            if self.cached.contains(&key) || self.fetching.contains(&key) {
                 continue;
             }
-            if self.coming.len() >= MAX_COMING {
+            if self.fetching.len() >= MAX_FETCHING {
                 break;
             }
-            self.coming.insert(key);
+            self.fetching.insert(key);
             match runs.last_mut() {
-                Some(run) if run.end == page && page - run.start < RUN => run.end += 1,
+                Some(run) if run.end == page && page - run.start < MAX_RUN => run.end += 1,
                 _ => runs.push(page..page + 1),
             }
         }
@@ -69,12 +69,12 @@ impl Pages {
     }
 
     /// Stores a received run; its missing pages may be requested again.
-    pub(super) fn arrived(&mut self, file: u64, run: Range<u64>, bytes: &[u8]) {
+    pub(super) fn insert(&mut self, file: u64, run: Range<u64>, bytes: &[u8]) {
         self.failed(file, run.clone());
         for (page, bytes) in run.zip(bytes.chunks(PAGE as usize)) {
-            self.here.put((file, page), bytes.into());
-            if self.here.len() > MAX_KEPT {
-                self.here.pop_lru();
+            self.cached.put((file, page), bytes.into());
+            if self.cached.len() > MAX_CACHED {
+                self.cached.pop_lru();
             }
         }
     }
@@ -82,7 +82,7 @@ impl Pages {
     /// Marks a run as no longer being fetched.
     pub(super) fn failed(&mut self, file: u64, run: Range<u64>) {
         for page in run {
-            self.coming.remove(&(file, page));
+            self.fetching.remove(&(file, page));
         }
     }
 }
@@ -117,7 +117,7 @@ mod tests {
         );
         pages.failed(1, 5..21);
         assert_eq!(pages.take_missing(1, 4..7), one(5..7));
-        pages.arrived(1, 3..5, &vec![7; PAGE as usize + 1]);
+        pages.insert(1, 3..5, &vec![7; PAGE as usize + 1]);
         assert_eq!(
             pages.get((1, 3)).map(|page| page.len()),
             Some(PAGE as usize)
@@ -132,20 +132,20 @@ mod tests {
     }
 
     #[test]
-    fn kept_and_requested_pages_are_bounded() {
+    fn cached_and_requested_pages_are_bounded() {
         let mut pages = Pages::default();
-        let asked = |runs: Vec<Range<u64>>| runs.iter().map(|run| run.end - run.start).sum::<u64>();
-        assert_eq!(asked(pages.take_missing(1, 0..10_000)), MAX_COMING as u64);
-        assert_eq!(asked(pages.take_missing(1, 0..10_000)), 0);
+        let count = |runs: Vec<Range<u64>>| runs.iter().map(|run| run.end - run.start).sum::<u64>();
+        assert_eq!(count(pages.take_missing(1, 0..10_000)), MAX_FETCHING as u64);
+        assert_eq!(count(pages.take_missing(1, 0..10_000)), 0);
         for page in 0..2000 {
-            pages.arrived(1, page..page + 1, &[0]);
+            pages.insert(1, page..page + 1, &[0]);
         }
-        assert_eq!(pages.here.len(), MAX_KEPT);
+        assert_eq!(pages.cached.len(), MAX_CACHED);
         assert!(pages.get((1, 1999)).is_some() && pages.get((1, 0)).is_none());
     }
 
     #[test]
-    fn the_last_page_is_cut() {
+    fn last_page_ends_with_the_file() {
         assert_eq!(of(&(PAGE - 1..PAGE + 1), 10 * PAGE), 0..2);
         assert_eq!(of(&(0..u64::MAX), PAGE + 5), 0..2);
         assert!(of(&(9 * PAGE..9 * PAGE + 1), PAGE).is_empty());

@@ -32,8 +32,8 @@ impl PagesOnDisk {
     pub(super) fn get(&self, run: Range<u64>) -> Vec<Option<Vec<u8>>> {
         let page = |page: u64| {
             let bytes = pages::bytes(&(page..page + 1), self.len);
-            let kept = self.disk.get(&self.name(page))?;
-            (kept.len() as u64 == bytes.end - bytes.start).then_some(kept)
+            let stored = self.disk.get(&self.name(page))?;
+            (stored.len() as u64 == bytes.end - bytes.start).then_some(stored)
         };
         run.map(page).collect()
     }
@@ -47,18 +47,18 @@ impl PagesOnDisk {
 }
 
 /// Returns the range from the first missing page to the last, as indices in the run.
-pub(super) fn missing(kept: &[Option<Vec<u8>>]) -> Option<Range<u64>> {
-    let first = kept.iter().position(Option::is_none)?;
-    let last = kept.iter().rposition(Option::is_none)?;
+pub(super) fn missing(stored: &[Option<Vec<u8>>]) -> Option<Range<u64>> {
+    let first = stored.iter().position(Option::is_none)?;
+    let last = stored.iter().rposition(Option::is_none)?;
     Some(first as u64..last as u64 + 1)
 }
 
 /// Joins the received bytes with the stored pages before and after them.
-pub(super) fn joined(kept: &[Option<Vec<u8>>], came: &Range<u64>, bytes: &[u8]) -> Vec<u8> {
+pub(super) fn joined(stored: &[Option<Vec<u8>>], gap: &Range<u64>, bytes: &[u8]) -> Vec<u8> {
     let pages = |pages: &[Option<Vec<u8>>]| pages.iter().flatten().flatten().copied().collect();
-    let before: Vec<u8> = pages(&kept[..came.start as usize]);
-    let behind: Vec<u8> = pages(&kept[came.end as usize..]);
-    [&before, bytes, &behind].concat()
+    let before: Vec<u8> = pages(&stored[..gap.start as usize]);
+    let after: Vec<u8> = pages(&stored[gap.end as usize..]);
+    [&before, bytes, &after].concat()
 }
 
 #[cfg(test)]
@@ -71,17 +71,17 @@ mod tests {
         let disk = DiskCache::at(folder.path(), 1 << 24);
         let page = pages::PAGE as usize;
         let file: Vec<u8> = (0..5 * page + 100).map(|i| (i / 7) as u8).collect();
-        let kept = PagesOnDisk::new(&disk, "file".into(), file.len() as u64);
-        assert_eq!(missing(&kept.get(0..6)), Some(0..6));
-        kept.put(0..2, &file[..2 * page]);
-        kept.put(5..6, &file[5 * page..]);
-        let found = kept.get(0..6);
+        let stored = PagesOnDisk::new(&disk, "file".into(), file.len() as u64);
+        assert_eq!(missing(&stored.get(0..6)), Some(0..6));
+        stored.put(0..2, &file[..2 * page]);
+        stored.put(5..6, &file[5 * page..]);
+        let found = stored.get(0..6);
         let gap = missing(&found).expect("some are missing");
         assert_eq!(gap, 2..5);
-        let came = &file[2 * page..5 * page];
-        assert!(joined(&found, &gap, came) == file);
-        kept.put(2..5, came);
-        let all = kept.get(0..6);
+        let fetched = &file[2 * page..5 * page];
+        assert!(joined(&found, &gap, fetched) == file);
+        stored.put(2..5, fetched);
+        let all = stored.get(0..6);
         assert_eq!(missing(&all), None);
         assert!(joined(&all, &(6..6), &[]) == file);
         // Nothing is found for another state of the same file.

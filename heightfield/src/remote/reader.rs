@@ -7,10 +7,10 @@ use std::sync::Arc;
 use super::RemoteFile;
 
 /// Prefetched bytes: a sequential read waits once, not once per page.
-const AHEAD: u64 = 4 << 20;
+const READ_AHEAD: u64 = 4 << 20;
 
 /// Max bytes of a sequential read: the file size from a server may be wrong.
-const MAX_IN_ORDER: u64 = 1 << 30;
+const MAX_SEQUENTIAL: u64 = 1 << 30;
 
 /// A reader of a remote file from any offset.
 pub(crate) struct RemoteReader {
@@ -27,18 +27,19 @@ impl RemoteReader {
 
 impl Read for RemoteReader {
     fn read(&mut self, into: &mut [u8]) -> Result<usize> {
-        let left = self.file.len().saturating_sub(self.at);
-        let count = left.min(into.len() as u64) as usize;
+        let remaining = self.file.len().saturating_sub(self.at);
+        let count = remaining.min(into.len() as u64) as usize;
         if count == 0 {
             return Ok(0);
         }
-        if self.at >= MAX_IN_ORDER {
+        if self.at >= MAX_SEQUENTIAL {
             let why = "it is larger than 1 GB, and its format is read as a whole";
             return Err(Error::new(ErrorKind::Unsupported, why));
         }
         // The caller may need only the first bytes.
         if self.at > 0 {
-            self.file.want(once(self.at..self.at.saturating_add(AHEAD)));
+            self.file
+                .prefetch(once(self.at..self.at.saturating_add(READ_AHEAD)));
         }
         let bytes = self.file.read_at(self.at, count)?;
         into[..count].copy_from_slice(&bytes);

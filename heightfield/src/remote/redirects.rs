@@ -4,7 +4,7 @@ use reqwest::Url;
 use reqwest::header::{HeaderMap, HeaderName};
 
 /// Headers that are not keys; any other may be one.
-const WITHOUT_KEY: [&str; 9] = [
+const KEYLESS_HEADERS: [&str; 9] = [
     "accept",
     "content-length",
     "host",
@@ -26,16 +26,16 @@ pub(super) enum RedirectError {
     #[error(
         "its server redirects to {0}, and the key of the request is for another host: name its URL there if that is meant"
     )]
-    TakesKeyAlong(String),
+    SendsKey(String),
     #[error("its server redirects to what is no URL of a web server")]
-    NoUrl,
+    NotAUrl,
     #[error("its server redirects again and again")]
     TooMany,
 }
 
 /// Returns true if a request may contain a key: in a header, a password, or the URL's query.
 pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
-    let may_be_key = |name: &HeaderName| !WITHOUT_KEY.contains(&name.as_str());
+    let may_be_key = |name: &HeaderName| !KEYLESS_HEADERS.contains(&name.as_str());
     let in_url = url.query().is_some() || url.password().is_some() || !url.username().is_empty();
     in_url || headers.keys().any(may_be_key)
 }
@@ -44,17 +44,17 @@ pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
 ///
 /// # Errors
 /// The reason why it is not followed.
-pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url, RedirectError> {
-    let to = from.join(location).map_err(|_| RedirectError::NoUrl)?;
+pub(super) fn target(from: &Url, location: &str, has_key: bool) -> Result<Url, RedirectError> {
+    let to = from.join(location).map_err(|_| RedirectError::NotAUrl)?;
     let host = match (to.scheme(), to.host_str()) {
         ("http" | "https", Some(host)) => host.to_owned(),
-        _ => return Err(RedirectError::NoUrl),
+        _ => return Err(RedirectError::NotAUrl),
     };
     if from.scheme() == "https" && to.scheme() == "http" {
         return Err(RedirectError::LeavesHttps(host));
     }
     if has_key && !is_same_host(from, &to) {
-        return Err(RedirectError::TakesKeyAlong(host));
+        return Err(RedirectError::SendsKey(host));
     }
     Ok(to)
 }
@@ -62,8 +62,8 @@ pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url,
 /// Returns true if both are on one server, even if the redirect is from http to https.
 fn is_same_host(from: &Url, to: &Url) -> bool {
     let port = |url: &Url| url.port_or_known_default();
-    let goes_on_encrypted = (port(from), port(to)) == (Some(80), Some(443));
-    from.host_str() == to.host_str() && (port(from) == port(to) || goes_on_encrypted)
+    let is_upgrade = (port(from), port(to)) == (Some(80), Some(443));
+    from.host_str() == to.host_str() && (port(from) == port(to) || is_upgrade)
 }
 
 #[cfg(test)]
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn redirect_is_followed_where_it_gives_nothing_away() {
+    fn redirect_is_followed_if_it_discloses_no_key() {
         for (from, location, has_key, to) in [
             ("https://h/a", "/b", true, "https://h/b"),
             ("https://h/a", "c/d?e", true, "https://h/c/d?e"),
@@ -84,42 +84,32 @@ mod tests {
             ("https://h/a", "https://other/b", false, "https://other/b"),
             ("http://h/a", "//other/b", false, "http://other/b"),
         ] {
-            let followed = followed(&url(from), location, has_key);
-            assert_eq!(followed, Ok(url(to)), "{from} {location}");
+            let found = target(&url(from), location, has_key);
+            assert_eq!(found, Ok(url(to)), "{from} {location}");
         }
     }
 
     #[test]
-    fn redirect_from_https_or_with_a_key_to_another_host_is_refused() {
-        use RedirectError::{LeavesHttps, NoUrl, TakesKeyAlong};
+    fn redirect_that_would_disclose_a_key_is_refused() {
+        use RedirectError::{LeavesHttps, NotAUrl, SendsKey};
         let other = || "other".to_owned();
         for (from, location, has_key, why) in [
             ("https://h/a", "http://h/a", false, LeavesHttps("h".into())),
             ("https://h/a", "http://other/a", true, LeavesHttps(other())),
-            ("https://h/a", "//other/a", true, TakesKeyAlong(other())),
-            (
-                "https://h/a",
-                "https://h:444/",
-                true,
-                TakesKeyAlong("h".into()),
-            ),
-            (
-                "http://h:81/a",
-                "https://h/",
-                true,
-                TakesKeyAlong("h".into()),
-            ),
-            ("http://h/a", "https://other/", true, TakesKeyAlong(other())),
-            ("https://h/a", "file:///etc/passwd", false, NoUrl),
-            ("https://h/a", "http://", false, NoUrl),
+            ("https://h/a", "//other/a", true, SendsKey(other())),
+            ("https://h/a", "https://h:444/", true, SendsKey("h".into())),
+            ("http://h:81/a", "https://h/", true, SendsKey("h".into())),
+            ("http://h/a", "https://other/", true, SendsKey(other())),
+            ("https://h/a", "file:///etc/passwd", false, NotAUrl),
+            ("https://h/a", "http://", false, NotAUrl),
         ] {
-            let refused = followed(&url(from), location, has_key);
+            let refused = target(&url(from), location, has_key);
             assert_eq!(refused, Err(why), "{from} {location}");
         }
     }
 
     #[test]
-    fn key_is_any_header_or_part_of_the_url_that_may_open_something() {
+    fn unknown_headers_and_url_credentials_count_as_keys() {
         let with = |name: &'static str| {
             let mut headers = HeaderMap::new();
             headers.insert("range", "bytes=0-1".parse().expect("a value"));

@@ -95,10 +95,10 @@ impl HttpService for Requests {
         Self: 'f,
     {
         Box::pin(async move {
-            let response = self.followed(request).await?;
+            let response = self.follow_redirects(request).await?;
             Ok(match response.status().is_success() {
                 true => response,
-                false => cut(response).await,
+                false => truncate(response).await,
             })
         })
     }
@@ -106,7 +106,7 @@ impl HttpService for Requests {
 
 impl Requests {
     /// Returns the response after all redirects.
-    async fn followed(&self, mut request: HttpRequest) -> Result<HttpResponse, HttpError> {
+    async fn follow_redirects(&self, mut request: HttpRequest) -> Result<HttpResponse, HttpError> {
         for _ in 0..=MAX_REDIRECTS {
             let response = self.0.execute(request.clone()).await?;
             let location = response.headers().get(LOCATION);
@@ -118,19 +118,19 @@ impl Requests {
                 return Ok(response);
             }
             let location = String::from_utf8_lossy(location.as_bytes());
-            let to = next(&request, &location).map_err(refused)?;
+            let to = redirect_target(&request, &location).map_err(refused)?;
             let uri = to.as_str().parse();
-            *request.uri_mut() = uri.map_err(|_| refused(RedirectError::NoUrl))?;
+            *request.uri_mut() = uri.map_err(|_| refused(RedirectError::NotAUrl))?;
         }
         Err(refused(RedirectError::TooMany))
     }
 }
 
 /// Returns the target of a redirect.
-fn next(request: &HttpRequest, location: &str) -> Result<Url, RedirectError> {
-    let from = Url::parse(&request.uri().to_string()).map_err(|_| RedirectError::NoUrl)?;
+fn redirect_target(request: &HttpRequest, location: &str) -> Result<Url, RedirectError> {
+    let from = Url::parse(&request.uri().to_string()).map_err(|_| RedirectError::NotAUrl)?;
     let has_key = redirects::has_key(&from, request.headers());
-    redirects::followed(&from, location, has_key)
+    redirects::target(&from, location, has_key)
 }
 
 fn refused(why: RedirectError) -> HttpError {
@@ -139,15 +139,15 @@ fn refused(why: RedirectError) -> HttpError {
 }
 
 /// Truncates a response to [`MAX_ERROR_BYTES`]. If it breaks off, the received part is returned.
-async fn cut(response: HttpResponse) -> HttpResponse {
+async fn truncate(response: HttpResponse) -> HttpResponse {
     let (parts, body) = response.into_parts();
     let mut stream = body.bytes_stream();
     let mut bytes = Vec::new();
     while bytes.len() < MAX_ERROR_BYTES
         && let Some(Ok(part)) = stream.next().await
     {
-        let room = MAX_ERROR_BYTES - bytes.len();
-        bytes.extend_from_slice(part.get(..room).unwrap_or(&part));
+        let capacity = MAX_ERROR_BYTES - bytes.len();
+        bytes.extend_from_slice(part.get(..capacity).unwrap_or(&part));
     }
     HttpResponse::from_parts(parts, HttpResponseBody::from(bytes))
 }

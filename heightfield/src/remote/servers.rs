@@ -13,17 +13,17 @@ use object_store::http::HttpBuilder;
 use object_store::path::Path;
 use object_store::{ObjectStore, RetryConfig};
 
-use super::errors::wrong;
+use super::errors::configuration_error;
 use super::requests::Connector;
-use super::url::without_rest;
+use super::url::without_query;
 
 /// Time-outs of a request: in total, without data, and for the connection.
-const REQUEST: &str = "60 seconds";
-const SILENCE: &str = "10 seconds";
-const CONNECT: &str = "5 seconds";
+const REQUEST_TIMEOUT: &str = "60 seconds";
+const READ_TIMEOUT: &str = "10 seconds";
+const CONNECT_TIMEOUT: &str = "5 seconds";
 /// Max retries of a request after a server error, and their max total time.
-const RETRIES: usize = 3;
-const RETRIES_SECONDS: u64 = 15;
+const MAX_RETRIES: usize = 3;
+const RETRY_TIMEOUT_S: u64 = 15;
 
 /// Max cached servers.
 const MAX_SERVERS: NonZeroUsize = NonZeroUsize::new(64).unwrap();
@@ -34,30 +34,30 @@ type Server = Arc<dyn ObjectStore>;
 /// Returns the server of a URL, and the path there. All files of a server share its open
 /// connections and its access token, so that these are not requested for each file.
 pub(super) fn at(url: &str) -> Result<(Server, Path)> {
-    static KNOWN: LazyLock<Mutex<LruCache<String, Server>>> =
+    static SERVERS: LazyLock<Mutex<LruCache<String, Server>>> =
         LazyLock::new(|| Mutex::new(LruCache::new(MAX_SERVERS)));
     let (server, path) = parts(url)?;
     // A panic in the library does not change the cache.
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(server) = known.get(&server) {
+    let mut servers = SERVERS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(server) = servers.get(&server) {
         return Ok((server.clone(), path));
     }
-    let made = made(&server)?;
-    known.put(server, made.clone());
-    Ok((made, path))
+    let connection = connect(&server)?;
+    servers.put(server, connection.clone());
+    Ok((connection, path))
 }
 
 /// Splits a URL into the server, including any key after the path, and the path.
 fn parts(url: &str) -> Result<(String, Path)> {
     let (scheme, rest) = url.split_once("://").unwrap_or_default();
     let scheme = scheme.to_ascii_lowercase();
-    let named = without_rest(rest);
+    let named = without_query(rest);
     if named.to_ascii_lowercase().contains("%2f") || named.ends_with('/') {
         let why = "a file's name ends in no slash and has none in it (%2F)";
         return Err(Error::new(ErrorKind::InvalidInput, why));
     }
     let (host, path) = named.split_at(named.find('/').unwrap_or(named.len()));
-    let path = Path::from_url_path(path).map_err(|error| wrong(&error))?;
+    let path = Path::from_url_path(path).map_err(|error| configuration_error(&error))?;
     let query = rest[named.len()..].split('#').next().unwrap_or_default();
     // For a bucket, the key is in the environment.
     let query = if scheme.starts_with("http") {
@@ -68,16 +68,16 @@ fn parts(url: &str) -> Result<(String, Path)> {
     Ok((format!("{scheme}://{host}/{query}"), path))
 }
 
-fn made(url: &str) -> Result<Server> {
+fn connect(url: &str) -> Result<Server> {
     use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
-    static CHOSEN: Once = Once::new();
-    CHOSEN.call_once(|| {
+    static PROVIDER: Once = Once::new();
+    PROVIDER.call_once(|| {
         // Another thread may have installed the same one.
         let _ = rustls::crypto::ring::default_provider().install_default();
     });
     let retry = RetryConfig {
-        max_retries: RETRIES,
-        retry_timeout: std::time::Duration::from_secs(RETRIES_SECONDS),
+        max_retries: MAX_RETRIES,
+        retry_timeout: std::time::Duration::from_secs(RETRY_TIMEOUT_S),
         ..RetryConfig::default()
     };
     macro_rules! server {
@@ -87,11 +87,11 @@ fn made(url: &str) -> Result<Server> {
                     .with_url(url)
                     .with_retry(retry)
                     .with_http_connector(Connector)
-                    .with_config($key(Timeout), REQUEST)
-                    .with_config($key(ReadTimeout), SILENCE)
-                    .with_config($key(ConnectTimeout), CONNECT)
+                    .with_config($key(Timeout), REQUEST_TIMEOUT)
+                    .with_config($key(ReadTimeout), READ_TIMEOUT)
+                    .with_config($key(ConnectTimeout), CONNECT_TIMEOUT)
                     .build()
-                    .map_err(|error| wrong(&error))?,
+                    .map_err(|error| configuration_error(&error))?,
             )
         };
     }
@@ -103,7 +103,7 @@ fn made(url: &str) -> Result<Server> {
             GoogleConfigKey::Client
         ),
         "az" | "azure" | "abfs" | "abfss" | "adl" => {
-            server!(microsofts(), AzureConfigKey::Client)
+            server!(azure_builder(), AzureConfigKey::Client)
         }
         "http" | "https" => server!(
             HttpBuilder::new().with_config(AllowHttp, "true"),
@@ -119,16 +119,16 @@ fn made(url: &str) -> Result<Server> {
 
 /// Returns the settings of Microsoft's servers from the environment, including variables that only
 /// Microsoft's own command uses.
-fn microsofts() -> MicrosoftAzureBuilder {
+fn azure_builder() -> MicrosoftAzureBuilder {
     let names = [
         ("AZURE_STORAGE_ACCOUNT", AzureConfigKey::AccountName),
         ("AZURE_STORAGE_KEY", AzureConfigKey::AccessKey),
     ];
-    let known = MicrosoftAzureBuilder::from_env();
-    names.into_iter().fold(known, |known, (name, key)| {
-        match (known.get_config_value(&key), std::env::var(name)) {
-            (None, Ok(value)) => known.with_config(key, value),
-            _ => known,
+    let builder = MicrosoftAzureBuilder::from_env();
+    names.into_iter().fold(builder, |builder, (name, key)| {
+        match (builder.get_config_value(&key), std::env::var(name)) {
+            (None, Ok(value)) => builder.with_config(key, value),
+            _ => builder,
         }
     })
 }

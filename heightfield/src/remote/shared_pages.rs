@@ -15,29 +15,29 @@ use super::pages::Pages;
 use crate::disk_cache::DiskCache;
 
 /// Max concurrent requests.
-const AT_ONCE: usize = 16;
+const MAX_CONCURRENT_REQUESTS: usize = 16;
 
 /// State shared by the files of a terrain.
 pub(super) struct SharedPages {
-    is_touched: AtomicBool,
+    is_terrain_open: AtomicBool,
     requests: Semaphore,
     files: AtomicU64,
-    held: Mutex<Held>,
+    state: Mutex<PageState>,
     /// Disk cache of pages for later runs.
     disk: OnceLock<DiskCache>,
-    pub(super) arrived: Condvar,
+    pub(super) received: Condvar,
 }
 
 /// Pages of all files in memory.
 #[derive(Default)]
-pub(super) struct Held {
+pub(super) struct PageState {
     pub(super) pages: Pages,
     /// Errors of files, by their numbers.
-    pub(super) troubles: HashMap<u64, Trouble>,
+    pub(super) faults: HashMap<u64, FileFault>,
 }
 
 /// Fault of a file.
-pub(super) enum Trouble {
+pub(super) enum FileFault {
     /// Time and reason of the last failed request; a retry may succeed.
     Outage(Instant, String),
     /// Reason why all further requests fail.
@@ -47,12 +47,12 @@ pub(super) enum Trouble {
 impl Default for SharedPages {
     fn default() -> Self {
         Self {
-            is_touched: AtomicBool::new(false),
-            requests: Semaphore::new(AT_ONCE),
+            is_terrain_open: AtomicBool::new(false),
+            requests: Semaphore::new(MAX_CONCURRENT_REQUESTS),
             files: AtomicU64::new(0),
-            held: Mutex::default(),
+            state: Mutex::default(),
             disk: OnceLock::new(),
-            arrived: Condvar::new(),
+            received: Condvar::new(),
         }
     }
 }
@@ -64,9 +64,9 @@ impl SharedPages {
     }
 
     /// Returns the pages in memory.
-    pub(super) fn held(&self) -> MutexGuard<'_, Held> {
+    pub(super) fn state(&self) -> MutexGuard<'_, PageState> {
         // No code that panics runs while the lock is held.
-        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Sets the disk cache for later runs; only the first call has an effect.
@@ -80,17 +80,17 @@ impl SharedPages {
     }
 
     /// Marks the terrain as open: from now on errors are logged.
-    pub(super) fn touch(&self) {
-        self.is_touched.store(true, Ordering::Relaxed);
+    pub(super) fn set_terrain_open(&self) {
+        self.is_terrain_open.store(true, Ordering::Relaxed);
     }
 
     /// Returns true if the terrain is open.
-    pub(super) fn is_touched(&self) -> bool {
-        self.is_touched.load(Ordering::Relaxed)
+    pub(super) fn is_terrain_open(&self) -> bool {
+        self.is_terrain_open.load(Ordering::Relaxed)
     }
 
-    /// Waits until there are fewer than `AT_ONCE` requests.
-    pub(super) async fn turn(&self) -> Option<SemaphorePermit<'_>> {
+    /// Waits until there are fewer than `MAX_CONCURRENT_REQUESTS` requests.
+    pub(super) async fn request_permit(&self) -> Option<SemaphorePermit<'_>> {
         self.requests.acquire().await.ok()
     }
 }
@@ -101,13 +101,13 @@ impl SharedPages {
 /// If the system cannot start its thread.
 pub(super) fn background() -> Result<&'static Runtime> {
     static BACKGROUND: OnceLock<std::result::Result<Runtime, String>> = OnceLock::new();
-    let made = BACKGROUND.get_or_init(|| {
+    let runtime = BACKGROUND.get_or_init(|| {
         let mut builder = Builder::new_multi_thread();
         let builder = builder.worker_threads(1).enable_all();
-        let made = builder.thread_name("fetching").build();
-        made.map_err(|error| error.to_string())
+        let runtime = builder.thread_name("fetching").build();
+        runtime.map_err(|error| error.to_string())
     });
-    made.as_ref().map_err(|why| Error::other(why.clone()))
+    runtime.as_ref().map_err(|why| Error::other(why.clone()))
 }
 
 /// Runs `work` in the background, and calls `then` with its result, even after a panic.

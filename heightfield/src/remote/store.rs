@@ -19,7 +19,7 @@ pub(super) struct Object {
     store: Arc<dyn ObjectStore>,
     path: Path,
     /// Its metadata at opening.
-    was: ObjectMeta,
+    metadata: ObjectMeta,
 }
 
 /// An opened file, and its first bytes.
@@ -28,7 +28,7 @@ pub(super) struct Opened {
     /// The first page, or the whole file if it is shorter or its server does not support ranges.
     pub(super) first: Vec<u8>,
     /// True if `first` is the whole file.
-    pub(super) is_all: bool,
+    pub(super) is_whole: bool,
 }
 
 /// Opens the file at a URL. One request returns its size and its first bytes.
@@ -39,19 +39,19 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
         ..GetOptions::default()
     };
     match store.get_opts(&path, first).await {
-        Ok(got) => {
-            let (was, range) = (got.meta.clone(), got.range.clone());
-            let first = body(got, &range).await?;
-            let is_all = first.len() as u64 == was.size;
+        Ok(response) => {
+            let (metadata, range) = (response.meta.clone(), response.range.clone());
+            let first = body(response, &range).await?;
+            let is_whole = first.len() as u64 == metadata.size;
             Ok(Opened {
                 object: Object {
                     url: url.to_owned(),
                     store,
                     path,
-                    was,
+                    metadata,
                 },
                 first,
-                is_all,
+                is_whole,
             })
         }
         Err(error) if is_without_ranges(&error) => whole(url, store, path).await,
@@ -62,42 +62,47 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
 /// Reads a whole file into memory, from a server without ranges.
 async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Opened> {
     const MAX: u64 = 256 << 20;
-    let got = store.get_opts(&path, GetOptions::default()).await;
-    let got = got.map_err(|error| reported(&error))?;
-    let was = got.meta.clone();
-    if was.size > MAX {
+    let response = store.get_opts(&path, GetOptions::default()).await;
+    let response = response.map_err(|error| reported(&error))?;
+    let metadata = response.meta.clone();
+    if metadata.size > MAX {
         let why = format!(
             "the server hands out no parts of files, and this one has {} MB",
-            was.size >> 20
+            metadata.size >> 20
         );
         return Err(Error::new(ErrorKind::Unsupported, why));
     }
-    let first = body(got, &(0..was.size)).await?;
+    let first = body(response, &(0..metadata.size)).await?;
     Ok(Opened {
         object: Object {
             url: url.to_owned(),
             store,
             path,
-            was,
+            metadata,
         },
         first,
-        is_all: true,
+        is_whole: true,
     })
 }
 
 impl Object {
     /// Returns the size of the file, bytes.
     pub(super) const fn len(&self) -> u64 {
-        self.was.size
+        self.metadata.size
     }
 
     /// Returns the stamp of the file's state at opening; `None` if the server sends neither tag nor
     /// time.
     pub(super) fn stamp(&self) -> Option<String> {
-        let was = &self.was;
-        let tells = was.e_tag.is_some() || was.last_modified.timestamp() > 0;
-        let time = was.last_modified.timestamp_micros();
-        tells.then(|| format!("{:?} {} {:?} {time}", self.url, was.size, was.e_tag))
+        let metadata = &self.metadata;
+        let is_identified = metadata.e_tag.is_some() || metadata.last_modified.timestamp() > 0;
+        let time = metadata.last_modified.timestamp_micros();
+        is_identified.then(|| {
+            format!(
+                "{:?} {} {:?} {time}",
+                self.url, metadata.size, metadata.e_tag
+            )
+        })
     }
 
     /// Fetches a byte range inside the file.
@@ -109,36 +114,36 @@ impl Object {
             range: Some(GetRange::Bounded(range.clone())),
             ..GetOptions::default()
         };
-        let got = self.store.get_opts(&self.path, options).await;
-        let got = got.map_err(|error| reported(&error))?;
-        let is = &got.meta;
-        let same = is.size == self.was.size
-            && is.e_tag == self.was.e_tag
-            && (is.e_tag.is_some() || is.last_modified == self.was.last_modified);
+        let response = self.store.get_opts(&self.path, options).await;
+        let response = response.map_err(|error| reported(&error))?;
+        let current = &response.meta;
+        let same = current.size == self.metadata.size
+            && current.e_tag == self.metadata.e_tag
+            && (current.e_tag.is_some() || current.last_modified == self.metadata.last_modified);
         if !same {
             let why = "it was changed at its server since it was opened";
             return Err(Error::new(LOST, why));
         }
-        body(got, &range).await
+        body(response, &range).await
     }
 }
 
 /// Returns the bytes of a response, limited to the range.
-async fn body(got: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
-    let wanted = range.end - range.start;
+async fn body(response: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
+    let expected = range.end - range.start;
     let mut bytes = Vec::new();
-    let mut parts = got.into_stream();
+    let mut parts = response.into_stream();
     while let Some(part) = parts.next().await {
         bytes.extend_from_slice(&part.map_err(|error| reported(&error))?);
-        if bytes.len() as u64 > wanted {
-            let why = format!("more than {wanted} bytes came");
+        if bytes.len() as u64 > expected {
+            let why = format!("more than {expected} bytes came");
             return Err(Error::new(OUTAGE, why));
         }
     }
-    match bytes.len() as u64 == wanted {
+    match bytes.len() as u64 == expected {
         true => Ok(bytes),
         false => {
-            let why = format!("{} bytes of {wanted} came", bytes.len());
+            let why = format!("{} bytes of {expected} came", bytes.len());
             Err(Error::new(OUTAGE, why))
         }
     }

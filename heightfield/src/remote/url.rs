@@ -4,61 +4,61 @@ use std::path::Path;
 
 /// Returns true if a name is a URL.
 pub fn is_url(name: &str) -> bool {
-    let Some((scheme, rest)) = name.split_once("://") else {
+    let Some((scheme, address)) = name.split_once("://") else {
         return false;
     };
     let is_word = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
-    scheme.len() > 1 && scheme.chars().all(is_word) && !rest.is_empty()
+    scheme.len() > 1 && scheme.chars().all(is_word) && !address.is_empty()
 }
 
 /// Returns a path or URL for display, without a key.
 pub fn without_key(path: &Path) -> String {
     let text = path.display().to_string();
     match is_url(&text) {
-        true => in_text(&text),
+        true => without_credentials(&text),
         false => text,
     }
 }
 
 /// Returns a URL without its query and without name and password.
-pub(super) fn in_text(url: &str) -> String {
-    let (scheme, rest) = without_rest(url).split_once("://").unwrap_or(("", url));
-    let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
+pub(super) fn without_credentials(url: &str) -> String {
+    let (scheme, address) = without_query(url).split_once("://").unwrap_or(("", url));
+    let (host, path) = address.split_at(address.find('/').unwrap_or(address.len()));
     let host = host.rsplit('@').next().unwrap_or_default();
     format!("{scheme}://{host}{path}")
 }
 
 /// Returns a URL without its query or fragment, which may be a key.
-pub(crate) fn without_rest(url: &str) -> &str {
+pub(crate) fn without_query(url: &str) -> &str {
     split(url).0
 }
 
 /// Returns the last part of a URL's path.
 pub fn file_name(url: &str) -> &str {
-    without_rest(url).rsplit('/').next().unwrap_or_default()
+    without_query(url).rsplit('/').next().unwrap_or_default()
 }
 
 /// Returns the URLs of a file beside another: with its extension replaced, and with one appended.
 pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
-    let (path, rest) = split(url);
+    let (path, query) = split(url);
     let name = file_name(url);
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let folder = &path[..path.len() - name.len()];
     [
-        format!("{folder}{stem}.{extension}{rest}"),
-        format!("{path}.{extension}{rest}"),
+        format!("{folder}{stem}.{extension}{query}"),
+        format!("{path}.{extension}{query}"),
     ]
 }
 
 /// Splits a URL: up to the slash after its host or bucket, the path, and the rest, which may be a
 /// key.
 pub(crate) fn parts(url: &str) -> [&str; 3] {
-    let (named, rest) = split(url);
+    let (named, query) = split(url);
     let host = named.find("://").map_or(0, |at| at + 3);
     let path = named[host..]
         .find('/')
         .map_or(named.len(), |at| host + at + 1);
-    [&named[..path], &named[path..], rest]
+    [&named[..path], &named[path..], query]
 }
 
 /// Returns the prefixes of GDAL's names for files at the same host or in the same bucket; a prefix
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn query_key_is_hidden_and_kept_in_neighbour_urls() {
+    fn query_key_is_hidden_but_used_in_neighbour_urls() {
         let url = "https://h/d.e/a.b.tif?sig=x/y.z";
         assert_eq!(without_key(Path::new(url)), "https://h/d.e/a.b.tif");
         assert_eq!(without_key(Path::new("what?.tif")), "what?.tif");

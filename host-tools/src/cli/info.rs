@@ -20,7 +20,7 @@ use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
 use heightfield::printable_text::printable_json;
 use heightfield::without_key;
-use heightfield::{CellSize, CellUnit, Certainty, Fill, ReferenceSystem, SamplesAre};
+use heightfield::{CellSize, CellUnit, Certainty, Fill, RasterType, ReferenceSystem};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, reported};
 
@@ -207,18 +207,18 @@ impl FileReport {
             highest: summary.highest,
             scale,
             offset,
-            no_data: summary.holes,
+            no_data: summary.no_data,
             filled_within: raster.fill().map(Fill::samples),
             no_data_value: raster.no_data(),
             bands: layout.bands,
             block: layout.block,
             overviews: layout.overviews.clone(),
-            samples_are: layout.samples_are.map(|samples| match samples {
-                SamplesAre::Areas => "area",
-                SamplesAre::Points => "point",
+            samples_are: layout.raster_type.map(|samples| match samples {
+                RasterType::Area => "area",
+                RasterType::Point => "point",
             }),
-            looked_at: summary.looked_at,
-            known_whole: raster.is_known_whole(),
+            looked_at: summary.examined,
+            known_whole: raster.is_summary_complete(),
             bytes: raster.memory_bytes(),
             levels: levels(grid.columns(), grid.rows()),
             link: None,

@@ -21,7 +21,7 @@ pub(crate) fn in_file(
     let path = folder.join("in_file.npy");
     std::fs::write(&path, bytes).expect("written");
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     Raster::open(&path, &options).expect("opened")

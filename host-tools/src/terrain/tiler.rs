@@ -392,7 +392,7 @@ impl<'r> Terrain<'r> {
     /// but must not read all of it.
     #[must_use]
     pub fn planned_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
-        if self.raster().is_known_whole() {
+        if self.raster().is_summary_complete() {
             return self.height_mm(east_mm, north_mm);
         }
         let ground = self.seen_mm(east_mm, north_mm, apart_mm)?;
@@ -569,7 +569,7 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
             scale: *scale,
         });
     }
-    if !raster.is_known_whole() {
+    if !raster.is_summary_complete() {
         return Ok(MAX_CELL + 1);
     }
     Ok(tile_heights::top(low, high))

@@ -87,7 +87,7 @@ impl<'t> Picture<'_, 't> {
             mm_per_unit: scale.height_mm_per_unit(),
             tip_mm: terrain.grid().tip_mm(),
             home_mm: self.home_mm.unwrap_or(middle_mm),
-            laid_mm: self.laid_mm.unwrap_or([0.0, 0.0, east_mm, north_mm]),
+            fitted_mm: self.laid_mm.unwrap_or([0.0, 0.0, east_mm, north_mm]),
             ground_m_per_mm: terrain.grid().side_m().map(|side| side / level_0_mm),
             // A terrain rendered flat has no heights to show.
             height_per_mm: if height_per_mm.is_finite() {
@@ -165,7 +165,7 @@ mod tests {
         };
         let scene = picture.scene();
         assert_eq!(scene.home_mm, [32.0, 16.0, 1.5]);
-        assert_eq!(scene.laid_mm, [0.0, 0.0, 64.0, 32.0]);
+        assert_eq!(scene.fitted_mm, [0.0, 0.0, 64.0, 32.0]);
         assert_eq!(scene.height_per_mm, 2.0);
         // Cells of a metre are 2 device millimetres; their position is unknown.
         assert_eq!(

@@ -1,7 +1,7 @@
 // Esri's ASCII grid: a header of six lines, then heights, north row first.
 
-import { turned } from "../terrain.js";
-import { ReadError, degree } from "./samples.js";
+import { reverseRows } from "../terrain.js";
+import { ReadError, metresPerDegree } from "./samples.js";
 
 export async function asc(bytes, name) {
   const text = new TextDecoder("latin1").decode(bytes);
@@ -20,7 +20,7 @@ export async function asc(bytes, name) {
   }
   // A cell size below a hundredth is in degrees.
   const south = head.yllcorner ?? head.yllcenter ?? 0;
-  const degrees = () => degree(south + (cellsize * ny) / 2).map((metres) => metres * cellsize);
+  const degrees = () => metresPerDegree(south + (cellsize * ny) / 2).map((metres) => metres * cellsize);
   const cellM = cellsize > 0 ? (cellsize < 0.01 ? degrees() : cellsize) : null;
-  return { nx, ny, heights: turned(heights, nx, ny), cellM, unitM: 1 };
+  return { nx, ny, heights: reverseRows(heights, nx, ny), cellM, unitM: 1 };
 }

@@ -1,6 +1,6 @@
 // NumPy's .npy, two-dimensional, north row first as in the command.
 
-import { turned } from "../terrain.js";
+import { reverseRows } from "../terrain.js";
 import { ReadError, samples } from "./samples.js";
 
 export async function npy(bytes, name) {
@@ -15,5 +15,5 @@ export async function npy(bytes, name) {
   if (/'fortran_order':\s*True/.test(head)) throw new ReadError(`${name}: its order is Fortran's. Save numpy.ascontiguousarray(a).`);
   const [ny, nx] = shape;
   const heights = samples(kind, bytes.subarray(start + length), order !== ">", nx * ny);
-  return { nx, ny, heights: turned(heights, nx, ny), cellM: null, unitM: null };
+  return { nx, ny, heights: reverseRows(heights, nx, ny), cellM: null, unitM: null };
 }

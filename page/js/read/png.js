@@ -1,6 +1,6 @@
 // Grey PNG, 8 or 16 bits a sample. The browser's own decoder would keep only 8 of 16 bits.
 
-import { turned } from "../terrain.js";
+import { reverseRows } from "../terrain.js";
 import { ReadError } from "./samples.js";
 
 const GREY = 0;
@@ -22,14 +22,14 @@ export async function png(bytes, name) {
   const packed = new Uint8Array(await new Response(stream).arrayBuffer());
   const step = (depth / 8) * (colour === GREY ? 1 : 2);
   if (packed.length < ny * (1 + nx * step)) throw new ReadError(`${name}: the picture is cut off. Copy it again.`);
-  const pixels = unfiltered(packed, nx * step, ny, step);
+  const pixels = unfilter(packed, nx * step, ny, step);
   const heights = new Float32Array(nx * ny);
   for (let i = 0; i < heights.length; i++) heights[i] = depth === 8 ? pixels[i * step] : pixels[i * step] * 256 + pixels[i * step + 1];
-  return { nx, ny, heights: turned(heights, nx, ny), cellM: null, unitM: null };
+  return { nx, ny, heights: reverseRows(heights, nx, ny), cellM: null, unitM: null };
 }
 
 /** Undoes the filters of the PNG specification: each row begins with the number of its filter. */
-function unfiltered(packed, width, rows, step) {
+function unfilter(packed, width, rows, step) {
   const out = new Uint8Array(width * rows);
   for (let row = 0; row < rows; row++) {
     const [from, to] = [row * (width + 1), row * width];

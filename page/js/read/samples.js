@@ -4,7 +4,7 @@
 export class ReadError extends Error {}
 
 /** Returns the metres of a degree east and north at a latitude, on WGS 84 (to 1 part in 10⁵). */
-export function degree(latitude) {
+export function metresPerDegree(latitude) {
   const at = (times) => Math.cos((times * latitude * Math.PI) / 180);
   return [111_412.84 * at(1) - 93.5 * at(3) + 0.118 * at(5), 111_132.954 - 559.822 * at(2) + 1.175 * at(4)];
 }

@@ -1,7 +1,7 @@
 // GeoTIFF, read by geotiff.js, which is loaded when the first one is dropped.
 
-import { turned } from "../terrain.js";
-import { ReadError, degree } from "./samples.js";
+import { reverseRows } from "../terrain.js";
+import { ReadError, metresPerDegree } from "./samples.js";
 
 const LIBRARY = "geotiff.js";
 const GEOGRAPHIC = 2;
@@ -25,7 +25,7 @@ export async function tiff(bytes) {
   const [band] = await image.readRasters({ samples: [0] });
   const noData = image.getGDALNoData();
   const heights = Float32Array.from(band, (height) => (height === noData ? NaN : height));
-  return { nx, ny, heights: turned(heights, nx, ny), cellM: cell(image, ny), unitM: 1 };
+  return { nx, ny, heights: reverseRows(heights, nx, ny), cellM: cell(image, ny), unitM: 1 };
 }
 
 /** Returns the sides of a cell east and north in metres; null if the file does not state them. */
@@ -34,6 +34,6 @@ function cell(image, ny) {
   if (!hasPlace) return null;
   const [east, north] = image.getResolution().map(Math.abs);
   if (image.getGeoKeys()?.GTModelTypeGeoKey !== GEOGRAPHIC) return [east, north];
-  const [metresEast, metresNorth] = degree(image.getOrigin()[1] - (north * ny) / 2);
+  const [metresEast, metresNorth] = metresPerDegree(image.getOrigin()[1] - (north * ny) / 2);
   return [east * metresEast, north * metresNorth];
 }

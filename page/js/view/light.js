@@ -1,7 +1,7 @@
 // Light on the terrain, computed once for a terrain: slopes, and the share of light at each
 // position.
 
-import { every } from "../terrain.js";
+import { everyNth } from "../terrain.js";
 
 /** Maximum samples along a side of the picture: every WebGL 2 supports textures of that size. */
 const MAX_SIDE = 2048;
@@ -11,10 +11,10 @@ const SHADOW_SIDE = 384;
 export const SUN = [-0.6, 0.5, 0.62];
 
 /** Returns heights and slopes to draw: `nx`, `ny`, `heights`, `texels` (RGBA, see `slopes`). */
-export function lit(terrain) {
+export function shade(terrain) {
   const step = Math.ceil((Math.max(terrain.nx, terrain.ny) - 1) / (MAX_SIDE - 1));
-  const drawn = every(terrain, step);
-  const coarse = every(terrain, Math.ceil((Math.max(terrain.nx, terrain.ny) - 1) / (SHADOW_SIDE - 1)));
+  const drawn = everyNth(terrain, step);
+  const coarse = everyNth(terrain, Math.ceil((Math.max(terrain.nx, terrain.ny) - 1) / (SHADOW_SIDE - 1)));
   return { ...drawn, texels: slopes(drawn, coarse, shadows(coarse)) };
 }
 
@@ -57,14 +57,14 @@ function slopes({ nx, ny, heights, cellMm }, coarse, share) {
       const dx = (heights[row * nx + east] - heights[row * nx + west]) / ((east - west) * cellMm);
       const dy = (heights[north * nx + i] - heights[south * nx + i]) / ((north - south) * cellMm);
       const scale = 127.5 / Math.sqrt(1 + dx * dx + dy * dy);
-      texels.set([127.5 - dx * scale, 127.5 - dy * scale, 255 * mixed(coarse, share, i * sx, row * sy), dx + dy === dx + dy ? 255 : 0], 4 * (row * nx + i));
+      texels.set([127.5 - dx * scale, 127.5 - dy * scale, 255 * interpolate(coarse, share, i * sx, row * sy), dx + dy === dx + dy ? 255 : 0], 4 * (row * nx + i));
     }
   }
   return texels;
 }
 
 /** Returns an interpolated value between four samples. */
-function mixed({ nx, ny }, values, x, y) {
+function interpolate({ nx, ny }, values, x, y) {
   const [i, j] = [Math.min(nx - 2, Math.floor(x)), Math.min(ny - 2, Math.floor(y))];
   const [u, v, first] = [x - i, y - j, j * nx + i];
   const south = values[first] * (1 - u) + values[first + 1] * u;

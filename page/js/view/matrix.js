@@ -18,10 +18,10 @@ export function product(a, b) {
   return out;
 }
 
-export const AS_IS = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+export const IDENTITY = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
 
 /** Returns the matrix that moves a shape to `at`, along `axis`, scaled by `wide` and `long`. */
-export function placed(at, axis, wide, long) {
+export function placementMatrix(at, axis, wide, long) {
   const z = unit(axis);
   const x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z));
   const y = cross(z, x);

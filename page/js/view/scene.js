@@ -1,17 +1,17 @@
 // The picture: ground with its light, pen, proxy, force.
 
-import { SUN, lit } from "./light.js";
-import { AS_IS, Camera, add, length, placed, times } from "./matrix.js";
-import { GROUND, THING, TRAIL } from "./shaders.js";
+import { SUN, shade } from "./light.js";
+import { IDENTITY, Camera, add, length, placementMatrix, times } from "./matrix.js";
+import { GROUND, SOLID, TRAIL } from "./shaders.js";
 import { BALL, PEN, POINT, SHAFT, sides } from "./shapes.js";
 
 /** Maximum vertices along a side of the ground's mesh; fewer on a slow machine. */
 const MAX_MESH = 320;
-const LEAST_MESH = 80;
+const MIN_MESH = 80;
 /** Duration of a slow frame, ms, and the number of them after which the picture gets coarser. */
 const SLOW_MS = 60;
 const SLOW_FRAMES = 4;
-const LEAST_PIXELS = 0.5;
+const MIN_PIXELS = 0.5;
 /** Height of the block under the lowest sample, mm. */
 const BLOCK_MM = 14;
 /** Length of the arrow for a newton, mm. */
@@ -35,7 +35,7 @@ export class Scene {
     const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: false });
     if (!gl) throw new Error("This browser draws no WebGL 2, which the picture needs. Allow hardware acceleration in its settings, or use another browser.");
     this.gl = gl;
-    [this.ground, this.thing, this.trail] = [GROUND, THING, TRAIL].map((sources) => program(gl, sources));
+    [this.ground, this.solid, this.trail] = [GROUND, SOLID, TRAIL].map((sources) => program(gl, sources));
     this.shapes = Object.fromEntries(Object.entries({ BALL, PEN, POINT, SHAFT }).map(([name, corners]) => [name, shape(gl, corners)]));
     this.indices = gl.createBuffer();
     this.trailBuffer = gl.createBuffer();
@@ -50,7 +50,7 @@ export class Scene {
     this.terrain = terrain;
     this.#trail = [];
     this.camera.centre = [terrain.widthMm / 2, terrain.depthMm / 2, terrain.topMm * 0.3 - BLOCK_MM];
-    const drawn = lit(terrain);
+    const drawn = shade(terrain);
     const texture = (unit, filter, ...image) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
@@ -82,7 +82,7 @@ export class Scene {
   /** Draws the state of touch.js: `arm`, `proxy`, `force`, …; `scaleMm` is the bar's length. */
   draw({ arm, proxy, foot, force, state, tipMm }, scaleMm) {
     const { gl, camera, canvas } = this;
-    this.#keepUp();
+    this.#adaptQuality();
     const ratio = this.#pixels;
     const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
@@ -91,28 +91,28 @@ export class Scene {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     camera.look(width / Math.max(1, height));
     this.#drawGround(foot);
-    this.#use(this.thing, { camera: camera.matrix, sun: SUN });
-    this.#put("SIDES", AS_IS, COLOURS.block, 1);
+    this.#use(this.solid, { camera: camera.matrix, sun: SUN });
+    this.#drawShape("SIDES", IDENTITY, COLOURS.block, 1);
     this.#drawScale(scaleMm);
     const ball = tipMm || POINT_MM;
     const pen = [0.25, -0.35, 1];
-    this.#put("PEN", placed(add(proxy, times(pen, 1.6)), pen, 3.2, 62), COLOURS.pen);
-    this.#put("BALL", placed(proxy, [0, 0, 1], ball, ball), COLOURS.proxy);
+    this.#drawShape("PEN", placementMatrix(add(proxy, times(pen, 1.6)), pen, 3.2, 62), COLOURS.pen);
+    this.#drawShape("BALL", placementMatrix(proxy, [0, 0, 1], ball, ball), COLOURS.proxy);
     if (state !== "free") this.#drawForce(arm.at, proxy, force);
     this.#drawTrail(foot, state, ratio);
   }
 
   /** Makes the picture coarser while frames take too long: its mesh first, then its pixels. */
-  #keepUp() {
-    const took = performance.now() - this.#last;
-    this.#last += took;
-    this.#slow = took > SLOW_MS && took < 2000 ? this.#slow + 1 : 0;
+  #adaptQuality() {
+    const elapsed = performance.now() - this.#last;
+    this.#last += elapsed;
+    this.#slow = elapsed > SLOW_MS && elapsed < 2000 ? this.#slow + 1 : 0;
     if (this.#slow < SLOW_FRAMES) return;
     this.#slow = 0;
-    if (this.#side > LEAST_MESH) {
+    if (this.#side > MIN_MESH) {
       this.#side /= 2;
       this.#setMesh();
-    } else this.#pixels = Math.max(LEAST_PIXELS, this.#pixels * 0.8);
+    } else this.#pixels = Math.max(MIN_PIXELS, this.#pixels * 0.8);
   }
 
   #drawGround(foot) {
@@ -129,10 +129,10 @@ export class Scene {
     const reach = ARROW_MM * size;
     const head = Math.min(6, reach * 0.5);
     gl.depthRange(0, 0.05);
-    this.#put("BALL", placed(hip, [0, 0, 1], 1.5, 1.5), COLOURS.hip);
+    this.#drawShape("BALL", placementMatrix(hip, [0, 0, 1], 1.5, 1.5), COLOURS.hip);
     if (size > 0.02) {
-      this.#put("SHAFT", placed(proxy, force, 2.4, reach - head), COLOURS.force);
-      this.#put("POINT", placed(add(proxy, times(force, (reach - head) / size)), force, 2.6, head), COLOURS.force);
+      this.#drawShape("SHAFT", placementMatrix(proxy, force, 2.4, reach - head), COLOURS.force);
+      this.#drawShape("POINT", placementMatrix(add(proxy, times(force, (reach - head) / size)), force, 2.6, head), COLOURS.force);
     }
     gl.depthRange(0, 1);
   }
@@ -140,8 +140,8 @@ export class Scene {
   /** Draws a bar along the front edge. */
   #drawScale(scaleMm) {
     const at = this.scaleAt = [this.terrain.widthMm / 2 - scaleMm / 2, -5, -BLOCK_MM];
-    this.#put("SHAFT", placed(at, [1, 0, 0], 2, scaleMm), COLOURS.scale);
-    for (const end of [0, scaleMm]) this.#put("SHAFT", placed(add(at, [end, 0, -2]), [0, 0, 1], 1.6, 4), COLOURS.scale);
+    this.#drawShape("SHAFT", placementMatrix(at, [1, 0, 0], 2, scaleMm), COLOURS.scale);
+    for (const end of [0, scaleMm]) this.#drawShape("SHAFT", placementMatrix(add(at, [end, 0, -2]), [0, 0, 1], 1.6, 4), COLOURS.scale);
   }
 
   #drawTrail(foot, state, ratio) {
@@ -167,10 +167,10 @@ export class Scene {
     for (const [name, value] of Object.entries(values)) set(gl, uniforms[name], value);
   }
 
-  #put(name, model, tint, strata = 0) {
+  #drawShape(name, model, tint, strata = 0) {
     const gl = this.gl;
     const { array, count } = this.shapes[name];
-    for (const [key, value] of Object.entries({ model, tint, strata })) set(gl, this.thing.uniforms[key], value);
+    for (const [key, value] of Object.entries({ model, tint, strata })) set(gl, this.solid.uniforms[key], value);
     gl.bindVertexArray(array);
     gl.drawArrays(gl.TRIANGLES, 0, count);
   }
@@ -196,8 +196,8 @@ function program(gl, sources) {
   gl.linkProgram(handle);
   if (!gl.getProgramParameter(handle, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(handle));
   const count = gl.getProgramParameter(handle, gl.ACTIVE_UNIFORMS);
-  const known = Array.from({ length: count }, (_, i) => gl.getActiveUniform(handle, i));
-  return { handle, uniforms: Object.fromEntries(known.map(({ name, type }) => [name, { at: gl.getUniformLocation(handle, name), type }])) };
+  const active = Array.from({ length: count }, (_, i) => gl.getActiveUniform(handle, i));
+  return { handle, uniforms: Object.fromEntries(active.map(({ name, type }) => [name, { at: gl.getUniformLocation(handle, name), type }])) };
 }
 
 function shape(gl, corners) {

@@ -55,7 +55,7 @@ void main() {
 ];
 
 /** Shapes of one colour with light, and the block's sides. */
-export const THING = [
+export const SOLID = [
   `${HEAD}
 uniform mat4 camera;
 uniform mat4 model;

@@ -107,21 +107,21 @@ def run(*words: Word, program: list[str] | None = None) -> str:
         creationflags=_NEW_GROUP,
     ) as child:
         try:
-            printed, told = child.communicate()
+            printed, stderr_text = child.communicate()
         except BaseException:
             child.send_signal(_INTERRUPT)
             child.communicate()
             raise
     if child.returncode:
-        raise error(told, child.returncode)
+        raise error(stderr_text, child.returncode)
     return printed
 
 
-def error(told: str, code: int) -> CommandError:
+def error(stderr_text: str, code: int) -> CommandError:
     """Returns the error from the command's standard error and exit code."""
-    before, found, text = f"\n{told}".rpartition("\nerror: ")
+    before, found, text = f"\n{stderr_text}".rpartition("\nerror: ")
     if not found:
-        return CommandError(f"hapterra ended with exit code {code}: {told.strip()}")
+        return CommandError(f"hapterra ended with exit code {code}: {stderr_text.strip()}")
     message, _, hint = text.partition("\nhint: ")
     # After a wrong word the command prints its usage.
     message = message.partition("\n\nUsage: ")[0]

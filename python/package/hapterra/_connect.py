@@ -18,18 +18,18 @@ from typing import Any, NamedTuple, Union
 from ._command import options as options_of
 from ._native import Surface
 from ._params import Params
-from ._session import Buffer, DeviceError, NotDisarmedError, Session, own
-from ._terminal import at_the_terminal
+from ._session import Buffer, DeviceError, NotDisarmedError, Session, refuse_in_fork
+from ._terminal import ask_at_terminal
 from ._terrain import Terrain
 
 _Path = Union[str, "os.PathLike[str]"]
 _Vector = tuple[float, float, float]
 #: Time-out of a command, s: the clutch opens and closes in a second.
-_DONE_S = 15.0
+_COMMAND_TIMEOUT_S = 15.0
 #: Parameters of ``Surface`` that are options of the command; the others are in its file.
 _OPTIONS = ("stiffness", "max_force")
 #: Commands that do not change the placement, or that change the surface, and their replacements.
-_NOT_HERE = {
+_REPLACEMENTS = {
     **dict.fromkeys(
         ("surface", "stiffness", "friction", "viscous-friction", "damping", "shading", "texture"),
         "set it by device.params",
@@ -41,17 +41,17 @@ _NOT_HERE = {
 }
 
 
-def _written(surface: dict[str, Any], path: Path) -> Path:
+def _write_surface(surface: dict[str, Any], path: Path) -> Path:
     """Writes a surface as a file of the command."""
     scene = {"shading": surface["shading"]}
-    default = {name: it for name, it in surface.items() if name not in ("shading", *_OPTIONS)}
+    default = {name: value for name, value in surface.items() if name not in ("shading", *_OPTIONS)}
     lines = [*_toml(scene), "[default]", *_toml(default)]
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
 def _toml(values: dict[str, Any]) -> list[str]:
-    return [f"{name} = {json.dumps(it)}" for name, it in values.items()]
+    return [f"{name} = {json.dumps(value)}" for name, value in values.items()]
 
 
 class Sample(NamedTuple):
@@ -153,7 +153,7 @@ class Device:
         self._surface: dict[str, Any] = {}
         self._session: Session | None = None
         #: The touched surface; None for a parameter whose change was not confirmed.
-        self._touched: dict[str, Any] = {}
+        self._current_surface: dict[str, Any] = {}
         self._samples: Buffer[Sample] = Buffer(buffer)
         self._events: Buffer[dict[str, Any]] = Buffer(buffer)
         self._confirmed = False
@@ -163,7 +163,7 @@ class Device:
         self._pid = os.getpid()
         self._folder = tempfile.mkdtemp(prefix="hapterra-")
         self._remove_folder = weakref.finalize(self, _remove, self._folder, self._pid)
-        self._abandon: Callable[[], object] | None = None
+        self._detach_finalizer: Callable[[], object] | None = None
 
     def load(
         self, terrain: Terrain | _Path, surface: Surface | _Path | None = None, **options: Any
@@ -193,8 +193,8 @@ class Device:
             file, words = terrain._write(Path(self._folder) / "terrain.npy")
         else:
             file = os.fspath(terrain)
-        of_params = surface if isinstance(surface, Surface) else Surface()
-        self._surface = of_params.params()
+        parameters = surface if isinstance(surface, Surface) else Surface()
+        self._surface = parameters.params()
         if self._surface.pop("materials"):
             raise ValueError(
                 "materials of a surface cannot be loaded: give materials=, a file, and the file of"
@@ -202,12 +202,12 @@ class Device:
             )
         if isinstance(surface, Surface):
             words.update((name, self._surface[name]) for name in _OPTIONS)
-            words["surface"] = _written(self._surface, Path(self._folder) / "surface.toml")
+            words["surface"] = _write_surface(self._surface, Path(self._folder) / "surface.toml")
         elif surface is not None:
             words["surface"] = surface
             self._surface = dict.fromkeys(self._surface)
         words.update(options)
-        given = {name: it for name, it in options.items() if it is not None}
+        given = {name: value for name, value in options.items() if value is not None}
         if "friction" in given:
             self._surface["static_friction"] = given["friction"]
         self._surface.update(given)
@@ -231,27 +231,27 @@ class Device:
         """
         if self._loaded is None:
             raise DeviceError("there is nothing to touch: load() a terrain first")
-        own(self._pid)
+        refuse_in_fork(self._pid)
         session = self._session or self._begin()
         until = time.monotonic() + timeout
 
-        def is_news() -> bool:
+        def is_armed_or_asked() -> bool:
             return session.mode == "armed" or session.asks
 
         try:
-            while session.wait(is_news, until - time.monotonic()) and session.mode != "armed":
+            while session.wait(is_armed_or_asked, until - time.monotonic()) and session.mode != "armed":
                 question = session.take_question()
                 if question is None:
                     continue
-                number, said = question
-                if not (ask or at_the_terminal)(said):
+                number, text = question
+                if not (ask or ask_at_terminal)(text):
                     hint = "" if ask else " by Enter at a terminal: elsewhere give arm() an ask="
                     raise session.error(f"not armed: the question was not answered{hint}")
                 session.send(f"enter {number}")
                 until = time.monotonic() + timeout
             if session.mode != "armed":
-                over = "the session is over" if session.is_over else f"not after {timeout:g} s"
-                raise session.error(f"the arm is not armed: {over}")
+                reason = "the session is over" if session.has_ended else f"not after {timeout:g} s"
+                raise session.error(f"the arm is not armed: {reason}")
         except BaseException as why:
             self._end(why)
             raise
@@ -267,11 +267,11 @@ class Device:
         words += [*self._loaded, *options_of(**self._options), "--events", f"0,{self._every}"]
         self._confirmed = False
         self._samples, self._events = Buffer(self._buffer), Buffer(self._buffer)
-        take = functools.partial(_take, self._samples, self._events)
-        self._touched = dict(self._surface)
+        on_event = functools.partial(_sort_event, self._samples, self._events)
+        self._current_surface = dict(self._surface)
         # A device without references, such as one that a notebook has replaced, ends its session.
-        self._session = session = Session(words, take, self._quiet)
-        self._abandon = weakref.finalize(self, session.close_input).detach
+        self._session = session = Session(words, on_event, self._quiet)
+        self._detach_finalizer = weakref.finalize(self, session.close_input).detach
         return session
 
     def disarm(self) -> None:
@@ -287,7 +287,7 @@ class Device:
         self._end(None)
 
     def _end(self, why: BaseException | None) -> None:
-        own(self._pid)
+        refuse_in_fork(self._pid)
         with self._ending:
             if self._session is not None:
                 self._end_session(self._session, why)
@@ -307,8 +307,8 @@ class Device:
         elif self._confirmed:
             self._unconfirmed = None
         self._session = None
-        if self._abandon is not None:
-            self._abandon()
+        if self._detach_finalizer is not None:
+            self._detach_finalizer()
         made = list(Path(self._folder, "demo").glob("*.csv"))
         if error is None and self._record is not None and made:
             shutil.move(made[0], self._record)
@@ -318,14 +318,14 @@ class Device:
     @property
     def is_armed(self) -> bool:
         """Returns True if the arm is armed by the last report."""
-        own(self._pid)
+        refuse_in_fork(self._pid)
         session = self._session
-        return session is not None and not session.is_over and session.mode == "armed"
+        return session is not None and not session.has_ended and session.mode == "armed"
 
     @property
     def is_disarmed(self) -> bool:
         """Returns True if the board confirmed at the end of the last session that it is disarmed."""
-        own(self._pid)
+        refuse_in_fork(self._pid)
         return self._session is None and self._confirmed
 
     @property
@@ -336,8 +336,8 @@ class Device:
     @property
     def params(self) -> Params:
         """The surface, which may be changed while it is touched."""
-        self._serving()
-        return Params(self._change, self._touched, self._changing)
+        self._require_session()
+        return Params(self._change, self._current_surface, self._changing)
 
     @property
     def dropped(self) -> int:
@@ -358,15 +358,15 @@ class Device:
         "pan 5 0", and waits until it is done. Raises DeviceError if it is refused. "reset" sets
         ``params`` to the loaded values; commands of the surface are refused."""
         first = [*line.partition("#")[0].split(), ""][0]
-        if first in _NOT_HERE:
-            raise DeviceError(f"{line!r} is not given as a command: {_NOT_HERE[first]}")
+        if first in _REPLACEMENTS:
+            raise DeviceError(f"{line!r} is not given as a command: {_REPLACEMENTS[first]}")
         self._change(line, self._surface if first == "reset" else {})
 
     def _change(self, line: str, changed: dict[str, Any]) -> None:
         """Sends a command, and stores its changes of the surface when it is done."""
-        session = self._serving()
+        session = self._require_session()
         with self._changing:
-            before, surface = dict(self._touched), self._touched
+            before, surface = dict(self._current_surface), self._current_surface
             view, refused = session.view, len(session.refused)
             # Until the command is confirmed, the parameter is unknown: the change may still be
             # made.
@@ -377,14 +377,14 @@ class Device:
                 surface.update(before)
                 raise
             done = session.wait(
-                lambda: session.view != view or len(session.refused) > refused, _DONE_S
+                lambda: session.view != view or len(session.refused) > refused, _COMMAND_TIMEOUT_S
             )
             if len(session.refused) > refused:
                 surface.update(before)
                 raise DeviceError(session.refused[-1])
             if not done:
                 raise session.error(
-                    f"{line!r} is not done after {_DONE_S:g} s; the change may still come"
+                    f"{line!r} is not done after {_COMMAND_TIMEOUT_S:g} s; the change may still come"
                 )
             surface.update(changed)
 
@@ -394,24 +394,24 @@ class Device:
         ``text`` has 1 to 200 characters, no control characters. Returns when the device has
         reported the marked tick.
         """
-        session = self._serving()
+        session = self._require_session()
         text = text.strip()
         with self._marking:
             made, refused = len(session.marks), len(session.refused)
 
-            def mine() -> list[dict[str, Any]]:
+            def matching() -> list[dict[str, Any]]:
                 return [mark for mark in session.marks[made:] if mark["text"] == text]
 
             session.send(f"mark {text}")
-            session.wait(lambda: bool(mine()) or len(session.refused) > refused, _DONE_S)
-            mark = [*mine(), {}][0]
+            session.wait(lambda: bool(matching()) or len(session.refused) > refused, _COMMAND_TIMEOUT_S)
+            mark = [*matching(), {}][0]
         if not mark and len(session.refused) > refused:
             raise DeviceError(session.refused[-1])
         if mark.get("marked_tick") is None:
             raise session.error(f"the device has not said which tick {text!r} marks")
         return Mark(text, mark["marked_tick"], mark["marked_t_s"], mark["host_unix_s"])
 
-    def _serving(self) -> Session:
+    def _require_session(self) -> Session:
         if self._session is None:
             raise DeviceError("nothing is touched: arm() first")
         return self._session
@@ -435,7 +435,7 @@ class Device:
         return f"<Device {self.name!r}, {mode}>"
 
 
-def _take(samples: Buffer[Sample], events: Buffer[dict[str, Any]], event: dict[str, Any]) -> None:
+def _sort_event(samples: Buffer[Sample], events: Buffer[dict[str, Any]], event: dict[str, Any]) -> None:
     """Adds an event to its queue. Has no reference to the device, so that it can be collected."""
     kind = event["event"]
     if kind == "over":
@@ -445,8 +445,8 @@ def _take(samples: Buffer[Sample], events: Buffer[dict[str, Any]], event: dict[s
         events.put(event)
     else:
         hip, proxy, force = (tuple(event[name]) for name in ("hip_mm", "proxy_mm", "force_n"))
-        what = (event[name] for name in ("state", "mode", "view"))
-        samples.put(Sample(event["tick"], event["t_s"], hip, proxy, force, *what))
+        rest = (event[name] for name in ("state", "mode", "view"))
+        samples.put(Sample(event["tick"], event["t_s"], hip, proxy, force, *rest))
 
 
 def _remove(folder: str, pid: int) -> None:

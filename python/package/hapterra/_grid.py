@@ -132,12 +132,12 @@ def _scaled(heights: Any, scale: float, offset: float) -> Any:
 
 
 def _dimension(da: Any, word: str, axis: str, names: set[str]) -> Any:
-    def is_it(name: Any) -> bool:
+    def matches(name: Any) -> bool:
         attrs = da[name].attrs if name in da.coords else {}
         stated = {str(name).lower(), attrs.get("standard_name")}
         return attrs.get("axis") == axis or bool(stated & names)
 
-    found = [name for name in da.dims if is_it(name)]
+    found = [name for name in da.dims if matches(name)]
     if len(found) != 1:
         raise ValueError(f"which of the dimensions {da.dims} is {word}? give {word}=")
     return found[0]

@@ -54,18 +54,18 @@ def is_lonlat(crs: str | None) -> bool:
 
 
 def resized(
-    how: dict[str, Any],
+    sizing: dict[str, Any],
     cell_mm: float | None,
     scale: str | float | None,
     exaggeration: float | str | None,
 ) -> dict[str, Any]:
     """Returns the size of an opened terrain, with the given values instead of its own."""
     if not (cell_mm is None and scale is None):
-        how = {**how, "cell_mm": cell_mm, "scale": scale}
-    return how if exaggeration is None else {**how, "exaggeration": exaggeration}
+        sizing = {**sizing, "cell_mm": cell_mm, "scale": scale}
+    return sizing if exaggeration is None else {**sizing, "exaggeration": exaggeration}
 
 
-class Laid(NamedTuple):
+class GridScale(NamedTuple):
     """The scale of a grid's terrain."""
 
     cell_mm: float
@@ -78,21 +78,21 @@ class Laid(NamedTuple):
 class Ground:
     """The position of an array's terrain, in the coordinates of its data."""
 
-    def __init__(self, grid: Grid, laid: Laid) -> None:
-        self._grid, self._laid = grid, laid
+    def __init__(self, grid: Grid, grid_scale: GridScale) -> None:
+        self._grid, self._scale = grid, grid_scale
 
     def mm_at(self, at: tuple[float, float], lonlat: bool) -> tuple[float, float]:
         """Returns the millimetres east and north to a position."""
-        _check_own(lonlat)
+        _refuse_lonlat(lonlat)
         (west, south), (east, north) = self._grid.corner, self._grid.cell
-        cell_mm = self._laid.cell_mm
+        cell_mm = self._scale.cell_mm
         return (at[0] - west) / east * cell_mm, (at[1] - south) / north * cell_mm
 
     def ground_at(self, mm: tuple[float, float], lonlat: bool) -> tuple[float, float]:
         """Returns the position at millimetres east and north."""
-        _check_own(lonlat)
+        _refuse_lonlat(lonlat)
         (west, south), (east, north) = self._grid.corner, self._grid.cell
-        cell_mm = self._laid.cell_mm
+        cell_mm = self._scale.cell_mm
         return west + mm[0] / cell_mm * east, south + mm[1] / cell_mm * north
 
     def window(
@@ -103,29 +103,29 @@ class Ground:
         cell_mm: float | None,
         scale: str | float | None,
         exaggeration: float | str | None,
-    ) -> tuple[Grid, Laid]:
+    ) -> tuple[Grid, GridScale]:
         """Returns the samples around a position, and the scale of their terrain."""
-        grid, laid = self._grid, self._laid
+        grid, grid_scale = self._grid, self._scale
         metres = ground_m_per_mm(scale)
         if metres is not None:
-            cell_mm = grid.metres(laid.ground_unit, laid.height_unit).cell / metres
-        middle = [mm / laid.cell_mm for mm in self.mm_at(at, lonlat)]
+            cell_mm = grid.metres(grid_scale.ground_unit, grid_scale.height_unit).cell / metres
+        middle = [mm / grid_scale.cell_mm for mm in self.mm_at(at, lonlat)]
         if cell_mm is not None:
-            height = laid.height_mm_per_unit
-            height = None if height is None else height * cell_mm / laid.cell_mm
-            laid = laid._replace(cell_mm=cell_mm, height_mm_per_unit=height)
+            height = grid_scale.height_mm_per_unit
+            height = None if height is None else height * cell_mm / grid_scale.cell_mm
+            grid_scale = grid_scale._replace(cell_mm=cell_mm, height_mm_per_unit=height)
         if exaggeration is not None:
-            laid = laid._replace(exaggeration=float(exaggeration))
+            grid_scale = grid_scale._replace(exaggeration=float(exaggeration))
         rows, columns = grid.heights.shape
-        west, east = _span(at, middle[0], size_mm[0] / laid.cell_mm, columns - 1)
-        south, north = _span(at, middle[1], size_mm[1] / laid.cell_mm, rows - 1)
+        west, east = _span(at, middle[0], size_mm[0] / grid_scale.cell_mm, columns - 1)
+        south, north = _span(at, middle[1], size_mm[1] / grid_scale.cell_mm, rows - 1)
         first, end = south, north + 1
         if grid.origin == "upper":
             first, end = rows - 1 - north, rows - south
         (x, y), (wide, high) = grid.corner, grid.cell
         corner = (x + west * wide, y + south * high)
         heights = grid.heights[first:end, west : east + 1]
-        return replace(grid, heights=heights, corner=corner), laid
+        return replace(grid, heights=heights, corner=corner), grid_scale
 
 
 def _span(
@@ -141,7 +141,7 @@ def _span(
     return min(max(begin, 0), end - 1), end
 
 
-def _check_own(lonlat: bool) -> None:
+def _refuse_lonlat(lonlat: bool) -> None:
     if lonlat:
         raise ValueError(
             'the coordinates of an array are its own: leave crs="lonlat" out, or take Terrain.open,'

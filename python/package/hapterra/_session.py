@@ -31,16 +31,16 @@ _T = TypeVar("_T")
 _NOT_CONFIRMED = "switch the amplifiers off"
 _CONFIRMED = "the board has confirmed that it is disarmed"
 #: Time-out for the board to confirm that it is disarmed, s; used again after a signal.
-_CONFIRMS_S = 20.0
+_CONFIRM_TIMEOUT_S = 20.0
 #: Time-out for the command's last lines after the board is disarmed, s: a viewer that still runs
 #: keeps standard error open.
-_TOLD_S = 1.0
+_STDERR_TIMEOUT_S = 1.0
 #: Lines of the command that an error may quote.
-_KEPT = 200
+_MAX_LINES = 200
 #: Lines that are never passed on, and those that a quiet session does not pass on. A recording that
 #: was cut is reported.
-_FIGURES = re.compile(r"\s*\d")
-_NEWS = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
+_FIGURE_LINE = re.compile(r"\s*\d")
+_STATUS_LINE = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
 
 
 class DeviceError(CommandError):
@@ -52,7 +52,7 @@ class NotDisarmedError(DeviceError):
     amplifiers off."""
 
 
-def own(pid: int) -> None:
+def refuse_in_fork(pid: int) -> None:
     """Refuses a fork's request to a session of its parent, whose state the fork cannot know."""
     if os.getpid() != pid:
         raise DeviceError(
@@ -113,14 +113,14 @@ class Session:
         self._on_event, self._is_quiet = on_event, is_quiet
         self._pid = os.getpid()
         self._changed = threading.Condition()
-        self._told: collections.deque[str] = collections.deque(maxlen=_KEPT)
+        self._lines: collections.deque[str] = collections.deque(maxlen=_MAX_LINES)
         #: As the column ``mode`` of a recording.
         self.mode = "disarmed"
         self.fault: int | None = None
         #: The current placement, counted from 0.
         self.view = -1
         #: Number of the last question, its lines, and True while it needs an answer.
-        self._asked: int | None = None
+        self._question_number: int | None = None
         self._question: list[str] = []
         self.asks = False
         #: The last lines about arming.
@@ -128,9 +128,9 @@ class Session:
         self.refused: list[str] = []
         self.marks: list[dict[str, Any]] = []
         self._disarmed = False
-        driven = ["--commands", "-", "--end-with-input"]
+        input_options = ["--commands", "-", "--end-with-input"]
         self._child = subprocess.Popen(
-            [*command(), *words, *driven],
+            [*command(), *words, *input_options],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -146,13 +146,13 @@ class Session:
 
     def _read_stderr(self) -> None:
         try:
-            self._pass_on()
+            self._forward_stderr()
             if self._events is not None:
                 self._events.join()
         finally:
             self._on_event({"event": "over"})
 
-    def _pass_on(self) -> None:
+    def _forward_stderr(self) -> None:
         """Passes on the command's lines to its end, so that the command never waits for a
         reader."""
         assert self._child.stderr
@@ -169,27 +169,27 @@ class Session:
                     # A session without a reader of its events must not arm.
                     self.close_input()
                     continue
-                self._events = threading.Thread(target=self._read, args=(stream,), daemon=True)
+                self._events = threading.Thread(target=self._read_events, args=(stream,), daemon=True)
                 self._events.start()
                 continue
-            self._told.append(line)
+            self._lines.append(line)
             self._disarmed = self._disarmed or line.endswith(_CONFIRMED)
-            if not (_FIGURES.match(line) or self._is_quiet and _NEWS.match(line)):
+            if not (_FIGURE_LINE.match(line) or self._is_quiet and _STATUS_LINE.match(line)):
                 # A replacement of standard error may raise any exception.
                 with contextlib.suppress(Exception):
                     print(f"hapterra: {line}", file=sys.stderr)
 
-    def _read(self, stream: socket.socket) -> None:
+    def _read_events(self, stream: socket.socket) -> None:
         # A killed process resets the connection; its end is detected elsewhere.
         with contextlib.suppress(OSError), stream, stream.makefile("rb") as lines:
             for line in lines:
                 # Its last line may be cut.
                 with contextlib.suppress(ValueError):
                     event = json.loads(line)
-                    self._take(event)
+                    self._handle_event(event)
                     self._on_event(event)
 
-    def _take(self, event: dict[str, Any]) -> None:
+    def _handle_event(self, event: dict[str, Any]) -> None:
         kind = event["event"]
         if kind in ("place", "contact", "material"):
             return
@@ -204,14 +204,14 @@ class Session:
             elif kind == "view":
                 self.view = event["view"]
             elif kind == "arming":
-                lines, asked = event["lines"], event["asks"]
-                self.arming = (self.arming + lines)[-_KEPT:]
-                if asked is None:
+                lines, number = event["lines"], event["asks"]
+                self.arming = (self.arming + lines)[-_MAX_LINES:]
+                if number is None:
                     self.asks = False
-                elif asked == self._asked:
+                elif number == self._question_number:
                     self._question += [line for line in lines if line not in self._question]
                 else:
-                    self._asked, self._question, self.asks = asked, list(lines), True
+                    self._question_number, self._question, self.asks = number, list(lines), True
             elif kind == "refused":
                 self.refused.append(event["text"])
             elif kind == "mark":
@@ -225,20 +225,20 @@ class Session:
     def take_question(self) -> tuple[int, str] | None:
         """Returns the number and the lines of the open question, once."""
         with self._changed:
-            if not self.asks or self._asked is None:
+            if not self.asks or self._question_number is None:
                 return None
             self.asks = False
-            return self._asked, "\n".join(self._question)
+            return self._question_number, "\n".join(self._question)
 
     @property
     def is_disarmed(self) -> bool:
         """Returns True if the board has confirmed, at the end, that it is disarmed."""
         # The exit code does not show it: it is also 0 for a child that other code has waited for.
-        own(self._pid)
+        refuse_in_fork(self._pid)
         return self._disarmed
 
     @property
-    def is_over(self) -> bool:
+    def has_ended(self) -> bool:
         """Returns True if the command has ended, or is about to, and all its events were
         handled."""
         return not self._stderr.is_alive()
@@ -247,7 +247,7 @@ class Session:
         """Sends a command. Raises ValueError if it is not one line."""
         if not line.isprintable():
             raise ValueError(f"{line!r} has characters that no command can have")
-        own(self._pid)
+        refuse_in_fork(self._pid)
         assert self._child.stdin
         try:
             self._child.stdin.write(f"{line}\n".encode())
@@ -259,24 +259,24 @@ class Session:
         if self._child.stdin:
             self._child.stdin.close()
 
-    def wait(self, is_it: Callable[[], bool], timeout: float) -> bool:
+    def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Waits until ``is_it`` is true, the session is over, or ``timeout`` seconds have passed.
         Returns True if ``is_it`` is true."""
         until = time.monotonic() + timeout
         with self._changed:
-            while not is_it() and not self.is_over and time.monotonic() < until:
+            while not condition() and not self.has_ended and time.monotonic() < until:
                 # The end of the notifying thread itself sends no notification.
                 self._changed.wait(min(0.1, until - time.monotonic()))
-            return is_it()
+            return condition()
 
     def error(self, message: str) -> DeviceError:
         """Returns an error with the command's lines, or the command's own error if it ended with
         one."""
-        told = list(self._told)
-        has_ended = self.is_over or self._child.returncode is not None
+        told = list(self._lines)
+        has_ended = self.has_ended or self._child.returncode is not None
         if has_ended and any(line.startswith("error: ") for line in told):
-            its = error("\n".join(told), self._child.wait())
-            return DeviceError(its.message, its.hint)
+            failure = error("\n".join(told), self._child.wait())
+            return DeviceError(failure.message, failure.hint)
         reasons = self.arming[-8:] + self.refused[-1:]
         return DeviceError("\n".join([message, *reasons]))
 
@@ -290,11 +290,11 @@ class Session:
         DeviceError
             The board is disarmed, and the command has failed.
         """
-        own(self._pid)
+        refuse_in_fork(self._pid)
         self.close_input()
         for _ in range(3):
             try:
-                self._child.wait(_CONFIRMS_S)
+                self._child.wait(_CONFIRM_TIMEOUT_S)
                 break
             # The second Ctrl-C ends the command at once, and its guardian disarms the board.
             except (KeyboardInterrupt, subprocess.TimeoutExpired):
@@ -302,12 +302,12 @@ class Session:
         else:
             self._child.kill()
         code = self._child.wait()
-        self.wait(lambda: self.is_disarmed, _CONFIRMS_S)
-        self._stderr.join(_TOLD_S)
+        self.wait(lambda: self.is_disarmed, _CONFIRM_TIMEOUT_S)
+        self._stderr.join(_STDERR_TIMEOUT_S)
         self._on_event({"event": "over"})
         _SESSIONS.discard(self)
         if not self.is_disarmed:
-            told = "\n".join(self._told)
+            told = "\n".join(self._lines)
             # If nothing was opened, nothing was armed.
             if self.view >= 0 or _NOT_CONFIRMED in told:
                 message = "the board did not confirm that it is disarmed: " + _NOT_CONFIRMED
@@ -319,7 +319,7 @@ class Session:
 #: Sessions that have not ended.
 _SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
 #: The process in which a thread waits for the end of the main thread.
-_waits_in: int | None = None
+_watched_pid: int | None = None
 
 
 def _close_inputs() -> None:
@@ -330,14 +330,14 @@ def _close_inputs() -> None:
 def _end_with_main_thread() -> None:
     """Requests the end of all sessions when the main thread ends: Python waits for its other
     threads, which may read samples, before it calls the functions registered by atexit."""
-    global _waits_in
+    global _watched_pid
 
     def wait() -> None:
         threading.main_thread().join()
         _close_inputs()
 
-    if _waits_in != os.getpid():
-        _waits_in = os.getpid()
+    if _watched_pid != os.getpid():
+        _watched_pid = os.getpid()
         threading.Thread(target=wait, daemon=True).start()
 
 

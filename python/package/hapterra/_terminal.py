@@ -8,14 +8,14 @@ import sys
 from typing import Any
 
 
-def at_the_terminal(said: str) -> bool:
+def ask_at_terminal(question: str) -> bool:
     """Shows a question and waits for Enter, alone on its line and pressed after the question.
     Without a terminal there is no question."""
-    shown = next(filter(_is_terminal, (sys.stderr, sys.stdout)), None)
-    if shown is None or not _is_terminal(sys.stdin):
+    terminal = next(filter(_is_terminal, (sys.stderr, sys.stdout)), None)
+    if terminal is None or not _is_terminal(sys.stdin):
         return False
-    _forget_typed()
-    print(said, file=shown, flush=True)
+    _discard_input()
+    print(question, file=terminal, flush=True)
     # Without Python's buffer, which may contain earlier input.
     return os.read(sys.stdin.fileno(), 1024) in (b"\n", b"\r", b"\r\n")
 
@@ -26,7 +26,7 @@ def _is_terminal(stream: Any) -> bool:
     return False
 
 
-def _forget_typed() -> None:
+def _discard_input() -> None:
     if sys.platform == "win32":
         import msvcrt
 

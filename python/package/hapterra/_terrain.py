@@ -14,18 +14,18 @@ import numpy.typing as npt
 from . import _native
 from ._command import options, reading_options
 from ._grid import Grid, of_rasterio, of_xarray
-from ._place import Ground, Laid, Pair, Path, files, ground_m_per_mm, is_lonlat, pair, resized
+from ._place import GridScale, Ground, Pair, Path, files, ground_m_per_mm, is_lonlat, pair, resized
 
 if TYPE_CHECKING:
     import rasterio.io
     import xarray
 
 #: Types of samples that are kept as they are; all others become f8.
-_KEPT = {"f8", "f4", "i4", "u4", "i2", "u2", "i1", "u1"}
+_NATIVE_TYPES = {"f8", "f4", "i4", "u4", "i2", "u2", "i1", "u1"}
 #: Samples that are written at a time.
-_WRITTEN = 1 << 20
+_BLOCK_SAMPLES = 1 << 20
 #: More are left in their file: 1 GiB.
-_MOST_WRITTEN = 1 << 27
+_MAX_WRITTEN = 1 << 27
 _SOUTH_FIRST = {"upper": False, "lower": True}
 
 
@@ -134,18 +134,18 @@ class Terrain:
         A step waits for data that has to be fetched. If that fails, the step raises an OSError and
         may be repeated. Damaged parts of a file are no-data, with a warning.
         """
-        how = {"cell_mm": cell_mm, "scale": scale, "exaggeration": exaggeration}
+        sizing = {"cell_mm": cell_mm, "scale": scale, "exaggeration": exaggeration}
         paths = files(source)
-        native = _native.Terrain.open(paths, [*reading_options(**reading), *options(**_size(how))])
-        return cls._of_file(native, {"file": paths[0] if len(paths) == 1 else paths}, how)
+        native = _native.Terrain.open(paths, [*reading_options(**reading), *options(**_size(sizing))])
+        return cls._from_native(native, {"file": paths[0] if len(paths) == 1 else paths}, sizing)
 
     @classmethod
-    def _of_file(cls, native: _native.Terrain, source: dict[str, Any], how: dict[str, Any]) -> Terrain:
+    def _from_native(cls, native: _native.Terrain, source: dict[str, Any], sizing: dict[str, Any]) -> Terrain:
         terrain = cls.__new__(cls)
         terrain._native, terrain.shape = native, native.shape
         terrain.cell_mm, terrain.height_mm_per_unit = native.scale
         terrain.source = {**source, **dict(native.stated())}
-        terrain._ground, terrain._opened, terrain.tip_mm = None, how, 0.0
+        terrain._ground, terrain._opened, terrain.tip_mm = None, sizing, 0.0
         return terrain
 
     def place(
@@ -170,29 +170,29 @@ class Terrain:
         coordinates.
         """
         place, lonlat, size = pair("at", at), is_lonlat(crs), pair("size_mm", size_mm)
-        lies = self._lies()
-        if isinstance(lies, Ground):
-            window = self._of(*lies.window(place, lonlat, size, cell_mm, scale, exaggeration))
+        georeference = self._georeference()
+        if isinstance(georeference, Ground):
+            window = self._from_grid(*georeference.window(place, lonlat, size, cell_mm, scale, exaggeration))
         else:
-            how = resized(self._opened or {}, cell_mm, scale, exaggeration)
-            native = lies.window(place, lonlat, size, options(**_size(how)))
-            window = self._of_file(native, self.source or {}, how)
+            sizing = resized(self._opened or {}, cell_mm, scale, exaggeration)
+            native = georeference.window(place, lonlat, size, options(**_size(sizing)))
+            window = self._from_native(native, self.source or {}, sizing)
         return window.with_tip(self.tip_mm) if self.tip_mm else window
 
     def mm_at(self, x: float, y: float, crs: str | None = None) -> tuple[float, float]:
         """Returns the millimetres east and north from the south-west sample to a position in the
         terrain's own coordinates, or with ``crs="lonlat"`` in degrees. It may be outside the
         terrain."""
-        return self._lies().mm_at((x, y), is_lonlat(crs))
+        return self._georeference().mm_at((x, y), is_lonlat(crs))
 
     def ground_at(
         self, east_mm: float, north_mm: float, crs: str | None = None
     ) -> tuple[float, float]:
         """Returns the position in the terrain's own coordinates, or with ``crs="lonlat"`` in
         degrees, at millimetres east and north of the south-west sample."""
-        return self._lies().ground_at((east_mm, north_mm), is_lonlat(crs))
+        return self._georeference().ground_at((east_mm, north_mm), is_lonlat(crs))
 
-    def _lies(self) -> Ground | _native.Terrain:
+    def _georeference(self) -> Ground | _native.Terrain:
         """Returns the georeference of the terrain."""
         if self._opened is not None:
             return self._native
@@ -225,8 +225,8 @@ class Terrain:
         ``height_unit`` are "m", "km", "ft" and the like, and ``height_mm_per_unit`` takes the place
         of both units and of the exaggeration.
         """
-        how = Laid(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
-        return cls._of(of_xarray(da, x, y), how)
+        sizing = GridScale(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
+        return cls._from_grid(of_xarray(da, x, y), sizing)
 
     @classmethod
     def from_rasterio(
@@ -247,23 +247,23 @@ class Terrain:
         and of the band; its no-data value or mask marks no-data, and its scale and offset are
         applied. ``source`` of the result reports them. The rest is as in ``from_xarray``.
         """
-        how = Laid(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
-        return cls._of(of_rasterio(ds, band), how)
+        sizing = GridScale(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
+        return cls._from_grid(of_rasterio(ds, band), sizing)
 
     @classmethod
-    def _of(cls, grid: Grid, laid: Laid) -> Terrain:
-        height_mm_per_unit = laid.height_mm_per_unit
+    def _from_grid(cls, grid: Grid, grid_scale: GridScale) -> Terrain:
+        height_mm_per_unit = grid_scale.height_mm_per_unit
         if height_mm_per_unit is None:
-            metres = grid.metres(laid.ground_unit, laid.height_unit)
-            height_mm_per_unit = laid.cell_mm * metres.height / metres.cell * laid.exaggeration
+            metres = grid.metres(grid_scale.ground_unit, grid_scale.height_unit)
+            height_mm_per_unit = grid_scale.cell_mm * metres.height / metres.cell * grid_scale.exaggeration
         terrain = cls(
             grid.heights,
-            cell_mm=laid.cell_mm,
+            cell_mm=grid_scale.cell_mm,
             height_mm_per_unit=height_mm_per_unit,
             origin=grid.origin,
         )
         terrain.source = grid.source()
-        terrain._ground = Ground(grid, laid)
+        terrain._ground = Ground(grid, grid_scale)
         return terrain
 
     def with_tip(self, mm: float) -> Terrain:
@@ -296,13 +296,13 @@ class Terrain:
                 "materials of a Terrain cannot be loaded: give materials=, a file, and surface=, a file of its classes"
             )
         rows, columns = self.shape
-        if rows * columns > _MOST_WRITTEN:
+        if rows * columns > _MAX_WRITTEN:
             raise ValueError(
                 f"{rows} rows of {columns} samples are too many to be written for a device:"
                 ' load the file itself, as device.load("dem.tif", ...), or a window by place()'
             )
         heights = np.lib.format.open_memmap(path, "w+", "=f8", self.shape)
-        step = max(1, _WRITTEN // columns)
+        step = max(1, _BLOCK_SAMPLES // columns)
         for south in range(0, rows, step):
             block = np.frombuffer(self._native.rows(south, step), "=f8").reshape(-1, columns)
             heights[rows - south - len(block) : rows - south] = block[::-1]
@@ -332,7 +332,7 @@ def _samples(heights: npt.ArrayLike) -> npt.NDArray[Any]:
         is_whole = not np.ma.getmaskarray(samples).any()
         samples = samples.data if is_whole else np.ma.filled(samples.astype("f8"), np.nan)
     native = samples.dtype.newbyteorder("=")
-    kind = native if native.str[1:] in _KEPT else np.dtype("f8")
+    kind = native if native.str[1:] in _NATIVE_TYPES else np.dtype("f8")
     return np.asarray(samples, kind)
 
 
@@ -345,7 +345,7 @@ def _materials(materials: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[
     return of.astype(np.uint8)
 
 
-def _size(how: dict[str, Any]) -> dict[str, Any]:
+def _size(sizing: dict[str, Any]) -> dict[str, Any]:
     """Returns the size in the hand, by the command's names."""
-    scale = ground_m_per_mm(how["scale"])
-    return {"cell_mm": how["cell_mm"], "ground_m_per_mm": scale, "exaggeration": how["exaggeration"]}
+    scale = ground_m_per_mm(sizing["scale"])
+    return {"cell_mm": sizing["cell_mm"], "ground_m_per_mm": scale, "exaggeration": sizing["exaggeration"]}

@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sequence_is_there_when_its_time_is_up() {
+    fn sequence_is_complete_after_its_duration() {
         let mut adc = with_regulator(16);
         adc.levels[9] = 0x123;
         adc.write(JSQR, 1 | 9 << 9 | 2 << 15, u32::MAX, UP_NS);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_conversion_after_a_millisecond_is_wrong() {
+    fn first_conversion_after_a_millisecond_is_wrong() {
         let mut adc = with_regulator(12);
         adc.levels[9] = 0x123;
         adc.write(JSQR, 1 | 9 << 9 | 9 << 15, u32::MAX, UP_NS);

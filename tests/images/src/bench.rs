@@ -71,7 +71,7 @@ impl Bench {
         let mut machine = device.machine.borrow_mut();
         assert!(machine.is_enabled(), "{}: pressed", machine.chip.board);
         // The test continues between two ticks.
-        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        assert_eq!(machine.run_ticks(1), Stop::Requested);
         let _ = machine.take_effects();
         drop(machine);
         device

@@ -153,7 +153,7 @@ impl Bus {
     pub fn advance(&mut self, by_ns: u64) {
         self.now_ns += by_ns;
         if self.is_halted && self.is_frozen(self.chip.freeze.watchdog) {
-            self.watchdog.stand_still(by_ns);
+            self.watchdog.freeze(by_ns);
         }
         self.follow_gate();
         let freeze = self.chip.freeze;
@@ -167,7 +167,7 @@ impl Bus {
                 _ => false,
             };
             match is_frozen {
-                true => timer.stand_still(self.now_ns),
+                true => timer.freeze(self.now_ns),
                 false => timer.advance(self.now_ns),
             }
         }
@@ -194,7 +194,7 @@ impl Bus {
     fn follow_gate(&mut self) {
         let level = self
             .timer_named("TIM15")
-            .is_some_and(|gate| gate.triggers());
+            .is_some_and(|gate| gate.trigger_output());
         if let Some(timer) = self.timer_named("TIM1") {
             timer.trigger = level;
         }
@@ -362,17 +362,19 @@ impl Bus {
             return;
         };
         for (axis, channel) in channels.into_iter().enumerate() {
-            let held = self.command_held_at.filter(|(held, _)| *held == axis);
+            let overridden = self
+                .command_held_at
+                .filter(|(overridden, _)| *overridden == axis);
             self.read_back.levels[channel] =
-                held.map_or(self.plain(at[axis]) as u16, |(_, reading)| reading);
+                overridden.map_or(self.plain(at[axis]) as u16, |(_, reading)| reading);
         }
     }
 
     /// Returns the level at a pin: its output if it is driven, else the external level.
     fn level(&self, pin: (u32, u32)) -> bool {
-        let held = self.enable_held_at.filter(|_| pin == self.chip.enable);
+        let overridden = self.enable_held_at.filter(|_| pin == self.chip.enable);
         let from_outside = || self.inputs.get(&pin).copied().unwrap_or(false);
-        held.unwrap_or_else(|| self.output(pin) || from_outside())
+        overridden.unwrap_or_else(|| self.output(pin) || from_outside())
     }
 
     /// Sets the readings of the current monitors of axes 1 to 3, A, as 12-bit values.
@@ -424,7 +426,7 @@ impl Bus {
             }
             _ if address == self.chip.recovery.0 + 8 => self.recovery_status(),
             _ if self.is_sent(address) => self.converter.status(self.plain(address)),
-            _ if self.is_back(address) => self.converter.give().into(),
+            _ if self.is_response_register(address) => self.converter.next_byte().into(),
             _ => self.ready(address, self.plain(address)),
         }
     }
@@ -446,8 +448,8 @@ impl Bus {
     }
 
     /// Returns true for the register with the data received by the SPI.
-    fn is_back(&self, address: u32) -> bool {
-        matches!(self.chip.commands, Commands::Serial { back, .. } if back == address)
+    fn is_response_register(&self, address: u32) -> bool {
+        matches!(self.chip.commands, Commands::Serial { response_register, .. } if response_register == address)
     }
 
     /// Returns the value of a register with the bits that the hardware adds.
@@ -536,7 +538,7 @@ impl Bus {
             }
             Commands::Serial { data, sync, .. } => {
                 if address == data {
-                    self.converter.take(value as u8);
+                    self.converter.receive(value as u8);
                 }
                 if let Some((axis, code)) = self.converter.select(!self.output(sync), self.now_ns) {
                     self.reach(axis, code);

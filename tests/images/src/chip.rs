@@ -57,7 +57,7 @@ pub enum Commands {
         /// Register for bytes to send.
         data: u32,
         /// Register of bytes received.
-        back: u32,
+        response_register: u32,
         /// Status register and its end-of-frame bit.
         sent: (u32, u32),
         /// Low during a frame: port and number.
@@ -124,7 +124,7 @@ pub struct Chip {
     /// Core clock, Hz.
     pub core_hz: u64,
     /// The fastest core clock in the data sheet, Hz.
-    pub core_at_most_hz: u64,
+    pub max_core_hz: u64,
     /// Clock of the timers, Hz.
     pub timer_hz: u64,
     /// Memories for code and data: address and bytes.
@@ -227,7 +227,7 @@ pub static G474: Chip = Chip {
     variable: "HAPTERRA_G474_ELF",
     is_m7: false,
     core_hz: 168_000_000,
-    core_at_most_hz: 170_000_000,
+    max_core_hz: 170_000_000,
     timer_hz: 168_000_000,
     memories: &[
         (0x0800_0000, 512 * KIB),
@@ -332,7 +332,7 @@ pub static H743: Chip = Chip {
     variable: "HAPTERRA_H743_ELF",
     is_m7: true,
     core_hz: 456_000_000,
-    core_at_most_hz: 480_000_000,
+    max_core_hz: 480_000_000,
     timer_hz: 228_000_000,
     memories: &[
         (0x0800_0000, 2048 * KIB),
@@ -454,7 +454,7 @@ pub static H743_SPI: Chip = Chip {
     output_break: None,
     commands: Commands::Serial {
         data: 0x4001_3420,
-        back: 0x4001_3430,
+        response_register: 0x4001_3430,
         sent: (0x4001_3414, 1 << 3),
         sync: (E, 11),
     },

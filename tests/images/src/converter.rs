@@ -39,21 +39,21 @@ pub struct Converter {
     powered_ns: u64,
     is_selected: bool,
     /// The time at which SYNC rose, ns, and true if the frame before it was a read.
-    rose: Option<(u64, bool)>,
+    rising_edge: Option<(u64, bool)>,
     /// True if SYNC fell too early, so that the frame is lost.
     is_lost: bool,
     frame: Vec<u8>,
     /// Request of the last frame.
-    asked: u16,
+    requested: u16,
     /// Bytes received and not read yet.
-    back: Vec<u8>,
+    response: Vec<u8>,
     /// True if the SPI's clock has failed: no frames are sent.
     pub is_cut: bool,
     /// True if the return wire is broken: the pull-up makes all bits ones.
     pub is_silent: bool,
     /// Shortest time that SYNC was high after a frame that writes and after one that reads, ns;
     /// zero before the first.
-    pub shortest_high_ns: (u64, u64),
+    pub min_high_ns: (u64, u64),
     /// Frames that were lost because SYNC was high too briefly, or the outputs were not powered up
     /// yet.
     pub lost: u32,
@@ -70,7 +70,7 @@ impl Converter {
     }
 
     /// Cycles the supply: all registers are as after power-up.
-    pub fn forget(&mut self) {
+    pub fn clear(&mut self) {
         self.codes = [0; 4];
         self.ranges = [0; 4];
         self.powered = 0;
@@ -96,19 +96,19 @@ impl Converter {
     }
 
     /// Sends a byte and receives one.
-    pub fn take(&mut self, byte: u8) {
-        let [high, low] = self.asked.to_be_bytes();
-        let back = [0, high, low].get(self.frame.len()).copied();
-        let back = back.filter(|_| !self.is_silent && !self.is_lost);
-        self.back.push(back.unwrap_or(u8::MAX));
+    pub fn receive(&mut self, byte: u8) {
+        let [high, low] = self.requested.to_be_bytes();
+        let response = [0, high, low].get(self.frame.len()).copied();
+        let response = response.filter(|_| !self.is_silent && !self.is_lost);
+        self.response.push(response.unwrap_or(u8::MAX));
         self.frame.push(byte);
     }
 
     /// Returns the oldest byte received.
-    pub fn give(&mut self) -> u8 {
-        match self.back.is_empty() {
+    pub fn next_byte(&mut self) -> u8 {
+        match self.response.is_empty() {
             true => 0,
-            false => self.back.remove(0),
+            false => self.response.remove(0),
         }
     }
 
@@ -120,31 +120,31 @@ impl Converter {
         self.is_selected = is_selected;
         if falls {
             self.frame.clear();
-            self.back.clear();
-            self.is_lost = self.rose.is_some_and(|(rose_ns, asked)| {
-                let (writes, reads) = &mut self.shortest_high_ns;
-                let (least, shortest) = match asked {
+            self.response.clear();
+            self.is_lost = self.rising_edge.is_some_and(|(rose_ns, requested)| {
+                let (writes, reads) = &mut self.min_high_ns;
+                let (min, min_high) = match requested {
                     true => (HIGH_AFTER_READ_NS, reads),
                     false => (HIGH_AFTER_WRITE_NS, writes),
                 };
                 let high_ns = now_ns - rose_ns;
-                *shortest = if *shortest == 0 {
+                *min_high = if *min_high == 0 {
                     high_ns
                 } else {
-                    high_ns.min(*shortest)
+                    high_ns.min(*min_high)
                 };
-                high_ns < least
+                high_ns < min
             });
             self.lost += u32::from(self.is_lost);
         }
         if !rises {
             return None;
         }
-        let asks = self.frame.first().is_some_and(|head| head & READ != 0);
-        self.rose = Some((now_ns, asks));
+        let is_read = self.frame.first().is_some_and(|head| head & READ != 0);
+        self.rising_edge = Some((now_ns, is_read));
         match self.frame[..] {
             [head, high, low] if !self.is_cut && !self.is_lost => {
-                self.asked = 0;
+                self.requested = 0;
                 self.execute(head, u16::from_be_bytes([high, low]), now_ns)
             }
             _ => None,
@@ -155,9 +155,9 @@ impl Converter {
         let (register, channel) = (head >> 3 & 7, head & 7);
         let at = usize::from(channel);
         match (head & READ != 0, register) {
-            (true, DATA) => self.asked = *self.codes.get(at)?,
-            (true, RANGE) => self.asked = *self.ranges.get(at)?,
-            (true, POWER) if at == 0 => self.asked = self.powered,
+            (true, DATA) => self.requested = *self.codes.get(at)?,
+            (true, RANGE) => self.requested = *self.ranges.get(at)?,
+            (true, POWER) if at == 0 => self.requested = self.powered,
             (false, DATA) if channel == ALL => self.codes = [value; 4],
             (false, DATA) => return self.output(at, value, now_ns),
             (false, RANGE) if channel == ALL => self.ranges = [value & 7; 4],
@@ -192,9 +192,9 @@ mod tests {
     /// Sends a frame that begins at a time. Returns the data received.
     fn send(converter: &mut Converter, frame: [u8; 3], at_ns: u64) -> u16 {
         converter.select(true, at_ns);
-        frame.iter().for_each(|byte| converter.take(*byte));
+        frame.iter().for_each(|byte| converter.receive(*byte));
         converter.select(false, at_ns + 3_200);
-        let [_, high, low] = [(); 3].map(|()| converter.give());
+        let [_, high, low] = [(); 3].map(|()| converter.next_byte());
         u16::from_be_bytes([high, low])
     }
 
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_code_before_the_outputs_have_powered_up_is_lost() {
+    fn code_before_the_outputs_power_up_is_lost() {
         let mut converter = set_up();
         send(&mut converter, [0, 1, 2], 14_000);
         assert_eq!((converter.codes()[0], converter.lost), (0, 1));

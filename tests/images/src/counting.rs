@@ -19,7 +19,7 @@ use crate::elf::Image;
 
 /// Memories and the area of the registers: address and bytes.
 const CODE: (u32, u32) = (0, 0x40_0000);
-const OTHERS: [(u32, u32); 3] = [
+const OTHER_CODE: [(u32, u32); 3] = [
     (0x2000_0000, 0x40_0000),
     (0x4000_0000, 0x10_0000),
     (0xE000_0000, 0x10_0000),
@@ -29,10 +29,10 @@ const CALL: u32 = 0xBEAB_0000;
 const NOP: [u8; 2] = [0x00, 0xBF];
 /// The image's functions that are a tick, and the prefix of its own functions.
 const TICKS: [&str; 2] = ["mps2_an386_counts4tick", "mps2_an386_counts4step"];
-const OWN: &str = "mps2_an386_counts";
+const OWN_FUNCTIONS: &str = "mps2_an386_counts";
 /// Functions that take most of the time between two ticks and that no tick calls: otherwise the
 /// count of instructions would differ.
-const APART: [&str; 6] = [
+const SEPARATE: [&str; 6] = [
     "FrameReader",
     "counts5files6Frames",
     "counts5files7Records",
@@ -82,14 +82,14 @@ struct Run {
 #[must_use]
 pub fn follow(image: &Path, folder: &Path) -> Vec<Cycles> {
     let image = Image::read(image);
-    let is_apart = |name: &str| APART.iter().any(|part| name.contains(part));
-    let apart = image.functions().filter(|(name, _)| is_apart(name));
-    let mut apart: Vec<_> = apart.map(|(_, function)| function).collect();
-    apart.sort_by_key(|function| function.address);
+    let is_separate = |name: &str| SEPARATE.iter().any(|part| name.contains(part));
+    let separate = image.functions().filter(|(name, _)| is_separate(name));
+    let mut separate: Vec<_> = separate.map(|(_, function)| function).collect();
+    separate.sort_by_key(|function| function.address);
     let mut core = Unicorn::new(Arch::ARM, Mode::MCLASS | Mode::THUMB).expect("a core");
     core.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)
         .expect("its model");
-    for (address, bytes) in OTHERS.into_iter().chain([CODE]) {
+    for (address, bytes) in OTHER_CODE.into_iter().chain([CODE]) {
         let mapped = core.mem_map(address.into(), bytes.into(), Prot::ALL);
         mapped.expect("memory");
     }
@@ -109,7 +109,7 @@ pub fn follow(image: &Path, folder: &Path) -> Vec<Cycles> {
         ended: vec![],
     }));
     let mut from = 0;
-    for (to, next) in { apart.iter() }
+    for (to, next) in { separate.iter() }
         .map(|function| (function.address, function.address + function.size))
         .chain([(CODE.1, CODE.1)])
     {
@@ -160,12 +160,12 @@ fn load(core: &mut Core<'_>, image: &Image) -> Vec<u32> {
 
 impl Run {
     fn execute(&mut self, core: &Core<'_>, address: u32, bytes: u32) {
-        let known = self.blocks[(address / 2) as usize].clone();
-        let known = known.filter(|block| block.bytes == bytes);
-        let next = known.unwrap_or_else(|| self.read(core, address, bytes));
+        let cached = self.blocks[(address / 2) as usize].clone();
+        let cached = cached.filter(|block| block.bytes == bytes);
+        let next = cached.unwrap_or_else(|| self.read(core, address, bytes));
         if let (Some(tick), Some(block)) = (&mut self.tick, &self.now) {
-            let behind = block.code.iter().skip(1).map(|i| i.address);
-            for (instruction, next) in block.code.iter().zip(behind.chain([address])) {
+            let after = block.code.iter().skip(1).map(|i| i.address);
+            for (instruction, next) in block.code.iter().zip(after.chain([address])) {
                 tick.execute(instruction, next, block.in_flash);
             }
         }
@@ -193,12 +193,12 @@ impl Run {
         let name = self.image.at(address);
         let owner = match name {
             _ if TICKS.iter().any(|tick| name.contains(tick)) => Owner::Tick,
-            _ if name.contains(OWN) => Owner::Image,
+            _ if name.contains(OWN_FUNCTIONS) => Owner::Image,
             _ => Owner::Shared,
         };
         let block = Rc::new(Block {
             owner,
-            in_flash: in_flash::is_left(name),
+            in_flash: in_flash::is_in_flash(name),
             bytes,
             code: instructions,
         });

@@ -135,8 +135,8 @@ impl<'t> Device<'t> {
         device.request(Request::SetCalibration { calibration });
         device.run_ms(10);
         // The board may have found a fault when it started.
-        let seen = device.guard.and_then(|report| report.fault);
-        device.request(Request::ClearFault { seen });
+        let fault = device.guard.and_then(|report| report.fault);
+        device.request(Request::ClearFault { seen: fault });
         device.request(Request::Zero { counts: [0; 3] });
         device.request(Request::Arm);
         device.run_ms(30);
@@ -191,7 +191,7 @@ impl<'t> Device<'t> {
     ///
     /// # Panics
     /// If there is no answer.
-    pub fn ask_status(&mut self) -> Status {
+    pub fn query_status(&mut self) -> Status {
         self.status = None;
         self.session.ask(HostRequest::Status);
         self.run_ms(150);
@@ -219,7 +219,7 @@ impl<'t> Device<'t> {
     pub fn run_ms(&mut self, ms: u64) {
         let end_ns = self.machine.borrow().bus().now_ns + ms * 1_000_000;
         while self.machine.borrow().bus().now_ns < end_ns {
-            let mut take = |event: Event<'_>| match event {
+            let mut on_event = |event: Event<'_>| match event {
                 Event::Sample(sample) => self.latest = Some(*sample),
                 Event::Guard(report) => self.guard = Some(*report),
                 Event::Status(status) => self.status = Some(status.clone()),
@@ -228,7 +228,7 @@ impl<'t> Device<'t> {
                 _ => {}
             };
             self.session
-                .poll(Duration::from_millis(1), &mut take)
+                .poll(Duration::from_millis(1), &mut on_event)
                 .expect("goes on");
         }
     }
@@ -329,14 +329,14 @@ impl Plane {
         let jacobian = kinematics::jacobian(&self.model, q);
         // The torque that holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.
         let record = Calibration::PREMIUM_1_5;
-        let held = [
+        let gravity_torques = [
             0.0,
             f64::from(record.gravity_2_nm) * q[1].cos(),
             f64::from(record.gravity_3_nm) * q[2].sin(),
         ];
         std::array::from_fn(|joint| {
             let pressed: f64 = (0..3).map(|axis| jacobian[axis][joint] * force[axis]).sum();
-            let torque = pressed + held[joint];
+            let torque = pressed + gravity_torques[joint];
             let drive = &self.model.drive[joint];
             drive.sign * torque / (drive.ratio * drive.motor.kt_nm_per_a)
         })

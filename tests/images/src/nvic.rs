@@ -40,7 +40,7 @@ pub struct Nvic {
     regions: [(u32, u32); REGIONS],
     other: HashMap<u32, u32>,
     /// True if the program has requested a reset.
-    pub asks_for_reset: bool,
+    pub requests_reset: bool,
 }
 
 impl Default for Nvic {
@@ -51,7 +51,7 @@ impl Default for Nvic {
             priority: [0; INTERRUPTS],
             regions: [(0, 0); REGIONS],
             other: HashMap::new(),
-            asks_for_reset: false,
+            requests_reset: false,
         }
     }
 }
@@ -109,7 +109,7 @@ impl Nvic {
                 self.regions[self.region_number()].0 = value & !0x1F;
             }
             MPU_RASR => self.regions[self.region_number()].1 = value,
-            AIRCR => self.asks_for_reset |= value >> 16 == KEY && value & SYSRESETREQ != 0,
+            AIRCR => self.requests_reset |= value >> 16 == KEY && value & SYSRESETREQ != 0,
             _ => {
                 let word = self.other.entry(offset).or_default();
                 *word = *word & !mask | value & mask;
@@ -168,7 +168,7 @@ impl Nvic {
 
     /// Returns true if an interrupt is enabled and pending.
     #[must_use]
-    pub fn waits(&self, interrupt: usize) -> bool {
+    pub fn is_waiting(&self, interrupt: usize) -> bool {
         self.enabled[interrupt] && self.pending[interrupt]
     }
 

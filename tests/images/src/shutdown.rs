@@ -88,7 +88,7 @@ pub enum Outputs {
     /// They are driven low.
     Low,
     /// They keep their last level: an amplifier detects a broken wire.
-    Standing,
+    Frozen,
     /// At least one of them is not driven: its level depends on the outside.
     Floating,
 }
@@ -114,8 +114,8 @@ pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {
         modes & CHANNEL == PWM_1
     };
     match timer.get(CR1) & CEN != 0 && each(&makes_duty_cycles) {
-        true if timer.is_let() => Outputs::Pulses,
-        true => Outputs::Standing,
+        true if timer.is_gate_open() => Outputs::Pulses,
+        true => Outputs::Frozen,
         false => Outputs::Low,
     }
 }

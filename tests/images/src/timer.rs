@@ -30,7 +30,7 @@ const CEN: u32 = 1 << 0;
 const URS: u32 = 1 << 2;
 const OPM: u32 = 1 << 3;
 /// CR2.MMS: CEN is the trigger output to other timers.
-const GIVES_CEN: (u32, u32) = (7 << 4, 1 << 4);
+const TRIGGER_IS_CEN: (u32, u32) = (7 << 4, 1 << 4);
 /// SMCR: the timer counts while its trigger is high; the trigger is ITR0.
 const SMS_TS: u32 = 0x77;
 const GATED: u32 = 5;
@@ -115,19 +115,19 @@ impl Timer {
 
     fn is_counting(&self) -> bool {
         let follows_encoder = matches!(self.get(SMCR) & 7, 1..=3);
-        self.get(CR1) & CEN != 0 && !follows_encoder && self.is_let()
+        self.get(CR1) & CEN != 0 && !follows_encoder && self.is_gate_open()
     }
 
     /// Returns true unless the timer is gated and its trigger is low.
     #[must_use]
-    pub fn is_let(&self) -> bool {
+    pub fn is_gate_open(&self) -> bool {
         self.get(SMCR) & SMS_TS != GATED || self.trigger
     }
 
     /// Returns its trigger output, if that is CEN.
     #[must_use]
-    pub fn triggers(&self) -> bool {
-        self.get(CR2) & GIVES_CEN.0 == GIVES_CEN.1 && self.get(CR1) & CEN != 0
+    pub fn trigger_output(&self) -> bool {
+        self.get(CR2) & TRIGGER_IS_CEN.0 == TRIGGER_IS_CEN.1 && self.get(CR1) & CEN != 0
     }
 
     /// Lets time pass up to `now_ns`, and sets flags.
@@ -144,7 +144,7 @@ impl Timer {
     }
 
     /// Lets time pass up to `now_ns` without counting, while a halted core stops the timer.
-    pub fn stand_still(&mut self, now_ns: u64) {
+    pub fn freeze(&mut self, now_ns: u64) {
         self.now_ns = now_ns;
     }
 
@@ -201,14 +201,14 @@ mod tests {
     fn one_pulse_gates_another_timer_for_one_period() {
         let mut timers = [Timer::new(1_000_000), Timer::new(1_000_000)];
         let [gate, gated] = &mut timers;
-        for (register, value) in [(ARR, 99), (CR2, GIVES_CEN.1), (CR1, CEN | OPM)] {
+        for (register, value) in [(ARR, 99), (CR2, TRIGGER_IS_CEN.1), (CR1, CEN | OPM)] {
             gate.write(register, value, u32::MAX);
         }
         for (register, value) in [(SMCR, GATED), (CR1, CEN)] {
             gated.write(register, value, u32::MAX);
         }
         for us in 1..=300 {
-            gated.trigger = gate.triggers();
+            gated.trigger = gate.trigger_output();
             gate.advance(us * 1000);
             gated.advance(us * 1000);
         }
@@ -216,11 +216,11 @@ mod tests {
         assert_eq!(gated.get(CNT), 100);
         gate.write(CR2, 0, u32::MAX);
         gate.write(CR1, CEN | OPM, u32::MAX);
-        assert!(!gate.triggers(), "it gives something else");
+        assert!(!gate.trigger_output(), "it gives something else");
     }
 
     #[test]
-    fn a_compare_match_is_flagged_once_a_round() {
+    fn compare_match_is_flagged_once_per_period() {
         let mut timer = Timer::new(1_000_000);
         for (register, value) in [(ARR, 99), (CCR1, 40), (DIER, 2), (CR1, CEN)] {
             timer.write(register, value, u32::MAX);

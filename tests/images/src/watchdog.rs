@@ -11,7 +11,7 @@ const RLR: u32 = 0x08;
 /// temperatures. The fastest is 34 kHz.
 const LSI_HZ: u64 = 29_400;
 /// Fastest frequency of this oscillator.
-const FASTEST_LSI_HZ: u64 = 34_000;
+const MAX_LSI_HZ: u64 = 34_000;
 
 /// The watchdog and the time of its last feeding.
 #[derive(Default)]
@@ -21,7 +21,7 @@ pub struct Watchdog {
     reload: u32,
     fed_ns: u64,
     /// Number of feedings.
-    pub feedings: u64,
+    pub feed_count: u64,
 }
 
 impl Watchdog {
@@ -39,7 +39,7 @@ impl Watchdog {
     pub fn write(&mut self, offset: u32, value: u32, now_ns: u64) {
         match (offset, value) {
             (KR, 0xCCCC) => (self.running, self.fed_ns) = (true, now_ns),
-            (KR, 0xAAAA) => (self.feedings, self.fed_ns) = (self.feedings + 1, now_ns),
+            (KR, 0xAAAA) => (self.feed_count, self.fed_ns) = (self.feed_count + 1, now_ns),
             (PR, _) => self.prescaler = value & 7,
             (RLR, _) => self.reload = value & 0xFFF,
             _ => {}
@@ -52,7 +52,7 @@ impl Watchdog {
     }
 
     /// Stops the count for a while.
-    pub fn stand_still(&mut self, ns: u64) {
+    pub fn freeze(&mut self, ns: u64) {
         self.fed_ns += ns;
     }
 
@@ -64,8 +64,8 @@ impl Watchdog {
 
     /// Returns the shortest time without a feeding after which it may reset the chip, ns.
     #[must_use]
-    pub fn soonest_ns(&self) -> u64 {
-        self.cycles() * 1_000_000_000 / FASTEST_LSI_HZ
+    pub fn min_timeout_ns(&self) -> u64 {
+        self.cycles() * 1_000_000_000 / MAX_LSI_HZ
     }
 
     fn cycles(&self) -> u64 {

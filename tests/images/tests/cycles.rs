@@ -48,22 +48,22 @@ fn write(rows: &[Row]) {
 }
 
 /// Returns a message for each figure in these columns above the table's allowance.
-fn worse(rows: &[Row], columns: &[usize]) -> Vec<String> {
+fn regressions(rows: &[Row], columns: &[usize]) -> Vec<String> {
     let mut table = csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
-    let kept: Vec<_> = table.records().map(|row| row.expect("a row")).collect();
+    let recorded: Vec<_> = table.records().map(|row| row.expect("a row")).collect();
     let worse_row = |row: &Row| {
         let record = record(row);
-        let Some(kept) = kept.iter().find(|kept| kept[0] == *row.state) else {
+        let Some(recorded) = recorded.iter().find(|recorded| recorded[0] == *row.state) else {
             return vec![format!("{}: not in the table", row.state)];
         };
         let number = |text: &str| text.parse::<f64>().expect("a number");
-        let is_worse = |i: &usize| number(&record[*i]) > TOLERANCE * number(&kept[*i]);
+        let is_worse = |i: &usize| number(&record[*i]) > TOLERANCE * number(&recorded[*i]);
         let reported = |i: usize| {
-            let (title, now, kept) = (TITLES[i], &record[i], &kept[i]);
-            format!("{}: {title} {now}, {kept} in the table", row.state)
+            let (title, now, recorded) = (TITLES[i], &record[i], &recorded[i]);
+            format!("{}: {title} {now}, {recorded} in the table", row.state)
         };
-        let worse = columns.iter().copied().filter(is_worse);
-        worse.map(reported).collect()
+        let regressions = columns.iter().copied().filter(is_worse);
+        regressions.map(reported).collect()
     };
     rows.iter().flat_map(worse_row).collect()
 }
@@ -74,8 +74,8 @@ fn compared_scenes_do_not_exceed_recorded_cycles() {
         return;
     };
     let rows = soak::compared_rows(&board.following(follow));
-    let worse = worse(&rows, &[1, 2, 3, 4, 5, 6, 7]);
-    assert!(worse.is_empty(), "{}", worse.join("\n"));
+    let regressions = regressions(&rows, &[1, 2, 3, 4, 5, 6, 7]);
+    assert!(regressions.is_empty(), "{}", regressions.join("\n"));
 }
 
 /// `cargo xtask cycles` runs this; `--write` writes the table.
@@ -88,8 +88,8 @@ fn tick_states_do_not_exceed_recorded_cycles() {
     let board = board.following(follow);
     let mut rows = chain::rows(&board);
     rows.extend(contact::rows(&board));
-    let wanted = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
-    let scenes = if wanted == "all" {
+    let requested = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
+    let scenes = if requested == "all" {
         soak::ALL
     } else {
         soak::PART
@@ -99,12 +99,12 @@ fn tick_states_do_not_exceed_recorded_cycles() {
     println!("{}", TITLES.join(", "));
     rows.iter()
         .for_each(|row| println!("{}", record(row).join(", ")));
-    if wanted == "write" {
+    if requested == "write" {
         return write(&rows);
     }
     // The table's rows of the stress test cover a part of the scenes.
-    let is_bound = |i: &usize| wanted != "all" || TITLES[*i].contains("max");
+    let is_bound = |i: &usize| requested != "all" || TITLES[*i].contains("max");
     let columns: Vec<usize> = (1..TITLES.len()).filter(is_bound).collect();
-    let worse = worse(&rows, &columns);
-    assert!(worse.is_empty(), "{}", worse.join("\n"));
+    let regressions = regressions(&rows, &columns);
+    assert!(regressions.is_empty(), "{}", regressions.join("\n"));
 }

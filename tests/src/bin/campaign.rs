@@ -43,14 +43,14 @@ fn main() -> ExitCode {
     match ran {
         Ok(page) => finish(&request, &page),
         Err(violation) => {
-            tell(&request, &violation);
+            print_summary(&request, &violation);
             ExitCode::FAILURE
         }
     }
 }
 
 /// Prints a violation and the command that repeats it.
-fn tell(request: &Request, violation: &Violation) {
+fn print_summary(request: &Request, violation: &Violation) {
     let Violation {
         segment,
         ground,

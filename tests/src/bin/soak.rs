@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::tile_supply::Buffers;
-use hapterra_tests::soak::{Found, LinkStats, Until, run, soak};
+use hapterra_tests::soak::{LinkStats, SceneOutcome, Until, run, soak};
 
 /// Violations of each invariant that are printed in full.
-const SHOWN: usize = 3;
+const MAX_SHOWN: usize = 3;
 
-struct Wanted {
+struct Request {
     minutes: f64,
     seed: u64,
     scene: Option<u64>,
@@ -21,14 +21,14 @@ struct Wanted {
 }
 
 fn main() -> ExitCode {
-    match wanted() {
-        Ok(Wanted {
+    match parse_request() {
+        Ok(Request {
             seed,
             scene: Some(scene),
             surface,
             ..
         }) => one(seed, scene, surface),
-        Ok(wanted) => all(&wanted),
+        Ok(request) => all(&request),
         Err(why) => {
             eprintln!("error: {why}\nhint: hapterra-soak MINUTES [--seed N] [--scene K] [--rough]");
             ExitCode::FAILURE
@@ -36,8 +36,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn wanted() -> Result<Wanted, String> {
-    let mut wanted = Wanted {
+fn parse_request() -> Result<Request, String> {
+    let mut request = Request {
         minutes: 1.0,
         seed: 1,
         scene: None,
@@ -50,40 +50,40 @@ fn wanted() -> Result<Wanted, String> {
             given.ok_or(format!("{word} wants a whole number"))
         };
         match word.as_str() {
-            "--seed" => wanted.seed = number()?,
-            "--rough" => wanted.surface = Surface::Rough,
-            "--scene" => wanted.scene = Some(number()?),
+            "--seed" => request.seed = number()?,
+            "--rough" => request.surface = Surface::Rough,
+            "--scene" => request.scene = Some(number()?),
             minutes => {
                 let minutes = minutes.parse().ok().filter(|m: &f64| *m > 0.0);
-                wanted.minutes = minutes.ok_or(format!("{word} is no number of minutes"))?;
+                request.minutes = minutes.ok_or(format!("{word} is no number of minutes"))?;
             }
         }
     }
-    Ok(wanted)
+    Ok(request)
 }
 
 /// Repeats one scene by its number.
 fn one(seed: u64, number: u64, surface: Surface) -> ExitCode {
     match run(seed, number, surface, &mut Buffers::default()) {
-        Found::Held(kind, measured) => {
+        SceneOutcome::Passed(kind, measured) => {
             println!("seed {seed}, scene {number}, {kind:?}: holds\n{measured:#?}");
             ExitCode::SUCCESS
         }
-        Found::Broke(kind, _, what) => {
+        SceneOutcome::Violated(kind, _, what) => {
             println!("seed {seed}, scene {number}, {kind:?}: {what}");
             ExitCode::FAILURE
         }
     }
 }
 
-fn all(wanted: &Wanted) -> ExitCode {
+fn all(request: &Request) -> ExitCode {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let time = Duration::from_secs_f64(wanted.minutes * 60.0);
+    let time = Duration::from_secs_f64(request.minutes * 60.0);
     let began = Instant::now();
     let mut last = None;
     let stats = soak(
-        wanted.seed,
-        wanted.surface,
+        request.seed,
+        request.surface,
         0,
         Until::Time(time),
         threads,
@@ -100,27 +100,27 @@ fn all(wanted: &Wanted) -> ExitCode {
     }
     println!(
         "seed {}, {:.1} minutes on {threads} threads\n{stats}",
-        wanted.seed,
+        request.seed,
         began.elapsed().as_secs_f64() / 60.0
     );
     // Prints a few of each kind.
     let mut reported: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
-    for broken in &stats.broken {
+    for broken in &stats.failed {
         let times = reported.entry(&broken.invariant).or_default();
         *times += 1;
-        if *times > SHOWN {
+        if *times > MAX_SHOWN {
             continue;
         }
         println!(
             "\n{:?}: {}\n    again: cargo xtask soak --seed {} --scene {}{}",
             broken.kind,
             broken.what,
-            wanted.seed,
+            request.seed,
             broken.number,
-            wanted.surface.option()
+            request.surface.option()
         );
     }
-    if stats.broken.is_empty() {
+    if stats.failed.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
@@ -140,7 +140,7 @@ fn live(stats: &LinkStats, elapsed: Duration, time: Duration) {
         time.as_secs(),
         stats.scenes,
         stats.ticks() as f64 / 1e6,
-        stats.broken.len()
+        stats.failed.len()
     );
     let _ = stderr().flush();
 }

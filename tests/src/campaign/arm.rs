@@ -9,7 +9,7 @@ use hapterra::terrain::Terrain;
 use crate::random::Random;
 
 /// Range of the hand around the home pose, east and north, mm.
-const REACH_MM: [f64; 2] = [55.0, 30.0];
+const MAX_OFFSET_MM: [f64; 2] = [55.0, 30.0];
 /// Vertical speed of the hand except during a yank, mm/s.
 const UP_AND_DOWN_MM_S: f64 = 100.0;
 /// Height above the terrain while the arm is being armed, mm.
@@ -22,15 +22,15 @@ const TICK_S: f64 = 1e-3;
 
 /// Behaviour of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mood {
+pub enum HandMotion {
     /// Held off the terrain.
     Lifted,
     /// Wanders in and out of contact.
-    Wanders,
+    Wander,
     /// Presses as hard as it can.
-    Presses,
+    Press,
     /// Is pulled away by this much, mm.
-    Yanked([f64; 3]),
+    Yank([f64; 3]),
 }
 
 /// The arm and its hand.
@@ -102,40 +102,40 @@ impl<'t> Arm<'t> {
     }
 
     /// Advances the arm by one tick under these motor currents.
-    pub fn step(&mut self, currents_a: [f64; 3], mood: Mood) {
+    pub fn step(&mut self, currents_a: [f64; 3], hand_motion: HandMotion) {
         let before = self.target_mm;
         self.t_s += TICK_S;
-        self.target_mm = self.target(mood);
+        self.target_mm = self.target(hand_motion);
         let speed = std::array::from_fn(|i| 1e-3 * (self.target_mm[i] - before[i]) / TICK_S);
         let at = self.placement.to_device_m(self.plant.model(), before);
         self.plant.aim(at, ArmFrame::turn_to_device(speed));
         self.plant.step(currents_a, TICK_S);
     }
 
-    fn target(&mut self, mood: Mood) -> [f64; 3] {
+    fn target(&mut self, hand_motion: HandMotion) -> [f64; 3] {
         let wave = |i: usize| {
             let (turns, phase) = self.waves[i];
             libm::sin(TAU * turns * self.t_s + phase)
         };
         let [home_east, home_north, _] = self.placement.home_mm;
-        let east = home_east + REACH_MM[0] * (0.6 * wave(0) + 0.4 * wave(1));
-        let north = home_north + REACH_MM[1] * (0.6 * wave(2) + 0.4 * wave(3));
-        let wanted = match mood {
-            Mood::Lifted => LIFTED_MM,
-            Mood::Presses => -70.0,
-            Mood::Wanders | Mood::Yanked(_) => -5.0 + 7.0 * wave(4) + 5.0 * wave(5),
+        let east = home_east + MAX_OFFSET_MM[0] * (0.6 * wave(0) + 0.4 * wave(1));
+        let north = home_north + MAX_OFFSET_MM[1] * (0.6 * wave(2) + 0.4 * wave(3));
+        let expected = match hand_motion {
+            HandMotion::Lifted => LIFTED_MM,
+            HandMotion::Press => -70.0,
+            HandMotion::Wander | HandMotion::Yank(_) => -5.0 + 7.0 * wave(4) + 5.0 * wave(5),
         };
-        let most = UP_AND_DOWN_MM_S * TICK_S;
-        self.above_mm += (wanted - self.above_mm).clamp(-most, most);
+        let max = UP_AND_DOWN_MM_S * TICK_S;
+        self.above_mm += (expected - self.above_mm).clamp(-max, max);
         // Over no-data the hand keeps its height.
         if let Some(ground) = self.terrain.height_mm(east, north) {
-            self.ground_mm += (ground - self.ground_mm).clamp(-2.0 * most, 2.0 * most);
+            self.ground_mm += (ground - self.ground_mm).clamp(-2.0 * max, 2.0 * max);
         }
         let mut target = [east, north, self.ground_mm + self.above_mm];
         for (at, turns) in target.iter_mut().zip(TREMOR_HZ) {
             *at += TREMOR_MM * libm::sin(TAU * turns * self.t_s);
         }
-        if let Mood::Yanked(by) = mood {
+        if let HandMotion::Yank(by) = hand_motion {
             target.iter_mut().zip(by).for_each(|(at, by)| *at += by);
         }
         target

@@ -9,10 +9,10 @@ use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::ResetCause;
 
-use super::arm::Mood;
+use super::arm::HandMotion;
 use super::clock::Reading;
 use super::fault_kind::{Kind, LOADED_TICKS};
-use super::faulty_pipe::Unkind;
+use super::faulty_pipe::LinkDisturbance;
 use super::host::Tiles;
 use crate::random::Random;
 
@@ -31,7 +31,7 @@ pub enum Core {
 
 /// An injected fault in progress.
 #[derive(Clone, Debug)]
-pub struct Mishap {
+pub struct InjectedFault {
     /// Its kind.
     pub kind: Kind,
     /// Its ticks.
@@ -44,12 +44,12 @@ pub struct Mishap {
     held: Option<i32>,
 }
 
-impl Mishap {
+impl InjectedFault {
     /// Draws a fault of a kind that begins at `now`.
     #[must_use]
     pub fn of(kind: Kind, now: u64, random: &mut Random) -> Self {
-        let (shortest, longest) = kind.duration();
-        let ticks = shortest + random.below((longest - shortest) as usize + 1) as u32;
+        let (min_ticks, max_ticks) = kind.duration();
+        let ticks = min_ticks + random.below((max_ticks - min_ticks) as usize + 1) as u32;
         let side = |random: &mut Random| random.between(-120.0, 120.0);
         Self {
             kind,
@@ -64,22 +64,22 @@ impl Mishap {
 
     /// Changes the readings of encoders and switches. `lost` are the encoders' permanent errors,
     /// counts.
-    pub fn meddle(
+    pub fn apply_to_inputs(
         &mut self,
-        sense: &mut GuardInputs,
+        inputs: &mut GuardInputs,
         lost: &mut [i32; 3],
         now: u64,
         random: &mut Random,
     ) {
-        let far = self.sign * (130 + (5_000.0 * self.size) as i32);
-        let since = (now - self.ticks.start + 1) as i32;
-        let counts = &mut sense.counts;
+        let jump = self.sign * (130 + (5_000.0 * self.size) as i32);
+        let elapsed = (now - self.ticks.start + 1) as i32;
+        let counts = &mut inputs.counts;
         match self.kind {
             Kind::EncoderJump => {
-                lost[self.axis] += far;
-                counts[self.axis] += far;
+                lost[self.axis] += jump;
+                counts[self.axis] += jump;
             }
-            Kind::EncoderGlitch => counts[self.axis] += far,
+            Kind::EncoderGlitch => counts[self.axis] += jump,
             Kind::EncoderNoise => {
                 for count in counts {
                     *count += random.below(5) as i32 - 2;
@@ -91,22 +91,22 @@ impl Mishap {
             // Below the limit for a tick, whatever the hand adds, but above a real tip's speed.
             Kind::EncoderRunaway => {
                 let count = &mut counts[self.axis];
-                let away = *count + self.sign * 110 * since;
+                let runaway = *count + self.sign * 110 * elapsed;
                 *count = match self.held {
-                    Some(last) => last + (away - last).clamp(-127, 127),
+                    Some(last) => last + (runaway - last).clamp(-127, 127),
                     None => *count + self.sign * 60,
                 };
                 self.held = Some(*count);
             }
-            Kind::EncoderBeyondLimits => counts[self.axis] += self.sign * 12 * since,
-            Kind::EmergencyStop => sense.emergency_stop = true,
-            Kind::Clutch => sense.clutch = true,
-            Kind::DeadManReleased | Kind::DeadManBounce => sense.dead_man = false,
-            Kind::HardwareFailed => sense.hardware_failed = true,
-            Kind::OutputsNotAsSet => sense.outputs_not_as_set = true,
+            Kind::EncoderBeyondLimits => counts[self.axis] += self.sign * 12 * elapsed,
+            Kind::EmergencyStop => inputs.emergency_stop = true,
+            Kind::Clutch => inputs.clutch = true,
+            Kind::DeadManReleased | Kind::DeadManBounce => inputs.dead_man = false,
+            Kind::HardwareFailed => inputs.hardware_failed = true,
+            Kind::OutputsNotAsSet => inputs.outputs_not_as_set = true,
             Kind::CurrentMismatch => {
                 let more_ma = self.sign as i16 * (1_500 + (4_000.0 * self.size) as i16);
-                if let Some(of_axis) = sense.measured_ma.as_mut().map(|all| &mut all[self.axis]) {
+                if let Some(of_axis) = inputs.measured_ma.as_mut().map(|all| &mut all[self.axis]) {
                     *of_axis = of_axis.saturating_add(more_ma);
                 }
             }
@@ -127,27 +127,27 @@ impl Mishap {
 
     /// Returns its effect on the link.
     #[must_use]
-    pub fn unkind(&self) -> Unkind {
-        let none = Unkind::default();
+    pub fn disturbance(&self) -> LinkDisturbance {
+        let none = LinkDisturbance::default();
         let share = 0.02 + 0.4 * self.size;
         match self.kind {
-            Kind::LinkLoss => Unkind {
+            Kind::LinkLoss => LinkDisturbance {
                 lost: share,
                 ..none
             },
-            Kind::LinkDelay => Unkind {
+            Kind::LinkDelay => LinkDisturbance {
                 late: 20 + (380.0 * self.size) as u32,
                 ..none
             },
-            Kind::LinkDuplicates => Unkind {
+            Kind::LinkDuplicates => LinkDisturbance {
                 twice: share,
                 ..none
             },
-            Kind::LinkCorruption => Unkind {
+            Kind::LinkCorruption => LinkDisturbance {
                 flipped: share,
                 ..none
             },
-            Kind::LinkSilence => Unkind { cut: true, ..none },
+            Kind::LinkSilence => LinkDisturbance { cut: true, ..none },
             _ => none,
         }
     }
@@ -219,11 +219,11 @@ impl Mishap {
 
     /// Returns its effect on the hand.
     #[must_use]
-    pub fn mood(&self) -> Mood {
+    pub fn hand_motion(&self) -> HandMotion {
         match self.kind {
-            Kind::HotMotors | Kind::ResetUnderLoad | Kind::BrownOut => Mood::Presses,
-            Kind::Yank => Mood::Yanked(self.by_mm),
-            _ => Mood::Wanders,
+            Kind::HotMotors | Kind::ResetUnderLoad | Kind::BrownOut => HandMotion::Press,
+            Kind::Yank => HandMotion::Yank(self.by_mm),
+            _ => HandMotion::Wander,
         }
     }
 

@@ -79,9 +79,9 @@ impl LinkStats {
             ));
         }
         match (expected.within, reaction) {
-            (Some(most), Some(took)) if took <= u64::from(most) => Ok(()),
-            (Some(most), took) => Err(format!(
-                "{kind:?}: amplifiers on for {took:?} ticks, expected at most {most}"
+            (Some(max), Some(took)) if took <= u64::from(max) => Ok(()),
+            (Some(max), took) => Err(format!(
+                "{kind:?}: amplifiers on for {took:?} ticks, expected at most {max}"
             )),
             (None, _) => Ok(()),
         }
@@ -91,7 +91,7 @@ impl LinkStats {
     pub fn add(&mut self, ticks: u64, armed: u64, extremes: &Maxima) {
         self.ticks += ticks;
         self.armed += armed;
-        self.extremes = self.extremes.or(*extremes);
+        self.extremes = self.extremes.max(*extremes);
     }
 
     /// Returns the number of injected faults.

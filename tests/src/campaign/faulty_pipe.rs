@@ -6,7 +6,7 @@ use crate::random::Random;
 
 /// Disturbance of a pipe's transfers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Unkind {
+pub struct LinkDisturbance {
     /// Share of chunks that are lost.
     pub lost: f64,
     /// Share of chunks that are duplicated.
@@ -27,27 +27,33 @@ pub struct Pipe {
 
 impl Pipe {
     /// Sends bytes at a tick.
-    pub fn send(&mut self, bytes: &[u8], now: u64, unkind: &Unkind, random: &mut Random) {
-        if unkind.cut {
+    pub fn send(
+        &mut self,
+        bytes: &[u8],
+        now: u64,
+        disturbance: &LinkDisturbance,
+        random: &mut Random,
+    ) {
+        if disturbance.cut {
             self.pieces.clear();
             return;
         }
-        if bytes.is_empty() || random.between(0.0, 1.0) < unkind.lost {
+        if bytes.is_empty() || random.between(0.0, 1.0) < disturbance.lost {
             return;
         }
         let mut piece = bytes.to_vec();
-        if random.between(0.0, 1.0) < unkind.flipped {
+        if random.between(0.0, 1.0) < disturbance.flipped {
             let at = random.below(piece.len());
             piece[at] ^= 1 << random.below(8);
         }
-        let late = random.below(unkind.late as usize + 1) as u64;
+        let late = random.below(disturbance.late as usize + 1) as u64;
         // Bytes do not overtake each other.
         let due = self
             .pieces
             .back()
             .map_or(0, |(due, _)| *due)
             .max(now + late);
-        if random.between(0.0, 1.0) < unkind.twice {
+        if random.between(0.0, 1.0) < disturbance.twice {
             self.pieces.push_back((due, piece.clone()));
         }
         self.pieces.push_back((due, piece));

@@ -13,38 +13,38 @@ use super::limit_cycle::{MAX_TURNS, Swing};
 
 /// Delay of a force after the start of its tick, as a fraction of a tick
 /// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
-const LATE: f32 = 0.11;
+const DELAY_SHARE: f32 = 0.11;
 /// Energy that a contact may create with the controller on, mJ: a hundredth of a tap's without it
 /// (docs/explanation/effects.md).
-const GIVEN_MJ: f32 = 0.05;
+const GAINED_MJ: f32 = 0.05;
 /// Additional energy that shaded ground may create until its force is no longer turned
 /// (docs/explanation/effects.md), mJ: a constant, a fraction of the largest force times a cell and
 /// the depth, and the bound of both.
 const SHADED_MJ: f32 = 0.2;
 const SHADED_PART: f32 = 0.2;
-const SHADED_MOST_MJ: f32 = 2.0;
+const MAX_SHADED_MJ: f32 = 2.0;
 /// Rounding: a fraction of a force, and a constant in N.
 const ROUNDING: f32 = 1e-4;
 /// The guard's clamp, N.
 const CLAMP_N: f32 = WORKING_SHARE * Calibration::PREMIUM_1_5.max_force_n;
 /// Limits that change the force of a scene.
-const NOT_AS_ASKED: Limits = Limits::SLEW_LIMITED.union(Limits::SPEED_LIMITED);
+const FORCE_REDUCED: Limits = Limits::SLEW_LIMITED.union(Limits::SPEED_LIMITED);
 /// Limits under which a surface is not a spring.
-const NO_SPRING: Limits = Limits::SPEED_LIMITED
+const NO_SPRING_FORCE: Limits = Limits::SPEED_LIMITED
     .union(Limits::TERRAIN_MISSING)
     .union(Limits::EDGE_FADING);
 
 /// Checks the forces of one scene.
-pub struct ForceWatch {
+pub struct ForceChecks {
     surfaces: SceneSurfaces,
     cell_mm: f32,
     last: Option<TickRecord>,
     /// The force of the tick before the last one.
     before_n: Vec3,
     /// The contact in progress, if all of it is known.
-    contact: Option<Touched>,
+    contact: Option<ContactEnergy>,
     /// The most energy that a contact has given to the tip with the controller on, mJ.
-    pub max_given_mj: f32,
+    pub max_gained_mj: f32,
     /// Ticks of these contacts.
     pub watched_ticks: u64,
     /// Those of `watched_ticks` during the ramp.
@@ -53,7 +53,7 @@ pub struct ForceWatch {
     pub clutch_ticks: u64,
     share: Share,
     /// The share of force in the last tick, if it is known.
-    let_through: Option<Shares>,
+    previous_shares: Option<Shares>,
     swing: Swing,
     /// The most reversals of the tip in a quarter of a second.
     pub max_turns: usize,
@@ -61,13 +61,13 @@ pub struct ForceWatch {
 
 /// Record of a contact.
 #[derive(Clone, Copy, Debug, Default)]
-struct Touched {
+struct ContactEnergy {
     /// The work of its force at the tip, mJ, less the energy due to a rising stiffness.
-    given_mj: f32,
-    deepest_mm: f32,
+    gained_mj: f32,
+    max_depth_mm: f32,
 }
 
-impl ForceWatch {
+impl ForceChecks {
     /// Creates the checks of a scene.
     #[must_use]
     pub fn new(surfaces: SceneSurfaces, cell_mm: f32) -> Self {
@@ -77,19 +77,19 @@ impl ForceWatch {
             last: None,
             before_n: Vec3::ZERO,
             contact: None,
-            max_given_mj: 0.0,
+            max_gained_mj: 0.0,
             watched_ticks: 0,
             ramp_ticks: 0,
             clutch_ticks: 0,
             share: Share::UNKNOWN,
-            let_through: None,
+            previous_shares: None,
             swing: Swing::default(),
             max_turns: 0,
         }
     }
 
     /// Sets another scene.
-    pub fn feels(&mut self, surfaces: SceneSurfaces) {
+    pub fn set_surfaces(&mut self, surfaces: SceneSurfaces) {
         self.surfaces = surfaces;
         (self.last, self.contact) = (None, None);
     }
@@ -98,27 +98,34 @@ impl ForceWatch {
     ///
     /// # Errors
     /// The broken invariant.
-    pub fn look(&mut self, sample: &TickRecord, is_calm: bool) -> Result<(), String> {
+    pub fn check(&mut self, sample: &TickRecord, is_calm: bool) -> Result<(), String> {
         let last = self.last.replace(*sample);
         let last = last.filter(|last| last.tick.wrapping_add(1) == sample.tick);
-        let before = self.let_through;
-        let share = self.share.of(last.as_ref(), sample);
-        self.let_through = share;
+        let before = self.previous_shares;
+        let share = self.share.update(last.as_ref(), sample);
+        self.previous_shares = share;
         if let Some(last) = &last {
-            fades(last, sample)?;
+            check_fade(last, sample)?;
         }
-        let is_asked = !sample.limits.intersects(NOT_AS_ASKED);
-        if let Some(share) = share.filter(|_| is_asked && sample.state == ContactState::Touching) {
-            let way_mm = sample.hip.to(&sample.proxy) * self.cell_mm;
-            self.is_small(sample, way_mm, share.product())?;
-            self.never_pulls(sample, way_mm)?;
+        let is_full_force = !sample.limits.intersects(FORCE_REDUCED);
+        if let Some(share) =
+            share.filter(|_| is_full_force && sample.state == ContactState::Touching)
+        {
+            let displacement_mm = sample.hip.to(&sample.proxy) * self.cell_mm;
+            self.check_size(sample, displacement_mm, share.product())?;
+            self.check_no_pull(sample, displacement_mm)?;
         }
-        self.gives_nothing(last.as_ref(), sample, before.zip(share), is_calm)
+        self.check_no_energy_gain(last.as_ref(), sample, before.zip(share), is_calm)
     }
 
     /// Checks that no force exceeds the stiffest material's at this depth.
-    fn is_small(&self, sample: &TickRecord, way_mm: Vec3, share: f32) -> Result<(), String> {
-        let depth_mm = way_mm.length();
+    fn check_size(
+        &self,
+        sample: &TickRecord,
+        displacement_mm: Vec3,
+        share: f32,
+    ) -> Result<(), String> {
+        let depth_mm = displacement_mm.length();
         let [high_mm, steep] = self.surfaces.relief();
         let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
         let spring_n = share * self.surfaces.stiffest_n_per_mm() * stretch_mm;
@@ -135,22 +142,24 @@ impl ForceWatch {
 
     /// Checks that no force points away from the proxy: friction holds and does not push. Shading
     /// turns a force by 60° at most.
-    fn never_pulls(&self, sample: &TickRecord, way_mm: Vec3) -> Result<(), String> {
+    fn check_no_pull(&self, sample: &TickRecord, displacement_mm: Vec3) -> Result<(), String> {
         let [high_mm, _] = self.surfaces.relief();
         if high_mm > 0.0 && self.surfaces.is_shaded() {
             return Ok(());
         }
-        let along = sample.force_n.dot(way_mm);
-        let least = -ROUNDING * (way_mm.length() + 1e-3) * (sample.force_n.length() + 1e-3);
-        match along >= least {
+        let along = sample.force_n.dot(displacement_mm);
+        let min = -ROUNDING * (displacement_mm.length() + 1e-3) * (sample.force_n.length() + 1e-3);
+        match along >= min {
             true => Ok(()),
-            false => Err(format!("the force pulls along {way_mm}: {sample:?}")),
+            false => Err(format!(
+                "the force pulls along {displacement_mm}: {sample:?}"
+            )),
         }
     }
 
     /// Returns the energy of the spring at a depth, mJ: the guard clamps the clutch's share of the
     /// force, and the ramp scales the result.
-    fn holds_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
+    fn stored_share_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
         if shares.clutch == 0.0 {
             return 0.0;
         }
@@ -158,16 +167,17 @@ impl ForceWatch {
         shares.product() * self.surfaces.stored_mj(depth_mm, max_n)
     }
 
-    fn shading_mj(&self, deepest_mm: f32) -> f32 {
-        let way_mm = self.cell_mm + deepest_mm;
-        let gives_mj = SHADED_MJ + SHADED_PART * self.surfaces.max_n(deepest_mm) * way_mm;
-        gives_mj.min(SHADED_MOST_MJ)
+    fn shading_mj(&self, max_depth_mm: f32) -> f32 {
+        let displacement_mm = self.cell_mm + max_depth_mm;
+        let max_gain_mj =
+            SHADED_MJ + SHADED_PART * self.surfaces.max_n(max_depth_mm) * displacement_mm;
+        max_gain_mj.min(MAX_SHADED_MJ)
     }
 
     /// Checks that with the controller on no contact gives more energy than it received, at any
     /// time, and that the tip does not swing, within the allowance for shading and texture.
     /// `shares` are those of the last tick and of this one.
-    fn gives_nothing(
+    fn check_no_energy_gain(
         &mut self,
         last: Option<&TickRecord>,
         sample: &TickRecord,
@@ -176,33 +186,33 @@ impl ForceWatch {
     ) -> Result<(), String> {
         let before_n =
             std::mem::replace(&mut self.before_n, last.map_or(Vec3::ZERO, |s| s.force_n));
-        let is_spring = |sample: &TickRecord| !sample.limits.intersects(NO_SPRING);
-        let is_reported = self.surfaces.is_spring() && self.surfaces.is_controlled() && is_calm;
-        let last = last.filter(|last| is_reported && is_spring(last) && is_spring(sample));
+        let is_spring = |sample: &TickRecord| !sample.limits.intersects(NO_SPRING_FORCE);
+        let is_checked = self.surfaces.is_spring() && self.surfaces.is_controlled() && is_calm;
+        let last = last.filter(|last| is_checked && is_spring(last) && is_spring(sample));
         let Some((last, (before, now))) = last.zip(shares) else {
             (self.contact, self.swing) = (None, Swing::default());
             return Ok(());
         };
-        let acted_n = last.force_n + (before_n - last.force_n) * LATE;
+        let acted_n = last.force_n + (before_n - last.force_n) * DELAY_SHARE;
         let moved_mm = last.hip.to(&sample.hip) * self.cell_mm;
         let work_mj = acted_n.dot(moved_mm);
         let depth_mm = sample.hip.to(&sample.proxy).length() * self.cell_mm;
         // A rising stiffness may add this energy at this depth.
         let is_rendered = sample.state == ContactState::Touching;
-        let meant_mj = match is_rendered {
-            true => self.holds_mj(depth_mm, now) - self.holds_mj(depth_mm, before),
+        let intended_mj = match is_rendered {
+            true => self.stored_share_mj(depth_mm, now) - self.stored_share_mj(depth_mm, before),
             false => 0.0,
         };
         // A force that fades belongs to the contact before.
         let begins = last.force_n == Vec3::ZERO
             && (last.state == ContactState::Free || before.product() == 0.0);
         self.contact = match begins {
-            true => Some(Touched::default()),
+            true => Some(ContactEnergy::default()),
             false => self.contact,
         }
-        .map(|so_far| Touched {
-            given_mj: so_far.given_mj + work_mj - meant_mj,
-            deepest_mm: so_far.deepest_mm.max(depth_mm),
+        .map(|previous| ContactEnergy {
+            gained_mj: previous.gained_mj + work_mj - intended_mj,
+            max_depth_mm: previous.max_depth_mm.max(depth_mm),
         });
         let along = sample.force_n.normalize_or_zero();
         let turns = self.swing.turns(sample.tick, moved_mm, along);
@@ -218,14 +228,14 @@ impl ForceWatch {
         self.watched_ticks += 1;
         self.ramp_ticks += u64::from(sample.limits.contains(Limits::RAMPING) && is_rendered);
         self.clutch_ticks += u64::from(sample.limits.contains(Limits::CLUTCH_MOVES) && is_rendered);
-        self.max_given_mj = self.max_given_mj.max(contact.given_mj);
+        self.max_gained_mj = self.max_gained_mj.max(contact.gained_mj);
         let [high_mm, _] = self.surfaces.relief();
-        let textures = 2.0 * self.surfaces.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
+        let textures = 2.0 * self.surfaces.stiffest_n_per_mm() * high_mm * contact.max_depth_mm;
         let shading = match self.surfaces.is_shaded() {
-            true => self.shading_mj(contact.deepest_mm),
+            true => self.shading_mj(contact.max_depth_mm),
             false => 0.0,
         };
-        match contact.given_mj <= GIVEN_MJ + shading + textures {
+        match contact.gained_mj <= GAINED_MJ + shading + textures {
             true => Ok(()),
             false => Err(format!("the ground gave {contact:?}: {sample:?}")),
         }
@@ -234,7 +244,7 @@ impl ForceWatch {
 
 /// Checks that a fading force only decreases, whatever the tip does, and that with an open
 /// clutch only the slew limit leaves any.
-fn fades(last: &TickRecord, sample: &TickRecord) -> Result<(), String> {
+fn check_fade(last: &TickRecord, sample: &TickRecord) -> Result<(), String> {
     let (was, is) = (last.force_n, sample.force_n);
     if sample.mode == Mode::Fading && is.length() > was.length() * (1.0 + ROUNDING) {
         return Err(format!(

@@ -51,7 +51,7 @@ impl Share {
 
     /// Takes the sample after `last`, or `None` as `last` if samples are missing. Returns the
     /// shares of the force if they are known and agree with the scene.
-    pub fn of(&mut self, last: Option<&TickRecord>, sample: &TickRecord) -> Option<Shares> {
+    pub fn update(&mut self, last: Option<&TickRecord>, sample: &TickRecord) -> Option<Shares> {
         self.ramp = match (last.map(|last| last.mode), sample.mode) {
             (_, Mode::Armed) => Some(1.0),
             (Some(Mode::Confirming), Mode::Ramping) => Some(RAMPS),

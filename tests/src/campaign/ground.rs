@@ -197,7 +197,7 @@ impl SceneSurfaces {
     pub fn stiffest_n_per_mm(&self) -> f32 {
         self.all_params
             .iter()
-            .fold(0.0, |most, params| params.stiffness_n_per_mm.max(most))
+            .fold(0.0, |max, params| params.stiffness_n_per_mm.max(max))
     }
 
     /// Returns the largest force of a spring at this depth, N.
@@ -243,13 +243,13 @@ impl SceneSurfaces {
     /// Returns the largest height of a texture, mm, and the largest slope.
     #[must_use]
     pub fn relief(&self) -> [f32; 2] {
-        let relief = |most: [f32; 2], params: &SurfaceParams| {
+        let relief = |max: [f32; 2], params: &SurfaceParams| {
             let texture = &params.texture;
             if texture.is_none() {
-                return most;
+                return max;
             }
             let steep = std::f32::consts::TAU * texture.amplitude_mm / texture.wavelength_mm;
-            [most[0].max(texture.amplitude_mm), most[1].max(steep)]
+            [max[0].max(texture.amplitude_mm), max[1].max(steep)]
         };
         self.all_params.iter().fold([0.0; 2], relief)
     }

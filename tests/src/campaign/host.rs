@@ -14,7 +14,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
-use super::faulty_pipe::{Pipe, Unkind};
+use super::faulty_pipe::{LinkDisturbance, Pipe};
 use crate::random::Random;
 
 /// Bytes of a tile's samples.
@@ -79,7 +79,8 @@ impl<'t> Host<'t> {
     pub fn greet(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.greet(time(now), &mut out);
-        self.to_device.send(&out, now, &Unkind::default(), random);
+        self.to_device
+            .send(&out, now, &LinkDisturbance::default(), random);
     }
 
     /// Opens a session if none is open.
@@ -93,11 +94,12 @@ impl<'t> Host<'t> {
     pub fn leave(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.leave(time(now), &mut out);
-        self.to_device.send(&out, now, &Unkind::default(), random);
+        self.to_device
+            .send(&out, now, &LinkDisturbance::default(), random);
     }
 
     /// Queries the status.
-    pub fn ask_status(&mut self) {
+    pub fn query_status(&mut self) {
         self.client.ask(HostRequest::Status);
     }
 
@@ -107,44 +109,50 @@ impl<'t> Host<'t> {
     }
 
     /// Sends a message that the real client would not send.
-    pub fn say(&mut self, message: &ToDevice<'_>, now: u64, unkind: &Unkind, random: &mut Random) {
+    pub fn send(
+        &mut self,
+        message: &ToDevice<'_>,
+        now: u64,
+        disturbance: &LinkDisturbance,
+        random: &mut Random,
+    ) {
         let bytes = framed(self.client.session(), message);
-        self.to_device.send(&bytes, now, unkind, random);
+        self.to_device.send(&bytes, now, disturbance, random);
     }
 
     /// Delivers the bytes of this tick to the device; `take` returns the number of bytes accepted.
     pub fn deliver(&mut self, now: u64, take: &mut dyn FnMut(&[u8]) -> usize) {
-        while let Some(piece) = self.to_device.receive(now) {
-            let taken = take(&piece);
-            if taken < piece.len() {
-                return self.to_device.put_back(piece[taken..].to_vec(), now);
+        while let Some(chunk) = self.to_device.receive(now) {
+            let accepted = take(&chunk);
+            if accepted < chunk.len() {
+                return self.to_device.put_back(chunk[accepted..].to_vec(), now);
             }
         }
     }
 
     /// Queues the device's bytes of this tick, and answers those that arrive.
-    pub fn hear(
+    pub fn receive(
         &mut self,
-        stated: &[u8],
+        chunk: &[u8],
         now: u64,
-        unkind: &Unkind,
+        disturbance: &LinkDisturbance,
         tiles: Tiles,
         random: &mut Random,
     ) {
-        self.to_host.send(stated, now, unkind, random);
+        self.to_host.send(chunk, now, disturbance, random);
         let mut out = Vec::new();
-        while let Some(piece) = self.to_host.receive(now) {
+        while let Some(chunk) = self.to_host.receive(now) {
             match tiles {
-                Tiles::Sent => self.understand(&piece, now, &mut out),
-                other => self.mistreat(&piece, other == Tiles::Poisoned, now, &mut out, random),
+                Tiles::Sent => self.process(&chunk, now, &mut out),
+                other => self.corrupt(&chunk, other == Tiles::Poisoned, now, &mut out, random),
             }
         }
-        self.do_what_is_due(now, &mut out);
-        self.to_device.send(&out, now, unkind, random);
+        self.run_timers(now, &mut out);
+        self.to_device.send(&out, now, disturbance, random);
     }
 
     /// Repeats unanswered messages, and opens a new session if the device is gone.
-    fn do_what_is_due(&mut self, now: u64, out: &mut Vec<u8>) {
+    fn run_timers(&mut self, now: u64, out: &mut Vec<u8>) {
         match self.client.due(time(now), out, &mut |_| {}) {
             Ok(()) => {}
             Err(LinkError::Silent(_) | LinkError::NotConfirmed) => {
@@ -154,7 +162,7 @@ impl<'t> Host<'t> {
         }
     }
 
-    fn understand(&mut self, bytes: &[u8], now: u64, out: &mut Vec<u8>) {
+    fn process(&mut self, bytes: &[u8], now: u64, out: &mut Vec<u8>) {
         let Self {
             client,
             samples,
@@ -174,7 +182,7 @@ impl<'t> Host<'t> {
     }
 
     /// Withholds or poisons tiles; handles all other messages normally.
-    fn mistreat(
+    fn corrupt(
         &mut self,
         mut bytes: &[u8],
         poison: bool,
@@ -183,8 +191,8 @@ impl<'t> Host<'t> {
         random: &mut Random,
     ) {
         while !bytes.is_empty() {
-            let (taken, frame) = self.reader.push(bytes);
-            bytes = bytes.get(taken..).unwrap_or(&[]);
+            let (consumed, frame) = self.reader.push(bytes);
+            bytes = bytes.get(consumed..).unwrap_or(&[]);
             let Some(Ok(framed)) = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>))
             else {
                 continue;
@@ -194,14 +202,14 @@ impl<'t> Host<'t> {
                     let session = self.client.session();
                     let has_materials = self.terrain.grid().materials().is_some();
                     out.extend(match has_materials && random.below(4) > 0 {
-                        true => of_poisoned_materials(session, epoch, key, random),
-                        false => poisoned(session, epoch, key, random),
+                        true => poisoned_material_tile(session, epoch, key, random),
+                        false => poisoned_tile(session, epoch, key, random),
                     });
                 }
             } else {
                 let mut frame = [0; MAX_FRAME];
                 let frame = encode(&framed, &mut frame).unwrap_or(&[]).to_vec();
-                self.understand(&frame, now, out);
+                self.process(&frame, now, out);
             }
         }
     }
@@ -219,7 +227,7 @@ fn framed(session: SessionNumber, message: &ToDevice<'_>) -> Vec<u8> {
 }
 
 /// Returns a tile of even ground with materials that are invalid or belong to other ground.
-fn of_poisoned_materials(
+fn poisoned_material_tile(
     session: SessionNumber,
     epoch: u32,
     key: TileKey,
@@ -250,8 +258,8 @@ fn of_poisoned_materials(
 }
 
 /// Returns a well-formed tile with impossible heights.
-fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, random: &mut Random) -> Vec<u8> {
-    const WORDS: [f32; 6] = [
+fn poisoned_tile(session: SessionNumber, epoch: u32, key: TileKey, random: &mut Random) -> Vec<u8> {
+    const HOSTILE_HEIGHTS: [f32; 6] = [
         f32::INFINITY,
         f32::NEG_INFINITY,
         f32::NAN,
@@ -263,7 +271,7 @@ fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, random: &mut Rando
     let heights = match random.below(4) {
         0 => Heights::Flat {
             base: i32::MAX,
-            height: WORDS[random.below(6)],
+            height: HOSTILE_HEIGHTS[random.below(6)],
         },
         1 => Heights::Samples {
             base: i32::MIN,
@@ -271,7 +279,7 @@ fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, random: &mut Rando
         },
         _ => {
             for word in bytes.chunks_exact_mut(4) {
-                word.copy_from_slice(&WORDS[random.below(6)].to_le_bytes());
+                word.copy_from_slice(&HOSTILE_HEIGHTS[random.below(6)].to_le_bytes());
             }
             Heights::Samples {
                 base: 0,

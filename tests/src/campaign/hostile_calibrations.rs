@@ -47,16 +47,12 @@ pub fn calibration(random: &mut Random) -> Calibration {
 ///
 /// # Errors
 /// The first number above its limit.
-pub fn keeps_ceilings(record: &Calibration) -> Result<(), String> {
+pub fn check_limits(record: &Calibration) -> Result<(), String> {
     let thermal = &record.thermal;
-    let most = |values: Vec3| values.max_element();
+    let max = |values: Vec3| values.max_element();
     let numbers = [
-        ("peak current", most(record.peak_current_a), 5.5),
-        (
-            "continuous current",
-            most(record.continuous_current_a),
-            1.24,
-        ),
+        ("peak current", max(record.peak_current_a), 5.5),
+        ("continuous current", max(record.continuous_current_a), 1.24),
         ("1 / Ω", 1.0 / thermal.resistance_ohm, 1.0 / 2.82),
         ("W/K of a winding", 1.0 / thermal.winding_k_per_w, 1.0 / 3.1),
         (
@@ -70,7 +66,7 @@ pub fn keeps_ceilings(record: &Calibration) -> Result<(), String> {
         ("speed", record.max_speed_mm_s, 1_250.0),
         (
             "A/Nm of a joint",
-            most((record.ratio * record.torque_constant).recip()),
+            max((record.ratio * record.torque_constant).recip()),
             2.0 / (11.2 * 0.0234),
         ),
     ];

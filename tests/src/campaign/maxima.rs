@@ -37,8 +37,8 @@ pub struct Maxima {
     /// Energy that the ticks have created, as reported by the device, mJ.
     pub created_mj: f32,
     /// The most energy that a contact has given to the tip with the controller on, mJ.
-    pub given_mj: f32,
-    /// Ticks in which `given_mj` was computed.
+    pub gained_mj: f32,
+    /// Ticks in which `gained_mj` was computed.
     pub watched_ticks: u64,
     /// Those of `watched_ticks` during the ramp.
     pub ramp_ticks: u64,
@@ -56,17 +56,17 @@ pub struct Maxima {
 impl Maxima {
     /// Returns the larger of each value, and the sum of the ticks.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         Self {
             force_n: self.force_n.max(other.force_n),
             read_force_n: self.read_force_n.max(other.read_force_n),
             tip_force_n: self.tip_force_n.max(other.tip_force_n),
-            misled: self.misled.or(other.misled),
+            misled: self.misled.max(other.misled),
             current_a: self.current_a.max(other.current_a),
             slew_n: self.slew_n.max(other.slew_n),
             winding_c: self.winding_c.max(other.winding_c),
             created_mj: self.created_mj.max(other.created_mj),
-            given_mj: self.given_mj.max(other.given_mj),
+            gained_mj: self.gained_mj.max(other.gained_mj),
             watched_ticks: self.watched_ticks + other.watched_ticks,
             ramp_ticks: self.ramp_ticks + other.ramp_ticks,
             clutch_ticks: self.clutch_ticks + other.clutch_ticks,
@@ -80,7 +80,7 @@ impl Maxima {
 impl Misled {
     /// Returns the one with the larger force.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         if other.force_n > self.force_n {
             other
         } else {

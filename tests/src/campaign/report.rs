@@ -90,7 +90,7 @@ detected within {STALL_TICKS} ticks, before the watchdog resets the board. The a
         at.current_a,
         at.slew_n,
         at.winding_c,
-        at.given_mj,
+        at.gained_mj,
         at.turns,
         at.created_mj,
         1e-3 * at.misled_ticks as f64,

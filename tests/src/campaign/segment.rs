@@ -16,36 +16,36 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::{ResetCause, Status};
 use heightfield::Raster;
 
-use super::arm::{Arm, Mood};
+use super::arm::{Arm, HandMotion};
 use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
-use super::fault_effect::{Core, Mishap};
+use super::fault_effect::{Core, InjectedFault};
 use super::fault_kind::Kind;
 use super::fault_outcomes::{LinkStats, Outcome};
-use super::faulty_pipe::Unkind;
-use super::force_invariants::ForceWatch;
+use super::faulty_pipe::LinkDisturbance;
+use super::force_invariants::ForceChecks;
 use super::ground::{Effects, Ground, SceneSurfaces};
 use super::host::{Host, Tiles};
 use super::hostile_calibrations;
-use super::tick_invariants::{Truth, Watch};
+use super::tick_invariants::{TickChecks, Truth};
 use crate::random::Random;
 
 /// Samples along the side of the terrain, and the side of a cell, mm.
 const SAMPLES: u32 = 512;
 const CELL_MM: f64 = 0.5;
 /// Armed ticks between two faults, shortest and longest.
-const CALM: (usize, usize) = (200, 1_500);
+const CALM_TICKS: (usize, usize) = (200, 1_500);
 /// Ticks between the end of a fault and the check of its outcome.
-const SETTLE: u64 = 400;
+const SETTLING_TICKS: u64 = 400;
 /// Ticks that an answer may take.
-const ANSWER: u64 = 5_000;
+const STATUS_TIMEOUT: u64 = 5_000;
 /// Ticks of one attempt to arm, and the number of attempts before a violation: hot motors must
 /// cool.
-const TRY: u64 = 4_000;
-const TRIES: u64 = 40;
+const ARMING_TIMEOUT: u64 = 4_000;
+const MAX_ATTEMPTS: u64 = 40;
 /// The ticks of an attempt at which the host sends the request and the switch is pressed.
-const ASK: u64 = 60;
-const PRESS: u64 = 200;
+const ARM_REQUEST_TICK: u64 = 60;
+const PRESS_TICK: u64 = 200;
 
 /// Violation of an invariant.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,12 +83,12 @@ pub fn run(
     let mut running = Segment::new(&terrain, effects, random);
     let played = running.play(stats);
     let forces = &running.forces;
-    running.watch.extremes.given_mj = forces.max_given_mj;
-    running.watch.extremes.watched_ticks = forces.watched_ticks;
-    running.watch.extremes.ramp_ticks = forces.ramp_ticks;
-    running.watch.extremes.clutch_ticks = forces.clutch_ticks;
-    running.watch.extremes.turns = forces.max_turns;
-    stats.add(running.now, running.armed, &running.watch.extremes);
+    running.tick_checks.extremes.gained_mj = forces.max_gained_mj;
+    running.tick_checks.extremes.watched_ticks = forces.watched_ticks;
+    running.tick_checks.extremes.ramp_ticks = forces.ramp_ticks;
+    running.tick_checks.extremes.clutch_ticks = forces.clutch_ticks;
+    running.tick_checks.extremes.turns = forces.max_turns;
+    stats.add(running.now, running.armed, &running.tick_checks.extremes);
     played.map_err(|what| Violation {
         segment,
         ground,
@@ -99,12 +99,15 @@ pub fn run(
 
 /// Returns hills with no-data among them.
 fn terrain(random: &mut Random) -> Raster {
-    let looks = [Look::Fractal, Look::Ridge, Look::Steps, Look::Fractal];
+    let kinds = [Look::Fractal, Look::Ridge, Look::Steps, Look::Fractal];
     let amplitude_mm = random.between(6.0, 20.0);
-    let synth = Synth::new(looks[random.below(4)], random.bits(), amplitude_mm);
-    let hole = [150.0, 350.0].map(|at| at + random.between(-40.0, 40.0));
+    let synth = Synth::new(kinds[random.below(4)], random.bits(), amplitude_mm);
+    let no_data_center = [150.0, 350.0].map(|at| at + random.between(-40.0, 40.0));
     let raster = Raster::from_fn(SAMPLES, SAMPLES, |column, row| {
-        let [east, north] = [f64::from(column) - hole[0], f64::from(row) - hole[1]];
+        let [east, north] = [
+            f64::from(column) - no_data_center[0],
+            f64::from(row) - no_data_center[1],
+        ];
         match libm::hypot(east, north) < 25.0 {
             true => f32::NAN,
             false => synth.height(column, row),
@@ -117,7 +120,7 @@ struct Segment<'t> {
     terrain: &'t Terrain<'t>,
     /// Effects besides the spring.
     effects: Option<Effects>,
-    forces: ForceWatch,
+    forces: ForceChecks,
     /// The tick from which no fault is active.
     calm_from: u64,
     /// True if the device may store poisoned tiles, whose borders are open.
@@ -128,15 +131,15 @@ struct Segment<'t> {
     host: Host<'t>,
     scene: Scene,
     arm: Arm<'t>,
-    watch: Watch,
+    tick_checks: TickChecks,
     /// The encoders' permanent errors, counts.
-    lost: [i32; 3],
+    count_offset: [i32; 3],
     /// Counts of the zero pose, as sent to the device.
     zero: [i32; 3],
     dead_man: bool,
     /// Readings of the current monitors in the last tick, mA.
     measured_ma: [i16; 3],
-    drive: GuardOutputs,
+    outputs: GuardOutputs,
     now: u64,
     /// Ticks with the amplifiers on.
     armed: u64,
@@ -149,7 +152,7 @@ impl<'t> Segment<'t> {
         let device = board::new(clock.clone());
         let arm = Arm::new(terrain, &mut random);
         let scene = scene(terrain, &arm, effects.as_ref(), &mut random);
-        let forces = ForceWatch::new(forces(terrain, &scene), scene.cell_mm);
+        let forces = ForceChecks::new(forces(terrain, &scene), scene.cell_mm);
         let host = Host::new(terrain, scene, random.bits());
         Self {
             terrain,
@@ -163,12 +166,12 @@ impl<'t> Segment<'t> {
             host,
             scene,
             arm,
-            watch: Watch::new(record, PhantomModel::premium_1_5()),
-            lost: [0; 3],
+            tick_checks: TickChecks::new(record, PhantomModel::premium_1_5()),
+            count_offset: [0; 3],
             zero: [0; 3],
             dead_man: false,
             measured_ma: [0; 3],
-            drive: GuardOutputs::default(),
+            outputs: GuardOutputs::default(),
             now: 0,
             armed: 0,
         }
@@ -180,20 +183,20 @@ impl<'t> Segment<'t> {
             deck.swap(left, self.random.below(left + 1));
         }
         for kind in deck {
-            if !self.drive.enabled || self.status()?.health.report.mode != Mode::Armed {
-                self.arm_it()?;
+            if !self.outputs.enabled || self.status()?.health.report.mode != Mode::Armed {
+                self.arm_device()?;
             }
-            let calm = CALM.0 + self.random.below(CALM.1 - CALM.0);
+            let calm = CALM_TICKS.0 + self.random.below(CALM_TICKS.1 - CALM_TICKS.0);
             for _ in 0..calm {
                 self.tick(None)?;
             }
-            if !self.drive.enabled {
+            if !self.outputs.enabled {
                 return Err(format!(
                     "the arm is off without a mishap: {:?}",
                     self.status()?
                 ));
             }
-            let (outcome, reaction) = self.mishap(kind)?;
+            let (outcome, reaction) = self.inject(kind)?;
             stats.count(kind, outcome, reaction)?;
         }
         Ok(())
@@ -201,8 +204,8 @@ impl<'t> Segment<'t> {
 
     /// Injects one fault. Returns its outcome, and for how many ticks after its first one the
     /// amplifiers stayed on.
-    fn mishap(&mut self, kind: Kind) -> Result<(Outcome, Option<u64>), String> {
-        let mut mishap = Mishap::of(kind, self.now, &mut self.random);
+    fn inject(&mut self, kind: Kind) -> Result<(Outcome, Option<u64>), String> {
+        let mut injected = InjectedFault::of(kind, self.now, &mut self.random);
         let began = self.now;
         let mut off = None;
         match kind {
@@ -210,9 +213,9 @@ impl<'t> Segment<'t> {
             Kind::HostRestarted => {
                 let effects = self.effects.as_ref();
                 self.scene = scene(self.terrain, &self.arm, effects, &mut self.random);
-                self.bring(self.scene);
+                self.restart_host(self.scene);
             }
-            Kind::ReplayThenRun => self.bring(Scene {
+            Kind::ReplayThenRun => self.restart_host(Scene {
                 source: Source::Points,
                 epoch: self.scene.epoch.wrapping_add(1),
                 ..self.scene
@@ -222,18 +225,18 @@ impl<'t> Segment<'t> {
             Kind::HostileCalibration => self.host.greet(self.now, &mut self.random),
             _ => {}
         }
-        let end = mishap.ticks.end + SETTLE;
+        let end = injected.ticks.end + SETTLING_TICKS;
         while self.now < end {
             let at = self.now - began;
-            let under_way = mishap.ticks.contains(&self.now);
-            self.act(kind, at, mishap.ticks.end.saturating_sub(self.now));
-            self.tick(under_way.then_some(&mut mishap))?;
-            if !self.drive.enabled {
+            let is_active = injected.ticks.contains(&self.now);
+            self.act(kind, at, injected.ticks.end.saturating_sub(self.now));
+            self.tick(is_active.then_some(&mut injected))?;
+            if !self.outputs.enabled {
                 off.get_or_insert(at);
             }
         }
         let status = self.status()?;
-        self.judge(kind, &status)?;
+        self.check_outcome(kind, &status)?;
         let report = status.health.report;
         let outcome = match (report.fault, report.mode) {
             (Some(fault), _) => Outcome::Latched(fault),
@@ -249,12 +252,12 @@ impl<'t> Segment<'t> {
         match kind {
             Kind::ReplayThenRun if left == 1 => {
                 self.scene.epoch = self.scene.epoch.wrapping_add(2);
-                self.bring(self.scene);
+                self.restart_host(self.scene);
             }
             Kind::ReplayThenRun if left > 1 && at.is_multiple_of(3) => {
                 let hip = GridPoint::new(self.scene.home.cell(), Vec3::splat(0.5));
                 let seq = at as u32;
-                self.say(&ToDevice::Hip(HipCommand { seq, hip }));
+                self.send(&ToDevice::Hip(HipCommand { seq, hip }));
             }
             Kind::HostileCalibration if at == 30 => self.host.request(Request::Disarm),
             // The force has faded.
@@ -265,9 +268,9 @@ impl<'t> Segment<'t> {
                     0 => hostile_calibrations::harmless(),
                     _ => hostile_calibrations::calibration(&mut self.random),
                 };
-                self.ask_past_the_client(Request::SetCalibration { calibration });
+                self.send_raw_request(Request::SetCalibration { calibration });
                 if store {
-                    self.ask_past_the_client(Request::StoreCalibration);
+                    self.send_raw_request(Request::StoreCalibration);
                 }
             }
             _ => {}
@@ -275,19 +278,19 @@ impl<'t> Segment<'t> {
     }
 
     /// Makes a request under any number, which a correct host never does.
-    fn ask_past_the_client(&mut self, request: Request) {
+    fn send_raw_request(&mut self, request: Request) {
         let number = self.random.bits() as u8;
-        self.say(&ToDevice::Request { number, request });
+        self.send(&ToDevice::Request { number, request });
     }
 
     /// Sends a message that the real client would not send.
-    fn say(&mut self, message: &ToDevice<'_>) {
-        let (now, kind) = (self.now, Unkind::default());
-        self.host.say(message, now, &kind, &mut self.random);
+    fn send(&mut self, message: &ToDevice<'_>) {
+        let (now, kind) = (self.now, LinkDisturbance::default());
+        self.host.send(message, now, &kind, &mut self.random);
     }
 
     /// Checks the conditions after a fault besides [`Kind::expectation`].
-    fn judge(&self, kind: Kind, status: &Status) -> Result<(), String> {
+    fn check_outcome(&self, kind: Kind, status: &Status) -> Result<(), String> {
         let zero = status.health.zero;
         if kind == Kind::ReplayThenRun && zero != Some(self.zero) {
             return Err(format!("a replay lost the zero: {zero:?}"));
@@ -299,10 +302,10 @@ impl<'t> Segment<'t> {
     }
 
     /// Restarts the host with a scene.
-    fn bring(&mut self, scene: Scene) {
+    fn restart_host(&mut self, scene: Scene) {
         self.host.restart(scene, self.now, &mut self.random);
-        self.watch.forget();
-        self.forces.feels(forces(self.terrain, &scene));
+        self.tick_checks.reset();
+        self.forces.set_surfaces(forces(self.terrain, &scene));
         self.poisoned = false;
     }
 
@@ -310,22 +313,23 @@ impl<'t> Segment<'t> {
     fn reset(&mut self, cause: ResetCause) {
         let clock = self.clock.clone();
         self.device = board::reset(&self.device, clock, cause, &mut self.random);
-        self.lost = self.arm.counts().map(i32::wrapping_neg);
-        self.watch.forget();
+        self.count_offset = self.arm.counts().map(i32::wrapping_neg);
+        self.tick_checks.reset();
     }
 
     /// Queries the status until it is answered.
     fn status(&mut self) -> Result<Status, String> {
         self.host.status = None;
         let began = self.now;
-        while self.now < began + ANSWER {
+        while self.now < began + STATUS_TIMEOUT {
             if (self.now - began).is_multiple_of(100) {
                 self.host.greet_if_closed(self.now, &mut self.random);
-                self.host.ask_status();
+                self.host.query_status();
             }
             self.tick(None)?;
             if let Some(status) = self.host.status.take() {
-                self.watch.created(status.health.created_mj)?;
+                self.tick_checks
+                    .check_created_energy(status.health.created_mj)?;
                 return Ok(status);
             }
         }
@@ -333,8 +337,8 @@ impl<'t> Segment<'t> {
     }
 
     /// Clears faults, zeroes and arms as a user would, until the force is ramped up.
-    fn arm_it(&mut self) -> Result<(), String> {
-        for _ in 0..TRIES {
+    fn arm_device(&mut self) -> Result<(), String> {
+        for _ in 0..MAX_ATTEMPTS {
             if self.try_to_arm()? {
                 return Ok(());
             }
@@ -346,7 +350,7 @@ impl<'t> Segment<'t> {
         let began = self.now;
         self.dead_man = false;
         self.host.greet(self.now, &mut self.random);
-        while self.now < began + TRY {
+        while self.now < began + ARMING_TIMEOUT {
             let at = self.now - began;
             match at {
                 30 => self.host.request(Request::Disarm),
@@ -354,19 +358,19 @@ impl<'t> Segment<'t> {
                     let seen = self.host.fault;
                     self.host.request(Request::ClearFault { seen });
                 }
-                50 => self.say_zero(),
-                ASK => self.host.request(Request::Arm),
-                PRESS => self.dead_man = true,
+                50 => self.send_zero(),
+                ARM_REQUEST_TICK => self.host.request(Request::Arm),
+                PRESS_TICK => self.dead_man = true,
                 _ => {}
             }
-            let mood = if at > PRESS + 300 {
-                Mood::Wanders
+            let hand_motion = if at > PRESS_TICK + 300 {
+                HandMotion::Wander
             } else {
-                Mood::Lifted
+                HandMotion::Lifted
             };
-            self.tick_in(mood, None)?;
-            let latest = self.watch.latest();
-            if at > PRESS && self.drive.enabled && latest == Some(Mode::Armed) {
+            self.tick_with(hand_motion, None)?;
+            let latest = self.tick_checks.latest();
+            if at > PRESS_TICK && self.outputs.enabled && latest == Some(Mode::Armed) {
                 return Ok(true);
             }
         }
@@ -374,23 +378,27 @@ impl<'t> Segment<'t> {
     }
 
     /// Sends the zero pose: in it the encoders would read their permanent errors.
-    fn say_zero(&mut self) {
-        self.zero = self.lost;
+    fn send_zero(&mut self) {
+        self.zero = self.count_offset;
         self.host.request(Request::Zero { counts: self.zero });
     }
 
-    fn tick(&mut self, mishap: Option<&mut Mishap>) -> Result<(), String> {
-        let mood = mishap
+    fn tick(&mut self, injected: Option<&mut InjectedFault>) -> Result<(), String> {
+        let hand_motion = injected
             .as_ref()
-            .map_or(Mood::Wanders, |mishap| mishap.mood());
-        self.tick_in(mood, mishap)
+            .map_or(HandMotion::Wander, |injected| injected.hand_motion());
+        self.tick_with(hand_motion, injected)
     }
 
     /// Advances everything by one tick.
-    fn tick_in(&mut self, mood: Mood, mishap: Option<&mut Mishap>) -> Result<(), String> {
+    fn tick_with(
+        &mut self,
+        hand_motion: HandMotion,
+        injected: Option<&mut InjectedFault>,
+    ) -> Result<(), String> {
         self.arm
-            .break_amplifier(mishap.as_ref().and_then(|mishap| mishap.amplifier()));
-        let mut sense = GuardInputs {
+            .break_amplifier(injected.as_ref().and_then(|injected| injected.amplifier()));
+        let mut inputs = GuardInputs {
             counts: self.arm.counts(),
             dead_man: self.dead_man,
             emergency_stop: false,
@@ -401,38 +409,44 @@ impl<'t> Segment<'t> {
             clutch: false,
         };
         self.measured_ma = self.arm.plant().monitors_ma();
-        for (count, lost) in sense.counts.iter_mut().zip(self.lost) {
-            *count += lost;
+        for (count, count_offset) in inputs.counts.iter_mut().zip(self.count_offset) {
+            *count += count_offset;
         }
-        let (mut unkind, mut tiles) = (Unkind::default(), Tiles::Sent);
+        let (mut disturbance, mut tiles) = (LinkDisturbance::default(), Tiles::Sent);
         let (mut reading, mut stalls) = (Reading::default(), false);
         let mut core = Core::Runs;
-        if let Some(mishap) = mishap {
-            if mishap.kind != Kind::Clutch {
-                self.calm_from = mishap.ticks.end + SETTLE;
+        if let Some(injected) = injected {
+            if injected.kind != Kind::Clutch {
+                self.calm_from = injected.ticks.end + SETTLING_TICKS;
             }
-            mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.random);
-            (unkind, tiles) = (mishap.unkind(), mishap.tiles());
-            (reading, stalls) = (mishap.reading(self.now), mishap.stalls());
+            injected.apply_to_inputs(
+                &mut inputs,
+                &mut self.count_offset,
+                self.now,
+                &mut self.random,
+            );
+            (disturbance, tiles) = (injected.disturbance(), injected.tiles());
+            (reading, stalls) = (injected.reading(self.now), injected.stalls());
             self.poisoned |= tiles == Tiles::Poisoned;
-            core = mishap.core(self.now);
-            if mishap.unplugs(self.now) || mishap.halts_endpoint(&mut self.random) {
+            core = injected.core(self.now);
+            if injected.unplugs(self.now) || injected.halts_endpoint(&mut self.random) {
                 self.device.link.interrupted();
             }
-            if let Some(message) = mishap.misplaced(&mut self.random, self.scene.epoch) {
-                self.host.say(&message, self.now, &unkind, &mut self.random);
+            if let Some(message) = injected.misplaced(&mut self.random, self.scene.epoch) {
+                self.host
+                    .send(&message, self.now, &disturbance, &mut self.random);
             }
         }
         self.clock.set(reading);
-        let mut stated = [0; 1024];
-        let length = self.run_core(core, sense, stalls, &mut stated);
-        let stated = &stated[..length];
+        let mut output = [0; 1024];
+        let length = self.run_core(core, inputs, stalls, &mut output);
+        let output = &output[..length];
         self.host
-            .hear(stated, self.now, &unkind, tiles, &mut self.random);
-        self.look(core, &sense)?;
-        let currents = self.drive.currents_a.to_array().map(f64::from);
-        self.arm.step(currents, mood);
-        self.armed += u64::from(self.drive.enabled);
+            .receive(output, self.now, &disturbance, tiles, &mut self.random);
+        self.check_tick(core, &inputs)?;
+        let currents = self.outputs.currents_a.to_array().map(f64::from);
+        self.arm.step(currents, hand_motion);
+        self.armed += u64::from(self.outputs.enabled);
         self.now += 1;
         Ok(())
     }
@@ -441,31 +455,31 @@ impl<'t> Segment<'t> {
     fn run_core(
         &mut self,
         core: Core,
-        sense: GuardInputs,
+        inputs: GuardInputs,
         stalls: bool,
-        stated: &mut [u8],
+        output: &mut [u8],
     ) -> usize {
         match core {
-            Core::Runs if stalls => self.drive = self.device.tick_alone(sense),
+            Core::Runs if stalls => self.outputs = self.device.tick_alone(inputs),
             Core::Runs => {
                 let device = &mut self.device;
                 self.host
                     .deliver(self.now, &mut |bytes| device.receive(bytes));
-                self.drive = device.tick(sense);
-                return device.link.transmit(stated);
+                self.outputs = device.tick(inputs);
+                return device.link.transmit(output);
             }
             // The last command stays on.
             Core::Halted => {}
-            Core::Down => self.drive = GuardOutputs::default(),
+            Core::Down => self.outputs = GuardOutputs::default(),
             Core::Resets(cause) => {
                 self.reset(cause);
-                self.drive = GuardOutputs::default();
+                self.outputs = GuardOutputs::default();
             }
         }
         0
     }
 
-    fn look(&mut self, core: Core, sense: &GuardInputs) -> Result<(), String> {
+    fn check_tick(&mut self, core: Core, inputs: &GuardInputs) -> Result<(), String> {
         if let Some(error) = self.host.failed.take() {
             return Err(format!("the link broke: {error}"));
         }
@@ -476,21 +490,23 @@ impl<'t> Segment<'t> {
             winding_c: plant.winding_c(),
         };
         if core == Core::Halted {
-            self.watch.held(&self.drive, &truth)?;
+            self.tick_checks.check_held(&self.outputs, &truth)?;
         } else {
-            self.watch.drive(&self.drive, sense, self.zero, &truth)?;
+            self.tick_checks
+                .check_outputs(&self.outputs, inputs, self.zero, &truth)?;
         }
         if core == Core::Runs {
             let believed_c = self.device.temperatures().winding_c();
-            self.watch.warmth(believed_c, &truth)?;
+            self.tick_checks.check_temperature(believed_c, &truth)?;
             self.device
                 .calibration()
-                .map_or(Ok(()), hostile_calibrations::keeps_ceilings)?;
+                .map_or(Ok(()), hostile_calibrations::check_limits)?;
         }
         for sample in std::mem::take(&mut self.host.samples) {
-            self.watch.sample(&sample, self.scene.params.max_force_n)?;
+            self.tick_checks
+                .check_sample(&sample, self.scene.params.max_force_n)?;
             let is_calm = self.now >= self.calm_from && !self.poisoned;
-            self.forces.look(&sample, is_calm)?;
+            self.forces.check(&sample, is_calm)?;
         }
         Ok(())
     }

@@ -19,10 +19,10 @@ use super::motor_forces::{Levers, torques_nm};
 const SLEW_N: f32 = 1.0;
 /// Highest temperature of a virtual motor's winding, °C. The guard trips at 110 °C by its own, more
 /// careful model.
-const HOTTEST_C: f64 = 112.0;
+const MAX_WINDING_C: f64 = 112.0;
 /// Largest excess of a winding's temperature over the device's estimate, K: the virtual motors and
 /// the device's model use different formulas.
-const COLDER_K: f64 = 1.0;
+const MAX_COLDER_K: f64 = 1.0;
 /// Bound of the stored energy, mJ (docs/explanation/effects.md).
 const MAX_CREATED_MJ: f32 = 2.0;
 /// Allowance for rounding in comparisons of f32.
@@ -40,7 +40,7 @@ pub struct Truth {
 }
 
 /// Checks the ticks of one segment.
-pub struct Watch {
+pub struct TickChecks {
     record: Calibration,
     model: PhantomModel,
     last: Option<TickRecord>,
@@ -50,7 +50,7 @@ pub struct Watch {
     pub extremes: Maxima,
 }
 
-impl Watch {
+impl TickChecks {
     /// Creates the checks for a device with this calibration on an arm of this model.
     #[must_use]
     pub fn new(record: Calibration, model: PhantomModel) -> Self {
@@ -63,26 +63,26 @@ impl Watch {
         }
     }
 
-    /// Checks the amplifiers' inputs in a tick in which the device received `sense`, with `zero` as
+    /// Checks the amplifiers' inputs in a tick in which the device received `inputs`, with `zero` as
     /// the counts of its zero pose.
     ///
     /// # Errors
     /// The broken invariant.
-    pub fn drive(
+    pub fn check_outputs(
         &mut self,
         drive: &GuardOutputs,
-        sense: &GuardInputs,
+        inputs: &GuardInputs,
         zero: [i32; 3],
         truth: &Truth,
     ) -> Result<(), String> {
         self.outputs(drive, truth)?;
-        let told_unfit = sense.hardware_failed || sense.outputs_not_as_set;
-        let unsafe_input = !sense.dead_man || sense.emergency_stop || told_unfit;
+        let reported_unfit = inputs.hardware_failed || inputs.outputs_not_as_set;
+        let unsafe_input = !inputs.dead_man || inputs.emergency_stop || reported_unfit;
         if drive.enabled && unsafe_input {
-            return Err(format!("amplifiers on with {sense:?}"));
+            return Err(format!("amplifiers on with {inputs:?}"));
         }
         if drive.enabled {
-            let reported = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
+            let reported = std::array::from_fn(|i| inputs.counts[i].wrapping_sub(zero[i]));
             let currents = drive.currents_a.to_array().map(f64::from);
             let torque = torques_nm(&self.model, currents);
             self.force_as_read(torque, reported)?;
@@ -96,7 +96,7 @@ impl Watch {
     ///
     /// # Errors
     /// The broken invariant.
-    pub fn held(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
+    pub fn check_held(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
         self.outputs(drive, truth)?;
         let currents = drive.currents_a.to_array().map(f64::from);
         let torque = torques_nm(&self.model, currents);
@@ -107,10 +107,10 @@ impl Watch {
     ///
     /// # Errors
     /// If it is lower.
-    pub fn warmth(&self, believed_c: Vec3, truth: &Truth) -> Result<(), String> {
+    pub fn check_temperature(&self, believed_c: Vec3, truth: &Truth) -> Result<(), String> {
         for (axis, is_c) in truth.winding_c.into_iter().enumerate() {
             let believed_c = f64::from(believed_c[axis]);
-            if believed_c.is_nan() || believed_c < is_c - COLDER_K {
+            if believed_c.is_nan() || believed_c < is_c - MAX_COLDER_K {
                 return Err(format!(
                     "winding {} is at {is_c:.1} °C, and the device takes it to be at {believed_c:.1} °C",
                     axis + 1
@@ -146,7 +146,7 @@ impl Watch {
         self.extremes.current_a = self.extremes.current_a.max(f64::from(largest));
         let hottest = truth.winding_c.into_iter().fold(0.0, f64::max);
         self.extremes.winding_c = self.extremes.winding_c.max(hottest);
-        if hottest > HOTTEST_C {
+        if hottest > MAX_WINDING_C {
             return Err(format!("a winding of the arm is at {hottest:.1} °C"));
         }
         Ok(())
@@ -189,7 +189,7 @@ impl Watch {
                 force_n,
                 off_counts,
             };
-            self.extremes.misled = self.extremes.misled.or(misled);
+            self.extremes.misled = self.extremes.misled.max(misled);
             return Ok(());
         }
         self.extremes.tip_force_n = self.extremes.tip_force_n.max(force_n);
@@ -205,7 +205,7 @@ impl Watch {
     ///
     /// # Errors
     /// The broken invariant.
-    pub fn sample(&mut self, sample: &TickRecord, max_force_n: f32) -> Result<(), String> {
+    pub fn check_sample(&mut self, sample: &TickRecord, max_force_n: f32) -> Result<(), String> {
         let force = sample.force_n.length();
         if !force.is_finite() {
             return Err(format!("a force is not a number: {sample:?}"));
@@ -240,7 +240,7 @@ impl Watch {
     ///
     /// # Errors
     /// If it is not a valid energy, or above the limit.
-    pub fn created(&mut self, mj: f32) -> Result<(), String> {
+    pub fn check_created_energy(&mut self, mj: f32) -> Result<(), String> {
         self.extremes.created_mj = self.extremes.created_mj.max(mj);
         match (0.0..=MAX_CREATED_MJ).contains(&mj) {
             true => Ok(()),
@@ -255,7 +255,7 @@ impl Watch {
     }
 
     /// Forgets the last sample, so that the next one is checked alone.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.last = None;
     }
 }

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn an_m7_waits_for_what_it_reads() {
+    fn m7_waits_for_its_operands() {
         let add = decode(0, 0xEE30, 0x0A20); // vadd.f32 s0, s0, s1
         let other = decode(0, 0xEE31, 0x1A22); // vadd.f32 s2, s2, s5
         let mac = decode(0, 0xEE00, 0x0A20); // vmla.f32 s0, s0, s1
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn an_m7_is_charged_for_every_guess() {
+    fn m7_is_charged_for_each_misprediction() {
         let conditional = decode(0, 0xD001, 0);
         assert_eq!(Core::M7.cycles(&conditional, false), 7);
         assert_eq!(Core::M7.cycles(&decode(0, 0x1840, 0), false), 1);

@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_literal_delays_the_line_behind() {
+    fn literal_delays_the_line_after_it() {
         let mut fetch = Fetch::new(G474);
         assert_eq!(fetch.instruction(0, 4, 0), 5);
         assert_eq!(fetch.literal(6), 15);

@@ -2,18 +2,21 @@
 
 const SCRIPT: &str = include_str!("../../../firmware/memory/nucleo-h743zi2.x");
 /// Markers around the patterns.
-const FROM: &str = "_tick_in_flash_start = .;";
-const TO: &str = "_tick_in_flash_end = .;";
+const LIST_START: &str = "_tick_in_flash_start = .;";
+const LIST_END: &str = "_tick_in_flash_end = .;";
 
 /// Returns true if the function of this mangled name stays in flash.
 #[must_use]
-pub fn is_left(name: &str) -> bool {
+pub fn is_in_flash(name: &str) -> bool {
     patterns().any(|pattern| fits(name, pattern))
 }
 
 /// Returns the patterns without the prefix that all code sections share.
 fn patterns() -> impl Iterator<Item = &'static str> {
-    let list = SCRIPT.split(FROM).nth(1).and_then(|s| s.split(TO).next());
+    let list = SCRIPT
+        .split(LIST_START)
+        .nth(1)
+        .and_then(|s| s.split(LIST_END).next());
     let lines = list.unwrap_or_default().lines();
     lines.filter_map(|line| line.trim().strip_prefix("*(.text.")?.strip_suffix(')'))
 }
@@ -42,12 +45,12 @@ mod tests {
                 "{pattern}"
             );
         }
-        assert!(is_left(
+        assert!(is_in_flash(
             "_ZN13hapterra_core7haptics16Haptics$LT$_$GT$10take_scene17h9bE"
         ));
-        assert!(!is_left(
+        assert!(!is_in_flash(
             "_ZN13hapterra_core4feel4Feel12with_effects17h8c6b8f46a38d6445E"
         ));
-        assert!(!is_left("memcpy"));
+        assert!(!is_in_flash("memcpy"));
     }
 }

@@ -196,7 +196,7 @@ mod tests {
 
     // The encodings are LLVM's for the instructions in the comments.
     #[test]
-    fn kinds_are_what_the_assembler_meant() {
+    fn kinds_match_the_assembler() {
         for (first, second, is) in [
             (0x1840, 0, Kind::Integer),                            // adds r0, r0, r1
             (0x4348, 0, Kind::Multiply),                           // muls r0, r1
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_and_its_reader_have_the_same_number() {
+    fn result_and_operand_have_the_same_register_number() {
         let adds = decode(0, 0xEE70, 0x0A20); // vadd.f32 s1, s0, s1
         let stores = decode(0, 0xEDC0, 0x0A00); // vstr s1, [r0]
         assert_eq!(adds.result, Some(1));

@@ -133,7 +133,7 @@ mod tests {
 
     /// The encodings are `vadd.f32 s0, s0, s1` and `b`.
     #[test]
-    fn a_loop_pays_for_its_jump_each_time() {
+    fn loop_is_charged_for_each_jump() {
         let mut tick = Tick::default();
         for _ in 0..10 {
             for address in [0, 4, 8] {
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn data_waits_until_all_of_it_is_read() {
+    fn data_access_waits_for_the_whole_line() {
         let loads = |count| {
             let mut tick = Tick::default();
             (0..count).for_each(|_| tick.execute(&decode(0, 0x6840, 0), 2, false));
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_peripheral_waits_each_time() {
+    fn peripheral_access_waits_each_time() {
         let mut tick = Tick::default();
         for address in [0x2400_0000, 0x4000_0024, 0x4000_0024] {
             tick.touch(address);

@@ -39,7 +39,7 @@ fn material(bytes: &mut Bytes<'_>) -> Material {
 
 /// Fills a tile's materials: as many as its samples, or one less, of this table or beyond it. A
 /// refused tile stays vacant.
-pub(super) fn lay(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>) {
+pub(super) fn fill(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>) {
     let kind = bytes.byte();
     let count = match kind & 3 {
         0 => MaterialTable::MAX,
@@ -47,10 +47,10 @@ pub(super) fn lay(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>)
     };
     let samples = TILE_SAMPLES * TILE_SAMPLES - usize::from(kind & 12 == 12);
     let classes: Vec<u8> = (0..5).map(|_| bytes.byte()).collect();
-    let most = match kind & 16 {
+    let max = match kind & 16 {
         0 => 16,
         _ => table.materials().len().clamp(1, 16) as u8,
     };
-    let class = |i: usize| classes[(i % TILE_SAMPLES / 4 + i / TILE_SAMPLES / 4) % 5] % most;
+    let class = |i: usize| classes[(i % TILE_SAMPLES / 4 + i / TILE_SAMPLES / 4) % 5] % max;
     let _ = tile.set_materials(count, (0..samples).map(class));
 }

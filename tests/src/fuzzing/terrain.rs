@@ -64,7 +64,7 @@ fn open(path: &Path, how: u8) -> bool {
             .extension()
             .is_some_and(|end| end == "raw")
             .then_some(raw),
-        most_in_memory_bytes: if is_set(0) { 0 } else { 1 << 20 },
+        max_in_memory_bytes: if is_set(0) { 0 } else { 1 << 20 },
         band: is_set(1).then_some(2),
         png_channel: is_set(2).then_some(PngChannel::Grey),
         classes: is_set(3),

@@ -20,7 +20,7 @@ use super::materials;
 /// Tiles along the side of the window.
 const SIDE: usize = 2;
 /// Additional buffers: one in transfer, and those that a fallback keeps.
-const SPARES: usize = 3;
+const SPARE_TILES: usize = 3;
 
 /// Runs an input, and checks every tick.
 ///
@@ -28,11 +28,11 @@ const SPARES: usize = 3;
 /// If a tick's output is invalid.
 pub fn run(data: &[u8]) {
     let mut bytes = Bytes(data);
-    let mut tiles = vec![Tile::VACANT; SIDE * SIDE + SPARES];
+    let mut tiles = vec![Tile::VACANT; SIDE * SIDE + SPARE_TILES];
     let mut slots = tiles.iter_mut();
     let mut next = || slots.next().expect("one for each slot, and spare ones");
     let window = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-    let mut spare: Vec<&mut Tile> = (0..SPARES).map(|_| next()).collect();
+    let mut spare: Vec<&mut Tile> = (0..SPARE_TILES).map(|_| next()).collect();
     let mut haptics = Haptics::<SIDE>::new(window, TickRate::DEFAULT, None);
     haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("a preset"));
     let mut params = SurfaceParams::PREMIUM;
@@ -96,7 +96,7 @@ pub fn run(data: &[u8]) {
                 let tile = spare.pop().expect("a fallback keeps two at most");
                 fill(tile, &mut bytes);
                 if kind % 16 >= 8 {
-                    materials::lay(tile, &table, &mut bytes);
+                    materials::fill(tile, &table, &mut bytes);
                 }
                 spare.extend(haptics.accept(Command::Tile(tile)).ok().flatten());
             }
@@ -147,7 +147,7 @@ pub fn run(data: &[u8]) {
         let is_next = ticks.is_none_or(|ticks: u32| outcome.sample.tick == ticks + 1);
         assert!(is_next, "{ticks:?}, then {outcome:?}");
         ticks = Some(outcome.sample.tick);
-        look(&outcome, &params);
+        check(&outcome, &params);
     }
 }
 
@@ -287,15 +287,15 @@ fn position(bytes: &mut Bytes<'_>) -> GridPoint {
 ///
 /// # Panics
 /// If it is invalid.
-pub fn look(outcome: &Outcome, params: &SurfaceParams) {
+pub fn check(outcome: &Outcome, params: &SurfaceParams) {
     let (sample, drive) = (&outcome.sample, &outcome.drive);
     let force = sample.force_n.as_dvec3().length();
     // A limit below the smallest normal number is only kept to that number.
     let limit = f64::from(params.max_force_n.max(f32::MIN_POSITIVE)) * (1.0 + 1e-6);
     assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
     assert!(drive.currents_a.is_finite(), "{outcome:?}");
-    let most = Calibration::PREMIUM_1_5.peak_current_a;
-    assert!(drive.currents_a.abs().cmple(most).all(), "{outcome:?}");
+    let max = Calibration::PREMIUM_1_5.peak_current_a;
+    assert!(drive.currents_a.abs().cmple(max).all(), "{outcome:?}");
     let off = drive.currents_a == Vec3::ZERO;
     assert!(drive.enabled || off, "{outcome:?}");
     assert!(sample.fault.is_none() || !drive.enabled, "{outcome:?}");

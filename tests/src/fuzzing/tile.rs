@@ -52,11 +52,11 @@ fn packed(bytes: &mut Bytes<'_>, tile: &mut Tile) {
     if tile.load(KEY, base, &le).is_err() {
         return;
     }
-    let wanted = bits(tile);
+    let expected = bits(tile);
     let mut buffer = [0; MAX_PACKED];
     if let Some(packed) = pack(&heights, base, &steps, &mut buffer) {
         assert_eq!(tile.unpack(KEY, base, packed), Ok(()));
-        assert!(bits(tile) == wanted, "{kind} {odd} {cells:e} {base}");
+        assert!(bits(tile) == expected, "{kind} {odd} {cells:e} {base}");
     }
 }
 

@@ -21,7 +21,7 @@ use hapterra_core::terrain::FieldSize;
 
 /// The session under test, and the number of sessions opened before it.
 const SESSION: SessionNumber = SessionNumber::new(0);
-const OTHERS: u32 = 16;
+const OTHER_SESSIONS: u32 = 16;
 
 /// A device that lives as long as the thread, as its memory is leaked.
 pub struct Wire {
@@ -61,11 +61,11 @@ impl Wire {
             bytes.0 = rest;
             match kind % 4 {
                 // Unchanged.
-                0 => self.hear(chunk),
+                0 => self.receive(chunk),
                 // In a frame with a correct checksum, so that its content is parsed.
-                1 => self.hear(&framed(chunk)),
+                1 => self.receive(&framed(chunk)),
                 // In a frame of the open session, so that the device acts on it.
-                2 => self.hear(&framed(&in_session(chunk))),
+                2 => self.receive(&framed(&in_session(chunk))),
                 _ => self.device.link.interrupted(),
             }
             let sense = GuardInputs {
@@ -83,32 +83,32 @@ impl Wire {
     /// Opens a new session, whatever the device received before.
     fn begin(&mut self) {
         self.device.link.interrupted();
-        self.hear(&[0]);
+        self.receive(&[0]);
         let hello = HostHello {
             protocol: PROTOCOL,
             number: 1,
             silence_s: DEFAULT_SILENCE_S,
         };
         // The other sessions first, so that the device no longer stores this session's number.
-        for session in (1..=OTHERS).map(SessionNumber::new) {
-            self.hear(&message_in(session, &ToDevice::Hello(hello)));
+        for session in (1..=OTHER_SESSIONS).map(SessionNumber::new) {
+            self.receive(&message_in(session, &ToDevice::Hello(hello)));
         }
-        for stated in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
-            self.hear(&message(&stated));
+        for message_to_device in [ToDevice::Hello(hello), ToDevice::Scene(scene())] {
+            self.receive(&message(&message_to_device));
         }
         // Clears any latched fault. The last of these requests has the number 1.
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
         for (fault, number) in Fault::ALL.into_iter().zip(0..) {
             let number = first.wrapping_add(number);
             let request = Request::ClearFault { seen: Some(fault) };
-            self.hear(&message(&ToDevice::Request { number, request }));
+            self.receive(&message(&ToDevice::Request { number, request }));
         }
         let _ = self.device.tick(GuardInputs::default());
         self.listen();
     }
 
     /// Sends all bytes, with ticks in between while the device has no room.
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn receive(&mut self, mut bytes: &[u8]) {
         for _ in 0..10_000 {
             let taken = self.device.receive(bytes);
             bytes = &bytes[taken..];
@@ -129,10 +129,10 @@ impl Wire {
             if n == 0 {
                 return;
             }
-            let mut stated = &chunk[..n];
-            while !stated.is_empty() {
-                let (taken, frame) = self.host.push(stated);
-                stated = &stated[taken..];
+            let mut message = &chunk[..n];
+            while !message.is_empty() {
+                let (taken, frame) = self.host.push(message);
+                message = &message[taken..];
                 if let Some(frame) = frame {
                     let frame = frame.expect("the device sends whole frames");
                     if VersionCheck::is_in(frame) {

@@ -11,7 +11,7 @@ use super::surface::{distance, patches_at};
 /// Moves shorter than this, in cells, pass no relevant crest.
 const SHORT: f64 = 0.02;
 /// HIPs farther than this, in cells, need too large a flood.
-const FAR: f64 = 4.0;
+const MAX_DISTANCE: f64 = 4.0;
 /// Columns over the reach of the HIP, if that is a cell or less: at least 64 a cell, and a whole
 /// number, so that edges between patches lie in columns.
 const COLUMNS: f64 = 256.0;
@@ -20,29 +20,29 @@ const SLACK: f64 = 0.02;
 
 impl TickOracle<'_> {
     /// Checks that a path within reach joins the proxy with its last position.
-    pub(super) fn stays_in_basin(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        let reach = distance(before.proxy, seen.hip);
-        let is_judged = before.is_touching()
-            && seen.is_touching()
-            && reach < FAR
+    pub(super) fn check_basin(&self, before: &ObservedTick, observed: &ObservedTick) -> Verdict {
+        let reach = distance(before.proxy, observed.hip);
+        let is_checked = before.is_touching()
+            && observed.is_touching()
+            && reach < MAX_DISTANCE
             // Otherwise another check reports it.
-            && distance(seen.proxy, seen.hip) <= reach + SLACK
-            && distance(before.proxy, seen.proxy) > SHORT;
-        if !is_judged {
+            && distance(observed.proxy, observed.hip) <= reach + SLACK
+            && distance(before.proxy, observed.proxy) > SHORT;
+        if !is_checked {
             return Ok(());
         }
-        let [from, to] = [before.proxy, seen.proxy].map(|at| [at[0], at[1]]);
-        let is_open = |at| self.is_open(at, seen.hip, reach + SLACK);
-        const LOOKS: u32 = 64;
-        let is_straight = (0..=LOOKS).all(|look| {
-            let share = f64::from(look) / f64::from(LOOKS);
+        let [from, to] = [before.proxy, observed.proxy].map(|at| [at[0], at[1]]);
+        let is_open = |at| self.is_open(at, observed.hip, reach + SLACK);
+        const MAX_SAMPLES: u32 = 64;
+        let is_straight = (0..=MAX_SAMPLES).all(|sample| {
+            let share = f64::from(sample) / f64::from(MAX_SAMPLES);
             is_open([0, 1].map(|i| from[i] + share * (to[i] - from[i])))
         });
         let columns = (COLUMNS / reach).clamp(64.0, 1_024.0).round();
         if is_straight || is_flooded(from, to, columns, is_open) {
             return Ok(());
         }
-        let detail = format!("over a crest of more than {reach}: {before:?} then {seen:?}");
+        let detail = format!("over a crest of more than {reach}: {before:?} then {observed:?}");
         self.fail(Invariant::Basin, detail)
     }
 

@@ -25,7 +25,7 @@ pub fn first(terrain: &Terrain, from: [f64; 3], to: [f64; 3]) -> Option<Crossing
             continue;
         };
         let gap = Gap::new(&patch, along(from, to, t0), along(from, to, t1));
-        let deepest = gap.most();
+        let deepest = gap.max();
         if deepest < 0.0 {
             continue;
         }
@@ -81,7 +81,7 @@ impl Gap {
         }
     }
 
-    fn most(&self) -> f64 {
+    fn max(&self) -> f64 {
         self.at(self.top())
     }
 
@@ -110,19 +110,19 @@ fn cells(
     from: [f64; 3],
     to: [f64; 3],
 ) -> impl Iterator<Item = (f64, f64, [i32; 2])> + use<> {
-    let way = [0, 1].map(|i| to[i] - from[i]);
+    let displacement = [0, 1].map(|i| to[i] - from[i]);
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     for axis in 0..2 {
         let last = f64::from(terrain.size[axis]);
-        if way[axis] == 0.0 {
+        if displacement[axis] == 0.0 {
             if from[axis] < 0.0 || from[axis] > last {
                 leave = -1.0;
             }
             continue;
         }
         let t = [
-            (0.0 - from[axis]) / way[axis],
-            (last - from[axis]) / way[axis],
+            (0.0 - from[axis]) / displacement[axis],
+            (last - from[axis]) / displacement[axis],
         ];
         enter = enter.max(t[0].min(t[1]));
         leave = leave.min(t[0].max(t[1]));
@@ -131,14 +131,14 @@ fn cells(
     if enter <= leave {
         cuts.push(enter);
         for axis in 0..2 {
-            if way[axis] == 0.0 {
+            if displacement[axis] == 0.0 {
                 continue;
             }
-            let ends = [enter, leave].map(|t| from[axis] + t * way[axis]);
+            let ends = [enter, leave].map(|t| from[axis] + t * displacement[axis]);
             let (low, high) = (ends[0].min(ends[1]).ceil(), ends[0].max(ends[1]).floor());
             let mut line = low;
             while line <= high {
-                cuts.push(((line - from[axis]) / way[axis]).clamp(enter, leave));
+                cuts.push(((line - from[axis]) / displacement[axis]).clamp(enter, leave));
                 line += 1.0;
             }
         }
@@ -149,7 +149,10 @@ fn cells(
         .windows(2)
         .flat_map(|cut| {
             let middle = 0.5 * (cut[0] + cut[1]);
-            let (x, y) = (from[0] + middle * way[0], from[1] + middle * way[1]);
+            let (x, y) = (
+                from[0] + middle * displacement[0],
+                from[1] + middle * displacement[1],
+            );
             // A path along a grid line belongs to the patches on both sides, and a vertical path
             // through a vertex to the four around it.
             let pair = |c: f64, still: bool| {
@@ -161,7 +164,10 @@ fn cells(
                 };
                 [cell, other]
             };
-            let (xs, ys) = (pair(x, way[0] == 0.0), pair(y, way[1] == 0.0));
+            let (xs, ys) = (
+                pair(x, displacement[0] == 0.0),
+                pair(y, displacement[1] == 0.0),
+            );
             let (t0, t1) = (cut[0], cut[1]);
             let mut all = vec![(t0, t1, [xs[0], ys[0]])];
             if xs[1] != xs[0] {

@@ -10,7 +10,7 @@ use super::surface::{Corners, Patch, distance};
 /// First step of the descent, cells: on a slope of 10⁶ the next minimum is close.
 const STEP: f64 = 1e-9;
 /// Least motion into a neighbouring patch, cells.
-const LEAST_WAY: f64 = 1e-11;
+const MIN_DISPLACEMENT: f64 = 1e-11;
 /// Most patches.
 const PATCHES: usize = 10_000;
 
@@ -38,7 +38,7 @@ pub fn from(field: &impl Corners, hip: [f64; 3], start: [f64; 2], patch: Patch) 
                 let end = descend(&there, hip, at);
                 let moved = (end[0] - at[0]).abs().max((end[1] - at[1]).abs());
                 let f = squared(&there, hip, end);
-                (moved > LEAST_WAY && f < here).then_some((f, there))
+                (moved > MIN_DISPLACEMENT && f < here).then_some((f, there))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
         match next {

@@ -24,8 +24,8 @@ const STEEP: f64 = 1e3;
 /// rest.
 #[derive(Clone, Copy, Debug)]
 struct Pull {
-    along: f64,
-    rest: f64,
+    tangential: f64,
+    normal: f64,
     /// Slope of the ground there.
     slope: f64,
     /// Tolerance of the height, from rounding of the position, and of the corner heights in a patch
@@ -35,71 +35,73 @@ struct Pull {
 
 impl TickOracle<'_> {
     /// Checks that a proxy that has slid or was held is inside the friction cone.
-    pub(super) fn is_in_cone(&mut self, seen: &ObservedTick) -> Verdict {
-        let Some((least, _)) = self.pulls(seen.proxy, seen.hip) else {
+    pub(super) fn check_cone(&mut self, observed: &ObservedTick) -> Verdict {
+        let Some((min, _)) = self.pulls(observed.proxy, observed.hip) else {
             return Ok(());
         };
-        let slid = self.slid_from(seen);
+        let slid = self.slip_start_of(observed);
         // Dynamic friction holds a proxy that slid, static friction one that may have landed.
         let mu = f64::from(match slid {
             Some(_) => self.friction.dynamic_mu,
             None => self.friction.static_mu,
         });
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
-        let place = seen.allowed() + least.rounding;
-        let gone = match (slid, self.before) {
-            (Some(start), _) => distance(start, seen.proxy),
+        let place = observed.allowed() + min.rounding;
+        let travelled = match (slid, self.before) {
+            (Some(start), _) => distance(start, observed.proxy),
             // A proxy that landed may have done so at any point nearer to the HIP than it was.
             (None, Some(before)) => {
-                distance(before.proxy, seen.hip) + distance(seen.proxy, seen.hip)
+                distance(before.proxy, observed.hip) + distance(observed.proxy, observed.hip)
             }
             (None, None) if viscous > 0.0 => return Ok(()),
             (None, None) => 0.0,
         };
-        let trail = viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope));
-        let holds = mu * least.rest + trail;
-        if least.along <= holds * (1.0 + SLACK) + 4.0 * place * (1.0 + mu) {
+        let trail = viscous * (travelled + 4.0 * observed.allowed() * (1.0 + min.slope));
+        let holds = mu * min.normal + trail;
+        if min.tangential <= holds * (1.0 + SLACK) + 4.0 * place * (1.0 + mu) {
             return Ok(());
         }
-        let detail = format!("{least:?} where {holds:.3e} is held: {seen:?}");
+        let detail = format!("{min:?} where {holds:.3e} is held: {observed:?}");
         self.fail(Invariant::Cone, detail)
     }
 
     /// Checks that a proxy that has slid moved no farther than friction allows.
-    pub(super) fn is_held_back(&mut self, seen: &ObservedTick) -> Verdict {
-        let Some(start) = self.slid_from(seen) else {
+    pub(super) fn check_held_back(&mut self, observed: &ObservedTick) -> Verdict {
+        let Some(start) = self.slip_start_of(observed) else {
             return Ok(());
         };
-        if self.pulls(seen.proxy, seen.hip).is_none() {
+        if self.pulls(observed.proxy, observed.hip).is_none() {
             return Ok(());
         }
         let mu = f64::from(self.friction.dynamic_mu);
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
-        let gone = distance(start, seen.proxy);
+        let travelled = distance(start, observed.proxy);
         // On an edge it may have come from any of the patches that meet there.
         let falls_short = |(start, patch): &([f64; 2], Patch)| {
-            let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
+            let displacement = [0, 1, 2].map(|i| observed.hip[i] - observed.proxy[i]);
             let [east, north] = patch.slopes(start[0], start[1]);
             let norm = (1.0 + east * east + north * north).sqrt();
-            let rest = (way[2] - east * way[0] - north * way[1]).abs() / norm;
-            let whole: f64 = way.iter().map(|c| c * c).sum();
-            let along = (whole - rest * rest).max(0.0).sqrt();
-            let place = seen.allowed() + self.rounding(patch, *start, seen.hip[2]);
-            let trail = viscous * (gone - 4.0 * seen.allowed() * (1.0 + east.hypot(north)));
-            let holds = mu * rest + trail.max(0.0);
-            along < holds * (1.0 - SLACK) - 4.0 * place * (1.0 + mu)
+            let normal =
+                (displacement[2] - east * displacement[0] - north * displacement[1]).abs() / norm;
+            let whole: f64 = displacement.iter().map(|c| c * c).sum();
+            let tangential = (whole - normal * normal).max(0.0).sqrt();
+            let place = observed.allowed() + self.rounding(patch, *start, observed.hip[2]);
+            let trail =
+                viscous * (travelled - 4.0 * observed.allowed() * (1.0 + east.hypot(north)));
+            let holds = mu * normal + trail.max(0.0);
+            tangential < holds * (1.0 - SLACK) - 4.0 * place * (1.0 + mu)
         };
-        if !self.nearby(seen.proxy).all(|at| falls_short(&at)) {
+        if !self.nearby(observed.proxy).all(|at| falls_short(&at)) {
             return Ok(());
         }
-        let detail = format!("let go: {start:?} then {seen:?}");
+        let detail = format!("let go: {start:?} then {observed:?}");
         self.fail(Invariant::Cone, detail)
     }
 
     /// Returns the position of the proxy at the start of its motion for this HIP, which may take
     /// several ticks.
-    pub(super) fn begun_at(&self, before: &ObservedTick, seen: &ObservedTick) -> [f64; 3] {
-        match before.output.converged || before.hip != seen.hip {
+    pub(super) fn slip_start(&self, before: &ObservedTick, observed: &ObservedTick) -> [f64; 3] {
+        match before.output.converged || before.hip != observed.hip {
             true => before.proxy,
             false => self.began,
         }
@@ -107,25 +109,25 @@ impl TickOracle<'_> {
 
     /// Returns the start of a slide over the surface alone: around start and end the HIP is clearly
     /// below every tangent plane, so that nothing lifts the proxy off.
-    fn slid_from(&self, seen: &ObservedTick) -> Option<[f64; 3]> {
-        const LOOKS: u32 = 12;
+    fn slip_start_of(&self, observed: &ObservedTick) -> Option<[f64; 3]> {
+        const SAMPLES: u32 = 12;
         /// Largest distance of a slide from the straight path, cells.
-        const BESIDE: f64 = 0.25;
+        const OFFSET: f64 = 0.25;
         let before = self.before?;
-        let start = self.begun_at(&before, seen);
-        let touches = before.is_touching() && seen.is_touching() && seen.output.converged;
-        let way = [0, 1].map(|i| seen.proxy[i] - start[i]);
-        let is_near = way[0].hypot(way[1]) < SLIDES;
-        if !touches || !is_near || before.output.proxy == seen.output.proxy {
+        let start = self.slip_start(&before, observed);
+        let touches = before.is_touching() && observed.is_touching() && observed.output.converged;
+        let displacement = [0, 1].map(|i| observed.proxy[i] - start[i]);
+        let is_near = displacement[0].hypot(displacement[1]) < SLIDES;
+        if !touches || !is_near || before.output.proxy == observed.output.proxy {
             return None;
         }
-        let at = |axis: usize, look: u32| {
-            let (from, to) = (start[axis], seen.proxy[axis]);
-            let (least, most) = (from.min(to) - BESIDE, from.max(to) + BESIDE);
-            least + (most - least) * f64::from(look) / f64::from(LOOKS)
+        let at = |axis: usize, sample: u32| {
+            let (from, to) = (start[axis], observed.proxy[axis]);
+            let (min, max) = (from.min(to) - OFFSET, from.max(to) + OFFSET);
+            min + (max - min) * f64::from(sample) / f64::from(SAMPLES)
         };
-        let is_pressed = (0..=LOOKS).all(|column| {
-            (0..=LOOKS).all(|row| self.is_pressed_at([at(0, column), at(1, row)], seen.hip))
+        let is_pressed = (0..=SAMPLES).all(|column| {
+            (0..=SAMPLES).all(|row| self.is_pressed_at([at(0, column), at(1, row)], observed.hip))
         });
         is_pressed.then_some(start)
     }
@@ -149,27 +151,31 @@ impl TickOracle<'_> {
 
     /// Checks that a proxy inside the cone does not move. A proxy that was in the air slides first,
     /// even if it returns to its old position.
-    pub(super) fn sticks(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        let touches = |seen: &ObservedTick| {
-            seen.output.state == ContactState::Touching && seen.output.converged
+    pub(super) fn check_sticks(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+    ) -> Verdict {
+        let touches = |observed: &ObservedTick| {
+            observed.output.state == ContactState::Touching && observed.output.converged
         };
-        let moved = before.output.proxy != seen.output.proxy;
+        let moved = before.output.proxy != observed.output.proxy;
         let still = self.still;
-        self.still = if seen.stays(before) { still + 1 } else { 0 };
-        if !(moved && touches(before) && touches(seen)) {
+        self.still = if observed.stays(before) { still + 1 } else { 0 };
+        if !(moved && touches(before) && touches(observed)) {
             return Ok(());
         }
-        let Some((_, most)) = self.pulls(before.proxy, seen.hip) else {
+        let Some((_, max)) = self.pulls(before.proxy, observed.hip) else {
             return Ok(());
         };
         let mu = match still >= STICKS_AFTER {
             true => self.friction.static_mu,
             false => self.friction.dynamic_mu,
         };
-        let place = seen.allowed() + most.rounding;
-        let held = f64::from(mu) * most.rest * (1.0 - 1e-3) - 4.0 * place;
-        if most.along < held {
-            let detail = format!("{most:?} of {held:.3e}: {before:?} then {seen:?}");
+        let place = observed.allowed() + max.rounding;
+        let max_held = f64::from(mu) * max.normal * (1.0 - 1e-3) - 4.0 * place;
+        if max.tangential < max_held {
+            let detail = format!("{max:?} of {max_held:.3e}: {before:?} then {observed:?}");
             return self.fail(Invariant::Stuck, detail);
         }
         Ok(())
@@ -182,42 +188,42 @@ impl TickOracle<'_> {
         if !(NEAR..FAR).contains(&distance(proxy, hip)) {
             return None;
         }
-        let way = [0, 1, 2].map(|i| hip[i] - proxy[i]);
+        let displacement = [0, 1, 2].map(|i| hip[i] - proxy[i]);
         let mut places: Vec<([f64; 2], Pull)> = Vec::new();
         for (start, patch) in self.nearby(proxy) {
             let [east, north] = patch.slopes(start[0], start[1]);
-            let above = way[2] - east * way[0] - north * way[1];
+            let above = displacement[2] - east * displacement[0] - north * displacement[1];
             if above > -NEAR || patch.slope(start[0], start[1]) > STEEP {
                 return None;
             }
-            let along = most_along(&patch, start, way);
-            let whole: f64 = way.iter().map(|c| c * c).sum();
-            let rest = (whole - along * along).max(0.0).sqrt();
+            let tangential = max_tangential(&patch, start, displacement);
+            let whole: f64 = displacement.iter().map(|c| c * c).sum();
+            let normal = (whole - tangential * tangential).max(0.0).sqrt();
             let slope = patch.slope(start[0], start[1]);
             let pull = Pull {
-                along,
-                rest,
+                tangential,
+                normal,
                 slope,
                 rounding: self.rounding(&patch, start, hip[2]),
             };
             match places.iter_mut().find(|(at, _)| *at == start) {
-                Some((_, most)) if along > most.along => *most = pull,
+                Some((_, max)) if tangential > max.tangential => *max = pull,
                 Some(_) => {}
                 None => places.push((start, pull)),
             }
         }
-        let by = |a: &Pull, b: &Pull| a.along.total_cmp(&b.along);
-        let least = places.iter().map(|(_, pull)| *pull).min_by(by)?;
-        let most = places.iter().map(|(_, pull)| *pull).max_by(by)?;
-        Some((least, most))
+        let by = |a: &Pull, b: &Pull| a.tangential.total_cmp(&b.tangential);
+        let min = places.iter().map(|(_, pull)| *pull).min_by(by)?;
+        let max = places.iter().map(|(_, pull)| *pull).max_by(by)?;
+        Some((min, max))
     }
 }
 
 /// Returns the largest component of a vector along the surface, over all directions into a patch.
-fn most_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
-    const TRIED: u32 = 720;
+fn max_tangential(patch: &Patch, start: [f64; 2], displacement: [f64; 3]) -> f64 {
+    const MAX_TRIED: u32 = 720;
     let [east, north] = patch.slopes(start[0], start[1]);
-    let along = |angle: f64| {
+    let tangential = |angle: f64| {
         let (y, x) = angle.sin_cos();
         let snap = |c: f64| if c.abs() < 1e-12 { 0.0 } else { c };
         let (x, y) = (snap(x), snap(y));
@@ -227,11 +233,11 @@ fn most_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
         });
         let z = east * x + north * y;
         let length = (1.0 + z * z).sqrt();
-        leads_in.then(|| (way[0] * x + way[1] * y + way[2] * z) / length)
+        leads_in.then(|| (displacement[0] * x + displacement[1] * y + displacement[2] * z) / length)
     };
-    let step = std::f64::consts::TAU / f64::from(TRIED);
-    let Some((best, angle)) = (0..TRIED)
-        .filter_map(|n| along(f64::from(n) * step).map(|most| (most, f64::from(n) * step)))
+    let step = std::f64::consts::TAU / f64::from(MAX_TRIED);
+    let Some((best, angle)) = (0..MAX_TRIED)
+        .filter_map(|n| tangential(f64::from(n) * step).map(|max| (max, f64::from(n) * step)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
     else {
         return 0.0;
@@ -239,8 +245,11 @@ fn most_along(patch: &Patch, start: [f64; 2], way: [f64; 3]) -> f64 {
     let (mut low, mut high) = (angle - step, angle + step);
     for _ in 0..60 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        let [at_a, at_b] = [a, b].map(|angle| along(angle).unwrap_or(f64::NEG_INFINITY));
+        let [at_a, at_b] = [a, b].map(|angle| tangential(angle).unwrap_or(f64::NEG_INFINITY));
         if at_a < at_b { low = a } else { high = b }
     }
-    along(0.5 * (low + high)).unwrap_or(best).max(best).max(0.0)
+    tangential(0.5 * (low + high))
+        .unwrap_or(best)
+        .max(best)
+        .max(0.0)
 }

@@ -102,7 +102,7 @@ impl ObservedTick {
     pub(super) fn rounding_of_corners(&self, terrain: &Terrain) -> f64 {
         let [x, y, _] = self.proxy;
         let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());
-        let highest = corners.fold(0.0, |most, h| (h - self.hip[2]).abs().max(most));
+        let highest = corners.fold(0.0, |max, h| (h - self.hip[2]).abs().max(max));
         4.0 * f64::from(f32::EPSILON) * highest
     }
 

@@ -6,7 +6,7 @@
 use hapterra_core::contact::{Friction, WORK_PER_TICK};
 use hapterra_core::force::Texture;
 
-use super::material::Judged;
+use super::material::MaterialCounts;
 use super::observed_tick::ObservedTick;
 use super::texture::TextureOracle;
 use super::{Invariant, Violation};
@@ -29,8 +29,9 @@ pub struct Measured {
     /// the bound of gentle patches.
     pub off_minimum: f64,
     /// Results compared with the exact closest point.
-    pub judged: u64,
-    /// Those of `judged` beyond that bound, because of steep ground or a badly conditioned minimum.
+    pub compared: u64,
+    /// Those of `compared` beyond that bound, because of steep ground or a badly conditioned
+    /// minimum.
     pub beyond: u64,
     /// Paths that met the surface but ended free: around a pole.
     pub around: u64,
@@ -38,11 +39,11 @@ pub struct Measured {
     pub stalled: u32,
     /// Metamorphic tests compared to the end: repeated, shifted, in another window, mirrored or
     /// turned.
-    pub twins: [u64; 4],
+    pub metamorphic: [u64; 4],
     /// Measurements on materials.
-    pub on_materials: Judged,
+    pub on_materials: MaterialCounts,
     /// Metamorphic tests on materials, to the end: in another window, shifted, mirrored or turned.
-    pub twins_on_materials: [u64; 3],
+    pub metamorphic_on_materials: [u64; 3],
 }
 
 impl Measured {
@@ -51,11 +52,11 @@ impl Measured {
         for (own, other) in self.states.iter_mut().zip(other.states) {
             *own += other;
         }
-        for (own, other) in self.twins.iter_mut().zip(other.twins) {
+        for (own, other) in self.metamorphic.iter_mut().zip(other.metamorphic) {
             *own += other;
         }
-        let twins = self.twins_on_materials.iter_mut();
-        for (own, other) in twins.zip(other.twins_on_materials) {
+        let metamorphic = self.metamorphic_on_materials.iter_mut();
+        for (own, other) in metamorphic.zip(other.metamorphic_on_materials) {
             *own += other;
         }
         self.on_materials.add(&other.on_materials);
@@ -63,7 +64,7 @@ impl Measured {
         self.work = self.work.max(other.work);
         self.off_surface = self.off_surface.max(other.off_surface);
         self.off_minimum = self.off_minimum.max(other.off_minimum);
-        self.judged += other.judged;
+        self.compared += other.compared;
         self.beyond += other.beyond;
         self.around += other.around;
         self.stalled = self.stalled.max(other.stalled);
@@ -84,7 +85,7 @@ pub struct TickOracle<'g> {
     /// Position of the proxy at the start of its motion for the last HIP.
     pub(super) began: [f64; 3],
     /// Displacement, cells, when the release began.
-    pub(super) let_go_from: f64,
+    pub(super) released_from: f64,
     /// Ticks in a row in which a proxy in the air made no progress.
     pub(super) stalled: u32,
     /// Its measurements.
@@ -107,7 +108,7 @@ impl<'g> TickOracle<'g> {
             tick: 0,
             before: None,
             began: [0.0; 3],
-            let_go_from: 0.0,
+            released_from: 0.0,
             stalled: 0,
             measured: Measured::default(),
         }
@@ -116,12 +117,12 @@ impl<'g> TickOracle<'g> {
     /// Creates the oracle of a scene.
     #[must_use]
     pub fn of(scene: &'g Scene) -> Self {
-        let judge = Self::new(&scene.terrain)
+        let oracle = Self::new(&scene.terrain)
             .with_friction(scene.friction)
             .with_texture(scene.texture);
         Self {
             work: scene.settings().work_per_tick,
-            ..judge
+            ..oracle
         }
     }
 
@@ -142,48 +143,51 @@ impl<'g> TickOracle<'g> {
     ///
     /// # Errors
     /// The first invariant that it breaks.
-    pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
-        self.all(seen).into_iter().next().map_or(Ok(()), Err)
+    pub fn check(&mut self, observed: &ObservedTick) -> Verdict {
+        self.violations(observed)
+            .into_iter()
+            .next()
+            .map_or(Ok(()), Err)
     }
 
     /// Checks the proxy of the next tick and its motion, but not its force. If friction may hold it
-    /// (`is_rubbed`), [`Self::is_held_by`] checks that before.
+    /// (`is_rubbed`), [`Self::check_friction`] checks that before.
     ///
     /// # Errors
     /// The first invariant that it breaks.
-    pub fn look_at_place(&mut self, seen: &ObservedTick, is_rubbed: bool) -> Verdict {
-        self.is_finite(seen)?;
-        self.is_within_work(seen)?;
-        if seen.is_touching() {
-            self.is_on_surface(seen)?;
+    pub fn check_position(&mut self, observed: &ObservedTick, is_rubbed: bool) -> Verdict {
+        self.check_finite(observed)?;
+        self.check_work(observed)?;
+        if observed.is_touching() {
+            self.check_on_surface(observed)?;
             if !is_rubbed {
-                self.is_local_minimum(seen)?;
+                self.check_local_minimum(observed)?;
             }
-            self.is_hip_below(seen)?;
+            self.check_hip_below(observed)?;
         }
-        if seen.is_free() {
-            self.is_above(seen, self.before.as_ref())?;
+        if observed.is_free() {
+            self.check_above(observed, self.before.as_ref())?;
         }
         if let Some(before) = self.before {
-            self.was_seen_above(&before, seen)?;
-            self.descends(&before, seen)?;
+            self.check_seen_from_above(&before, observed)?;
+            self.check_descent(&before, observed)?;
             if before.is_free() {
-                self.first_crossing(&before, seen)?;
+                self.check_first_crossing(&before, observed)?;
             }
-            self.passes_no_wall(&before, seen)?;
+            self.check_no_wall_crossed(&before, observed)?;
         }
-        let stays = self.before.is_some_and(|before| seen.stays(&before));
+        let stays = self.before.is_some_and(|before| observed.stays(&before));
         self.still = if stays { self.still + 1 } else { 0 };
-        self.remembers(seen);
+        self.remember(observed);
         Ok(())
     }
 
-    fn remembers(&mut self, seen: &ObservedTick) {
+    fn remember(&mut self, observed: &ObservedTick) {
         self.began = match self.before {
-            Some(before) => self.begun_at(&before, seen),
-            None => seen.proxy,
+            Some(before) => self.slip_start(&before, observed),
+            None => observed.proxy,
         };
-        self.before = Some(*seen);
+        self.before = Some(*observed);
         self.tick += 1;
     }
 
@@ -191,18 +195,22 @@ impl<'g> TickOracle<'g> {
     ///
     /// # Errors
     /// [`Invariant::Cone`] and [`Invariant::Stuck`].
-    pub fn is_held_by(&mut self, [least, most]: [Friction; 2], seen: &ObservedTick) -> Verdict {
-        self.friction = most;
-        if seen.is_touching() {
-            self.is_in_cone(seen)?;
+    pub fn check_friction(
+        &mut self,
+        [min, max]: [Friction; 2],
+        observed: &ObservedTick,
+    ) -> Verdict {
+        self.friction = max;
+        if observed.is_touching() {
+            self.check_cone(observed)?;
         }
-        self.friction = least;
-        if seen.is_touching() {
-            self.is_held_back(seen)?;
+        self.friction = min;
+        if observed.is_touching() {
+            self.check_held_back(observed)?;
         }
         let still = self.still;
         let verdict = match self.before {
-            Some(before) => self.sticks(&before, seen),
+            Some(before) => self.check_sticks(&before, observed),
             None => Ok(()),
         };
         self.still = still;
@@ -213,73 +221,78 @@ impl<'g> TickOracle<'g> {
     ///
     /// # Errors
     /// [`Invariant::Texture`].
-    pub fn look_at_texture(&mut self, seen: &ObservedTick) -> Verdict {
-        let verdict = self.is_textured(seen);
+    pub fn check_texture(&mut self, observed: &ObservedTick) -> Verdict {
+        let verdict = self.check_texture_force(observed);
         self.tick += 1;
         verdict
     }
 
     /// Checks the next tick. Returns all violations.
-    pub fn all(&mut self, seen: &ObservedTick) -> Vec<Violation> {
-        let output = &seen.output;
+    pub fn violations(&mut self, observed: &ObservedTick) -> Vec<Violation> {
+        let output = &observed.output;
         self.measured.states[output.state as usize] += 1;
         self.measured.unconverged += u64::from(!output.converged);
         self.measured.work = self.measured.work.max(output.work);
         let mut reported = Vec::new();
-        reported.extend(self.is_finite(seen).err());
+        reported.extend(self.check_finite(observed).err());
         if reported.is_empty() {
-            self.finite(seen, &mut reported);
+            self.check_finite_tick(observed, &mut reported);
         }
-        self.remembers(seen);
+        self.remember(observed);
         reported
     }
 
-    fn finite(&mut self, seen: &ObservedTick, reported: &mut Vec<Violation>) {
-        reported.extend(self.is_within_work(seen).err());
-        reported.extend(self.is_clamped(seen).err());
-        reported.extend(self.is_consistent(seen).err());
-        reported.extend(self.is_shaded(seen).err());
-        reported.extend(self.is_textured(seen).err());
-        if seen.is_touching() {
-            reported.extend(self.is_on_surface(seen).err());
+    fn check_finite_tick(&mut self, observed: &ObservedTick, reported: &mut Vec<Violation>) {
+        reported.extend(self.check_work(observed).err());
+        reported.extend(self.check_clamp(observed).err());
+        reported.extend(self.check_consistent(observed).err());
+        reported.extend(self.check_shading(observed).err());
+        reported.extend(self.check_texture_force(observed).err());
+        if observed.is_touching() {
+            reported.extend(self.check_on_surface(observed).err());
         }
-        if seen.is_touching() && seen.output.converged {
+        if observed.is_touching() && observed.output.converged {
             if self.friction.is_none() {
-                reported.extend(self.is_local_minimum(seen).err());
+                reported.extend(self.check_local_minimum(observed).err());
             } else {
-                reported.extend(self.is_in_cone(seen).err());
-                reported.extend(self.is_held_back(seen).err());
+                reported.extend(self.check_cone(observed).err());
+                reported.extend(self.check_held_back(observed).err());
             }
-            reported.extend(self.is_hip_below(seen).err());
+            reported.extend(self.check_hip_below(observed).err());
         }
-        if seen.is_free() {
-            reported.extend(self.is_above(seen, self.before.as_ref()).err());
+        if observed.is_free() {
+            reported.extend(self.check_above(observed, self.before.as_ref()).err());
         }
         if let Some(before) = self.before {
-            self.since(&before, seen, reported);
+            self.check_against_previous(&before, observed, reported);
         }
     }
 
-    fn since(&mut self, before: &ObservedTick, seen: &ObservedTick, reported: &mut Vec<Violation>) {
-        reported.extend(self.was_seen_above(before, seen).err());
-        reported.extend(self.fades(before, seen).err());
-        reported.extend(self.lets_go_gently(before, seen).err());
-        reported.extend(self.descends(before, seen).err());
-        reported.extend(self.stays_in_basin(before, seen).err());
-        reported.extend(self.advances(before, seen).err());
+    fn check_against_previous(
+        &mut self,
+        before: &ObservedTick,
+        observed: &ObservedTick,
+        reported: &mut Vec<Violation>,
+    ) {
+        reported.extend(self.check_seen_from_above(before, observed).err());
+        reported.extend(self.check_fade(before, observed).err());
+        reported.extend(self.check_release(before, observed).err());
+        reported.extend(self.check_descent(before, observed).err());
+        reported.extend(self.check_basin(before, observed).err());
+        reported.extend(self.check_advance(before, observed).err());
         if before.is_free() {
-            reported.extend(self.first_crossing(before, seen).err());
+            reported.extend(self.check_first_crossing(before, observed).err());
         }
-        reported.extend(self.passes_no_wall(before, seen).err());
+        reported.extend(self.check_no_wall_crossed(before, observed).err());
         if !self.friction.is_none() {
-            reported.extend(self.sticks(before, seen).err());
+            reported.extend(self.check_sticks(before, observed).err());
         }
     }
 
     /// Checks that the force is the untextured one plus the texture's.
-    fn is_textured(&mut self, seen: &ObservedTick) -> Verdict {
-        let judged = self.texture.as_mut().map(|judge| judge.look(seen));
-        match judged {
+    fn check_texture_force(&mut self, observed: &ObservedTick) -> Verdict {
+        let compared = self.texture.as_mut().map(|oracle| oracle.check(observed));
+        match compared {
             Some(Err(detail)) => self.fail(Invariant::Texture, detail),
             _ => Ok(()),
         }

@@ -20,36 +20,36 @@ struct Minimum {
 }
 
 impl TickOracle<'_> {
-    pub(super) fn is_on_surface(&mut self, seen: &ObservedTick) -> Verdict {
-        let [x, y, z] = seen.proxy;
-        let rounding = seen.rounding_of_corners(self.terrain);
+    pub(super) fn check_on_surface(&mut self, observed: &ObservedTick) -> Verdict {
+        let [x, y, z] = observed.proxy;
+        let rounding = observed.rounding_of_corners(self.terrain);
         let off = patches_at(self.terrain, x, y).map(|patch| {
             let above = (z - patch.height(x, y)).abs();
             (above - rounding).max(0.0) / patch.slope(x, y).hypot(1.0)
         });
         let off = off.fold(f64::INFINITY, f64::min);
-        if off > seen.allowed() {
-            let detail = format!("by {off:.3e} of {:.3e}: {seen:?}", seen.allowed());
+        if off > observed.allowed() {
+            let detail = format!("by {off:.3e} of {:.3e}: {observed:?}", observed.allowed());
             return self.fail(Invariant::OnSurface, detail);
         }
-        if seen.allowed() == ERROR {
+        if observed.allowed() == ERROR {
             self.measured.off_surface = self.measured.off_surface.max(off);
         }
         Ok(())
     }
 
-    pub(super) fn is_local_minimum(&mut self, seen: &ObservedTick) -> Verdict {
-        let minima = self.minima(seen.proxy, seen.hip);
+    pub(super) fn check_local_minimum(&mut self, observed: &ObservedTick) -> Verdict {
+        let minima = self.minima(observed.proxy, observed.hip);
         let error = minima.first().map(|nearest| nearest.off);
         let Some(error) = error else {
             return Ok(()); // off the surface: reported before
         };
-        self.measured.judged += 1;
+        self.measured.compared += 1;
         // Within the error bound of the HIP itself there is no force to check.
-        if !(ERROR..=FAR).contains(&distance(seen.proxy, seen.hip)) {
+        if !(ERROR..=FAR).contains(&distance(observed.proxy, observed.hip)) {
             return Ok(());
         }
-        let allowed = seen.allowed();
+        let allowed = observed.allowed();
         if error <= allowed {
             if allowed == ERROR {
                 self.measured.off_minimum = self.measured.off_minimum.max(error);
@@ -58,35 +58,35 @@ impl TickOracle<'_> {
         }
         self.measured.beyond += 1;
         // On a steep slope, rounding of the height decides which of two minima is nearer.
-        let tie = error + seen.rounding_of_corners(self.terrain);
+        let tie = error + observed.rounding_of_corners(self.terrain);
         let near = minima.iter().take_while(|minimum| minimum.off <= tie);
-        let verdicts = near.map(|minimum| self.is_near_in_plane(seen, minimum));
+        let verdicts = near.map(|minimum| self.check_near_in_plane(observed, minimum));
         verdicts.reduce(Verdict::or).unwrap_or(Ok(()))
     }
 
     /// On steep ground a unit in the last place of a coordinate is a large height, so the bound
     /// applies in the plane. It includes the motion of the minimum due to rounding of the HIP and
     /// of the corner heights.
-    fn is_near_in_plane(&self, seen: &ObservedTick, minimum: &Minimum) -> Verdict {
+    fn check_near_in_plane(&self, observed: &ObservedTick, minimum: &Minimum) -> Verdict {
         let Minimum {
             at, start, patch, ..
         } = *minimum;
-        let allowed = seen.allowed();
+        let allowed = observed.allowed();
         let moved = |axis: usize, by: f64| {
-            let mut hip = seen.hip;
+            let mut hip = observed.hip;
             hip[axis] += by;
             level(descent::from(self.terrain, hip, start, patch).at, at)
         };
-        let heights = patch.mixed_size(at[0], at[1], seen.hip[2]);
+        let heights = patch.mixed_size(at[0], at[1], observed.hip[2]);
         let up = allowed.max(4.0 * f64::from(f32::EPSILON) * heights);
         let moves = [(0, allowed), (1, allowed), (2, up)]
             .into_iter()
             .flat_map(|(axis, by)| [moved(axis, by), moved(axis, -by)]);
         let condition = moves.fold(0.0, f64::max);
-        let error = level(at, seen.proxy);
+        let error = level(at, observed.proxy);
         if error > 4.0 * (allowed + condition) {
             let detail = format!(
-                "{error:.3e} of {allowed:.3e} from {at:?}, truth moves {condition:.1e}: {seen:?}"
+                "{error:.3e} of {allowed:.3e} from {at:?}, truth moves {condition:.1e}: {observed:?}"
             );
             return self.fail(Invariant::LocalMinimum, detail);
         }
@@ -95,32 +95,32 @@ impl TickOracle<'_> {
 
     /// Checks that no contact pulls on a HIP that is free to leave: from no point of the proxy may
     /// the straight line to it start above the ground.
-    pub(super) fn is_hip_below(&self, seen: &ObservedTick) -> Verdict {
-        let above = starts(seen.proxy).map(|start| self.height_of_way(seen, start));
-        let above = above.fold(f64::INFINITY, |least, above| {
+    pub(super) fn check_hip_below(&self, observed: &ObservedTick) -> Verdict {
+        let above = starts(observed.proxy).map(|start| self.height_along(observed, start));
+        let above = above.fold(f64::INFINITY, |min, above| {
             // Over no-data there is no ground: the proxy is held at its edge.
-            least.min(above.unwrap_or(f64::NEG_INFINITY))
+            min.min(above.unwrap_or(f64::NEG_INFINITY))
         });
-        if above > 4.0 * seen.allowed() {
-            return self.fail(Invariant::HipBelow, format!("by {above:.3e}: {seen:?}"));
+        if above > 4.0 * observed.allowed() {
+            return self.fail(Invariant::HipBelow, format!("by {above:.3e}: {observed:?}"));
         }
         Ok(())
     }
 
     /// Returns the height of the HIP above the tangent plane of the patch into which the straight
     /// line from a point to it leads, or `None` if it leads into none.
-    fn height_of_way(&self, seen: &ObservedTick, start: [f64; 2]) -> Option<f64> {
-        let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
-        let level = way[0].hypot(way[1]);
+    fn height_along(&self, observed: &ObservedTick, start: [f64; 2]) -> Option<f64> {
+        let displacement = [0, 1, 2].map(|i| observed.hip[i] - observed.proxy[i]);
+        let level = displacement[0].hypot(displacement[1]);
         let patches = patches_at(self.terrain, start[0], start[1]);
-        let above = patches.filter(|patch| leads_into(start, way, patch));
+        let above = patches.filter(|patch| leads_into(start, displacement, patch));
         let above = above.map(|patch| {
             let [east, north] = patch.slopes(start[0], start[1]);
             // Rounding of the corner heights, and of the slope at a rounded position.
-            let heights = patch.mixed_size(start[0], start[1], seen.hip[2]);
+            let heights = patch.mixed_size(start[0], start[1], observed.hip[2]);
             let rounding = 4.0 * f64::from(f32::EPSILON) * heights;
             let unsure = rounding + 4.0 * ERROR * patch.twist().abs() * level;
-            let above = way[2] - east * way[0] - north * way[1];
+            let above = displacement[2] - east * displacement[0] - north * displacement[1];
             (above - unsure) / east.hypot(north).hypot(1.0)
         });
         above.reduce(f64::min)
@@ -151,8 +151,12 @@ impl TickOracle<'_> {
         minima
     }
 
-    pub(super) fn is_above(&self, seen: &ObservedTick, before: Option<&ObservedTick>) -> Verdict {
-        let [x, y, z] = seen.hip;
+    pub(super) fn check_above(
+        &self,
+        observed: &ObservedTick,
+        before: Option<&ObservedTick>,
+    ) -> Verdict {
+        let [x, y, z] = observed.hip;
         // On a grid line the HIP is over the patch to the north-east.
         let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
             return Ok(());
@@ -161,17 +165,20 @@ impl TickOracle<'_> {
         let before = before.map_or(z, |before| before.hip[2]);
         let fall = z.abs().max((z - before).abs());
         if below > ERROR.max(4.0 * f64::from(f32::EPSILON) * fall) {
-            return self.fail(Invariant::AboveSurface, format!("by {below:.3e}: {seen:?}"));
+            return self.fail(
+                Invariant::AboveSurface,
+                format!("by {below:.3e}: {observed:?}"),
+            );
         }
         Ok(())
     }
 }
 
 /// Returns true if a direction at a point of a patch leads into the patch, or along its border.
-fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
+fn leads_into(start: [f64; 2], displacement: [f64; 3], patch: &Patch) -> bool {
     (0..2).all(|axis| {
         let place = start[axis] - f64::from(patch.cell[axis]);
-        (place > 0.0 || way[axis] >= 0.0) && (place < 1.0 || way[axis] <= 0.0)
+        (place > 0.0 || displacement[axis] >= 0.0) && (place < 1.0 || displacement[axis] <= 0.0)
     })
 }
 

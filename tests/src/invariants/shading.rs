@@ -26,22 +26,24 @@ const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
 
 impl TickOracle<'_> {
     /// Checks the length, and without friction the direction inside a patch.
-    pub(super) fn is_shaded(&self, seen: &ObservedTick) -> Verdict {
-        let Some(shaded) = seen.shaded else {
+    pub(super) fn check_shading(&self, observed: &ObservedTick) -> Verdict {
+        let Some(shaded) = observed.shaded else {
             return Ok(());
         };
         let is_whole = shaded.is_whole;
         let shaded = shaded.displacement.as_dvec3();
-        let plain = seen.output.displacement.as_dvec3();
+        let plain = observed.output.displacement.as_dvec3();
         let off = (shaded.length() - plain.length()).abs();
         let is_long_enough = off <= LENGTH * plain.length() + 1e-30;
         if !is_long_enough {
             return self.fail(Invariant::Shading, format!("{shaded} of {plain}"));
         }
-        let [x, y, _] = seen.proxy;
+        let [x, y, _] = observed.proxy;
         let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
-        let is_reported =
-            is_whole && seen.is_touching() && seen.output.converged && plain.length() > SHORT;
+        let is_reported = is_whole
+            && observed.is_touching()
+            && observed.output.converged
+            && plain.length() > SHORT;
         if !is_reported || !inside(x) || !inside(y) || !self.friction.is_none() {
             return Ok(());
         }
@@ -55,11 +57,12 @@ impl TickOracle<'_> {
         let normal = DVec3::new(-east, -north, 1.0);
         // Without shading the force already deviates from its normal by this much.
         let allowed = ANGLE + angle(plain, normal);
-        let wanted = angle(normal, smoothed).min(MAX_TURN);
-        let left = (angle(normal, smoothed) - wanted).max(0.0);
+        let expected = angle(normal, smoothed).min(MAX_TURN);
+        let left = (angle(normal, smoothed) - expected).max(0.0);
         let off = angle(shaded, smoothed);
         if (off - left).abs() > allowed || shaded.dot(normal) < 0.0 {
-            let detail = format!("{shaded} is {off} rad from {smoothed}, {left} wanted: {seen:?}");
+            let detail =
+                format!("{shaded} is {off} rad from {smoothed}, {left} wanted: {observed:?}");
             return self.fail(Invariant::Shading, detail);
         }
         Ok(())

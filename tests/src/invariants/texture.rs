@@ -11,7 +11,7 @@ const TICK_S: f64 = 1e-3;
 /// Rounding, as a fraction of the depth and of the amplitude.
 const ROUNDING: f64 = 1e-5;
 /// Tolerance against pulling, as a fraction of the depth.
-const PULL: f64 = 1e-6;
+const TANGENTIAL_ROUNDING: f64 = 1e-6;
 /// Error bounds of the product's sine and of its slope.
 const SINE: f64 = 5e-4;
 const SLOPE: f64 = 1e-2;
@@ -20,8 +20,8 @@ const GRAIN: f64 = 1e-5;
 /// Additional tolerance, as a fraction of the texture's share, due to rounding of a speed.
 const SHARE: f64 = 1e-3;
 /// Depths whose squares are subnormal have no texture, cells.
-const SHALLOW: f64 = 2e-19;
-const DEEP: f64 = 1e18;
+const MIN_DEPTH: f64 = 2e-19;
+const MAX_DEPTH: f64 = 1e18;
 
 /// Checks the texture of one scene with cells of a millimetre, tick by tick.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub struct TextureOracle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Added {
     /// Addition to the displacement, cells.
-    pub(super) wanted: DVec3,
+    pub(super) expected: DVec3,
     /// Error bound of the displacement, cells.
     pub(super) allowed: f64,
 }
@@ -70,27 +70,29 @@ impl TextureOracle {
     ///
     /// # Errors
     /// The error of its force.
-    pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
-        let share = self.share(&seen.output.proxy);
-        let Some(textured) = seen.textured else {
+    pub fn check(&mut self, observed: &ObservedTick) -> Verdict {
+        let share = self.share(&observed.output.proxy);
+        let Some(textured) = observed.textured else {
             return Ok(());
         };
-        let shaded = seen.shaded.map(|shaded| shaded.displacement);
-        let plain = shaded.unwrap_or(seen.output.displacement).as_dvec3();
+        let shaded = observed.shaded.map(|shaded| shaded.displacement);
+        let plain = shaded.unwrap_or(observed.output.displacement).as_dvec3();
         let (textured, depth) = (textured.as_dvec3(), plain.length());
-        if !(SHALLOW..DEEP).contains(&depth) {
-            let same = (textured - plain).length() <= SHALLOW;
-            return held(same || depth >= DEEP, || format!("{textured} of {plain}"));
+        if !(MIN_DEPTH..MAX_DEPTH).contains(&depth) {
+            let same = (textured - plain).length() <= MIN_DEPTH;
+            return held(same || depth >= MAX_DEPTH, || {
+                format!("{textured} of {plain}")
+            });
         }
         let normal = plain / depth;
-        held(textured.dot(normal) >= -PULL * depth, || {
+        held(textured.dot(normal) >= -TANGENTIAL_ROUNDING * depth, || {
             format!("{textured} pulls, of {plain}")
         })?;
-        let Added { wanted, allowed } = self.adds(plain, &seen.output.proxy, share);
-        let off = (textured - plain - wanted * share).length();
+        let Added { expected, allowed } = self.adds(plain, &observed.output.proxy, share);
+        let off = (textured - plain - expected * share).length();
         let reported = || {
             format!(
-                "{textured} is {off:e} off {plain} and {share} of {wanted}, {allowed:e} may be: {seen:?}"
+                "{textured} is {off:e} off {plain} and {share} of {expected}, {allowed:e} may be: {observed:?}"
             )
         };
         // Exact, if the proxy is too fast for any texture.
@@ -108,7 +110,8 @@ impl TextureOracle {
         let slopes = slopes - normal * slopes.dot(normal);
         let deepest = wavelength * wavelength / (48.0 * amplitude);
         let output = depth.min(deepest);
-        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
+        let expected =
+            normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
         let (high, steep) = match self.texture.pattern {
             Pattern::Grain => (GRAIN, GRAIN),
             _ => (SINE, SLOPE),
@@ -119,7 +122,7 @@ impl TextureOracle {
             + output * steepest * (steep + 8.0 * misplaced)
             + SHARE * (amplitude.min(depth) + output * steepest) * f64::from(u8::from(share < 1.0))
             + ROUNDING * depth;
-        Added { wanted, allowed }
+        Added { expected, allowed }
     }
 
     /// Returns the height and slope of the whole texture at a point and depth, cells.
@@ -159,8 +162,8 @@ impl TextureOracle {
     /// a tick.
     pub(super) fn share(&mut self, proxy: &GridPoint) -> f64 {
         let now = self.before.map_or(1.0, |before| {
-            let way = before.to(proxy).as_dvec3();
-            (way.x.hypot(way.y) / self.sizes().1).min(1.0)
+            let displacement = before.to(proxy).as_dvec3();
+            (displacement.x.hypot(displacement.y) / self.sizes().1).min(1.0)
         });
         self.before = Some(*proxy);
         self.speed = now + (self.speed - now).max(0.0) * (1.0 - 100.0 * TICK_S);
@@ -194,14 +197,14 @@ fn height_and_slopes(texture: &Texture, at: &GridPoint) -> (f64, DVec3) {
         return (height, DVec3::new(east, north, 0.0) * per_cell);
     }
     let angle = f64::from(texture.direction_deg).to_radians();
-    let way = DVec3::new(angle.cos(), angle.sin(), 0.0);
+    let direction = DVec3::new(angle.cos(), angle.sin(), 0.0);
     // Rounded once, as in the product.
-    let [east, north] = [way.x, way.y].map(|part| (part as f32) * waves);
+    let [east, north] = [direction.x, direction.y].map(|part| (part as f32) * waves);
     let seed = f64::from(scrambled(texture.seed)) / 2_f64.powi(32);
     let turns = counted(east, cell[0], frac.x).1 + counted(north, cell[1], frac.y).1 + seed;
     let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
     let steepness = amplitude * std::f64::consts::TAU * f64::from(waves) * cos;
-    (sin, way * steepness)
+    (sin, direction * steepness)
 }
 
 /// Returns the integer and fractional part of a coordinate times a number per cell.

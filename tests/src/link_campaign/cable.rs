@@ -8,11 +8,11 @@ use crate::random::Random;
 /// not read.
 const CAPACITY: usize = 8 << 10;
 /// Bytes that a device may send in a tick, about as many as over full-speed USB.
-pub const A_TICK: usize = 1_024;
+pub const BYTES_PER_TICK: usize = 1_024;
 
 /// Fault of one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Harm {
+pub struct LineFaults {
     /// Share of bytes in which a bit flips.
     pub flipped: f64,
     /// Share of transfers that lose a run of bytes.
@@ -27,7 +27,7 @@ pub struct Harm {
     pub cut: bool,
 }
 
-impl Harm {
+impl LineFaults {
     /// No fault.
     pub const NONE: Self = Self {
         flipped: 0.0,
@@ -41,17 +41,17 @@ impl Harm {
 
 /// One direction.
 #[derive(Default)]
-pub struct Way {
+pub struct Channel {
     transfers: VecDeque<(u64, Vec<u8>)>,
     held: usize,
-    harm: Harm,
+    faults: LineFaults,
 }
 
-impl Way {
+impl Channel {
     /// Sets its fault from now on.
-    pub fn harm(&mut self, harm: Harm) {
-        self.harm = harm;
-        if harm.cut {
+    pub fn set_faults(&mut self, faults: LineFaults) {
+        self.faults = faults;
+        if faults.cut {
             self.transfers.clear();
             self.held = 0;
         }
@@ -65,21 +65,21 @@ impl Way {
 
     /// Sends a transfer at `now`, ms.
     pub fn send(&mut self, bytes: &[u8], now: u64, random: &mut Random) {
-        if bytes.is_empty() || self.harm.cut {
+        if bytes.is_empty() || self.faults.cut {
             return;
         }
         let mut transfer = bytes.to_vec();
-        flip(&mut transfer, self.harm.flipped, random);
-        if happens(self.harm.dropped, random) {
+        flip(&mut transfer, self.faults.flipped, random);
+        if happens(self.faults.dropped, random) {
             let from = random.below(transfer.len());
             let to = (from + 1 + random.below(80)).min(transfer.len());
             transfer.drain(from..to);
         }
-        let late = random.below(self.harm.late as usize + 1) as u64;
+        let late = random.below(self.faults.late as usize + 1) as u64;
         // Bytes do not overtake each other.
         let due = self.transfers.back().map_or(0, |(due, _)| *due);
         let due = due.max(now + late);
-        let times = 1 + usize::from(happens(self.harm.twice, random));
+        let times = 1 + usize::from(happens(self.faults.twice, random));
         for _ in 0..times {
             self.held += transfer.len();
             self.transfers.push_back((due, transfer.clone()));
@@ -89,7 +89,7 @@ impl Way {
     /// Returns the next transfer that has arrived.
     pub fn receive(&mut self, now: u64) -> Option<Vec<u8>> {
         let (due, _) = self.transfers.front()?;
-        if self.harm.stalled || *due > now {
+        if self.faults.stalled || *due > now {
             return None;
         }
         let (_, transfer) = self.transfers.pop_front()?;
@@ -146,24 +146,24 @@ mod tests {
     #[test]
     fn stalled_bytes_are_delayed_and_cut_bytes_are_lost() {
         let mut random = Random::new(2);
-        let mut way = Way::default();
-        let stalled = Harm {
+        let mut channel = Channel::default();
+        let stalled = LineFaults {
             stalled: true,
-            ..Harm::NONE
+            ..LineFaults::NONE
         };
-        way.harm(stalled);
-        way.send(b"held", 1, &mut random);
-        assert_eq!((way.receive(9), way.room()), (None, CAPACITY - 4));
-        way.harm(Harm::NONE);
-        assert_eq!(way.receive(9), Some(b"held".to_vec()));
-        let cut = Harm {
+        channel.set_faults(stalled);
+        channel.send(b"held", 1, &mut random);
+        assert_eq!((channel.receive(9), channel.room()), (None, CAPACITY - 4));
+        channel.set_faults(LineFaults::NONE);
+        assert_eq!(channel.receive(9), Some(b"held".to_vec()));
+        let cut = LineFaults {
             cut: true,
-            ..Harm::NONE
+            ..LineFaults::NONE
         };
-        way.send(b"gone", 10, &mut random);
-        way.harm(cut);
-        way.send(b"gone", 11, &mut random);
-        way.harm(Harm::NONE);
-        assert_eq!((way.receive(99), way.room()), (None, CAPACITY));
+        channel.send(b"gone", 10, &mut random);
+        channel.set_faults(cut);
+        channel.send(b"gone", 11, &mut random);
+        channel.set_faults(LineFaults::NONE);
+        assert_eq!((channel.receive(99), channel.room()), (None, CAPACITY));
     }
 }

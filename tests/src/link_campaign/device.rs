@@ -10,9 +10,9 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use super::cable::A_TICK;
-use crate::campaign::arm::{Arm, Mood};
-use crate::campaign::tick_invariants::{Truth, Watch};
+use super::cable::BYTES_PER_TICK;
+use crate::campaign::arm::{Arm, HandMotion};
+use crate::campaign::tick_invariants::{TickChecks, Truth};
 use crate::random::Random;
 
 /// Tiles along the side of the window, as on the smallest board.
@@ -23,11 +23,11 @@ pub struct Board<'t> {
     device: Device<StoppedClock, WINDOW>,
     arm: Arm<'t>,
     /// Checks every tick against its bounds.
-    pub watch: Watch,
+    pub tick_checks: TickChecks,
     /// True if the hand holds the dead-man switch.
     pub dead_man: bool,
     /// Behaviour of the hand.
-    pub mood: Mood,
+    pub hand_motion: HandMotion,
     /// Commands to the amplifiers in the last tick.
     pub drive: GuardOutputs,
     /// True if the device's time stops while it waits for the host.
@@ -43,9 +43,9 @@ impl<'t> Board<'t> {
         Self {
             device: start(),
             arm: Arm::new(terrain, random),
-            watch: Watch::new(record, PhantomModel::premium_1_5()),
+            tick_checks: TickChecks::new(record, PhantomModel::premium_1_5()),
             dead_man: false,
-            mood: Mood::Lifted,
+            hand_motion: HandMotion::Lifted,
             drive: GuardOutputs::default(),
             lock_step: false,
             ticks: [0; 2],
@@ -62,7 +62,7 @@ impl<'t> Board<'t> {
     pub fn restart(&mut self) {
         self.device = start();
         self.drive = GuardOutputs::default();
-        self.watch.forget();
+        self.tick_checks.reset();
     }
 
     /// Reports an interruption of the transport.
@@ -76,10 +76,10 @@ impl<'t> Board<'t> {
     }
 
     /// Returns the bytes that the device sends, up to `room`.
-    pub fn say<'b>(&mut self, into: &'b mut [u8; A_TICK], room: usize) -> &'b [u8] {
-        let room = room.min(A_TICK);
-        let stated = self.device.link.transmit(&mut into[..room]);
-        &into[..stated]
+    pub fn transmit<'b>(&mut self, into: &'b mut [u8; BYTES_PER_TICK], room: usize) -> &'b [u8] {
+        let room = room.min(BYTES_PER_TICK);
+        let sent = self.device.link.transmit(&mut into[..room]);
+        &into[..sent]
     }
 
     /// Runs one tick of device and arm.
@@ -105,9 +105,10 @@ impl<'t> Board<'t> {
             counts: plant.counts(),
             winding_c: plant.winding_c(),
         };
-        self.watch.drive(&self.drive, &sense, [0; 3], &truth)?;
+        self.tick_checks
+            .check_outputs(&self.drive, &sense, [0; 3], &truth)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
-        self.arm.step(currents, self.mood);
+        self.arm.step(currents, self.hand_motion);
         self.ticks[0] += 1;
         self.ticks[1] += u64::from(self.drive.enabled);
         Ok(())

@@ -1,6 +1,6 @@
 //! Faults of the link, and their durations.
 
-use super::cable::Harm;
+use super::cable::LineFaults;
 use crate::random::Random;
 
 /// Kind of a link fault.
@@ -75,7 +75,7 @@ pub struct Fault {
     pub end: u64,
     share: f64,
     /// Directions that a fault of the bytes affects: to the device, to the host.
-    ways: [bool; 2],
+    directions: [bool; 2],
 }
 
 impl Fault {
@@ -90,46 +90,46 @@ impl Fault {
             kind,
             end: now + shortest as u64 + length as u64,
             share: random.between(0.0, 1.0),
-            ways: [[true, true], [true, false], [false, true]][random.below(3)],
+            directions: [[true, true], [true, false], [false, true]][random.below(3)],
         }
     }
 
     /// Returns its faults for the directions to the device and to the host.
     #[must_use]
-    pub fn harms(&self) -> [Harm; 2] {
-        let harm = match self.kind {
-            Kind::Flips => Harm {
+    pub fn line_faults(&self) -> [LineFaults; 2] {
+        let faults = match self.kind {
+            Kind::Flips => LineFaults {
                 flipped: libm::pow(10.0, -6.0 + 4.0 * self.share),
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Drops => Harm {
+            Kind::Drops => LineFaults {
                 dropped: 0.001 + 0.4 * self.share * self.share,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Duplicates => Harm {
+            Kind::Duplicates => LineFaults {
                 twice: 0.02 + 0.98 * self.share,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Delays => Harm {
+            Kind::Delays => LineFaults {
                 late: 5 + (400.0 * self.share) as u32,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::Stall => Harm {
+            Kind::Stall => LineFaults {
                 stalled: true,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            Kind::DeafHost | Kind::DeafDevice | Kind::Cut => Harm {
+            Kind::DeafHost | Kind::DeafDevice | Kind::Cut => LineFaults {
                 cut: true,
-                ..Harm::NONE
+                ..LineFaults::NONE
             },
-            _ => Harm::NONE,
+            _ => LineFaults::NONE,
         };
-        let ways = match self.kind {
+        let directions = match self.kind {
             Kind::DeafHost => [false, true],
             Kind::DeafDevice => [true, false],
             Kind::Stall | Kind::Cut => [true, true],
-            _ => self.ways,
+            _ => self.directions,
         };
-        ways.map(|harmed| if harmed { harm } else { Harm::NONE })
+        directions.map(|is_faulty| if is_faulty { faults } else { LineFaults::NONE })
     }
 }

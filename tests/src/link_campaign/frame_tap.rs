@@ -62,31 +62,31 @@ impl Tap {
     /// Returns the samples made between the first and the last one that left the device since
     /// [`Tap::begin`], by their ticks, with those that never left.
     #[must_use]
-    pub fn made(&self) -> u64 {
+    pub fn samples_made(&self) -> u64 {
         self.before + self.ticks.map_or(0, length)
     }
 
     /// Returns an upper bound of the samples made but not sent at this tick of the device: for each
     /// scene, the ticks since its last sample.
     #[must_use]
-    pub fn unseen(&self, ticks: u64) -> u64 {
-        self.replaced + self.made_since(ticks)
+    pub fn max_unsent(&self, ticks: u64) -> u64 {
+        self.replaced + self.samples_since(ticks)
     }
 
-    fn made_since(&self, ticks: u64) -> u64 {
+    fn samples_since(&self, ticks: u64) -> u64 {
         let last = self.ticks.map_or(0, |(_, last)| u64::from(last));
         ticks.saturating_sub(self.lead.saturating_add(last))
     }
 
     /// Reads bytes from the device.
-    pub fn hear(&mut self, mut bytes: &[u8], when: &Moment) {
+    pub fn receive(&mut self, mut bytes: &[u8], when: &Moment) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
             // A frame cut short by an open is dropped.
-            let stated = frame.and_then(|frame| frames::said_by_device(frame.ok()?));
-            if let Some(stated) = stated.filter(|stated| Some(stated.session) == self.session) {
-                self.on_message(&stated.message, when);
+            let framed = frame.and_then(|frame| frames::parse_device_frame(frame.ok()?));
+            if let Some(framed) = framed.filter(|framed| Some(framed.session) == self.session) {
+                self.on_message(&framed.message, when);
             }
         }
     }
@@ -117,7 +117,7 @@ impl Tap {
             // A lower tick belongs to a new scene, whose ticks begin with 1.
             Some(scene) => {
                 self.before += length(scene);
-                self.replaced += taken.map_or(0, |ticks| self.made_since(ticks));
+                self.replaced += taken.map_or(0, |ticks| self.samples_since(ticks));
                 self.lead = u64::MAX;
                 (1, tick)
             }
@@ -141,7 +141,7 @@ mod tests {
     fn samples_dropped_by_a_new_scene_count_as_unseen() {
         let mut tap = Tap::default();
         tap.begin(None);
-        let mut say = |ticks: u64, message: ToHost| {
+        let mut send = |ticks: u64, message: ToHost| {
             let (now, flows) = (ticks, true);
             tap.on_message(&message, &Moment { now, ticks, flows });
         };
@@ -160,14 +160,14 @@ mod tests {
             accepted: true,
         };
         // The first scene runs for 19 ticks; its acknowledgement is repeated in between.
-        say(0, taken());
-        say(9, samples(1));
-        say(12, taken());
-        say(17, samples(9));
-        say(20, taken());
-        say(20, taken());
-        say(29, samples(1));
-        assert_eq!((tap.made(), tap.unseen(29)), (24, 3));
-        assert_eq!(tap.unseen(31), 5);
+        send(0, taken());
+        send(9, samples(1));
+        send(12, taken());
+        send(17, samples(9));
+        send(20, taken());
+        send(20, taken());
+        send(29, samples(1));
+        assert_eq!((tap.samples_made(), tap.max_unsent(29)), (24, 3));
+        assert_eq!(tap.max_unsent(31), 5);
     }
 }

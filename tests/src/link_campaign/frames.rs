@@ -31,23 +31,23 @@ pub fn version_check(check: VersionCheck) -> Vec<u8> {
 
 /// Returns a device's message in a frame, and its session.
 #[must_use]
-pub fn said_by_device(frame: &[u8]) -> Option<InSession<ToHost>> {
+pub fn parse_device_frame(frame: &[u8]) -> Option<InSession<ToHost>> {
     decode(frame).ok()
 }
 
 /// Returns a host's message in a frame, and its session.
 #[must_use]
-pub fn stated_by_host(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
+pub fn parse_host_frame(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
     decode(frame).ok()
 }
 
 /// Returns an encoded copy of a device's frame, modified by `change`.
 #[must_use]
-pub fn changed(frame: &[u8], change: impl FnOnce(&mut ToHost)) -> Option<Vec<u8>> {
+pub fn modified(frame: &[u8], change: impl FnOnce(&mut ToHost)) -> Option<Vec<u8>> {
     let InSession {
         session,
         mut message,
-    } = said_by_device(frame)?;
+    } = parse_device_frame(frame)?;
     change(&mut message);
     Some(from_device(session, &message))
 }

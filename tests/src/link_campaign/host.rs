@@ -49,7 +49,7 @@ pub struct Host<'t> {
     /// True if the scene is active.
     pub opened: bool,
     /// True if it has requested arming.
-    pub asked: bool,
+    pub requested_arming: bool,
     /// The report to its user on that request.
     pub reported: Reported,
     /// State of the device's guard, as shown to its user.
@@ -76,7 +76,7 @@ impl<'t> Host<'t> {
             client,
             last_end: None,
             opened: false,
-            asked: false,
+            requested_arming: false,
             reported: Reported::Nothing,
             view: None,
             samples: Vec::new(),
@@ -98,7 +98,7 @@ impl<'t> Host<'t> {
 
     /// Requests to clear a fault, to zero the arm and to arm it.
     pub fn arm(&mut self) {
-        self.asked = true;
+        self.requested_arming = true;
         let zero = Request::Zero { counts: [0; 3] };
         let seen = self.view.and_then(|view| view.fault);
         let clear = Request::ClearFault { seen };
@@ -118,15 +118,15 @@ impl<'t> Host<'t> {
             return;
         }
         let was_leaving = self.client.state() == State::Leaving;
-        let gone_on = self.go_on(Duration::from_millis(now), bytes, out);
-        self.end = match gone_on {
+        let result = self.process(Duration::from_millis(now), bytes, out);
+        self.end = match result {
             Err(error) => Some(End::Reported(error)),
             Ok(()) if was_leaving && self.client.state() == State::Closed => Some(End::Agreed),
             Ok(()) => None,
         };
     }
 
-    fn go_on(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), LinkError> {
+    fn process(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), LinkError> {
         let Self {
             client,
             last_end,
@@ -158,13 +158,13 @@ impl<'t> Host<'t> {
 
     /// Returns true if its user sees that the arm waits for the dead-man switch.
     #[must_use]
-    pub fn waits_for_the_hand(&self) -> bool {
-        self.sees(&[Mode::Requested])
+    pub fn is_waiting_for_press(&self) -> bool {
+        self.is_in_mode(&[Mode::Requested])
     }
 
     /// Returns true if its user sees that the device is in one of these modes.
     #[must_use]
-    pub fn sees(&self, modes: &[Mode]) -> bool {
+    pub fn is_in_mode(&self, modes: &[Mode]) -> bool {
         self.view.is_some_and(|view| modes.contains(&view.mode))
     }
 }

@@ -19,13 +19,13 @@ use super::frames;
 use crate::random::Random;
 
 /// Most bytes of a hostile program in a millisecond.
-const A_MILLISECOND: usize = 2_048;
+const BYTES_PER_MS: usize = 2_048;
 
 /// Returns a hostile host's bytes of a millisecond.
 pub fn host(random: &mut Random) -> Vec<u8> {
     match random.below(6) {
-        0 => noise(random, A_MILLISECOND),
-        1 => vec![0; random.below(A_MILLISECOND)],
+        0 => noise(random, BYTES_PER_MS),
+        1 => vec![0; random.below(BYTES_PER_MS)],
         // The start of a frame without its end, or an end without a start.
         2 => {
             let frame = host_frame(random);
@@ -38,18 +38,18 @@ pub fn host(random: &mut Random) -> Vec<u8> {
             part.to_vec()
         }
         _ => {
-            let mut stated = Vec::new();
+            let mut bytes = Vec::new();
             for _ in 0..1 + random.below(8) {
-                stated.extend(host_frame(random));
+                bytes.extend(host_frame(random));
             }
-            stated.truncate(A_MILLISECOND);
-            stated
+            bytes.truncate(BYTES_PER_MS);
+            bytes
         }
     }
 }
 
-fn noise(random: &mut Random, most: usize) -> Vec<u8> {
-    let length = random.below(most);
+fn noise(random: &mut Random, max_bytes: usize) -> Vec<u8> {
+    let length = random.below(max_bytes);
     (0..length).map(|_| random.bits() as u8).collect()
 }
 
@@ -191,9 +191,9 @@ pub enum Behaviour {
     /// It sends one byte every half second.
     Drips,
     /// It answers each open, and sends nothing else.
-    GreetsOnly,
+    OpensOnly,
     /// It accepts every scene, then requests non-existent tiles as fast as it can.
-    AsksForEverything,
+    RequestsEverything,
     /// It accepts every scene, then refuses the protocol that both use, and others.
     RefusesLate,
     /// It accepts every scene and sends samples with random numbers.
@@ -208,8 +208,8 @@ impl Behaviour {
         Self::Mute,
         Self::Noise,
         Self::Drips,
-        Self::GreetsOnly,
-        Self::AsksForEverything,
+        Self::OpensOnly,
+        Self::RequestsEverything,
         Self::RefusesLate,
         Self::CountsWildly,
         Self::RefusesScenes,
@@ -217,7 +217,7 @@ impl Behaviour {
 
     /// Returns its bytes in the millisecond `now` to a host that serves a scene and has sent an
     /// open with this number.
-    pub fn say(
+    pub fn bytes_to_send(
         self,
         now: u64,
         scene: &Scene,
@@ -225,38 +225,38 @@ impl Behaviour {
         random: &mut Random,
     ) -> Vec<u8> {
         let often = now.is_multiple_of(10);
-        let mut stated = Vec::new();
-        let mut tell = |message: ToHost| stated.extend(frames::from_device(session, &message));
+        let mut bytes = Vec::new();
+        let mut send = |message: ToHost| bytes.extend(frames::from_device(session, &message));
         let greets = !matches!(self, Self::Mute | Self::Noise | Self::Drips);
         if greets && often {
-            tell(ToHost::Hello(hello(number)));
+            send(ToHost::Hello(hello(number)));
         }
         let epoch = scene.epoch;
-        if greets && often && self != Self::GreetsOnly {
+        if greets && often && self != Self::OpensOnly {
             let accepted = self != Self::RefusesScenes;
-            tell(ToHost::SceneAck { epoch, accepted });
+            send(ToHost::SceneAck { epoch, accepted });
         }
         match self {
-            Self::Noise => return noise(random, A_MILLISECOND),
+            Self::Noise => return noise(random, BYTES_PER_MS),
             Self::Drips if now.is_multiple_of(500) => return vec![random.bits() as u8],
-            Self::AsksForEverything => {
+            Self::RequestsEverything => {
                 for _ in 0..20 {
                     let (level, row) = (random.bits() as u8, random.bits() as i32);
                     let key = TileKey::new(level, i32::MAX, row);
-                    tell(ToHost::TileRequest { epoch, key });
+                    send(ToHost::TileRequest { epoch, key });
                 }
             }
             Self::RefusesLate if now.is_multiple_of(100) => {
                 let protocol = [PROTOCOL, PROTOCOL + 1][random.below(2)];
-                stated.extend(frames::version_check(VersionCheck::Refused { protocol }));
+                bytes.extend(frames::version_check(VersionCheck::Refused { protocol }));
             }
             Self::CountsWildly => {
-                tell(ToHost::Telemetry(Telemetry {
+                send(ToHost::Telemetry(Telemetry {
                     first: random.bits() as u32,
                     dropped: random.bits() as u32,
                     samples: [TickRecord::default(); 8].into_iter().collect(),
                 }));
-                tell(ToHost::Heartbeat {
+                send(ToHost::Heartbeat {
                     epoch: Some(epoch),
                     count: count(random),
                     report: Report::default(),
@@ -264,7 +264,7 @@ impl Behaviour {
             }
             _ => {}
         }
-        stated
+        bytes
     }
 }
 

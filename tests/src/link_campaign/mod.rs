@@ -87,7 +87,12 @@ pub fn segment(seed: u64, number: u64, stats: &mut LinkStats) -> Result<(), Viol
         .into_iter()
         .try_for_each(|kind| runs::run(&mut segment, kind, stats).map_err(|what| (kind, what)));
     let (board, off) = (&segment.board, segment.off_surface);
-    stats.add(board.ticks, segment.touching, off, &board.watch.extremes);
+    stats.add(
+        board.ticks,
+        segment.touching,
+        off,
+        &board.tick_checks.extremes,
+    );
     played.map_err(|(kind, what)| Violation {
         ground: crate::campaign::Ground::Ice,
         segment: number,
@@ -99,8 +104,8 @@ pub fn segment(seed: u64, number: u64, stats: &mut LinkStats) -> Result<(), Viol
 /// Returns hills or steps; no sample is higher above a tile's base than
 /// [`proxy_oracle::OFF_SURFACE`] allows for.
 fn terrain(random: &mut Random) -> Raster {
-    let looks = [Look::Fractal, Look::Ridge, Look::Fractal];
+    let kinds = [Look::Fractal, Look::Ridge, Look::Fractal];
     let amplitude_mm = random.between(6.0, 16.0);
-    let synth = Synth::new(looks[random.below(3)], random.bits(), amplitude_mm);
+    let synth = Synth::new(kinds[random.below(3)], random.bits(), amplitude_mm);
     Raster::from_fn(SAMPLES, SAMPLES, |column, row| synth.height(column, row)).expect("a terrain")
 }

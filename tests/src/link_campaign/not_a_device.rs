@@ -11,45 +11,45 @@ use super::run_outcomes::Outcome;
 use super::segment::Segment;
 
 /// Time that the host stays connected to it, ms.
-const MEETS: u64 = 12_000;
+const SESSION_TICKS: u64 = 12_000;
 /// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
 /// Time that closing may take, ms.
 const LEAVES: u64 = 3_500;
 /// Most bytes that a host may send in a second, whatever it is connected to.
-const A_SECOND: usize = 1 << 20;
+const MAX_BYTES_PER_SECOND: usize = 1 << 20;
 
 /// Connects a host to such a program. Returns the outcome.
 ///
 /// # Errors
 /// If the run does not end, or the host sends without bound.
-pub fn meet(segment: &mut Segment<'_>) -> Result<Outcome, String> {
+pub fn run_against_other_program(segment: &mut Segment<'_>) -> Result<Outcome, String> {
     let behaviour = Behaviour::ALL[segment.random.below(Behaviour::ALL.len())];
-    let outcome = talk(segment, behaviour);
+    let outcome = run_session(segment, behaviour);
     outcome.map_err(|what| format!("{behaviour:?}: {what}"))
 }
 
-fn talk(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcome, String> {
+fn run_session(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcome, String> {
     let began = segment.now;
     let chance = &mut segment.random;
     let mut out = Vec::new();
     let mut host = Host::start(segment.terrain, segment.scene, began, chance, &mut out);
     let mut hellos = Hellos::default();
-    let mut stated = 0;
-    for now in began..=began + MEETS + LEAVES {
-        if now == began + MEETS {
+    let mut sent = 0;
+    for now in began..=began + SESSION_TICKS + LEAVES {
+        if now == began + SESSION_TICKS {
             host.leave(now, &mut out);
         }
-        stated += out.len();
-        hellos.hear(&out);
+        sent += out.len();
+        hellos.receive(&out);
         out.clear();
         let reported = (host.session(), hellos.last);
-        let received = behaviour.say(now, &segment.scene, reported, chance);
+        let received = behaviour.bytes_to_send(now, &segment.scene, reported, chance);
         host.step(now, &received, &mut out);
         host.samples.clear();
         let seconds = 1 + ((now - began) / 1_000) as usize;
-        if stated > seconds * A_SECOND {
-            return Err(format!("the host said {stated} bytes in {seconds} s"));
+        if sent > seconds * MAX_BYTES_PER_SECOND {
+            return Err(format!("the host said {sent} bytes in {seconds} s"));
         }
         match &host.end {
             Some(End::Agreed) => return Err("the end was agreed on with no device".into()),
@@ -72,12 +72,12 @@ struct Hellos {
 }
 
 impl Hellos {
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn receive(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
-            let stated = frame.and_then(|frame| frames::stated_by_host(frame.ok()?));
-            if let Some(ToDevice::Hello(hello)) = stated.map(|stated| stated.message) {
+            let message = frame.and_then(|frame| frames::parse_host_frame(frame.ok()?));
+            if let Some(ToDevice::Hello(hello)) = message.map(|message| message.message) {
                 self.last = hello.number;
             }
         }

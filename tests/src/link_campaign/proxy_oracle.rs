@@ -17,7 +17,7 @@ pub const OFF_SURFACE: f64 = 2e-6 + 4.0 * 64.0 * f32::EPSILON as f64;
 ///
 /// # Errors
 /// If it is above [`OFF_SURFACE`].
-pub fn judge(terrain: &Terrain<'_>, sample: &TickRecord) -> Result<f64, String> {
+pub fn check(terrain: &Terrain<'_>, sample: &TickRecord) -> Result<f64, String> {
     if sample.state != ContactState::Touching {
         return Ok(0.0);
     }

@@ -62,7 +62,7 @@ impl LinkStats {
         self.ticks = [0, 1].map(|i| self.ticks[i] + ticks[i]);
         self.touching += touching;
         self.off_surface = self.off_surface.max(off_surface);
-        self.extremes = self.extremes.or(*extremes);
+        self.extremes = self.extremes.max(*extremes);
     }
 
     /// Returns the number of runs with this kind of fault.

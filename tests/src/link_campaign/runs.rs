@@ -6,7 +6,7 @@ use super::host::{End, Reported, SILENCE_S};
 use super::not_a_device;
 use super::run_outcomes::{LinkStats, Outcome};
 use super::segment::Segment;
-use crate::campaign::arm::Mood;
+use crate::campaign::arm::HandMotion;
 use hapterra_core::guard::Mode;
 
 /// Time that a session may take to open or to fail, ms.
@@ -22,10 +22,10 @@ const REACTION: u64 = 150;
 /// Time that a host may be silent, as configured by these hosts, ms.
 const SILENCE: u64 = 1_000 * SILENCE_S as u64;
 /// Time that the force may then take to fade, ms.
-const LETS_GO: u64 = 300;
+const RELEASE_TICKS: u64 = 300;
 /// Largest time from the last message at the device to the loss of its host, ms: heartbeats are
 /// sent twice a second, and a faulty line may lose some.
-const AGO: u64 = 700;
+const MAX_AGE: u64 = 700;
 /// Tile requests that a device may repeat early in a session: those in transit when it began.
 const IN_FLIGHT: u32 = 4;
 
@@ -34,8 +34,8 @@ const IN_FLIGHT: u32 = 4;
 enum Step {
     Open,
     Arm,
-    Feel,
-    Leave,
+    Touch,
+    Close,
 }
 
 /// Injected faults of a run, with their steps.
@@ -53,7 +53,7 @@ struct Plan {
 /// The broken invariant.
 pub fn run(segment: &mut Segment<'_>, kind: Kind, stats: &mut LinkStats) -> Result<(), String> {
     if kind == Kind::HostileDevice {
-        let outcome = not_a_device::meet(segment)?;
+        let outcome = not_a_device::run_against_other_program(segment)?;
         stats.count(kind, outcome);
         return Ok(());
     }
@@ -69,10 +69,10 @@ pub fn run(segment: &mut Segment<'_>, kind: Kind, stats: &mut LinkStats) -> Resu
 
 /// Plays a run. Returns its outcome, if the planned fault happened.
 fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, String> {
-    let steps = [Step::Open, Step::Arm, Step::Feel, Step::Leave];
+    let steps = [Step::Open, Step::Arm, Step::Touch, Step::Close];
     let step = steps[segment.random.below(4)];
     // A host that leaves is gone when the force has faded, within a tenth of a second.
-    let within = if step == Step::Leave { 90 } else { 400 };
+    let within = if step == Step::Close { 90 } else { 400 };
     let plan = Plan {
         kind,
         step,
@@ -87,7 +87,7 @@ fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, Str
         is_whole: true,
     };
     let outcome = run.play()?;
-    run.afterwards()?;
+    run.release_switch()?;
     Ok(run.plan.done.then_some(outcome))
 }
 
@@ -113,7 +113,7 @@ impl Run<'_, '_> {
 
     /// Runs all steps, or up to the end of the run.
     fn steps(&mut self) -> Result<Outcome, String> {
-        for step in [Step::Open, Step::Arm, Step::Feel, Step::Leave] {
+        for step in [Step::Open, Step::Arm, Step::Touch, Step::Close] {
             if let Some(outcome) = self.take(step)? {
                 return Ok(outcome);
             }
@@ -128,14 +128,14 @@ impl Run<'_, '_> {
         let mut pressed = None;
         match step {
             Step::Arm => self.segment.with_host(|host, _, _| host.arm()),
-            Step::Leave => self
+            Step::Close => self
                 .segment
                 .with_host(|host, now, out| host.leave(now, out)),
-            Step::Open | Step::Feel => {}
+            Step::Open | Step::Touch => {}
         }
         loop {
             let at = self.segment.now - began;
-            if let Some(outcome) = self.go_wrong(step, at)? {
+            if let Some(outcome) = self.inject_fault(step, at)? {
                 return Ok(Some(outcome));
             }
             self.segment.step()?;
@@ -143,25 +143,25 @@ impl Run<'_, '_> {
                 return Ok(Some(Outcome::Killed));
             };
             if host.end.is_some() {
-                return self.ended().map(Some);
+                return self.check_end().map(Some);
             }
-            let (is_done, most) = match step {
+            let (is_done, max_ms) = match step {
                 Step::Open => (host.opened, OPENS),
                 Step::Arm => (self.is_armed(&mut pressed), ANSWERS + ARMS),
-                Step::Feel => (at >= feels, u64::MAX),
-                Step::Leave => (false, LEAVES),
+                Step::Touch => (at >= feels, u64::MAX),
+                Step::Close => (false, LEAVES),
             };
-            if is_done && self.may_go_on(step) {
+            if is_done && self.can_continue(step) {
                 return Ok(None);
             }
-            if at >= most && !is_done {
+            if at >= max_ms && !is_done {
                 return Err(format!("{step:?} hangs: nothing for {at} ms"));
             }
         }
     }
 
     /// Returns true if the fault planned for this step, if any, has been injected.
-    fn may_go_on(&self, step: Step) -> bool {
+    fn can_continue(&self, step: Step) -> bool {
         self.plan.done || self.plan.step != step
     }
 
@@ -172,23 +172,25 @@ impl Run<'_, '_> {
         let Some(host) = &self.segment.host else {
             return false;
         };
-        if host.waits_for_the_hand() {
+        if host.is_waiting_for_press() {
             let since = *pressed.get_or_insert(now);
             self.segment.board.dead_man = now >= since + REACTION;
         }
         let settled = pressed.is_some_and(|at| now >= at + ARMS);
         if settled {
-            self.segment.board.mood = Mood::Wanders;
+            self.segment.board.hand_motion = HandMotion::Wander;
         }
         match host.reported {
             Reported::Nothing => false,
             Reported::No => true,
-            Reported::Accepted => settled || (pressed.is_some() && host.sees(&[Mode::Disarmed])),
+            Reported::Accepted => {
+                settled || (pressed.is_some() && host.is_in_mode(&[Mode::Disarmed]))
+            }
         }
     }
 
     /// Injects the planned fault when it is due.
-    fn go_wrong(&mut self, step: Step, at: u64) -> Result<Option<Outcome>, String> {
+    fn inject_fault(&mut self, step: Step, at: u64) -> Result<Option<Outcome>, String> {
         if self.plan.done || step != self.plan.step || at < self.plan.after {
             return Ok(None);
         }
@@ -202,7 +204,7 @@ impl Run<'_, '_> {
             }
             Kind::HostVanishes => {
                 segment.kill_host();
-                self.vanished()?;
+                self.check_vanished_host()?;
                 return Ok(Some(Outcome::Killed));
             }
             Kind::HostileHost => {
@@ -227,9 +229,9 @@ impl Run<'_, '_> {
         Ok(None)
     }
 
-    /// Waits up to `most` milliseconds without a host.
-    fn wait(&mut self, most: usize) -> Result<(), String> {
-        let end = self.segment.now + self.segment.random.below(most) as u64;
+    /// Waits up to `max_ms` milliseconds without a host.
+    fn wait(&mut self, max_ms: usize) -> Result<(), String> {
+        let end = self.segment.now + self.segment.random.below(max_ms) as u64;
         self.wait_until(end)
     }
 
@@ -242,13 +244,13 @@ impl Run<'_, '_> {
 
     /// Waits without a host for longer than the device's limit: it must release the force and
     /// disarm, but not earlier.
-    fn vanished(&mut self) -> Result<(), String> {
+    fn check_vanished_host(&mut self) -> Result<(), String> {
         let was_on = self.segment.board.drive.enabled;
         // A stopped clock does not reach the limit.
         let runs = !self.segment.board.lock_step;
-        self.wait_until(self.segment.now + SILENCE - LETS_GO)?;
+        self.wait_until(self.segment.now + SILENCE - RELEASE_TICKS)?;
         let still_on = self.segment.board.drive.enabled;
-        self.wait_until(self.segment.now + 2 * LETS_GO + AGO)?;
+        self.wait_until(self.segment.now + 2 * RELEASE_TICKS + MAX_AGE)?;
         let segment = &mut *self.segment;
         if runs && was_on && segment.board.drive.enabled {
             return Err("the arm is armed, and its host has vanished".into());
@@ -258,7 +260,7 @@ impl Run<'_, '_> {
     }
 
     /// Checks the report of a host that ended against the truth.
-    fn ended(&mut self) -> Result<Outcome, String> {
+    fn check_end(&mut self) -> Result<Outcome, String> {
         let segment = &mut *self.segment;
         if let Some(End::Reported(error)) = segment.host.as_ref().and_then(|host| host.end.as_ref())
         {
@@ -267,20 +269,23 @@ impl Run<'_, '_> {
         if segment.board.drive.enabled {
             return Err("an end was agreed on, and the amplifiers are on".into());
         }
-        self.counts()?;
+        self.check_counts()?;
         Ok(Outcome::Agreed)
     }
 
-    fn counts(&self) -> Result<(), String> {
+    fn check_counts(&self) -> Result<(), String> {
         let Some(host) = &self.segment.host else {
             return Ok(());
         };
         let (stats, tap) = (host.stats(), &self.segment.tap);
-        let (reported, made) = (stats.samples + stats.lost + stats.dropped, tap.made());
+        let (reported, made) = (
+            stats.samples + stats.lost + stats.dropped,
+            tap.samples_made(),
+        );
         // The tap does not see samples that are dropped at the end of a scene or of the session.
         let unseen = match stats.dropped {
             0 => 0,
-            _ => tap.unseen(self.segment.board.ticks[0]),
+            _ => tap.max_unsent(self.segment.board.ticks[0]),
         };
         if self.is_whole && !(made..=made + unseen).contains(&reported) {
             return Err(format!(
@@ -298,10 +303,10 @@ impl Run<'_, '_> {
     }
 
     /// The user releases the switch and waits a moment.
-    fn afterwards(&mut self) -> Result<(), String> {
+    fn release_switch(&mut self) -> Result<(), String> {
         self.segment.host = None;
         self.segment.board.dead_man = false;
-        self.segment.board.mood = Mood::Lifted;
+        self.segment.board.hand_motion = HandMotion::Lifted;
         self.segment.step()?;
         self.wait(1_000)
     }

@@ -6,7 +6,7 @@ use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::session::SessionEnd;
 
-use super::cable::{A_TICK, Way};
+use super::cable::{BYTES_PER_TICK, Channel};
 use super::device::Board;
 use super::fault::{Fault, Kind};
 use super::frame_tap::{Moment, Tap};
@@ -35,9 +35,9 @@ pub struct Segment<'t> {
     /// The device and its arm.
     pub board: Board<'t>,
     /// The direction to the device.
-    pub to_device: Way,
+    pub to_device: Channel,
     /// The direction to the host.
-    pub to_host: Way,
+    pub to_host: Channel,
     /// Frames that leave the device, as the oracle reads them.
     pub tap: Tap,
     /// The correct host, if one runs.
@@ -78,8 +78,8 @@ impl<'t> Segment<'t> {
             scene,
             random,
             board,
-            to_device: Way::default(),
-            to_host: Way::default(),
+            to_device: Channel::default(),
+            to_host: Channel::default(),
             tap: Tap::default(),
             host: None,
             fault: None,
@@ -101,7 +101,7 @@ impl<'t> Segment<'t> {
         if other_scene {
             self.scene = scene(self.terrain, &self.board, &mut self.random);
         }
-        self.board.watch.forget();
+        self.board.tick_checks.reset();
         self.owed = std::mem::take(&mut self.let_go);
         let mut out = Vec::new();
         let random = &mut self.random;
@@ -131,9 +131,9 @@ impl<'t> Segment<'t> {
         if fault.kind == Kind::HostileHost {
             (self.let_go, self.owed) = (false, false);
         }
-        let [to_device, to_host] = fault.harms();
-        self.to_device.harm(to_device);
-        self.to_host.harm(to_host);
+        let [to_device, to_host] = fault.line_faults();
+        self.to_device.set_faults(to_device);
+        self.to_host.set_faults(to_host);
         self.fault = Some(fault);
     }
 
@@ -163,12 +163,12 @@ impl<'t> Segment<'t> {
     /// The broken invariant.
     pub fn step(&mut self) -> Result<(), String> {
         self.end_fault();
-        self.speak_hostile();
+        self.send_hostile_bytes();
         self.deliver();
         self.board.tick()?;
-        let mut buffer = [0; A_TICK];
-        let stated = self.board.say(&mut buffer, self.to_host.room());
-        if self.to_host.room() < A_TICK {
+        let mut buffer = [0; BYTES_PER_TICK];
+        let sent = self.board.transmit(&mut buffer, self.to_host.room());
+        if self.to_host.room() < BYTES_PER_TICK {
             self.full = self.now;
         }
         let when = Moment {
@@ -176,14 +176,14 @@ impl<'t> Segment<'t> {
             ticks: self.board.ticks[0],
             flows: self.now > self.full + DRAINS,
         };
-        self.tap.hear(stated, &when);
-        self.to_host.send(stated, self.now, &mut self.random);
+        self.tap.receive(sent, &when);
+        self.to_host.send(sent, self.now, &mut self.random);
         let mut received = Vec::new();
         while let Some(transfer) = self.to_host.receive(self.now) {
             received.extend(transfer);
         }
         self.with_host(|host, now, out| host.step(now, &received, out));
-        self.judge()?;
+        self.check()?;
         self.now += 1;
         Ok(())
     }
@@ -195,19 +195,19 @@ impl<'t> Segment<'t> {
         self.troubled = self.now;
         self.fault = self.fault.filter(|fault| self.now < fault.end);
         if self.fault.is_none() {
-            self.to_device.harm(Default::default());
-            self.to_host.harm(Default::default());
+            self.to_device.set_faults(Default::default());
+            self.to_host.set_faults(Default::default());
         }
     }
 
     /// Sends the bytes of another program to the device, during that fault.
-    fn speak_hostile(&mut self) {
+    fn send_hostile_bytes(&mut self) {
         let hostile = self
             .fault
             .is_some_and(|fault| fault.kind == Kind::HostileHost);
         if hostile && self.to_device.room() > 0 {
-            let stated = hostile_programs::host(&mut self.random);
-            self.send(&stated);
+            let bytes = hostile_programs::host(&mut self.random);
+            self.send(&bytes);
         }
     }
 
@@ -221,15 +221,15 @@ impl<'t> Segment<'t> {
         }
     }
 
-    fn judge(&mut self) -> Result<(), String> {
-        self.judge_samples()?;
-        self.judge_wish()?;
-        self.judge_view()?;
-        self.judge_last_end()
+    fn check(&mut self) -> Result<(), String> {
+        self.check_samples()?;
+        self.check_force_request()?;
+        self.check_view()?;
+        self.check_last_end()
     }
 
     /// Checks that the first host after one that vanished receives the reason for the disarming.
-    fn judge_last_end(&mut self) -> Result<(), String> {
+    fn check_last_end(&mut self) -> Result<(), String> {
         let greeted = self.host.as_ref().and_then(|host| host.last_end);
         match greeted.filter(|_| self.owed) {
             None => Ok(()),
@@ -243,15 +243,15 @@ impl<'t> Segment<'t> {
         }
     }
 
-    fn judge_samples(&mut self) -> Result<(), String> {
+    fn check_samples(&mut self) -> Result<(), String> {
         let Some(host) = &mut self.host else {
             return Ok(());
         };
         for sample in std::mem::take(&mut host.samples) {
             self.board
-                .watch
-                .sample(&sample, self.scene.params.max_force_n)?;
-            let off = proxy_oracle::judge(self.terrain, &sample)?;
+                .tick_checks
+                .check_sample(&sample, self.scene.params.max_force_n)?;
+            let off = proxy_oracle::check(self.terrain, &sample)?;
             self.off_surface = self.off_surface.max(off);
             self.touching += u64::from(off > 0.0);
         }
@@ -259,9 +259,9 @@ impl<'t> Segment<'t> {
     }
 
     /// Checks that the amplifiers are switched on only if a live host has requested it.
-    fn judge_wish(&mut self) -> Result<(), String> {
-        let wishes = |host: &Host<'_>| host.asked && host.end.is_none();
-        if self.host.as_ref().is_some_and(wishes) {
+    fn check_force_request(&mut self) -> Result<(), String> {
+        let requests_arming = |host: &Host<'_>| host.requested_arming && host.end.is_none();
+        if self.host.as_ref().is_some_and(requests_arming) {
             self.wished = self.now + LATE_ARM;
         }
         let (was, is) = (self.was_on, self.board.drive.enabled);
@@ -273,14 +273,14 @@ impl<'t> Segment<'t> {
     }
 
     /// Checks that the user sees the true state, a moment after the line works again.
-    fn judge_view(&mut self) -> Result<(), String> {
+    fn check_view(&mut self) -> Result<(), String> {
         let is_on = self.board.drive.enabled;
-        let sees = |host: &Host<'_>| {
+        let is_in_mode = |host: &Host<'_>| {
             let live = host.opened && host.end.is_none();
             let view = host.view.map(|view| view.mode.drives());
             live.then_some(view)
         };
-        let wrong = match self.host.as_ref().and_then(sees) {
+        let wrong = match self.host.as_ref().and_then(is_in_mode) {
             Some(seen) => seen != Some(is_on),
             None => false,
         };

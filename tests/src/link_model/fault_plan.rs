@@ -1,6 +1,6 @@
 //! Plan of the faults of a run.
 
-use super::lossy_line::{Direction, Harm};
+use super::lossy_line::{Direction, FrameFault};
 use crate::random::Random;
 
 /// Interruption of one of the two ends.
@@ -28,16 +28,16 @@ pub enum Interruption {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     /// Faults of single frames, by their number in their direction.
-    pub harms: Vec<(Direction, usize, Harm)>,
+    pub frame_faults: Vec<(Direction, usize, FrameFault)>,
     /// Interruptions by tick.
     pub interruptions: Vec<(u64, Interruption)>,
     /// The host leaves while the arm is armed, without a request to disarm.
     pub abrupt: bool,
     /// The host queries the status without a pause while it renders and disarms.
-    pub curious: bool,
+    pub queries_status: bool,
     /// The host changes the placement while it renders, and makes more requests when the arm is
     /// disarmed.
-    pub errands: bool,
+    pub requests: bool,
     /// Random faults: the seed, and the share of frames in a thousand.
     pub random: Option<(u64, usize)>,
 }

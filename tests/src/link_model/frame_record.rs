@@ -21,11 +21,11 @@ pub(super) struct FrameRecord {
 }
 
 /// Returns true if any of these frames requests arming.
-pub(super) fn asks_to_arm(mut bytes: &[u8]) -> bool {
+pub(super) fn requests_arming(mut bytes: &[u8]) -> bool {
     let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
     while !bytes.is_empty() {
-        let (taken, frame) = reader.push(bytes);
-        bytes = bytes.get(taken..).unwrap_or(&[]);
+        let (consumed, frame) = reader.push(bytes);
+        bytes = bytes.get(consumed..).unwrap_or(&[]);
         let Some(Ok(content)) = frame else {
             continue;
         };
@@ -41,10 +41,10 @@ pub(super) fn asks_to_arm(mut bytes: &[u8]) -> bool {
 
 impl FrameRecord {
     /// Records the device's bytes.
-    pub(super) fn hear(&mut self, mut bytes: &[u8]) {
+    pub(super) fn receive(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
-            let (taken, frame) = self.reader.push(bytes);
-            bytes = bytes.get(taken..).unwrap_or(&[]);
+            let (consumed, frame) = self.reader.push(bytes);
+            bytes = bytes.get(consumed..).unwrap_or(&[]);
             if let Some(Ok(framed)) = frame.map(|f| f.and_then(decode::<InSession<ToHost>>)) {
                 self.take(framed.session.get(), framed.message);
             }
@@ -76,15 +76,15 @@ impl FrameRecord {
     }
 
     /// Returns true if the sample of this tick was sent in this session.
-    pub(super) fn has_told(&self, session: u32, tick: u32) -> bool {
+    pub(super) fn has_sent(&self, session: u32, tick: u32) -> bool {
         let ticks = self.ticks.get(&session);
         ticks.is_some_and(|ticks| ticks.contains(&tick))
     }
 
     fn raise(&mut self, session: u32, count: SampleCount) {
-        let known = self.sessions.entry(session).or_default();
-        known.sent = known.sent.max(count.sent);
-        known.dropped = known.dropped.max(count.dropped);
+        let total = self.sessions.entry(session).or_default();
+        total.sent = total.sent.max(count.sent);
+        total.dropped = total.dropped.max(count.dropped);
     }
 
     /// Returns the sums over sessions: sent, and dropped.

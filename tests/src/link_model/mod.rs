@@ -18,6 +18,6 @@ mod run;
 mod status_queries;
 
 pub use fault_plan::{Interruption, Plan};
-pub use lossy_line::{Direction, Harm};
-pub use oracle::Wrong;
+pub use lossy_line::{Direction, FrameFault};
+pub use oracle::Violation;
 pub use run::{End, Report, check, frames};

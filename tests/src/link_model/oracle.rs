@@ -3,7 +3,7 @@
 use hapterra::link::LinkStats;
 use hapterra_core::wire::hello::DeviceHello;
 
-use super::frame_record::{FrameRecord, asks_to_arm};
+use super::frame_record::{FrameRecord, requests_arming};
 
 /// Ticks in which the force fades after the answer to a request to disarm.
 pub(super) const FADE: u64 = 150;
@@ -13,8 +13,8 @@ const SILENCE: u64 = SILENCE_S as u64 * 1_000 + FADE;
 
 /// Violation of the protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wrong {
-    /// The run did not end within `MAX` ticks.
+pub enum Violation {
+    /// The run did not end within `MAX_TICKS` ticks.
     Hangs,
     /// The amplifiers were on at this tick without a host that requested force.
     Driven(u64),
@@ -40,11 +40,11 @@ pub enum Wrong {
 /// State of a run's checks.
 #[derive(Default)]
 pub(super) struct RunOracle {
-    account: FrameRecord,
+    record: FrameRecord,
     /// The tick since which no host requests force.
-    unwished: Option<u64>,
+    forbidden_from: Option<u64>,
     /// True if the present host has requested arming.
-    asked: bool,
+    arming_requested: bool,
     /// The device's session, and true if the amplifiers were on at its start and ever since.
     inherited: (u32, bool),
     /// The tick of the last frame to the device.
@@ -52,50 +52,50 @@ pub(super) struct RunOracle {
 }
 
 impl RunOracle {
-    pub(super) fn device_says(&mut self, bytes: &[u8]) {
-        self.account.hear(bytes);
+    pub(super) fn on_device_bytes(&mut self, bytes: &[u8]) {
+        self.record.receive(bytes);
     }
 
-    pub(super) fn host_says(&mut self, bytes: &[u8]) {
-        self.asked |= asks_to_arm(bytes);
+    pub(super) fn on_host_bytes(&mut self, bytes: &[u8]) {
+        self.arming_requested |= requests_arming(bytes);
     }
 
     /// Records a frame that arrived at the device.
-    pub(super) const fn frame_came(&mut self, now: u64) {
+    pub(super) const fn on_frame(&mut self, now: u64) {
         self.received_at = now;
     }
 
     /// Records that another host replaced a killed one.
-    pub(super) const fn another_host(&mut self) {
-        self.asked = false;
+    pub(super) const fn on_host_restart(&mut self) {
+        self.arming_requested = false;
     }
 
     /// Records that a host requests force.
-    pub(super) const fn wished(&mut self) {
-        self.unwished = None;
+    pub(super) const fn request_force(&mut self) {
+        self.forbidden_from = None;
     }
 
     /// Records that no host requests force from this tick on.
-    pub(super) const fn unwished_from(&mut self, tick: u64) {
-        self.unwished = Some(tick);
+    pub(super) const fn forbid_force_from(&mut self, tick: u64) {
+        self.forbidden_from = Some(tick);
     }
 
     /// Checks a tick with the amplifiers on or off, while the host is in this session.
-    pub(super) fn look(&mut self, now: u64, enabled: bool, session: u32) -> Result<(), Wrong> {
-        let is_greeted = self.account.greetings(session).next().is_some();
+    pub(super) fn check(&mut self, now: u64, enabled: bool, session: u32) -> Result<(), Violation> {
+        let is_greeted = self.record.greetings(session).next().is_some();
         if self.inherited.0 != session && is_greeted {
             self.inherited = (session, enabled);
         }
         self.inherited.1 &= enabled;
-        let unasked = is_greeted && !self.inherited.1 && !self.asked;
-        if enabled && self.unwished.is_some_and(|since| now > since) {
-            return Err(Wrong::Driven(now));
+        let unasked = is_greeted && !self.inherited.1 && !self.arming_requested;
+        if enabled && self.forbidden_from.is_some_and(|since| now > since) {
+            return Err(Violation::Driven(now));
         }
         if enabled && unasked {
-            return Err(Wrong::Unasked(now));
+            return Err(Violation::Unasked(now));
         }
         if enabled && now > self.received_at + SILENCE {
-            return Err(Wrong::Forsaken(now));
+            return Err(Violation::Forsaken(now));
         }
         Ok(())
     }
@@ -107,34 +107,38 @@ impl RunOracle {
         session: u32,
         opened: Option<&DeviceHello>,
         samples: &[u32],
-    ) -> Result<(), Wrong> {
-        let mut greetings = self.account.greetings(session);
-        if let Some(device) = opened.filter(|device| !greetings.any(|stated| stated == *device)) {
-            return Err(Wrong::Misled(format!("{device:?}")));
+    ) -> Result<(), Violation> {
+        let mut greetings = self.record.greetings(session);
+        if let Some(device) = opened.filter(|device| !greetings.any(|sent| sent == *device)) {
+            return Err(Violation::Misled(format!("{device:?}")));
         }
-        let has_told = |tick: &&u32| self.account.has_told(session, **tick);
-        match samples.iter().find(|tick| !has_told(tick)) {
-            Some(tick) => Err(Wrong::Misled(format!("the sample of tick {tick}"))),
+        let has_sent = |tick: &&u32| self.record.has_sent(session, **tick);
+        match samples.iter().find(|tick| !has_sent(tick)) {
+            Some(tick) => Err(Violation::Misled(format!("the sample of tick {tick}"))),
             None => Ok(()),
         }
     }
 
     /// Checks that the device is disarmed, as the host concluded, and must stay so.
-    pub(super) const fn agreed(&mut self, now: u64, enabled: bool) -> Result<(), Wrong> {
-        self.unwished = Some(0);
+    pub(super) const fn check_agreed_end(
+        &mut self,
+        now: u64,
+        enabled: bool,
+    ) -> Result<(), Violation> {
+        self.forbidden_from = Some(0);
         match enabled {
-            true => Err(Wrong::NotDisarmed(now)),
+            true => Err(Violation::NotDisarmed(now)),
             false => Ok(()),
         }
     }
 
     /// Compares the host's counts of its sessions with the device's.
-    pub(super) fn count(&self, stats: &LinkStats, sessions: &[u32]) -> Result<(), Wrong> {
+    pub(super) fn count(&self, stats: &LinkStats, sessions: &[u32]) -> Result<(), Violation> {
         let counted = (stats.samples + stats.lost, stats.dropped);
-        let made = self.account.of(sessions);
+        let made = self.record.of(sessions);
         match counted == made || stats.uncertain > 0 {
             true => Ok(()),
-            false => Err(Wrong::Miscounted(counted, made)),
+            false => Err(Violation::Miscounted(counted, made)),
         }
     }
 }

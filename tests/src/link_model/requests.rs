@@ -28,10 +28,10 @@ pub(super) enum RequestStep {
 /// The remaining steps, and the results of the others.
 #[derive(Default)]
 pub(super) struct RequestSequence {
-    left: VecDeque<RequestStep>,
-    under_way: Option<(RequestStep, u64)>,
+    remaining: VecDeque<RequestStep>,
+    current: Option<(RequestStep, u64)>,
     /// Counts of requests that succeeded, were refused, and were given up.
-    pub(super) came_of: [u32; 3],
+    pub(super) outcomes: [u32; 3],
 }
 
 impl RequestSequence {
@@ -56,67 +56,67 @@ impl RequestSequence {
             current_a: 0.1,
             hold_ms: 100,
         };
-        let ask = |request| RequestStep::HostRequest(HostRequest::Request(request));
+        let request = |request| RequestStep::HostRequest(HostRequest::Request(request));
         Self::of([
             RequestStep::HostRequest(HostRequest::Calibration),
-            ask(Request::HoldOutputs(Some([0.5, 0.0, -0.5]))),
-            ask(Request::HoldOutputs(None)),
-            ask(Request::StoreCalibration),
-            ask(Request::Jog(jog)),
+            request(Request::HoldOutputs(Some([0.5, 0.0, -0.5]))),
+            request(Request::HoldOutputs(None)),
+            request(Request::StoreCalibration),
+            request(Request::Jog(jog)),
             RequestStep::Wait(JOG_TICKS),
-            ask(Request::Disarm),
+            request(Request::Disarm),
             RequestStep::Wait(FADE_TICKS),
         ])
     }
 
     fn of(list: impl IntoIterator<Item = RequestStep>) -> Self {
         Self {
-            left: list.into_iter().collect(),
+            remaining: list.into_iter().collect(),
             ..Self::default()
         }
     }
 
     pub(super) fn are_done(&self) -> bool {
-        self.left.is_empty() && self.under_way.is_none()
+        self.remaining.is_empty() && self.current.is_none()
     }
 
     /// Returns the next step if the last one has ended.
     pub(super) fn next(&mut self, now: u64) -> Option<RequestStep> {
-        if let Some((RequestStep::Wait(ticks), since)) = self.under_way
+        if let Some((RequestStep::Wait(ticks), since)) = self.current
             && now >= since + ticks
         {
-            self.under_way = None;
+            self.current = None;
         }
-        if self.under_way.is_some() {
+        if self.current.is_some() {
             return None;
         }
-        let next = self.left.pop_front()?;
-        self.under_way = Some((next, now));
+        let next = self.remaining.pop_front()?;
+        self.current = Some((next, now));
         Some(next)
     }
 
     /// Takes an event that may be the answer.
     pub(super) fn take(&mut self, event: &Event<'_>) {
-        let Some((errand, _)) = self.under_way else {
+        let Some((request, _)) = self.current else {
             return;
         };
-        let came = match (event, errand) {
+        let outcome = match (event, request) {
             (
                 Event::Answered { request, result },
-                RequestStep::HostRequest(HostRequest::Request(asked)),
-            ) if **request == asked => usize::from(result.is_err()),
+                RequestStep::HostRequest(HostRequest::Request(expected)),
+            ) if **request == expected => usize::from(result.is_err()),
             (Event::Calibration(_), RequestStep::HostRequest(HostRequest::Calibration)) => 0,
             (Event::Viewed { view, taken }, RequestStep::View(number)) if view.number == number => {
                 usize::from(!*taken)
             }
-            (Event::Unanswered(given_up), RequestStep::HostRequest(asked))
-                if **given_up == asked =>
+            (Event::Unanswered(unanswered), RequestStep::HostRequest(expected))
+                if **unanswered == expected =>
             {
                 2
             }
             _ => return,
         };
-        self.came_of[came] += 1;
-        self.under_way = None;
+        self.outcomes[outcome] += 1;
+        self.current = None;
     }
 }

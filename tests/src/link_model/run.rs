@@ -19,18 +19,18 @@ use heightfield::Raster;
 use super::fault_plan::{Interruption, Plan};
 use super::forged_frames;
 use super::lossy_line::{Direction, LossyLine};
-use super::oracle::{FADE, RunOracle, SILENCE_S, Wrong};
+use super::oracle::{FADE, RunOracle, SILENCE_S, Violation};
 use super::requests::{RequestSequence, RequestStep};
 use super::status_queries::StatusQueries;
 
 /// Ticks after which a run counts as hanging: each step has its deadline, and no plan needs more.
-const MAX: u64 = 60_000;
+const MAX_TICKS: u64 = 60_000;
 /// Ticks after the end in which delayed frames still arrive.
-const AFTER: u64 = 6_500;
+const AFTER_TICKS: u64 = 6_500;
 /// Samples with the amplifiers on after which the host continues.
 const RAMP_SAMPLES: u32 = 60;
 /// Times that the host resumes a silent session.
-const RESUMPTIONS: u32 = 4;
+const MAX_RESUMPTIONS: u32 = 4;
 
 /// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +59,7 @@ pub struct Report {
     /// Status queries that were answered.
     pub answers: u32,
     /// Other requests than arming and disarming: succeeded, refused, and given up.
-    pub came_of: [u32; 3],
+    pub outcomes: [u32; 3],
 }
 
 /// Current step of the host.
@@ -68,23 +68,23 @@ enum Step {
     /// Opens a session and arms.
     Arming,
     /// Renders for a while.
-    Feeling,
+    Touching,
     /// Disarms, with the tick of the answer if it has arrived.
     Disarming(Option<u64>),
     /// Makes the requests for a disarmed arm.
-    Asking,
+    Requesting,
     /// Closes the session.
-    Leaving,
-    Over(End),
+    Closing,
+    Ended(End),
 }
 
-struct World<'t> {
+struct Simulation<'t> {
     terrain: &'t Terrain<'t>,
     scene: Scene,
     client: Client<'t>,
     device: Device<StoppedClock, 2>,
     lines: [LossyLine; 2],
-    judge: RunOracle,
+    oracle: RunOracle,
     /// Sessions in which the present host has sent something.
     sessions: Vec<u32>,
     step: Step,
@@ -97,10 +97,10 @@ struct World<'t> {
     /// True if the host leaves without a request to disarm.
     abrupt: bool,
     /// True if the host queries the status without a pause.
-    curious: bool,
-    questions: StatusQueries,
+    queries_status: bool,
+    status_queries: StatusQueries,
     /// Requests while the arm is armed, and afterwards; `None` without requests.
-    errands: Option<[RequestSequence; 2]>,
+    requests: Option<[RequestSequence; 2]>,
     /// Ticks of the device since its start.
     device_ticks: u32,
     /// True if the device reports another version.
@@ -112,8 +112,8 @@ struct World<'t> {
 /// Plays a plan.
 ///
 /// # Errors
-/// The first [`Wrong`].
-pub fn check(plan: &Plan) -> Result<Report, Wrong> {
+/// The first [`Violation`].
+pub fn check(plan: &Plan) -> Result<Report, Violation> {
     let raster = Raster::from_fn(33, 33, |_, _| 0.0).expect("raster");
     let scale = Scale::new(1.0, 1.0).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
@@ -123,7 +123,7 @@ pub fn check(plan: &Plan) -> Result<Report, Wrong> {
         materials: None,
         ..terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
     };
-    World::new(&terrain, scene, plan).play(plan)
+    Simulation::new(&terrain, scene, plan).play(plan)
 }
 
 /// Returns the frames of an undisturbed run, to the device and to the host.
@@ -135,7 +135,7 @@ pub fn frames() -> [usize; 2] {
     check(&Plan::default()).expect("nothing goes wrong").frames
 }
 
-fn errands() -> [RequestSequence; 2] {
+fn requests() -> [RequestSequence; 2] {
     [RequestSequence::armed(), RequestSequence::disarmed()]
 }
 
@@ -151,12 +151,20 @@ fn device() -> Device<StoppedClock, 2> {
     )
 }
 
-impl<'t> World<'t> {
+impl<'t> Simulation<'t> {
     fn new(terrain: &'t Terrain<'t>, scene: Scene, plan: &Plan) -> Self {
         let line = |direction, salt| {
-            let harms = plan.harms.iter().filter(|(way, _, _)| *way == direction);
+            let frame_faults = plan
+                .frame_faults
+                .iter()
+                .filter(|(fault_direction, _, _)| *fault_direction == direction);
             let random = plan.random.map(|(seed, share)| (seed ^ salt, share));
-            LossyLine::new(harms.map(|(_, at, harm)| (*at, *harm)).collect(), random)
+            LossyLine::new(
+                frame_faults
+                    .map(|(_, at, frame_fault)| (*at, *frame_fault))
+                    .collect(),
+                random,
+            )
         };
         Self {
             terrain,
@@ -164,7 +172,7 @@ impl<'t> World<'t> {
             client: host(terrain, scene, 1),
             device: device(),
             lines: [line(Direction::ToDevice, 0), line(Direction::ToHost, 1)],
-            judge: RunOracle::default(),
+            oracle: RunOracle::default(),
             sessions: vec![],
             step: Step::Arming,
             ramp_samples: 0,
@@ -174,37 +182,37 @@ impl<'t> World<'t> {
             enabled: false,
             driven: false,
             abrupt: plan.abrupt,
-            curious: plan.curious,
-            questions: StatusQueries::default(),
-            errands: plan.errands.then(errands),
+            queries_status: plan.queries_status,
+            status_queries: StatusQueries::default(),
+            requests: plan.requests.then(requests),
             device_ticks: 0,
             other_device: false,
             host_gone: false,
         }
     }
 
-    fn play(mut self, plan: &Plan) -> Result<Report, Wrong> {
+    fn play(mut self, plan: &Plan) -> Result<Report, Violation> {
         self.greet();
         let end = loop {
             self.interrupt(plan);
             self.tick()?;
-            if let Step::Over(end) = self.step {
+            if let Step::Ended(end) = self.step {
                 break end;
             }
             // Without a user to report to, only the state of the device counts.
             if self.host_gone && !self.enabled {
                 break End::Reported;
             }
-            if self.now > MAX {
-                return Err(Wrong::Hangs);
+            if self.now > MAX_TICKS {
+                return Err(Violation::Hangs);
             }
         };
         let ticks = self.now;
         if end == End::Agreed {
-            self.judge.count(self.client.stats(), &self.sessions)?;
-            self.judge.agreed(self.now, self.enabled)?;
+            self.oracle.count(self.client.stats(), &self.sessions)?;
+            self.oracle.check_agreed_end(self.now, self.enabled)?;
         }
-        for _ in 0..AFTER {
+        for _ in 0..AFTER_TICKS {
             self.tick()?;
         }
         Ok(Report {
@@ -214,38 +222,38 @@ impl<'t> World<'t> {
             driven: self.driven,
             uncertain: self.client.stats().uncertain,
             resumptions: self.resumptions,
-            answers: self.questions.answers,
-            came_of: self.errands.map_or([0; 3], |[armed, disarmed]| {
-                std::array::from_fn(|i| armed.came_of[i] + disarmed.came_of[i])
+            answers: self.status_queries.answers,
+            outcomes: self.requests.map_or([0; 3], |[armed, disarmed]| {
+                std::array::from_fn(|i| armed.outcomes[i] + disarmed.outcomes[i])
             }),
         })
     }
 
     fn interrupt(&mut self, plan: &Plan) {
         let now = self.now;
-        let here = plan.interruptions.iter().filter(|(at, _)| *at == now);
-        for (_, what) in here {
+        let due = plan.interruptions.iter().filter(|(at, _)| *at == now);
+        for (_, what) in due {
             match what {
                 Interruption::HostKilled => {
                     self.seed += 1;
                     self.client = host(self.terrain, self.scene, self.seed);
-                    self.lines[0].break_off();
+                    self.lines[0].drop_partial();
                     self.sessions.clear();
                     (self.step, self.ramp_samples, self.resumptions) = (Step::Arming, 0, 0);
-                    self.questions.forget();
-                    self.errands = self.errands.is_some().then(errands);
-                    self.judge.another_host();
+                    self.status_queries.reset();
+                    self.requests = self.requests.is_some().then(requests);
+                    self.oracle.on_host_restart();
                     self.greet();
                 }
                 Interruption::HostGone => {
-                    self.lines[0].break_off();
+                    self.lines[0].drop_partial();
                     self.host_gone = true;
                 }
                 Interruption::DeviceReset => {
                     self.device = device();
                     self.device_ticks = 0;
-                    self.questions.device_restarted();
-                    self.lines[1].break_off();
+                    self.status_queries.device_restarted();
+                    self.lines[1].drop_partial();
                     self.enabled = false;
                 }
                 Interruption::Cut(Direction::ToDevice, long) => self.lines[0].cut(now + long),
@@ -254,12 +262,12 @@ impl<'t> World<'t> {
                 Interruption::Echo(Direction::ToHost) => self.lines[1].echo(now),
                 Interruption::OtherHost => {
                     for frame in forged_frames::greeting() {
-                        self.lines[0].slip_in(frame, now);
+                        self.lines[0].inject(frame, now);
                     }
                 }
                 Interruption::Takeover => {
                     for frame in forged_frames::takeover() {
-                        self.lines[0].slip_in(frame, now);
+                        self.lines[0].inject(frame, now);
                     }
                 }
                 Interruption::OtherDevice => self.other_device = true,
@@ -272,40 +280,40 @@ impl<'t> World<'t> {
         self.client.greet(time(self.now), &mut out);
         self.sessions.push(self.client.session().get());
         self.sessions.dedup();
-        self.judge.wished();
-        self.say(&out);
+        self.oracle.request_force();
+        self.send(&out);
     }
 
     /// Sends the bytes of the host.
-    fn say(&mut self, out: &[u8]) {
-        self.judge.host_says(out);
+    fn send(&mut self, out: &[u8]) {
+        self.oracle.on_host_bytes(out);
         self.lines[0].send(out, self.now);
     }
 
-    fn tick(&mut self) -> Result<(), Wrong> {
+    fn tick(&mut self) -> Result<(), Violation> {
         self.now += 1;
-        for frame in self.lines[0].arrived(self.now) {
-            self.judge.frame_came(self.now);
+        for frame in self.lines[0].take_arrived(self.now) {
+            self.oracle.on_frame(self.now);
             let mut rest = frame.as_slice();
             // Bytes without room now have room after a poll.
             for _ in 0..100 {
-                let taken = self.device.receive(rest);
-                rest = &rest[taken..];
-                self.listen();
+                let consumed = self.device.receive(rest);
+                rest = &rest[consumed..];
+                self.poll_device();
             }
         }
         // The user presses the switch until the amplifiers are on, and holds it.
         let dead_man = self.enabled || self.now % 300 > 60;
-        let sense = GuardInputs {
+        let inputs = GuardInputs {
             dead_man,
             ..GuardInputs::default()
         };
-        self.enabled = self.device.tick(sense).enabled;
+        self.enabled = self.device.tick(inputs).enabled;
         self.device_ticks += 1;
         self.driven |= self.enabled;
         let session = self.client.session().get();
-        self.judge.look(self.now, self.enabled, session)?;
-        self.listen();
+        self.oracle.check(self.now, self.enabled, session)?;
+        self.poll_device();
         match self.host_gone {
             true => Ok(()),
             false => self.host(),
@@ -313,27 +321,27 @@ impl<'t> World<'t> {
     }
 
     /// Sends the bytes of the device.
-    fn listen(&mut self) {
+    fn poll_device(&mut self) {
         let mut chunk = [0; 2048];
         loop {
-            let stated = self.device.link.transmit(&mut chunk);
-            if stated == 0 {
+            let sent = self.device.link.transmit(&mut chunk);
+            if sent == 0 {
                 return;
             }
-            self.judge.device_says(&chunk[..stated]);
-            self.lines[1].send(&chunk[..stated], self.now);
+            self.oracle.on_device_bytes(&chunk[..sent]);
+            self.lines[1].send(&chunk[..sent], self.now);
         }
     }
 
     /// Runs the host's program.
-    fn host(&mut self) -> Result<(), Wrong> {
+    fn host(&mut self) -> Result<(), Violation> {
         let (mut out, now) = (vec![], time(self.now));
         let (step, ramp_samples) = (&mut self.step, &mut self.ramp_samples);
         let at = self.now;
         let (mut opened, mut samples) = (None, vec![]);
-        let (questions, errands) = (&mut self.questions, &mut self.errands);
+        let (status_queries, requests) = (&mut self.status_queries, &mut self.requests);
         let mut on = |event: Event<'_>| {
-            for list in errands.iter_mut().flatten() {
+            for list in requests.iter_mut().flatten() {
                 list.take(&event);
             }
             match event {
@@ -350,89 +358,89 @@ impl<'t> World<'t> {
                         answered.get_or_insert(at);
                     }
                 }
-                event => questions.take(&event),
+                event => status_queries.take(&event),
             }
         };
         let mut received = Ok(());
-        for mut frame in self.lines[1].arrived(self.now) {
+        for mut frame in self.lines[1].take_arrived(self.now) {
             if self.other_device {
                 frame = forged_frames::of_another_version(frame);
             }
             received = received.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
         }
         let received = received.and_then(|()| self.client.due(now, &mut out, &mut on));
-        self.say(&out);
+        self.send(&out);
         let session = self.client.session().get();
-        self.judge.reported(session, opened.as_ref(), &samples)?;
-        self.questions.judge()?;
+        self.oracle.reported(session, opened.as_ref(), &samples)?;
+        self.status_queries.check()?;
         match received {
-            Ok(()) => self.go_on(),
+            Ok(()) => self.advance(),
             Err(error) => return self.on_error(error),
         }
         Ok(())
     }
 
     /// Queries the status, if the last query was answered.
-    fn wonder(&mut self) {
-        let is_at_leisure = matches!(self.step, Step::Feeling | Step::Disarming(_));
-        if self.curious
-            && is_at_leisure
-            && let Some(ask) = self.questions.ask(self.device_ticks)
+    fn query_status(&mut self) {
+        let is_idle = matches!(self.step, Step::Touching | Step::Disarming(_));
+        if self.queries_status
+            && is_idle
+            && let Some(ask) = self.status_queries.query(self.device_ticks)
         {
             self.client.ask(ask);
         }
     }
 
     /// Starts the next step, if the last one is done.
-    fn go_on(&mut self) {
-        self.wonder();
+    fn advance(&mut self) {
+        self.query_status();
         let is_closed = self.client.state() == State::Closed;
         match self.step {
-            Step::Arming if self.ramp_samples > 0 => self.step = Step::Feeling,
-            Step::Feeling if self.ramp_samples >= RAMP_SAMPLES && self.abrupt => self.leave(),
-            Step::Feeling if self.ramp_samples >= RAMP_SAMPLES && self.has_errands(0) => {
-                self.run_errands(0);
+            Step::Arming if self.ramp_samples > 0 => self.step = Step::Touching,
+            Step::Touching if self.ramp_samples >= RAMP_SAMPLES && self.abrupt => self.close(),
+            Step::Touching if self.ramp_samples >= RAMP_SAMPLES && self.has_requests(0) => {
+                self.run_requests(0);
             }
-            Step::Feeling if self.ramp_samples >= RAMP_SAMPLES => {
+            Step::Touching if self.ramp_samples >= RAMP_SAMPLES => {
                 self.client.ask(HostRequest::Request(Request::Disarm));
                 self.step = Step::Disarming(None);
             }
             Step::Disarming(Some(answered)) => {
-                self.judge.unwished_from(answered + FADE);
-                if self.now > answered + 2 * FADE && self.errands.is_some() {
-                    self.step = Step::Asking;
+                self.oracle.forbid_force_from(answered + FADE);
+                if self.now > answered + 2 * FADE && self.requests.is_some() {
+                    self.step = Step::Requesting;
                 } else if self.now > answered + 2 * FADE {
-                    self.leave();
+                    self.close();
                 }
             }
-            Step::Asking if self.has_errands(1) => self.run_errands(1),
-            Step::Asking => self.leave(),
-            Step::Leaving if is_closed => self.step = Step::Over(End::Agreed),
+            Step::Requesting if self.has_requests(1) => self.run_requests(1),
+            Step::Requesting => self.close(),
+            Step::Closing if is_closed => self.step = Step::Ended(End::Agreed),
             // A user who waits too long gives up and closes the session.
-            _ if self.now.is_multiple_of(40_000) && self.step != Step::Leaving => self.leave(),
+            _ if self.now.is_multiple_of(40_000) && self.step != Step::Closing => self.close(),
             _ => {}
         }
     }
 
     /// Returns true if a list has steps left or in progress.
-    fn has_errands(&self, list: usize) -> bool {
-        let lists = self.errands.as_ref();
+    fn has_requests(&self, list: usize) -> bool {
+        let lists = self.requests.as_ref();
         lists.is_some_and(|lists| !lists[list].are_done())
     }
 
     /// Starts the next step of a list, if the last one has ended.
-    fn run_errands(&mut self, list: usize) {
-        let lists = self.errands.as_mut();
-        let Some(errand) = lists.and_then(|lists| lists[list].next(self.now)) else {
+    fn run_requests(&mut self, list: usize) {
+        let lists = self.requests.as_mut();
+        let Some(request) = lists.and_then(|lists| lists[list].next(self.now)) else {
             return;
         };
-        match errand {
+        match request {
             RequestStep::HostRequest(ask) => {
                 match ask {
-                    HostRequest::Request(Request::Jog(_)) => self.judge.wished(),
+                    HostRequest::Request(Request::Jog(_)) => self.oracle.request_force(),
                     // Two deadlines, because the request may be repeated once.
                     HostRequest::Request(Request::Disarm) => {
-                        self.judge.unwished_from(self.now + 9_000);
+                        self.oracle.forbid_force_from(self.now + 9_000);
                     }
                     _ => {}
                 }
@@ -459,39 +467,39 @@ impl<'t> World<'t> {
         let terrain = self.terrain.clone();
         self.client
             .put_view(time(self.now), view, terrain, &mut out);
-        self.say(&out);
+        self.send(&out);
     }
 
-    fn leave(&mut self) {
-        if matches!(self.step, Step::Over(_)) {
+    fn close(&mut self) {
+        if matches!(self.step, Step::Ended(_)) {
             return;
         }
         let mut out = vec![];
         self.client.leave(time(self.now), &mut out);
-        self.say(&out);
-        self.step = Step::Leaving;
+        self.send(&out);
+        self.step = Step::Closing;
     }
 
-    fn on_error(&mut self, error: LinkError) -> Result<(), Wrong> {
+    fn on_error(&mut self, error: LinkError) -> Result<(), Violation> {
         match (error, self.step) {
-            (_, Step::Over(_)) => {}
+            (_, Step::Ended(_)) => {}
             // To the device, late frames of an earlier host look like another host's.
             (LinkError::NotConfirmed | LinkError::Taken, _) => {
-                self.step = Step::Over(End::Reported);
+                self.step = Step::Ended(End::Reported);
             }
             (LinkError::Version { .. }, _) if self.other_device => {
-                self.step = Step::Over(End::Reported);
+                self.step = Step::Ended(End::Reported);
             }
-            (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < RESUMPTIONS => {
+            (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < MAX_RESUMPTIONS => {
                 self.resumptions += 1;
-                if let Step::Disarming(_) | Step::Asking = self.step {
-                    self.leave();
+                if let Step::Disarming(_) | Step::Requesting = self.step {
+                    self.close();
                 } else {
                     self.greet();
                 }
             }
-            (LinkError::Silent(_) | LinkError::LetGo, _) => self.leave(),
-            (error, _) => return Err(Wrong::Error(error.to_string())),
+            (LinkError::Silent(_) | LinkError::LetGo, _) => self.close(),
+            (error, _) => return Err(Violation::Error(error.to_string())),
         }
         Ok(())
     }

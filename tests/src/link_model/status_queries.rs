@@ -2,13 +2,13 @@
 
 use hapterra::link::{Event, HostRequest};
 
-use super::oracle::Wrong;
+use super::oracle::Violation;
 
 /// The query in progress, and the answers up to now.
 #[derive(Default)]
 pub(super) struct StatusQueries {
     /// The device's tick at the query.
-    asked: Option<u32>,
+    queried_at: Option<u32>,
     /// Number of answers.
     pub(super) answers: u32,
     /// The tick of the first status that is older than its query, and the query's tick.
@@ -17,24 +17,24 @@ pub(super) struct StatusQueries {
 
 impl StatusQueries {
     /// Makes a query at this tick of the device, unless one is in progress.
-    pub(super) fn ask(&mut self, tick: u32) -> Option<HostRequest> {
-        match self.asked {
+    pub(super) fn query(&mut self, tick: u32) -> Option<HostRequest> {
+        match self.queried_at {
             Some(_) => None,
             None => {
-                self.asked = Some(tick);
+                self.queried_at = Some(tick);
                 Some(HostRequest::Status)
             }
         }
     }
 
     /// Drops the query of a killed host.
-    pub(super) const fn forget(&mut self) {
-        self.asked = None;
+    pub(super) const fn reset(&mut self) {
+        self.queried_at = None;
     }
 
     /// Drops the query if the device restarts, as its ticks count from zero again.
     pub(super) fn device_restarted(&mut self) {
-        self.asked = self.asked.and(Some(0));
+        self.queried_at = self.queried_at.and(Some(0));
     }
 
     pub(super) fn take(&mut self, event: &Event<'_>) {
@@ -42,18 +42,23 @@ impl StatusQueries {
             Event::Status(status) => {
                 self.answers += 1;
                 let reported = status.ticks.run;
-                let asked = self.asked.take().filter(|asked| reported < *asked);
-                self.outdated = self.outdated.or(asked.map(|asked| (reported, asked)));
+                let queried_at = self
+                    .queried_at
+                    .take()
+                    .filter(|queried_at| reported < *queried_at);
+                self.outdated = self
+                    .outdated
+                    .or(queried_at.map(|queried_at| (reported, queried_at)));
             }
-            Event::Unanswered(HostRequest::Status) => self.asked = None,
+            Event::Unanswered(HostRequest::Status) => self.queried_at = None,
             _ => {}
         }
     }
 
-    pub(super) fn judge(&self) -> Result<(), Wrong> {
+    pub(super) fn check(&self) -> Result<(), Violation> {
         match self.outdated {
             None => Ok(()),
-            Some((reported, asked)) => Err(Wrong::Outdated(reported, asked)),
+            Some((reported, queried_at)) => Err(Violation::Outdated(reported, queried_at)),
         }
     }
 }

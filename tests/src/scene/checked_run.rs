@@ -2,7 +2,7 @@
 
 use super::material_checks;
 use super::metamorphic;
-use super::run::{Scene, Twins};
+use super::run::{Metamorphic, Scene};
 use super::tile_supply::Buffers;
 use crate::invariants::Violation;
 use crate::invariants::oracle::{Measured, TickOracle};
@@ -14,29 +14,32 @@ impl Scene {
     /// # Errors
     /// The first violation.
     pub fn run(&self, buffers: &mut Buffers) -> Result<Measured, Violation> {
-        let mut judge = TickOracle::of(self);
-        let seen = self.step(buffers, [0; 3], self.supply, |seen| judge.look(seen))?;
+        let mut oracle = TickOracle::of(self);
+        let observed = self.render(buffers, [0; 3], self.supply, |observed| {
+            oracle.check(observed)
+        })?;
         let mut random = Random::new(self.seed);
-        let wanted = |twin: usize| {
-            matches!(self.twins, Twins::One(n) if n == twin) || self.twins == Twins::All
+        let expected = |twin: usize| {
+            matches!(self.metamorphic, Metamorphic::One(n) if n == twin)
+                || self.metamorphic == Metamorphic::All
         };
-        let mut twins = [false; 4];
-        if wanted(0) {
-            twins[0] = metamorphic::repeated(self, &seen, buffers)?;
+        let mut metamorphic = [false; 4];
+        if expected(0) {
+            metamorphic[0] = metamorphic::repeated(self, &observed, buffers)?;
         }
-        if wanted(1) {
-            twins[1] = metamorphic::shifted(self, buffers, &mut random)?;
+        if expected(1) {
+            metamorphic[1] = metamorphic::shifted(self, buffers, &mut random)?;
         }
-        if wanted(2) {
-            twins[2] = metamorphic::windowed(self, &seen, buffers, &mut random)?;
+        if expected(2) {
+            metamorphic[2] = metamorphic::windowed(self, &observed, buffers, &mut random)?;
         }
-        if wanted(3) || wanted(4) {
-            twins[3] = metamorphic::turned(self, buffers, &mut random)?;
+        if expected(3) || expected(4) {
+            metamorphic[3] = metamorphic::turned(self, buffers, &mut random)?;
         }
-        judge.measured.twins = twins.map(u64::from);
+        oracle.measured.metamorphic = metamorphic.map(u64::from);
         if let Some(materials) = &self.materials {
-            material_checks::run(self, materials, buffers, &mut judge.measured)?;
+            material_checks::run(self, materials, buffers, &mut oracle.measured)?;
         }
-        Ok(judge.measured)
+        Ok(oracle.measured)
     }
 }

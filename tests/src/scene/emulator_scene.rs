@@ -11,7 +11,7 @@ use hapterra_core::scene::{Scene as SceneMessage, Source};
 use hapterra_core::terrain::FieldSize;
 
 use super::loop_replay::noted;
-use super::run::{LEAST_WORK_PER_TICK, Player, Scene, Surface};
+use super::run::{MIN_WORK_PER_TICK, Player, Scene, Surface};
 use super::terrain::Terrain;
 use super::tile_supply::Buffers;
 use crate::cycles::Cycles;
@@ -52,7 +52,7 @@ impl EmulatorScene {
         let scene = Scene {
             execution: Execution::RealTime,
             // Like the counting board, which counts at 10 kHz.
-            work_per_tick: LEAST_WORK_PER_TICK,
+            work_per_tick: MIN_WORK_PER_TICK,
             ..Scene::random(seed, number).with_surface(surface)
         };
         let mut buffers = Buffers::new(WINDOW);

@@ -10,13 +10,13 @@ pub const GRAIN: f64 = 1.0 / (1 << 20) as f64;
 const COUNT: f64 = 0.03;
 
 /// Largest motion of the HIP along an axis in a tick, cells.
-pub const LEAP: f64 = 32.0;
+pub const JUMP_CELLS: f64 = 32.0;
 /// Most leaps towards a target.
-const LEAPS: usize = 12;
+const JUMPS: usize = 12;
 
 /// Motion of the HIP for some ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Habit {
+enum PathKind {
     /// Steps of one length near the surface.
     Wander,
     /// Jumps to any point in one tick.
@@ -37,27 +37,27 @@ enum Habit {
     Still,
 }
 
-const HABITS: [Habit; 9] = [
-    Habit::Wander,
-    Habit::Teleport,
-    Habit::Tremble,
-    Habit::Vertex,
-    Habit::Graze,
-    Habit::OnLines,
-    Habit::Tap,
-    Habit::Sweep,
-    Habit::Still,
+const PATH_KINDS: [PathKind; 9] = [
+    PathKind::Wander,
+    PathKind::Teleport,
+    PathKind::Tremble,
+    PathKind::Vertex,
+    PathKind::Graze,
+    PathKind::OnLines,
+    PathKind::Tap,
+    PathKind::Sweep,
+    PathKind::Still,
 ];
 
 /// Returns `ticks` positions in cells; the first is high above everything.
 #[must_use]
 pub fn random(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
     walked(terrain, random, ticks, |walker| {
-        let habit = match walker.random.below(20) {
-            n if n < HABITS.len() => HABITS[n],
-            _ => Habit::Wander,
+        let kind = match walker.random.below(20) {
+            n if n < PATH_KINDS.len() => PATH_KINDS[n],
+            _ => PathKind::Wander,
         };
-        walker.go_on(habit);
+        walker.advance(kind);
     })
 }
 
@@ -120,11 +120,11 @@ impl<'a> Walker<'a> {
 
     fn put(&mut self, x: f64, y: f64, z: f64) {
         self.at = [x, y];
-        for _ in 0..LEAPS {
+        for _ in 0..JUMPS {
             let to = [x, y, z];
             let last = self.path.last().copied().unwrap_or(to);
-            let way = |axis: usize| (to[axis] - last[axis]).clamp(-LEAP, LEAP);
-            let next = [0, 1, 2].map(|axis| ((last[axis] + way(axis)) / GRAIN).round() * GRAIN);
+            let step = |axis: usize| (to[axis] - last[axis]).clamp(-JUMP_CELLS, JUMP_CELLS);
+            let next = [0, 1, 2].map(|axis| ((last[axis] + step(axis)) / GRAIN).round() * GRAIN);
             self.path.push(next);
             if next
                 .iter()
@@ -140,32 +140,32 @@ impl<'a> Walker<'a> {
         self.put(x, y, self.terrain.height_about(x, y) + height);
     }
 
-    /// Returns a length over many orders of magnitude, at most `most`.
-    fn length(&mut self, most: f64) -> f64 {
-        most * 10_f64.powf(self.random.between(-4.0, 0.0))
+    /// Returns a length over many orders of magnitude, at most `max`.
+    fn length(&mut self, max: f64) -> f64 {
+        max * 10_f64.powf(self.random.between(-4.0, 0.0))
     }
 
-    fn anywhere(&mut self) -> [f64; 2] {
+    fn random_position(&mut self) -> [f64; 2] {
         // Also off the field.
         [0, 1].map(|axis| self.random.between(-2.0, self.size[axis] + 2.0))
     }
 
     fn vertex(&mut self) -> [f64; 2] {
-        self.anywhere().map(f64::round)
+        self.random_position().map(f64::round)
     }
 
-    fn go_on(&mut self, habit: Habit) {
+    fn advance(&mut self, kind: PathKind) {
         let ticks = 1 + self.random.below(40);
-        match habit {
-            Habit::Wander => self.wander(4 * ticks),
-            Habit::Teleport => self.teleport(ticks),
-            Habit::Tremble => self.tremble(ticks),
-            Habit::Vertex => self.press_vertex(ticks),
-            Habit::Graze => self.graze(ticks),
-            Habit::OnLines => self.on_lines(ticks),
-            Habit::Tap => self.tap(ticks),
-            Habit::Sweep => self.sweep(1 + ticks / 8),
-            Habit::Still => self.still(ticks),
+        match kind {
+            PathKind::Wander => self.wander(4 * ticks),
+            PathKind::Teleport => self.teleport(ticks),
+            PathKind::Tremble => self.tremble(ticks),
+            PathKind::Vertex => self.press_vertex(ticks),
+            PathKind::Graze => self.graze(ticks),
+            PathKind::OnLines => self.on_lines(ticks),
+            PathKind::Tap => self.tap(ticks),
+            PathKind::Sweep => self.sweep(1 + ticks / 8),
+            PathKind::Still => self.hold_still(ticks),
         }
     }
 
@@ -199,7 +199,7 @@ impl<'a> Walker<'a> {
 
     fn teleport(&mut self, ticks: usize) {
         for _ in 0..ticks {
-            let [x, y] = self.anywhere();
+            let [x, y] = self.random_position();
             let height = self.length(10.0) * if self.random.below(2) == 0 { 1.0 } else { -1.0 };
             self.above(x, y, height);
         }
@@ -265,7 +265,7 @@ impl<'a> Walker<'a> {
     fn sweep(&mut self, times: usize) {
         let height = self.random.between(-0.5, 1.0);
         for _ in 0..times {
-            let [x, y] = self.anywhere();
+            let [x, y] = self.random_position();
             self.above(x, y, height);
             let (x, y) = (self.size[0] - x, self.size[1] - y);
             let z = self.path[self.path.len() - 1][2];
@@ -277,7 +277,7 @@ impl<'a> Walker<'a> {
         }
     }
 
-    fn still(&mut self, ticks: usize) {
+    fn hold_still(&mut self, ticks: usize) {
         let last = self.path[self.path.len() - 1];
         self.path.extend(std::iter::repeat_n(last, ticks));
     }

@@ -48,7 +48,7 @@ struct Device<'t, 'g, const D: usize> {
     materials: &'g Materials,
     replay: Replay,
     spare: Vec<&'t mut Tile>,
-    coming: Vec<(u32, TileKey)>,
+    requested: Vec<(u32, TileKey)>,
     now: u32,
     seq: u32,
     /// Tiles and points in their order of arrival, and each tick's report.
@@ -56,11 +56,11 @@ struct Device<'t, 'g, const D: usize> {
     ticks: Vec<Counted>,
 }
 
-/// Replays the path of a scene on materials in a window of `D × D` tiles, and calls `look` for the
+/// Replays the path of a scene on materials in a window of `D × D` tiles, and calls `check` for the
 /// result of each point.
 ///
 /// # Errors
-/// The error of `look`, or a point without an answer.
+/// The error of `check`, or a point without an answer.
 ///
 /// # Panics
 /// If the loop refuses the scene, or a terrain to be stored whole does not fit.
@@ -69,7 +69,7 @@ pub fn replay<const D: usize>(
     materials: &Materials,
     buffers: &mut Buffers,
     replay: Replay,
-    mut look: impl FnMut(&Replied) -> Result<(), Violation>,
+    mut check: impl FnMut(&Replied) -> Result<(), Violation>,
 ) -> Result<Vec<Replied>, Violation> {
     let mut device = Device::<D>::new(scene, materials, buffers, replay);
     let mut all = Vec::with_capacity(scene.path.len());
@@ -87,7 +87,7 @@ pub fn replay<const D: usize>(
             proxy: here(&sample.proxy),
             sample,
         };
-        look(&replied)?;
+        check(&replied)?;
         all.push(replied);
     }
     Ok(all)
@@ -137,13 +137,13 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             materials,
             replay,
             spare: tiles.collect(),
-            coming: Vec::new(),
+            requested: Vec::new(),
             now: 0,
             seq: 0,
             events: Vec::new(),
             ticks: Vec::new(),
         };
-        if replay.supply == Supply::Held {
+        if replay.supply == Supply::Preloaded {
             device.hold_all();
         }
         device
@@ -158,13 +158,13 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         assert!(cols.clone().count() <= D && rows.clone().count() <= D);
         for row in rows {
             for col in cols.clone() {
-                let _ = self.bring(TileKey::new(0, col, row));
+                let _ = self.send_tile(TileKey::new(0, col, row));
             }
         }
     }
 
     /// Sends a tile. Returns true if the loop accepted it.
-    fn bring(&mut self, key: TileKey) -> bool {
+    fn send_tile(&mut self, key: TileKey) -> bool {
         let tile = self.spare.pop().expect("as many spares as requests");
         let [dx, dy, dz] = self.replay.shift;
         let first = key.index.first_cell();
@@ -231,7 +231,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
 
     /// Requests the tiles that the tick needs, and delivers those that are due.
     fn supply(&mut self, sample: &TickRecord) {
-        let Supply::Pulled { latency } = self.replay.supply else {
+        let Supply::OnDemand { latency } = self.replay.supply else {
             return;
         };
         let demand = RequestHint {
@@ -241,15 +241,15 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             velocity: [0.0; 2],
         };
         while let Some(key) = self.requester.next_request(self.now, &demand) {
-            self.coming.push((self.now + latency, key));
+            self.requested.push((self.now + latency, key));
         }
         let is_here = |(due, _): &(u32, TileKey)| *due <= self.now;
-        let (here, coming) = self.coming.iter().partition(|one| is_here(one));
-        self.coming = coming;
+        let (here, requested) = self.requested.iter().partition(|one| is_here(one));
+        self.requested = requested;
         let here: Vec<(u32, TileKey)> = here;
         for (_, key) in here {
             self.requester.received(key);
-            if !self.bring(key) {
+            if !self.send_tile(key) {
                 self.requester.lost(key);
             }
         }

@@ -1,7 +1,7 @@
 //! The replay of a scene on materials under its oracle, and in metamorphic tests in which no force
 //! may change.
 
-use super::hip_path::LEAP;
+use super::hip_path::JUMP_CELLS;
 use super::loop_replay::{Replay, Replied, replay};
 use super::materials::Materials;
 use super::run::{Scene, is_alike};
@@ -14,8 +14,8 @@ use crate::invariants::{Invariant, Violation};
 use crate::random::Random;
 
 /// Range of the HIP of a shifted scene beyond the field, and above or below it, cells.
-const BESIDE: f64 = 128.0;
-const DEEP: f64 = 4e6;
+const MAX_BESIDE: f64 = 128.0;
+const MAX_DEPTH: f64 = 4e6;
 
 /// Replays a scene on its materials under the oracle, and adds to its measurements.
 ///
@@ -29,16 +29,16 @@ pub fn run(
 ) -> Result<(), Violation> {
     let mut random = Random::new(scene.seed ^ 0x57ab_1e55);
     let side = match scene.supply {
-        Supply::Held => SIDE,
-        Supply::Pulled { .. } => [2, 3, 4, SIDE][random.below(4)],
+        Supply::Preloaded => SIDE,
+        Supply::OnDemand { .. } => [2, 3, 4, SIDE][random.below(4)],
     };
-    let mut judge = MaterialOracle::new(scene, materials, [0; 3]);
+    let mut oracle = MaterialOracle::new(scene, materials, [0; 3]);
     let usual = Replay {
         shift: [0; 3],
         supply: scene.supply,
     };
     let replied = replay_in(side, scene, materials, buffers, usual, |replied| {
-        judge.look(replied)
+        oracle.check(replied)
     })
     .map_err(|violation| Violation {
         detail: format!(
@@ -47,7 +47,7 @@ pub fn run(
         ),
         ..violation
     })?;
-    measured.on_materials = judge.judged;
+    measured.on_materials = oracle.counts;
     let twin = random.below(6);
     match twin {
         0 if fits(&replied) => windowed(scene, materials, &replied, buffers, &mut random)?,
@@ -56,7 +56,7 @@ pub fn run(
         2 if scene.terrain.kind != Kind::Walls => turned(scene, materials, buffers, &mut random)?,
         _ => return Ok(()),
     }
-    measured.twins_on_materials[twin] = 1;
+    measured.metamorphic_on_materials[twin] = 1;
     Ok(())
 }
 
@@ -67,14 +67,14 @@ fn replay_in(
     materials: &Materials,
     buffers: &mut Buffers,
     how: Replay,
-    look: impl FnMut(&Replied) -> Result<(), Violation>,
+    check: impl FnMut(&Replied) -> Result<(), Violation>,
 ) -> Result<Vec<Replied>, Violation> {
     match side {
-        2 => replay::<2>(scene, materials, buffers, how, look),
-        3 => replay::<3>(scene, materials, buffers, how, look),
-        4 => replay::<4>(scene, materials, buffers, how, look),
-        6 => replay::<6>(scene, materials, buffers, how, look),
-        _ => replay::<SIDE>(scene, materials, buffers, how, look),
+        2 => replay::<2>(scene, materials, buffers, how, check),
+        3 => replay::<3>(scene, materials, buffers, how, check),
+        4 => replay::<4>(scene, materials, buffers, how, check),
+        6 => replay::<6>(scene, materials, buffers, how, check),
+        _ => replay::<SIDE>(scene, materials, buffers, how, check),
     }
 }
 
@@ -82,8 +82,8 @@ fn replay_in(
 /// point lacked terrain, as one does that needs more tiles than its window has.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
-        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
-        way(0).max(way(1)) <= 4.0 * LEAP
+        let distance = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        distance(0).max(distance(1)) <= 4.0 * JUMP_CELLS
     };
     let is_whole = |replied: &Replied| replied.sample.missing_tile.is_none();
     replied.iter().all(is_whole) && replied.windows(2).all(is_near)
@@ -101,7 +101,7 @@ fn windowed(
     let latency = [0, 1, 5][random.below(3)];
     let how = Replay {
         shift: [0; 3],
-        supply: Supply::Pulled { latency },
+        supply: Supply::OnDemand { latency },
     };
     let other = replay_in(side, scene, materials, buffers, how, |_| Ok(()))?;
     same_bits(Invariant::Window, replied, &other, [0; 3], true)
@@ -115,22 +115,26 @@ fn shifted(
     buffers: &mut Buffers,
     random: &mut Random,
 ) -> Result<(), Violation> {
-    let far = [1_024, 30_016, 1_000_000, 99_999_968];
-    let mut pick = || far[random.below(far.len())] / 32 * 32;
+    let distances = [1_024, 30_016, 1_000_000, 99_999_968];
+    let mut pick = || distances[random.below(distances.len())] / 32 * 32;
     let away = [pick(), pick(), pick() - 50_000_000];
     let beside = |p: &[f64; 3]| {
-        let within =
-            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
-        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+        let within = |axis: usize| {
+            p[axis].clamp(
+                -MAX_BESIDE,
+                f64::from(scene.terrain.size[axis]) + MAX_BESIDE,
+            )
+        };
+        [within(0), within(1), p[2].clamp(-MAX_DEPTH, MAX_DEPTH)]
     };
     let path = scene.path.iter().map(beside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);
     let mut at = |shift| {
-        let supply = Supply::Pulled { latency: 0 };
-        let mut judge = MaterialOracle::new(scene, materials, shift);
+        let supply = Supply::OnDemand { latency: 0 };
+        let mut oracle = MaterialOracle::new(scene, materials, shift);
         let how = Replay { shift, supply };
         replay_in(4, scene, materials, buffers, how, |replied| {
-            judge.look(replied)
+            oracle.check(replied)
         })
     };
     // Both are away from the origin, so that the space beyond the field is alike.
@@ -155,14 +159,14 @@ fn turned(
     let path = scene.path.iter();
     let path = path.map(|p| symmetry.point(&scene.terrain, *p)).collect();
     let twin = scene.with(symmetry.terrain(&scene.terrain), path);
-    let materials = &materials.seen_by(symmetry);
-    let mut judge = MaterialOracle::new(&twin, materials, [0; 3]);
+    let materials = &materials.relative_to_(symmetry);
+    let mut oracle = MaterialOracle::new(&twin, materials, [0; 3]);
     let how = Replay {
         shift: [0; 3],
-        supply: Supply::Pulled { latency: 0 },
+        supply: Supply::OnDemand { latency: 0 },
     };
     replay_in(4, &twin, materials, buffers, how, |replied| {
-        judge.look(replied)
+        oracle.check(replied)
     })
     .map(drop)
 }

@@ -100,7 +100,7 @@ impl Materials {
             seed: random.bits(),
         };
         let class_of = classes(layout, count, terrain.size, random);
-        materials.lay(class_of);
+        materials.assign(class_of);
         materials
     }
 
@@ -119,11 +119,11 @@ impl Materials {
             classes: Vec::new(),
             seed: 1,
         };
-        materials.lay(class);
+        materials.assign(class);
         materials
     }
 
-    fn lay(&mut self, class: impl Fn(i32, i32) -> u8) {
+    fn assign(&mut self, class: impl Fn(i32, i32) -> u8) {
         let [columns, rows] = self.size;
         let samples = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
         self.classes = samples.map(|(x, y)| class(x, y)).collect();
@@ -164,13 +164,13 @@ impl Materials {
 
     /// Returns true if no material has friction.
     #[must_use]
-    pub fn is_like_ice(&self) -> bool {
+    pub fn is_frictionless(&self) -> bool {
         self.table.iter().all(|one| one.friction.is_none())
     }
 
     /// Returns the ground mirrored or turned.
     #[must_use]
-    pub fn seen_by(&self, symmetry: Symmetry) -> Self {
+    pub fn relative_to_(&self, symmetry: Symmetry) -> Self {
         let [columns, rows] = self.size;
         let mut turned = Self {
             size: match symmetry.transpose {
@@ -179,7 +179,7 @@ impl Materials {
             },
             ..self.clone()
         };
-        turned.lay(|x, y| {
+        turned.assign(|x, y| {
             let (x, y) = if symmetry.transpose { (y, x) } else { (x, y) };
             let x = if symmetry.mirror_x {
                 columns - 1 - x
@@ -259,13 +259,13 @@ fn blob(seed: u64, side: i32, [x, y]: [i32; 2]) -> Random {
     let (col, row) = (x.div_euclid(side), y.div_euclid(side));
     let squares = (-1..=1).flat_map(|north| (-1..=1).map(move |east| (col + east, row + north)));
     let nearest = squares.min_by(|a, b| {
-        let far = |(col, row): &(i32, i32)| {
+        let distance = |(col, row): &(i32, i32)| {
             let mut random = random_at(seed, *col, *row);
             let mut middle = |at: i32| f64::from(side) * (f64::from(at) + random.between(0.0, 1.0));
             let (east, north) = (middle(*col), middle(*row));
             (east - f64::from(x)).hypot(north - f64::from(y))
         };
-        far(a).total_cmp(&far(b))
+        distance(a).total_cmp(&distance(b))
     });
     let (col, row) = nearest.unwrap_or((col, row));
     random_at(!seed, col, row)

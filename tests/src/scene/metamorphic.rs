@@ -3,7 +3,7 @@
 use crate::scene::run::Execution;
 use hapterra_core::contact::ContactState;
 
-use super::hip_path::{GRAIN, LEAP};
+use super::hip_path::{GRAIN, JUMP_CELLS};
 use super::run::{Player, Scene};
 use super::symmetry::{self, Symmetry};
 use super::terrain::Kind;
@@ -22,19 +22,19 @@ type Compared = Result<bool, Violation>;
 ///
 /// # Errors
 /// The difference.
-pub fn repeated(scene: &Scene, seen: &[ObservedTick], buffers: &mut Buffers) -> Compared {
+pub fn repeated(scene: &Scene, observed: &[ObservedTick], buffers: &mut Buffers) -> Compared {
     let scene = Scene {
         fast_paths: false,
         ..scene.clone()
     };
-    let again = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()))?;
-    same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
+    let repeated = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()))?;
+    same_bits(Invariant::Repeatable, observed, &repeated, [0; 3]).map(|()| true)
 }
 
 /// Range of a shifted scene's HIP beyond the field, cells.
-const BESIDE: f64 = 128.0;
+const MAX_BESIDE: f64 = 128.0;
 /// Range above or below, cells: farther down than any spike is high.
-const DEEP: f64 = 4e6;
+const MAX_DEPTH: f64 = 4e6;
 
 /// Runs a scene up to 10⁸ cells away: the same bits, except for textures that differ there.
 ///
@@ -49,15 +49,19 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
         Execution::RealTime => 256,
         Execution::LockStep => 32,
     };
-    let far = [1_000, 30_000, 1_000_000, 100_000_000];
-    let mut pick = || far[random.below(far.len())] / whole * whole;
+    let distances = [1_000, 30_000, 1_000_000, 100_000_000];
+    let mut pick = || distances[random.below(distances.len())] / whole * whole;
     let shift = [pick(), pick(), pick() - 50_000_000];
     // No farther beyond the field than the nearer run is from the origin: each tile there is
     // requested.
     let beside = |p: &[f64; 3]| {
-        let within =
-            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
-        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+        let within = |axis: usize| {
+            p[axis].clamp(
+                -MAX_BESIDE,
+                f64::from(scene.terrain.size[axis]) + MAX_BESIDE,
+            )
+        };
+        [within(0), within(1), p[2].clamp(-MAX_DEPTH, MAX_DEPTH)]
     };
     let scene = &scene.with(
         scene.terrain.clone(),
@@ -65,12 +69,14 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
     );
     let mut output = |shift| {
         // Grain and most gratings have another part there, so the oracle checks them as well.
-        let mut judge = TickOracle::new(&scene.terrain).with_texture(scene.texture);
-        let pulled = Supply::Pulled { latency: 0 };
-        let seen = scene.step(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
-        Ok(seen.into_iter().map(|seen| ObservedTick {
-            textured: seen.textured.filter(|_| scene.is_textured_alike()),
-            ..seen
+        let mut oracle = TickOracle::new(&scene.terrain).with_texture(scene.texture);
+        let on_demand = Supply::OnDemand { latency: 0 };
+        let observed = scene.render(buffers, shift, on_demand, |observed| {
+            oracle.check_texture(observed)
+        })?;
+        Ok(observed.into_iter().map(|observed| ObservedTick {
+            textured: observed.textured.filter(|_| scene.is_textured_alike()),
+            ..observed
         }))
     };
     let near = Vec::from_iter(output([256, 256, 0])?);
@@ -86,26 +92,26 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
 /// The difference.
 pub fn windowed(
     scene: &Scene,
-    seen: &[ObservedTick],
+    observed: &[ObservedTick],
     buffers: &mut Buffers,
     random: &mut Random,
 ) -> Compared {
     let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
     // The path from the proxy to the HIP fits into the small window.
     let is_near = |ticks: &[ObservedTick]| {
-        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
-        way(0).max(way(1)) <= 5.0 * LEAP
+        let distance = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        distance(0).max(distance(1)) <= 5.0 * JUMP_CELLS
     };
-    if scene.execution != Execution::LockStep || !fits || !seen.windows(2).all(is_near) {
+    if scene.execution != Execution::LockStep || !fits || !observed.windows(2).all(is_near) {
         return Ok(false);
     }
     let latency = [0, 1, 5][random.below(3)];
-    let pulled = Supply::Pulled { latency };
-    let small = scene.feel_in::<7>(buffers, [0; 3], pulled, |_| Ok(()))?;
-    same_bits(Invariant::Window, seen, &small, [0; 3])?;
-    if scene.supply != Supply::Held {
-        let whole = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
-        same_bits(Invariant::Window, seen, &whole, [0; 3])?;
+    let on_demand = Supply::OnDemand { latency };
+    let small = scene.render_in::<7>(buffers, [0; 3], on_demand, |_| Ok(()))?;
+    same_bits(Invariant::Window, observed, &small, [0; 3])?;
+    if scene.supply != Supply::Preloaded {
+        let whole = scene.render(buffers, [0; 3], Supply::Preloaded, |_| Ok(()))?;
+        same_bits(Invariant::Window, observed, &whole, [0; 3])?;
     }
     Ok(true)
 }
@@ -116,19 +122,21 @@ pub fn windowed(
 /// `invariant`, if a bit of the results differs.
 pub fn same_bits(
     invariant: Invariant,
-    seen: &[ObservedTick],
+    observed: &[ObservedTick],
     other: &[ObservedTick],
     shift: [i32; 3],
 ) -> Verdict {
-    for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
-        let bits = |seen: &ObservedTick, shift: [i32; 3]| {
-            let (cell, frac) = (seen.output.proxy.cell(), seen.output.proxy.frac());
+    for (tick, (a, b)) in observed.iter().zip(other).enumerate() {
+        let bits = |observed: &ObservedTick, shift: [i32; 3]| {
+            let (cell, frac) = (observed.output.proxy.cell(), observed.output.proxy.frac());
             (
-                seen.output.state,
-                seen.output.displacement.to_array().map(f32::to_bits),
-                seen.shaded
+                observed.output.state,
+                observed.output.displacement.to_array().map(f32::to_bits),
+                observed
+                    .shaded
                     .map(|shaded| shaded.displacement.to_array().map(f32::to_bits)),
-                seen.textured
+                observed
+                    .textured
                     .map(|textured| textured.to_array().map(f32::to_bits)),
                 [0, 1, 2].map(|i| cell[i] - shift[i]),
                 frac.to_array().map(f32::to_bits),
@@ -164,7 +172,7 @@ const JUMP: f64 = 1e3;
 pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Compared {
     // On a border of the data a HIP belongs to the patch in the north-east, mirrored or not; and
     // the work left of a tick may differ.
-    let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
+    let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Preloaded;
     let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::NoData;
     if !settles || !plain {
         return Ok(false);
@@ -175,17 +183,19 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Comp
     };
     let path: Vec<_> = scene.path.iter().map(inside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);
-    let seen = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let observed = scene.render(buffers, [0; 3], Supply::Preloaded, |_| Ok(()))?;
     let symmetries = symmetry::all();
     let symmetry = symmetries[random.below(symmetries.len())];
-    let twin = twin_of(scene, symmetry);
-    let mut judge = TickOracle::of(&twin);
-    let other = twin.step(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
-    same_way(scene, symmetry, &seen, &other, buffers)
+    let twin = transformed(scene, symmetry);
+    let mut oracle = TickOracle::of(&twin);
+    let other = twin.render(buffers, [0; 3], Supply::Preloaded, |observed| {
+        oracle.check(observed)
+    })?;
+    same_forces(scene, symmetry, &observed, &other, buffers)
 }
 
 /// Returns the scene, mirrored or turned.
-fn twin_of(scene: &Scene, symmetry: Symmetry) -> Scene {
+fn transformed(scene: &Scene, symmetry: Symmetry) -> Scene {
     let turned = |p: &[f64; 3]| symmetry.point(&scene.terrain, *p);
     let path = scene.path.iter().map(turned).collect();
     scene.with(symmetry.terrain(&scene.terrain), path)
@@ -195,16 +205,16 @@ fn twin_of(scene: &Scene, symmetry: Symmetry) -> Scene {
 ///
 /// # Errors
 /// A difference that rounding does not explain.
-pub fn same_way(
+pub fn same_forces(
     scene: &Scene,
     symmetry: Symmetry,
-    seen: &[ObservedTick],
+    observed: &[ObservedTick],
     other: &[ObservedTick],
     buffers: &mut Buffers,
 ) -> Compared {
     let turned = |p| symmetry.point(&scene.terrain, p);
     let mut parted = false;
-    for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
+    for (tick, (a, b)) in observed.iter().zip(other).enumerate() {
         // Until both proxies are at the HIP again.
         parted &= a.output.state != ContactState::Free || b.output.state != ContactState::Free;
         if parted {
@@ -224,10 +234,10 @@ pub fn same_way(
             continue;
         }
         let decides = |there: &ObservedTick, hair| {
-            is_elsewhere(there, a, hair) || agree(turned(there.proxy), there, b)
+            has_moved_apart(there, a, hair) || agree(turned(there.proxy), there, b)
         };
         if is_undecided(scene, tick, decides, buffers)
-            || is_twin_undecided(scene, symmetry, tick, buffers)
+            || is_transformed_undecided(scene, symmetry, tick, buffers)
         {
             return Ok(false);
         }
@@ -245,7 +255,7 @@ pub fn same_way(
 /// position, on ground steep enough for mirrored scenes.
 const TURNED: f32 = 0.01;
 /// Distance of a HIP, cells, from which its force is not compared.
-const FAR: f32 = 1e4;
+const MIN_MOTION_RATIO: f32 = 1e4;
 
 fn is_shaded_likewise(
     scene: &Scene,
@@ -258,16 +268,16 @@ fn is_shaded_likewise(
     };
     // At this distance all points near the proxy are equally near, and each has its own normal.
     let length = a.output.displacement.length();
-    let is_reported = (0.1..FAR).contains(&length);
+    let is_reported = (0.1..MIN_MOTION_RATIO).contains(&length);
     if !is_reported || !scene.friction.is_none() || a.output.state != b.output.state {
         return true;
     }
     let tip = one.displacement.as_dvec3().to_array();
     let ends = [[0.0; 3], tip].map(|end| symmetry.point(&scene.terrain, end));
     let [x, y, z] = [0, 1, 2].map(|i| (ends[1][i] - ends[0][i]) as f32);
-    let wanted = hapterra_core::Vec3::new(x, y, z);
-    let along = wanted.dot(other.displacement);
-    let across = wanted.cross(other.displacement).length();
+    let expected = hapterra_core::Vec3::new(x, y, z);
+    let along = expected.dot(other.displacement);
+    let across = expected.cross(other.displacement).length();
     across <= TURNED * along
 }
 
@@ -281,12 +291,12 @@ fn agree(scene: &Scene, proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> 
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
     // A HIP in the surface may be touching or free: neither gives a force.
-    let at_hip = |seen: &ObservedTick| {
+    let at_hip = |observed: &ObservedTick| {
         let may = matches!(
-            seen.output.state,
+            observed.output.state,
             ContactState::Free | ContactState::Touching
         );
-        may && seen.output.displacement.length() <= ERROR as f32
+        may && observed.output.displacement.length() <= ERROR as f32
     };
     let same = a.output.state == b.output.state || (at_hip(a) && at_hip(b));
     let slack = match scene.friction.is_none() {
@@ -302,22 +312,22 @@ fn is_near(proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
 }
 
 /// Returns true if a proxy moves much farther than the tiny motion `hair` of its HIP, cells.
-fn is_elsewhere(there: &ObservedTick, here: &ObservedTick, hair: f64) -> bool {
+fn has_moved_apart(there: &ObservedTick, here: &ObservedTick, hair: f64) -> bool {
     distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
 }
 
 /// Returns true if a tiny motion of the HIP changes the result of the mirrored or turned run as
 /// well.
-fn is_twin_undecided(
+fn is_transformed_undecided(
     scene: &Scene,
     symmetry: Symmetry,
     tick: usize,
     buffers: &mut Buffers,
 ) -> bool {
-    let twin = twin_of(scene, symmetry);
+    let twin = transformed(scene, symmetry);
     let own = rendered_at(&twin, tick, |_| [0.0; 3], buffers);
     own.is_some_and(|own| {
-        let decides = |there: &ObservedTick, hair| is_elsewhere(there, &own, hair);
+        let decides = |there: &ObservedTick, hair| has_moved_apart(there, &own, hair);
         is_undecided(&twin, tick, decides, buffers)
     })
 }
@@ -330,11 +340,11 @@ fn is_undecided(
     decides: impl Fn(&ObservedTick, f64) -> bool,
     buffers: &mut Buffers,
 ) -> bool {
-    const HAIRS: [f64; 3] = [1.0, 16.0, 256.0];
-    let ways = [0, tick]
+    const OFFSETS: [f64; 3] = [1.0, 16.0, 256.0];
+    let starts = [0, tick]
         .into_iter()
-        .flat_map(|first| HAIRS.map(|hair| (first, GRAIN * hair)));
-    for (first, hair) in ways {
+        .flat_map(|first| OFFSETS.map(|hair| (first, GRAIN * hair)));
+    for (first, hair) in starts {
         for corner in 0..8 {
             let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
             let moved = |now| if now < first { [0.0; 3] } else { off };

@@ -19,7 +19,7 @@ use crate::random::Random;
 use crate::whole_field::point;
 
 /// Work units of a tick at 10 kHz.
-pub(super) const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
+pub(super) const MIN_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
     Some(rate) => work_per_tick(rate),
     None => WORK_PER_TICK,
 };
@@ -53,7 +53,7 @@ pub struct Scene {
     /// Work units of a tick at 1 kHz or at 10 kHz.
     pub(super) work_per_tick: u32,
     /// The metamorphic tests that are run.
-    pub(super) twins: Twins,
+    pub(super) metamorphic: Metamorphic,
     /// Seed of the metamorphic tests' random choices.
     pub(super) seed: u64,
 }
@@ -79,7 +79,7 @@ impl Surface {
     }
 }
 
-/// The grating of a scene from [`Scene::given`].
+/// The grating of a scene from [`Scene::new`].
 const GRATING: Texture = Texture {
     pattern: Pattern::Grating,
     amplitude_mm: 0.05,
@@ -132,7 +132,7 @@ pub(super) fn texture(mixed: u64) -> Texture {
 
 /// Metamorphic tests of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Twins {
+pub(super) enum Metamorphic {
     /// One of them, or none, as a stress test has many scenes.
     One(usize),
     /// All of them.
@@ -148,12 +148,12 @@ impl Scene {
         let kind = KINDS[random.below(KINDS.len())];
         // A hundred patches a side, or more than the window can store, or a strip of thousands.
         let (size, supply) = match random.below(4) {
-            0 | 1 => ([70 + random.below(60) as i32, 90], Supply::Held),
-            2 => ([200, 256], Supply::Held),
+            0 | 1 => ([70 + random.below(60) as i32, 90], Supply::Preloaded),
+            2 => ([200, 256], Supply::Preloaded),
             _ => {
                 let latency = [0, 3, 40][random.below(3)];
                 let size = [[1500, 40], [130, 120], [520, 400]][random.below(3)];
-                (size, Supply::Pulled { latency })
+                (size, Supply::OnDemand { latency })
             }
         };
         let terrain = Terrain::new(kind, size, random.bits());
@@ -180,9 +180,9 @@ impl Scene {
             texture: texture(mixed),
             materials,
             fast_paths: true,
-            twins: Twins::One(random.below(6)),
+            metamorphic: Metamorphic::One(random.below(6)),
             // By number, like the path.
-            work_per_tick: [WORK_PER_TICK, LEAST_WORK_PER_TICK][(number / 4 % 2) as usize],
+            work_per_tick: [WORK_PER_TICK, MIN_WORK_PER_TICK][(number / 4 % 2) as usize],
             seed: random.bits(),
         }
     }
@@ -202,7 +202,7 @@ impl Scene {
 
     /// Creates a scene with the work of a tick at 10 kHz and all metamorphic tests.
     #[must_use]
-    pub const fn given(
+    pub const fn new(
         terrain: Terrain,
         path: Vec<[f64; 3]>,
         execution: Execution,
@@ -218,8 +218,8 @@ impl Scene {
             texture: GRATING,
             materials: None,
             fast_paths: true,
-            twins: Twins::All,
-            work_per_tick: LEAST_WORK_PER_TICK,
+            metamorphic: Metamorphic::All,
+            work_per_tick: MIN_WORK_PER_TICK,
             seed: 1,
         }
     }
@@ -235,30 +235,30 @@ impl Scene {
         }
     }
 
-    /// Runs it over the terrain shifted by `shift` cells, and calls `look` for each tick.
+    /// Runs it over the terrain shifted by `shift` cells, and calls `check` for each tick.
     ///
     /// # Errors
-    /// The error of `look`, or a tick that does not converge.
-    pub fn step(
+    /// The error of `check`, or a tick that does not converge.
+    pub fn render(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
-        look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
+        check: impl FnMut(&ObservedTick) -> Result<(), Violation>,
     ) -> Result<Vec<ObservedTick>, Violation> {
-        self.feel_in::<SIDE>(buffers, shift, supply, look)
+        self.render_in::<SIDE>(buffers, shift, supply, check)
     }
 
-    /// Same as [`Self::step`] with a window of `D × D` tiles.
+    /// Same as [`Self::render`] with a window of `D × D` tiles.
     ///
     /// # Errors
-    /// Like [`Self::step`].
-    pub fn feel_in<const D: usize>(
+    /// Like [`Self::render`].
+    pub fn render_in<const D: usize>(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
-        mut look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
+        mut check: impl FnMut(&ObservedTick) -> Result<(), Violation>,
     ) -> Result<Vec<ObservedTick>, Violation> {
         let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
@@ -268,9 +268,9 @@ impl Scene {
                 tick,
                 detail: format!("never settles for {hip:?}"),
             })?;
-            let seen = player.seen(*hip, output);
-            look(&seen)?;
-            all.push(seen);
+            let observed = player.observed(*hip, output);
+            check(&observed)?;
+            all.push(observed);
         }
         Ok(all)
     }
@@ -393,7 +393,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 
     /// Returns the last HIP's result for the oracle.
     #[must_use]
-    pub fn seen(&self, hip: [f64; 3], output: ContactOutput) -> ObservedTick {
+    pub fn observed(&self, hip: [f64; 3], output: ContactOutput) -> ObservedTick {
         ObservedTick {
             shaded: self.shader.as_ref().map(|shader| Shaded {
                 displacement: self.shaded,

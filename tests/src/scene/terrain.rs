@@ -5,7 +5,7 @@ use hapterra_core::terrain::MAX_STEP_CELLS;
 use crate::random::Random;
 
 /// Heights beyond this, in cells, are no-data: no position can represent them.
-const TALLEST: f32 = (1 << 29) as f32;
+const MAX_HEIGHT: f32 = (1 << 29) as f32;
 
 /// Kind of a terrain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,7 +119,7 @@ impl Terrain {
         }
         let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
         let corners = corners.map(|(east, north)| f64::from(self.post(x + east, y + north)));
-        let tallest = f64::from(TALLEST);
+        let tallest = f64::from(MAX_HEIGHT);
         corners
             .iter()
             .all(|h| h.abs() <= tallest)
@@ -129,7 +129,7 @@ impl Terrain {
     /// Returns an integer height that no sample exceeds.
     #[must_use]
     pub fn top(&self) -> i32 {
-        let heights = self.posts.iter().filter(|h| h.abs() <= TALLEST);
+        let heights = self.posts.iter().filter(|h| h.abs() <= MAX_HEIGHT);
         let highest = heights.fold(f32::NEG_INFINITY, |a, b| a.max(*b));
         if highest == f32::NEG_INFINITY {
             0
@@ -153,11 +153,11 @@ impl Terrain {
             let north = if y < rows { self.post(x, y + 1) } else { here };
             [east - here, north - here]
         });
-        steps.fold(0.0, |most, step| {
+        steps.fold(0.0, |max, step| {
             if step.is_nan() {
                 f32::INFINITY
             } else {
-                step.abs().max(most)
+                step.abs().max(max)
             }
         })
     }
@@ -202,7 +202,7 @@ impl Shape {
                 let tiny = f32::from_bits((random * 1000.0) as u32);
                 return if self.random(y, x) > 0.5 { tiny } else { -tiny };
             }
-            Kind::NoData => return hole_or(random, 2.0 * self.random(y, x)),
+            Kind::NoData => return no_data_or(random, 2.0 * self.random(y, x)),
             Kind::Ridges => 4.0 * ((0.25 * (tx * fx + ty * fy)).rem_euclid(2.0) - 1.0).abs(),
             Kind::Steps => 5.0 * (waves * 1.5).round() + f64::from(x / 11 % 3),
             Kind::Twisted => {
@@ -227,7 +227,7 @@ impl Shape {
     }
 }
 
-fn hole_or(random: f64, height: f64) -> f32 {
+fn no_data_or(random: f64, height: f64) -> f32 {
     match (random * 100.0) as u32 {
         0 | 1 => f32::NAN,
         2 => f32::INFINITY,

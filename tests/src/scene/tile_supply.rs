@@ -38,9 +38,9 @@ impl Default for Buffers {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supply {
     /// All tiles are stored from the start.
-    Held,
+    Preloaded,
     /// Tiles are requested, and arrive later.
-    Pulled {
+    OnDemand {
         /// Ticks from the request to the tile.
         latency: u32,
     },
@@ -55,7 +55,7 @@ pub struct SuppliedWindow<'t, 'g, const D: usize> {
     supply: Supply,
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
-    coming: Vec<(u32, TileKey)>,
+    requested: Vec<(u32, TileKey)>,
     /// Tiles put into the window since this list was last emptied, in order.
     pub installed: Vec<TileKey>,
 }
@@ -87,10 +87,10 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
             supply,
             requester,
             spare: tiles.collect(),
-            coming: Vec::new(),
+            requested: Vec::new(),
             installed: Vec::new(),
         };
-        if supply == Supply::Held {
+        if supply == Supply::Preloaded {
             supplied.hold_all();
         }
         supplied
@@ -127,7 +127,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
 
     /// Requests the tiles that the tick needs, and stores those that are due.
     pub fn supply(&mut self, now: u32, contact: &Contact, output: &ContactOutput, hip: &GridPoint) {
-        let Supply::Pulled { latency } = self.supply else {
+        let Supply::OnDemand { latency } = self.supply else {
             return;
         };
         let focus = RequestHint {
@@ -137,10 +137,10 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
             velocity: [0.0; 2],
         };
         while let Some(key) = self.requester.next_request(now, &focus) {
-            self.coming.push((now + latency, key));
+            self.requested.push((now + latency, key));
         }
         let mut arrived = Vec::new();
-        self.coming.retain(|(due, key)| {
+        self.requested.retain(|(due, key)| {
             let here = *due <= now;
             if here {
                 arrived.push(*key);

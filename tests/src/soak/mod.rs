@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use soak_counts::{Broken, Found, LinkStats, MaxWork};
+pub use soak_counts::{FailedScene, LinkStats, MaxWork, SceneOutcome};
 
 use crate::scene::run::{Scene, Surface};
 use crate::scene::tile_supply::Buffers;
@@ -67,13 +67,13 @@ pub fn soak(
 
 /// Runs one scene; a panic counts as a violation.
 #[must_use]
-pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> Found {
+pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> SceneOutcome {
     let scene = Scene::random(seed, number).with_surface(surface);
     let ran = catch_unwind(AssertUnwindSafe(|| scene.run(buffers)));
     let kind = scene.terrain.kind;
     match ran {
-        Ok(Ok(measured)) => Found::Held(kind, measured),
-        Ok(Err(violation)) => Found::Broke(
+        Ok(Ok(measured)) => SceneOutcome::Passed(kind, measured),
+        Ok(Err(violation)) => SceneOutcome::Violated(
             kind,
             format!("{:?}", violation.invariant),
             violation.to_string(),
@@ -81,9 +81,9 @@ pub fn run(seed: u64, number: u64, surface: Surface, buffers: &mut Buffers) -> F
         Err(panic) => {
             // A tile may be partly filled.
             *buffers = Buffers::default();
-            let stated = panic.downcast_ref::<String>().cloned();
-            let stated = stated.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
-            Found::Broke(kind, "Panic".to_owned(), stated.unwrap_or_default())
+            let message = panic.downcast_ref::<String>().cloned();
+            let message = message.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+            SceneOutcome::Violated(kind, "Panic".to_owned(), message.unwrap_or_default())
         }
     }
 }

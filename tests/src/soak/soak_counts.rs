@@ -5,22 +5,22 @@ use std::fmt;
 
 use hapterra_core::contact::WORK_PER_TICK;
 
-use crate::invariants::material::Judged;
+use crate::invariants::material::MaterialCounts;
 use crate::invariants::oracle::Measured;
 use crate::scene::terrain::{KINDS, Kind};
 
 /// Outcome of one scene.
 #[derive(Clone, Debug)]
-pub enum Found {
+pub enum SceneOutcome {
     /// No violation.
-    Held(Kind, Measured),
+    Passed(Kind, Measured),
     /// A violation: the invariant, and its details.
-    Broke(Kind, String, String),
+    Violated(Kind, String, String),
 }
 
 /// A scene with a violation.
 #[derive(Clone, Debug)]
-pub struct Broken {
+pub struct FailedScene {
     /// Its number.
     pub number: u64,
     /// Its terrain.
@@ -46,7 +46,7 @@ pub struct LinkStats {
     /// Scenes run.
     pub scenes: u64,
     /// Violations.
-    pub broken: Vec<Broken>,
+    pub failed: Vec<FailedScene>,
     /// The tick with the most work, among the scenes without violations.
     pub max_work: Option<MaxWork>,
     by_kind: BTreeMap<usize, Measured>,
@@ -55,23 +55,23 @@ pub struct LinkStats {
 
 impl LinkStats {
     /// Adds one scene.
-    pub fn add(&mut self, number: u64, found: Found) {
+    pub fn add(&mut self, number: u64, found: SceneOutcome) {
         self.scenes += 1;
         match found {
-            Found::Broke(kind, invariant, what) => {
+            SceneOutcome::Violated(kind, invariant, what) => {
                 let which = format!("{invariant} on {kind:?}");
                 *self.by_invariant.entry(which).or_default() += 1;
-                self.broken.push(Broken {
+                self.failed.push(FailedScene {
                     number,
                     kind,
                     invariant,
                     what,
                 });
             }
-            Found::Held(kind, measured) => {
+            SceneOutcome::Passed(kind, measured) => {
                 let row = KINDS.iter().position(|k| *k == kind).unwrap_or(0);
                 self.by_kind.entry(row).or_default().add(&measured);
-                if self.max_work.is_none_or(|most| measured.work > most.units) {
+                if self.max_work.is_none_or(|max| measured.work > max.units) {
                     let units = measured.work;
                     self.max_work = Some(MaxWork { units, number });
                 }
@@ -111,7 +111,7 @@ impl fmt::Display for LinkStats {
             "\n{} scenes, {} ticks, {} wrong answers",
             self.scenes,
             self.ticks(),
-            self.broken.len()
+            self.failed.len()
         )?;
         if let Some(MaxWork { units, number }) = self.max_work {
             writeln!(
@@ -119,10 +119,10 @@ impl fmt::Display for LinkStats {
                 "largest work of a tick: {units} of {WORK_PER_TICK} units, in scene {number}"
             )?;
         }
-        let [again, shifted, window, turned] = self.total().twins;
+        let [repeated, shifted, window, turned] = self.total().metamorphic;
         writeln!(
             f,
-            "twins compared: {again} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
+            "twins compared: {repeated} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
         )?;
         on_materials(f, &self.total())?;
         for (invariant, scenes) in &self.by_invariant {
@@ -133,18 +133,18 @@ impl fmt::Display for LinkStats {
 }
 
 fn on_materials(f: &mut fmt::Formatter<'_>, m: &Measured) -> fmt::Result {
-    let Judged {
-        in_whole,
-        by_size,
+    let MaterialCounts {
+        compared_as_vectors,
+        compared_by_size,
         open,
         changing,
         sliding,
-        rubbed,
+        with_friction,
     } = m.on_materials;
-    let [window, shifted, turned] = m.twins_on_materials;
+    let [window, shifted, turned] = m.metamorphic_on_materials;
     writeln!(
         f,
-        "on materials: force judged in whole at {in_whole} points and by its size at {by_size}, {changing} of them while one changed, {rubbed} rubbed, {sliding} slid over a plane, {open} not judged\n\
+        "on materials: force judged in whole at {compared_as_vectors} points and by its size at {compared_by_size}, {changing} of them while one changed, {with_friction} rubbed, {sliding} slid over a plane, {open} not judged\n\
          twins on materials: {window} in another window, {shifted} shifted, {turned} mirrored or turned"
     )
 }

@@ -124,13 +124,13 @@ impl Board {
     /// Pulls the cable. Boards that do not sense the supply's voltage only detect an idle bus.
     pub fn unplug(&mut self) {
         self.wire.borrow_mut().report(Event::Suspend);
-        self.settle();
+        self.poll_tasks();
     }
 
     /// Returns the number of packets longer than an endpoint's.
     #[must_use]
-    pub fn babbles(&self) -> u32 {
-        self.wire.borrow().babbles
+    pub fn overlong_packets(&self) -> u32 {
+        self.wire.borrow().overlong_packets
     }
 
     /// Returns true if the watchdog is fed now: loop and link have both run since the last check.
@@ -138,7 +138,7 @@ impl Board {
         self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link])
     }
 
-    fn settle(&mut self) {
+    fn poll_tasks(&mut self) {
         let mut context = Context::from_waker(Waker::noop());
         for _ in 0..POLLS {
             let ended = self.tasks.as_mut().poll(&mut context).is_ready();
@@ -154,7 +154,7 @@ impl Port for Board {
 
     fn bus_reset(&mut self) {
         self.wire.borrow_mut().report(Event::Reset);
-        self.settle();
+        self.poll_tasks();
     }
 
     fn setup(&mut self, request: [u8; 8]) -> Handshake {
@@ -163,13 +163,13 @@ impl Port for Board {
 
     fn out(&mut self, endpoint: usize, packet: &[u8]) -> Handshake {
         let hand = self.wire.borrow_mut().out(endpoint, packet);
-        self.settle();
+        self.poll_tasks();
         hand
     }
 
     fn take_in(&mut self, endpoint: usize) -> Answer {
         let answer = self.wire.borrow_mut().take_in(endpoint);
-        self.settle();
+        self.poll_tasks();
         answer
     }
 
@@ -179,7 +179,7 @@ impl Port for Board {
             self.haptic_loop.tick();
             self.done.0.signal(());
         }
-        self.settle();
+        self.poll_tasks();
         Ok(())
     }
 }

@@ -34,7 +34,7 @@ pub(super) struct Wire {
     /// True if the control endpoint accepts a packet now.
     control_listens: bool,
     /// Packets longer than the endpoint's: counted, but never acknowledged.
-    pub(super) babbles: u32,
+    pub(super) overlong_packets: u32,
 }
 
 impl Wire {
@@ -65,7 +65,7 @@ impl Wire {
             return Handshake::Stall;
         }
         if packet.len() > 64 {
-            self.babbles += 1;
+            self.overlong_packets += 1;
             return Handshake::Nak;
         }
         if !listens || (endpoint != 0 && !pipe.enabled) || pipe.packet.is_some() {
@@ -183,9 +183,9 @@ impl Bus for ScriptedDriver {
 }
 
 impl End {
-    /// Waits until `look` returns a value.
-    async fn until<T>(&self, mut look: impl FnMut(&mut Wire) -> Option<T>) -> T {
-        poll_fn(|_| match look(&mut self.wire.borrow_mut()) {
+    /// Waits until `poll` returns a value.
+    async fn until<T>(&self, mut poll: impl FnMut(&mut Wire) -> Option<T>) -> T {
+        poll_fn(|_| match poll(&mut self.wire.borrow_mut()) {
             Some(found) => Poll::Ready(found),
             None => Poll::Pending,
         })

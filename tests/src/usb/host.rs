@@ -10,7 +10,7 @@ use hapterra::link::{BulkEndpoints, Pipes};
 use super::{Answer, Handshake, MOMENTS_A_MS, Port};
 
 /// Milliseconds of the device's time after which an unanswered packet is an error.
-const PATIENCE_MS: u64 = 200;
+const TIMEOUT_MS: u64 = 200;
 /// Milliseconds of recovery for a device after a reset of the bus.
 const RECOVERY_MS: u64 = 10;
 /// Bytes in a full-speed packet, bulk or control.
@@ -19,7 +19,7 @@ pub const PACKET: usize = 64;
 /// Cause of a failed transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// Not answered in `PATIENCE_MS`.
+    /// Not answered in `TIMEOUT_MS`.
     Silence,
     /// Refused.
     Stalled,
@@ -32,7 +32,7 @@ fn try_on<P: Port, T>(
     port: &mut P,
     mut attempt: impl FnMut(&mut P) -> Option<Result<T, Failure>>,
 ) -> Result<T, Failure> {
-    for _ in 0..PATIENCE_MS * MOMENTS_A_MS {
+    for _ in 0..TIMEOUT_MS * MOMENTS_A_MS {
         if let Some(done) = attempt(port) {
             return done;
         }
@@ -41,7 +41,7 @@ fn try_on<P: Port, T>(
     Err(Failure::Silence)
 }
 
-fn shaken(hand: Handshake) -> Option<Result<(), Failure>> {
+fn handshake(hand: Handshake) -> Option<Result<(), Failure>> {
     match hand {
         Handshake::Ack => Some(Ok(())),
         Handshake::Nak => None,
@@ -54,7 +54,7 @@ fn shaken(hand: Handshake) -> Option<Result<(), Failure>> {
 /// # Errors
 /// [`Failure`].
 pub fn send_packet(port: &mut impl Port, endpoint: usize, packet: &[u8]) -> Result<(), Failure> {
-    try_on(port, |port| shaken(port.out(endpoint, packet)))
+    try_on(port, |port| handshake(port.out(endpoint, packet)))
 }
 
 /// Requests a packet until there is one.
@@ -108,7 +108,7 @@ fn set_up(
     for (i, half) in [value, index, length].into_iter().enumerate() {
         bytes[2 + 2 * i..][..2].copy_from_slice(&half.to_le_bytes());
     }
-    try_on(port, |port| shaken(port.setup(bytes)))
+    try_on(port, |port| handshake(port.setup(bytes)))
 }
 
 /// Reads a descriptor by its type and index.

@@ -225,7 +225,7 @@ fn the_second_signal_names_the_boards_that_have_not_confirmed() {
     // The first has confirmed, and the second waits.
     let kept = format!("{} recording ", pair.name(1));
     child.stdout = Some(hear(child.stdout.take().expect("piped"), &[kept]));
-    pair.served[1].wait_for_unheard_bye();
+    pair.served[1].wait_for_ignored_bye();
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);

@@ -127,7 +127,7 @@ fn a_tick_that_may_not_be_is_refused() {
     let refuses = |change: fn(&mut Outcome)| {
         let mut outcome = Outcome::default();
         change(&mut outcome);
-        catch_unwind(|| tick::look(&outcome, &SurfaceParams::PREMIUM)).is_err()
+        catch_unwind(|| tick::check(&outcome, &SurfaceParams::PREMIUM)).is_err()
     };
     assert!(!refuses(|_| ()));
     assert!(!refuses(|o| o.sample.work = WORK_PER_TICK));

@@ -44,10 +44,10 @@ impl Found {
 fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     let mut judge = TickOracle::new(&scene.terrain);
     let mut found = Found::default();
-    let seen = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()));
+    let seen = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
     for (tick, now) in seen.iter().enumerate() {
-        let reported = judge.all(now);
+        let reported = judge.violations(now);
         let reported = reported
             .iter()
             .any(|v| v.invariant == Invariant::LocalMinimum);
@@ -142,8 +142,10 @@ fn proxy_displaced_from_its_minimum_is_detected() {
         [20.5, 20.25, 9.0],
         [20.5, 20.25, ground.height_about(20.5, 20.25) - 0.5],
     ];
-    let scene = Scene::given(ground, path, Execution::LockStep, Supply::Held);
-    let seen = scene.step(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
+    let scene = Scene::new(ground, path, Execution::LockStep, Supply::Preloaded);
+    let seen = scene.render(&mut Buffers::default(), [0; 3], Supply::Preloaded, |_| {
+        Ok(())
+    });
     let honest = seen.expect("it settles")[1];
     assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
     for axis in 0..2 {
@@ -197,7 +199,12 @@ fn every_proxy_on_real_terrain_rests_at_a_closest_point() {
             let mut total = Found::default();
             for _ in 0..12 {
                 let path = hip_path::random(&terrain, &mut random, 1000);
-                let scene = Scene::given(terrain.clone(), path, Execution::LockStep, Supply::Held);
+                let scene = Scene::new(
+                    terrain.clone(),
+                    path,
+                    Execution::LockStep,
+                    Supply::Preloaded,
+                );
                 let found = look(&scene, &mut Buffers::default());
                 let none = [&found.wrong, &found.disputed, &found.late]
                     .iter()

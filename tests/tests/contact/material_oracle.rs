@@ -5,7 +5,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::{Material, Pattern, Shading, Texture};
 use hapterra_tests::invariants::Invariant;
-use hapterra_tests::invariants::material::{Judged, MaterialOracle};
+use hapterra_tests::invariants::material::{MaterialCounts, MaterialOracle};
 use hapterra_tests::scene::loop_replay::{Replay, Replied, replay};
 use hapterra_tests::scene::materials::Materials;
 use hapterra_tests::scene::run::{Execution, Scene};
@@ -49,8 +49,8 @@ impl Way {
         let steps = (0..240).chain((180..240).rev());
         let along = steps.map(|i| [from + step * f64::from(i), 10.25, 0.5]);
         let path = [[from, 10.25, 3.0]].into_iter().chain(along).collect();
-        let (execution, supply) = (Execution::LockStep, Supply::Held);
-        let mut scene = Scene::given(terrain, path, execution, supply);
+        let (execution, supply) = (Execution::LockStep, Supply::Preloaded);
+        let mut scene = Scene::new(terrain, path, execution, supply);
         scene.shading = shading;
         let shift = [0; 3];
         let how = Replay { shift, supply };
@@ -65,24 +65,24 @@ impl Way {
 
     /// Returns the oracle's result if one point is changed: the violation with its point, and the
     /// measurements.
-    fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, Judged) {
+    fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, MaterialCounts) {
         let mut judge = MaterialOracle::new(&self.scene, &self.materials, [0; 3]);
         for (point, rendered) in self.rendered.iter().enumerate() {
             let mut rendered = *rendered;
             if point == at {
                 change(&mut rendered);
             }
-            if let Err(violation) = judge.look(&rendered) {
-                return (Some((violation.invariant, point)), judge.judged);
+            if let Err(violation) = judge.check(&rendered) {
+                return (Some((violation.invariant, point)), judge.counts);
             }
         }
-        (None, judge.judged)
+        (None, judge.counts)
     }
 
-    fn honest(&self) -> Judged {
-        let (found, judged) = self.with(usize::MAX, |_| {});
+    fn honest(&self) -> MaterialCounts {
+        let (found, counts) = self.with(usize::MAX, |_| {});
         assert_eq!(found, None);
-        judged
+        counts
     }
 
     /// Returns the violation by another force, which must be reported at that point.
@@ -120,9 +120,9 @@ const BORDER: usize = 51;
 #[test]
 fn wrong_force_during_a_stiffness_change_is_detected() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::None);
-    let judged = way.honest();
-    assert_eq!((judged.in_whole, judged.open), (300, 0));
-    assert!((100..110).contains(&judged.changing), "{judged:?}");
+    let counts = way.honest();
+    assert_eq!((counts.compared_as_vectors, counts.open), (300, 0));
+    assert!((100..110).contains(&counts.changing), "{counts:?}");
     let wrong = Some(Invariant::Material);
     // In one step, not at all, one tick early and one tick late.
     assert_eq!(way.force(BORDER, |_| Vec3::Z * 1.5), wrong);
@@ -163,8 +163,8 @@ fn friction_of_the_place_after_is_found() {
         ..SOFT
     };
     let way = Way::over([SOFT, rough], SLOW, Shading::None);
-    let judged = way.honest();
-    assert!(judged.sliding > 150 && judged.open == 0, "{judged:?}");
+    let counts = way.honest();
+    assert!(counts.sliding > 150 && counts.open == 0, "{counts:?}");
     // At 1.5 cells depth, each tick of the change holds 0.0075 cells more.
     let proxy = |at, east| way.proxy(BORDER + at, east, 0.4);
     let early = proxy(0, -0.0075);
@@ -219,8 +219,11 @@ fn another_damping_is_found() {
 #[test]
 fn shaded_force_is_checked_by_magnitude() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::Smooth);
-    let judged = way.honest();
-    assert_eq!((judged.in_whole, judged.by_size), (0, 300));
+    let counts = way.honest();
+    assert_eq!(
+        (counts.compared_as_vectors, counts.compared_by_size),
+        (0, 300)
+    );
     let wrong = Some(Invariant::Material);
     assert_eq!(way.force(BORDER + 50, |f| f * 1.001), wrong);
     assert_eq!(way.force(BORDER + 50, |f| f * 0.999), wrong);

@@ -106,9 +106,9 @@ fn reports(terrain: &Terrain, ticks: &[ObservedTick]) -> Vec<Violation> {
 fn reports_of(mut judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Violation> {
     let (last, before) = ticks.split_last().expect("there are ticks");
     for seen in before {
-        assert_eq!(judge.all(seen), [], "before the forged one");
+        assert_eq!(judge.violations(seen), [], "before the forged one");
     }
-    judge.all(last)
+    judge.violations(last)
 }
 
 /// Returns the invariants that the last of these ticks breaks.
@@ -285,9 +285,9 @@ fn a_force_that_is_textured_otherwise_is_found() {
             .take(60 * usize::from(honest.is_some()))
         {
             // The fade-in is not checked here.
-            let _ = judge.all(seen);
+            let _ = judge.violations(seen);
         }
-        let reported = judge.all(&last);
+        let reported = judge.violations(&last);
         reported
             .iter()
             .map(|violation| violation.invariant)
@@ -590,10 +590,10 @@ fn abrupt_force_onset_or_release_is_reported() {
 fn played(supply: Supply) -> (Scene, Vec<ObservedTick>, Buffers) {
     // Down into a side of the ridge, along it, and up again.
     let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
-    let scene = Scene::given(ridge(), path.to_vec(), Execution::LockStep, supply);
+    let scene = Scene::new(ridge(), path.to_vec(), Execution::LockStep, supply);
     let mut buffers = Buffers::default();
     let seen = scene
-        .step(&mut buffers, [0; 3], supply, |_| Ok(()))
+        .render(&mut buffers, [0; 3], supply, |_| Ok(()))
         .expect("it settles");
     (scene, seen, buffers)
 }
@@ -628,13 +628,13 @@ fn only<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, Violation>)
 
 #[test]
 fn other_bits_are_found() {
-    let (scene, seen, mut buffers) = played(Supply::Held);
+    let (scene, seen, mut buffers) = played(Supply::Preloaded);
     assert_eq!(metamorphic::repeated(&scene, &seen, &mut buffers), Ok(true));
     for forged in other_bits(&seen) {
         let verdict = metamorphic::repeated(&scene, &forged, &mut buffers);
         only(Invariant::Repeatable, verdict);
     }
-    let (scene, seen, mut buffers) = played(Supply::Pulled { latency: 2 });
+    let (scene, seen, mut buffers) = played(Supply::OnDemand { latency: 2 });
     assert_eq!(
         metamorphic::windowed(&scene, &seen, &mut buffers, &mut Random::new(1)),
         Ok(true)
@@ -648,9 +648,9 @@ fn other_bits_are_found() {
 #[test]
 fn other_bits_far_away_are_found() {
     let shift = [3200, 6400, -1_000_000];
-    let (scene, seen, mut buffers) = played(Supply::Held);
-    let pulled = Supply::Pulled { latency: 0 };
-    let away = scene.step(&mut buffers, shift, pulled, |_| Ok(()));
+    let (scene, seen, mut buffers) = played(Supply::Preloaded);
+    let on_demand = Supply::OnDemand { latency: 0 };
+    let away = scene.render(&mut buffers, shift, on_demand, |_| Ok(()));
     let away = away.expect("it settles");
     let judge =
         |away: &[ObservedTick], by| metamorphic::same_bits(Invariant::Shift, &seen, away, by);
@@ -663,16 +663,16 @@ fn other_bits_far_away_are_found() {
 
 #[test]
 fn result_differing_under_a_symmetry_is_reported() {
-    let (scene, seen, mut buffers) = played(Supply::Held);
+    let (scene, seen, mut buffers) = played(Supply::Preloaded);
     for symmetry in symmetry::all() {
         let turned = |p| symmetry.point(&scene.terrain, p);
         let path = scene.path.iter().map(|p| turned(*p)).collect();
         let twin = scene.with(symmetry.terrain(&scene.terrain), path);
         let other = twin
-            .step(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
+            .render(&mut buffers, [0; 3], Supply::Preloaded, |_| Ok(()))
             .expect("it settles");
         let mut judge = |other: &[ObservedTick]| {
-            metamorphic::same_way(&scene, symmetry, &seen, other, &mut buffers)
+            metamorphic::same_forces(&scene, symmetry, &seen, other, &mut buffers)
         };
         assert_eq!(judge(&other), Ok(true), "{symmetry:?}");
         let mut elsewhere = other.clone();
@@ -697,7 +697,7 @@ fn result_differing_under_a_symmetry_is_reported() {
 #[test]
 fn a_hip_that_is_never_answered_is_found() {
     let path = vec![ABOVE, BELOW];
-    let never = Supply::Pulled { latency: 1 << 30 };
-    let scene = Scene::given(flat(), path, Execution::LockStep, never);
+    let never = Supply::OnDemand { latency: 1 << 30 };
+    let scene = Scene::new(flat(), path, Execution::LockStep, never);
     only(Invariant::Settles, scene.run(&mut Buffers::default()));
 }

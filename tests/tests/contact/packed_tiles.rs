@@ -29,7 +29,7 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
             // NumPy archives are not read, and some formats need libgdal.
             Err(error)
                 if path.extension().is_some_and(|end| end == "npz")
-                    || matches!(error.fault(), RasterError::WantsGdal { .. }) =>
+                    || matches!(error.fault(), RasterError::NeedsGdal { .. }) =>
             {
                 println!("skipped: {error}");
                 continue;

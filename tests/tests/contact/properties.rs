@@ -103,21 +103,21 @@ proptest! {
     fn everything_holds_on_gentle_ground(
         heights in gentle(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
+        holds(&Scene::new(terrain(&heights), path, execution, Supply::Preloaded))?;
     }
 
     #[test]
     fn everything_holds_on_wild_ground(
         heights in wild(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
+        holds(&Scene::new(terrain(&heights), path, execution, Supply::Preloaded))?;
     }
 
     #[test]
     fn everything_holds_while_tiles_arrive(
         heights in gentle(), path in path(), execution in execution(), latency in 0..4_u32,
     ) {
-        let supply = Supply::Pulled { latency };
-        holds(&Scene::given(terrain(&heights), path, execution, supply))?;
+        let supply = Supply::OnDemand { latency };
+        holds(&Scene::new(terrain(&heights), path, execution, supply))?;
     }
 }

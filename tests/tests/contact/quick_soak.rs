@@ -1,7 +1,7 @@
 //! A fixed number of scenes of the stress test; `cargo xtask soak MINUTES` runs more.
 
 use hapterra_tests::scene::run::Surface;
-use hapterra_tests::soak::{Broken, LinkStats, Until, soak};
+use hapterra_tests::soak::{FailedScene, LinkStats, Until, soak};
 
 const SEED: u64 = 2027;
 
@@ -12,26 +12,26 @@ fn thousand(surface: Surface) -> LinkStats {
     let [waiting, free, touching, _] = total.states;
     assert!(waiting > 10_000 && free > 50_000 && touching > 50_000);
     // Repeated, shifted, in another window, mirrored or turned.
-    let twins = total.twins;
+    let metamorphic = total.metamorphic;
     assert!(
-        twins
+        metamorphic
             .iter()
             .zip([150, 100, 50, 50])
             .all(|(n, least)| *n >= least),
-        "{twins:?}"
+        "{metamorphic:?}"
     );
     // In another window, shifted, mirrored or turned.
-    let (judged, twins) = (total.on_materials, total.twins_on_materials);
+    let (judged, metamorphic) = (total.on_materials, total.metamorphic_on_materials);
     assert!(
-        judged.in_whole > 20_000 && judged.changing > 10_000,
+        judged.compared_as_vectors > 20_000 && judged.changing > 10_000,
         "{judged:?}"
     );
-    assert!(100 * judged.open < judged.in_whole, "{judged:?}");
-    assert!(twins.iter().all(|n| *n >= 20), "{twins:?}");
+    assert!(100 * judged.open < judged.compared_as_vectors, "{judged:?}");
+    assert!(metamorphic.iter().all(|n| *n >= 20), "{metamorphic:?}");
     stats
 }
 
-fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
+fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b FailedScene>) {
     let rough = surface.option();
     let reported: Vec<String> = broken
         .map(|b| {
@@ -49,7 +49,7 @@ fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
 
 #[test]
 fn everything_holds_in_a_thousand_random_scenes() {
-    none(Surface::Smooth, thousand(Surface::Smooth).broken.iter());
+    none(Surface::Smooth, thousand(Surface::Smooth).failed.iter());
 }
 
 #[test]
@@ -57,8 +57,8 @@ fn everything_holds_with_friction_too() {
     let stats = thousand(Surface::Rough);
     let judged = stats.total().on_materials;
     assert!(
-        judged.rubbed > 20_000 && judged.sliding > 1_000,
+        judged.with_friction > 20_000 && judged.sliding > 1_000,
         "{judged:?}"
     );
-    none(Surface::Rough, stats.broken.iter());
+    none(Surface::Rough, stats.failed.iter());
 }

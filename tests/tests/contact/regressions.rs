@@ -17,10 +17,10 @@ fn run(
     execution: Execution,
     supply: Supply,
 ) -> Result<Vec<ContactState>, Violation> {
-    let scene = Scene::given(terrain, path.to_vec(), execution, supply);
+    let scene = Scene::new(terrain, path.to_vec(), execution, supply);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers)?;
-    let seen = scene.step(&mut buffers, [0; 3], supply, |_| Ok(()))?;
+    let seen = scene.render(&mut buffers, [0; 3], supply, |_| Ok(()))?;
     Ok(seen.iter().map(|seen| seen.output.state).collect())
 }
 
@@ -40,7 +40,7 @@ fn a_proxy_on_the_east_border_leaves_as_on_the_west_one() {
         [0.5, 2.0, -2.502_653_121_948_242],
         [0.5, 0.5, 1.737_531_661_987_304_7],
     ];
-    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
     assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
@@ -72,7 +72,7 @@ fn contact_over_no_data_into_solid_ends_without_force_step() {
     let along = |i: i32| 9.5 - f64::from(i) / 16.0;
     path.extend((0..88).map(|i| [along(i), 1.0625, 0.0]));
     path.extend((0..64).map(|i| [4.0, 1.03125, f64::from(i) / 64.0]));
-    run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
+    run(terrain, &path, Execution::RealTime, Supply::Preloaded).expect("holds");
 }
 
 /// The closest point is 4·10⁻⁵ cell beyond the edge under the HIP.
@@ -89,7 +89,7 @@ fn a_minimum_just_beyond_an_edge_is_found() {
         [2.5, 2.5, 1e4],
         [1.948_299_407_958_984_4, 1.0, -1.016_087_532_043_457],
     ];
-    run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
+    run(terrain, &path, Execution::RealTime, Supply::Preloaded).expect("holds");
 }
 
 /// The force that fades is not that of the last slide but of the last tick with a search: a tile
@@ -104,7 +104,7 @@ fn contact_lost_after_a_late_tile_fades_from_its_last_force() {
     let mut path = vec![[10.5, 10.5, 4.0]];
     path.extend((0..16).map(|i| [10.5 + f64::from(i), 10.5, -0.05 * f64::from(i + 1)]));
     path.push([40.5, 10.5, 0.5]);
-    let supply = Supply::Pulled { latency: 40 };
+    let supply = Supply::OnDemand { latency: 40 };
     let states = run(terrain, &path, Execution::LockStep, supply).expect("holds");
     assert_eq!(states.last(), Some(&ContactState::Releasing));
 }
@@ -130,7 +130,7 @@ fn a_hip_just_below_a_vertex_is_not_let_through() {
         near(-0.03, -0.03, 5.953_146_934_509_277),
         near(0.0, 0.0, 5.923_147_201_538_086),
     ];
-    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
     assert_eq!(states.last(), Some(&ContactState::Touching));
 }
 
@@ -152,7 +152,7 @@ fn hip_leaving_high_ground_is_released() {
         }
     }
     let terrain = field([6, 6], height);
-    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
     let wanted = [ContactState::Touching, ContactState::Free];
     assert!(states[1..].chunks(2).all(|pair| pair == wanted));
 }
@@ -168,7 +168,7 @@ fn path_part_ending_below_the_border_is_not_a_crossing() {
         [119.25, -1.0, 0.375],
         [3.0, 3.0, -1_000_000.0],
     ];
-    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
     assert_eq!(
         states[1..],
         [
@@ -187,7 +187,7 @@ fn path_entering_under_the_corner_makes_no_contact() {
     for depth in [50.0, 1e4, 1e8] {
         let terrain = field([4, 4], |_, _| 0.0);
         let path = [[1.5, 1.5, 3.0], [-1.0, -1.0, 3.0], [3.0, 3.0, -depth]];
-        let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+        let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
         assert_eq!(
             states.last(),
             Some(&ContactState::Unseeded),
@@ -203,7 +203,7 @@ fn hip_vertically_above_its_proxy_is_released() {
     let mut buffers = Buffers::default();
     for number in [9, 99, 186] {
         let scene = Scene::random(91, number);
-        let seen = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
+        let seen = scene.render(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
         for seen in seen.expect("it settles") {
             let [x, y, z] = [0, 1, 2].map(|axis| seen.hip[axis] - seen.proxy[axis]);
             let touching = seen.output.state == ContactState::Touching && seen.output.converged;
@@ -218,7 +218,7 @@ fn hip_vertically_above_its_proxy_is_released() {
 fn a_proxy_leaves_as_often_as_that_leads_nearer() {
     let terrain = field([1500, 40], |x, y| ((x + y) & 1) as f32);
     let path = [[92.25, 8.0, 3.0], [92.5, 8.0, 0.5], [796.0, 36.0, 1.0]];
-    let supply = Supply::Pulled { latency: 0 };
+    let supply = Supply::OnDemand { latency: 0 };
     let states = run(terrain, &path, Execution::LockStep, supply).expect("holds");
     assert_eq!(states[1..], [ContactState::Touching, ContactState::Free]);
 }
@@ -240,7 +240,7 @@ fn a_proxy_held_where_it_left_climbs_on() {
         [4.042_195_320_129_395, 4.0, 287.258_709_907_531_74],
         [4.0, 4.055_518_150_329_59, 300.028_407_096_862_8],
     ];
-    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
     assert_eq!(states.last(), Some(&ContactState::Free));
 }
 
@@ -273,7 +273,7 @@ fn proxy_finds_the_path_over_an_edge_to_a_near_hip() {
             -2.611_005_783_081_054_7,
         ],
     ];
-    let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
+    let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
     assert_eq!(states.last(), Some(&ContactState::Touching));
 }
 
@@ -283,10 +283,10 @@ fn proxy_finds_the_path_over_an_edge_to_a_near_hip() {
 fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     let slope = field([200, 40], |x, _| -0.56 * x as f32);
     let path = [[100.5, 2.5, 4.0], [100.5, 2.5, -57.0], [3.0, 3.0, -1e8]];
-    let scene = Scene::given(slope, path.to_vec(), Execution::LockStep, Supply::Held);
+    let scene = Scene::new(slope, path.to_vec(), Execution::LockStep, Supply::Preloaded);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers).expect("holds");
-    let seen = scene.step(&mut buffers, [0; 3], Supply::Held, |_| Ok(()));
+    let seen = scene.render(&mut buffers, [0; 3], Supply::Preloaded, |_| Ok(()));
     let last = seen.expect("settles").pop().expect("ticks");
     assert_eq!(last.proxy[..2], [200.0, 3.0]);
 }
@@ -339,7 +339,7 @@ fn a_proxy_in_the_air_arrives_while_the_hip_moves() {
     };
     let mut path = vec![[45.5, 10.5, 35.0], [45.5, 10.5, 28.0]];
     path.extend((0..40).map(trembles));
-    let states = run(cliff, &path, Execution::RealTime, Supply::Held).expect("holds");
+    let states = run(cliff, &path, Execution::RealTime, Supply::Preloaded).expect("holds");
     let in_the_air = states[2..]
         .iter()
         .filter(|state| **state == ContactState::Free);

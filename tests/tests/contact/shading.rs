@@ -66,7 +66,7 @@ impl Circle<'_> {
     fn given(&self, terrain: &Terrain<'_>) -> Option<f64> {
         let rendered = self.rendered(terrain, Shading::Smooth);
         let is_whole = rendered.len() + 2 >= self.steps() as usize;
-        is_whole.then(|| given_mj(&rendered))
+        is_whole.then(|| gained_mj(&rendered))
     }
 }
 
@@ -84,7 +84,7 @@ fn largest_turn(rendered: &[TickRecord], farthest: f32) -> f32 {
 }
 
 /// Returns the work of the force on a HIP along its path, mJ.
-fn given_mj(rendered: &[TickRecord]) -> f64 {
+fn gained_mj(rendered: &[TickRecord]) -> f64 {
     let gives = rendered.windows(2).map(|pair| {
         let force = 0.5 * (pair[0].force_n + pair[1].force_n).as_dvec3();
         let (from, to) = (position(&pair[0].hip), position(&pair[1].hip));

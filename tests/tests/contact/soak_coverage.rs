@@ -101,11 +101,11 @@ fn every_promised_kind_of_scene_is_touched_and_checked() {
     for number in 0..SCENES {
         let scene = Scene::random(SEED, number);
         let mut judge = TickOracle::new(&scene.terrain);
-        let Ok(seen) = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
+        let Ok(seen) = scene.render(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
             panic!("scene {number} does not settle");
         };
         for (i, now) in seen.iter().enumerate() {
-            let _ = judge.all(now);
+            let _ = judge.violations(now);
             let before = i.checked_sub(1).map(|last| &seen[last]);
             for name in names(&scene.terrain, before, now) {
                 *counts.entry(name).or_default() += 1;
@@ -115,9 +115,9 @@ fn every_promised_kind_of_scene_is_touched_and_checked() {
         touched[kind.expect("known")] += judge.measured.states[ContactState::Touching as usize];
         samples(&scene.terrain, &mut counts);
         let supply = match scene.supply {
-            Supply::Held => "every tile held",
-            Supply::Pulled { latency: 0 } => "tiles at once",
-            Supply::Pulled { .. } => "tiles late",
+            Supply::Preloaded => "every tile held",
+            Supply::OnDemand { latency: 0 } => "tiles at once",
+            Supply::OnDemand { .. } => "tiles late",
         };
         *settings.entry(supply).or_default() += 1;
     }

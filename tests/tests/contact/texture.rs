@@ -110,7 +110,7 @@ fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
             let (mut touched, mut most) = (0, 0.0_f32);
             for (tick, (plain, textured)) in plain.iter().zip(&textured).enumerate() {
                 assert_eq!(plain.proxy, textured.proxy);
-                let judged = judge.look(&seen(plain, textured));
+                let judged = judge.check(&seen(plain, textured));
                 assert_eq!(judged, Ok(()), "{name}, {texture:?}, tick {tick}");
                 touched += u32::from(textured.state == ContactState::Touching);
                 most = most.max((textured.force_n - plain.force_n).length());

@@ -58,7 +58,7 @@ fn rename(hello: &mut DeviceHello) {
 /// Returns the replacement for a frame of the device.
 fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
-    let printed = frames::changed(frame, |message| match message {
+    let printed = frames::modified(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
         ToHost::Status { status, .. } => rename(&mut status.device),
         ToHost::SceneAck { epoch: taken, .. } => *epoch = *taken,
@@ -69,7 +69,7 @@ fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     if has_samples {
         for column in 0..REQUESTS {
             let key = TileKey::new(9, i32::MAX - column, i32::MIN);
-            let request = frames::changed(frame, |message| {
+            let request = frames::modified(frame, |message| {
                 *message = ToHost::TileRequest { epoch: *epoch, key };
             });
             printed.extend(request.expect("the device's own"));

@@ -2,15 +2,17 @@
 //! moment: the end is confirmed or reported, no force acts that no host wanted, every sample is
 //! counted once.
 
-use hapterra_tests::link_model::{Direction, End, Harm, Interruption, Plan, Report, check, frames};
+use hapterra_tests::link_model::{
+    Direction, End, FrameFault, Interruption, Plan, Report, check, frames,
+};
 
 /// Damage to a frame.
-const HARMS: [Harm; 5] = [
-    Harm::Lose,
-    Harm::Repeat(3),
-    Harm::Repeat(900),
-    Harm::Delay(30),
-    Harm::Delay(900),
+const HARMS: [FrameFault; 5] = [
+    FrameFault::Lose,
+    FrameFault::Repeat(3),
+    FrameFault::Repeat(900),
+    FrameFault::Delay(30),
+    FrameFault::Delay(900),
 ];
 /// Ticks between two moments at which an end is killed.
 const MOMENTS: usize = 23;
@@ -24,12 +26,12 @@ fn agree(plan: &Plan) -> Report {
 }
 
 /// Returns every fault of every frame of an undisturbed run, first those to the device.
-fn single_harms() -> Vec<(Direction, usize, Harm)> {
+fn single_harms() -> Vec<(Direction, usize, FrameFault)> {
     let [to_device, to_host] = frames();
     let to_device = (0..to_device).map(|number| (Direction::ToDevice, number));
     let to_host = (0..to_host).map(|number| (Direction::ToHost, number));
     let all = to_device.chain(to_host);
-    all.flat_map(|(way, number)| HARMS.map(|harm| (way, number, harm)))
+    all.flat_map(|(way, number)| HARMS.map(|frame_fault| (way, number, frame_fault)))
         .collect()
 }
 
@@ -42,17 +44,17 @@ fn undisturbed_it_ends_at_once_and_nothing_is_uncertain() {
 
 #[test]
 fn session_survives_any_single_lost_repeated_or_late_frame() {
-    let harms = single_harms();
-    eprintln!("{} runs", harms.len());
-    for harm in harms {
-        let harms = vec![harm];
+    let frame_faults = single_harms();
+    eprintln!("{} runs", frame_faults.len());
+    for frame_fault in frame_faults {
+        let frame_faults = vec![frame_fault];
         let report = agree(&Plan {
-            harms,
+            frame_faults,
             ..Plan::default()
         });
         // Sooner than with a resumed session.
-        assert!(report.ticks < 3_000, "{harm:?}: {report:?}");
-        assert_eq!(report.uncertain, 0, "{harm:?}");
+        assert!(report.ticks < 3_000, "{frame_fault:?}: {report:?}");
+        assert_eq!(report.uncertain, 0, "{frame_fault:?}");
     }
 }
 
@@ -61,15 +63,19 @@ fn session_survives_any_two_frame_faults_while_opening() {
     // The first frames in each direction: open, scene, zero, arm, the tile and their answers.
     let opening: Vec<_> = single_harms()
         .into_iter()
-        .filter(|(_, number, harm)| {
-            *number < 9 && matches!(harm, Harm::Lose | Harm::Repeat(900) | Harm::Delay(30))
+        .filter(|(_, number, frame_fault)| {
+            *number < 9
+                && matches!(
+                    frame_fault,
+                    FrameFault::Lose | FrameFault::Repeat(900) | FrameFault::Delay(30)
+                )
         })
         .collect();
     for (i, first) in opening.iter().enumerate() {
         for second in &opening[i + 1..] {
-            let harms = vec![*first, *second];
+            let frame_faults = vec![*first, *second];
             agree(&Plan {
-                harms,
+                frame_faults,
                 ..Plan::default()
             });
         }
@@ -81,19 +87,23 @@ fn session_survives_any_two_frame_faults_while_closing() {
     let [to_device, to_host] = frames();
     let last: Vec<_> = single_harms()
         .into_iter()
-        .filter(|(way, number, harm)| {
+        .filter(|(way, number, frame_fault)| {
             let count = match way {
                 Direction::ToDevice => to_device,
                 Direction::ToHost => to_host,
             };
-            number + 8 > count && matches!(harm, Harm::Lose | Harm::Repeat(900) | Harm::Delay(30))
+            number + 8 > count
+                && matches!(
+                    frame_fault,
+                    FrameFault::Lose | FrameFault::Repeat(900) | FrameFault::Delay(30)
+                )
         })
         .collect();
     for (i, first) in last.iter().enumerate() {
         for second in &last[i + 1..] {
-            let harms = vec![*first, *second];
+            let frame_faults = vec![*first, *second];
             agree(&Plan {
-                harms,
+                frame_faults,
                 ..Plan::default()
             });
         }
@@ -113,13 +123,13 @@ fn interrupted(what: Interruption) {
         assert_eq!(report.end, End::Agreed, "{plan:?}");
         // The first frames of the run.
         for number in 0..12 {
-            for (way, harm) in [
-                (Direction::ToDevice, Harm::Lose),
-                (Direction::ToHost, Harm::Lose),
-                (Direction::ToHost, Harm::Repeat(900)),
+            for (way, frame_fault) in [
+                (Direction::ToDevice, FrameFault::Lose),
+                (Direction::ToHost, FrameFault::Lose),
+                (Direction::ToHost, FrameFault::Repeat(900)),
             ] {
                 let plan = Plan {
-                    harms: vec![(way, number, harm)],
+                    frame_faults: vec![(way, number, frame_fault)],
                     ..plan.clone()
                 };
                 let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
@@ -146,7 +156,7 @@ fn close_of_an_armed_session_is_confirmed_once_disarmed() {
         ..Plan::default()
     };
     let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
-    for harm in HARMS {
+    for frame_fault in HARMS {
         // The last frames in each direction: the close, its confirmation, and others around them.
         for (way, count) in [Direction::ToDevice, Direction::ToHost]
             .into_iter()
@@ -154,7 +164,7 @@ fn close_of_an_armed_session_is_confirmed_once_disarmed() {
         {
             for number in count.saturating_sub(12)..count {
                 agree(&Plan {
-                    harms: vec![(way, number, harm)],
+                    frame_faults: vec![(way, number, frame_fault)],
                     ..abrupt()
                 });
             }
@@ -257,7 +267,7 @@ fn late_answer_is_never_matched_to_a_later_query() {
     let mut answers = 0;
     for seed in 0..60 {
         let plan = Plan {
-            curious: true,
+            queries_status: true,
             ..Plan::random(seed)
         };
         let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
@@ -268,10 +278,10 @@ fn late_answer_is_never_matched_to_a_later_query() {
 
 /// Returns the plan of a host that changes the placement while it renders, reads the calibration,
 /// then requests held outputs, the storing of the record and a jog.
-fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
+fn with_errands(frame_faults: Vec<(Direction, usize, FrameFault)>) -> Plan {
     Plan {
-        harms,
-        errands: true,
+        frame_faults,
+        requests: true,
         ..Plan::default()
     }
 }
@@ -280,14 +290,18 @@ fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
 fn every_request_is_done_or_refused_once_under_lost_frames() {
     let whole = agree(&with_errands(vec![]));
     eprintln!("{whole:?}");
-    assert_eq!(whole.came_of, [10, 0, 0], "all are done");
+    assert_eq!(whole.outcomes, [10, 0, 0], "all are done");
     let ways = [Direction::ToDevice, Direction::ToHost];
     for (way, count) in ways.into_iter().zip(whole.frames) {
         for number in 0..count {
-            for harm in [Harm::Lose, Harm::Repeat(900), Harm::Delay(900)] {
-                let plan = with_errands(vec![(way, number, harm)]);
+            for frame_fault in [
+                FrameFault::Lose,
+                FrameFault::Repeat(900),
+                FrameFault::Delay(900),
+            ] {
+                let plan = with_errands(vec![(way, number, frame_fault)]);
                 let report = agree(&plan);
-                assert_eq!(report.came_of, whole.came_of, "{plan:?}");
+                assert_eq!(report.outcomes, whole.outcomes, "{plan:?}");
                 assert_eq!(report.uncertain, 0, "{plan:?}");
             }
         }

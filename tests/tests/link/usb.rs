@@ -179,7 +179,7 @@ fn a_packet_that_is_too_long_is_never_taken_and_harms_nothing() {
         let babble = send_packet(&mut board, LINK, &[0xA5; PACKET + 1]);
         assert_eq!(babble, Err(Failure::Silence));
     }
-    assert!(board.babbles() > 3);
+    assert!(board.overlong_packets() > 3);
     // A zero ends any unfinished frame.
     send_packet(&mut board, LINK, &[0]).expect("taken");
     send_packet(&mut board, LINK, &hello()).expect("taken");

@@ -9,7 +9,7 @@ use hapterra_core::force::{
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::TickRecord;
-use hapterra_tests::campaign::force_invariants::ForceWatch;
+use hapterra_tests::campaign::force_invariants::ForceChecks;
 use hapterra_tests::campaign::ground::SceneSurfaces;
 
 const PARAMS: SurfaceParams = SurfaceParams {
@@ -45,9 +45,9 @@ fn at(tick: u32, height: f32, force_n: Vec3) -> TickRecord {
     }
 }
 
-fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
+fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceChecks {
     let table = table.map(|all| MaterialTable::new(all).expect("some"));
-    ForceWatch::new(SceneSurfaces::of(params, table.as_ref()), 0.5)
+    ForceChecks::new(SceneSurfaces::of(params, table.as_ref()), 0.5)
 }
 
 /// Returns the verdict on one tick, 2 mm deep.
@@ -56,7 +56,7 @@ fn stated(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), S
         limits,
         ..at(0, -4.0, force_n)
     };
-    watch(params, None).look(&sample, true)
+    watch(params, None).check(&sample, true)
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn force_above_the_maximum_for_its_depth_is_reported() {
     let table = [of(0.25), of(0.4), of(0.1)];
     let force = |newtons: f32| {
         let sample = at(0, -4.0, Vec3::Z * newtons);
-        watch(&plain, Some(&table)).look(&sample, true)
+        watch(&plain, Some(&table)).check(&sample, true)
     };
     assert_eq!(force(1.6), Ok(()));
     assert!(force(1.61).is_err());
@@ -131,9 +131,9 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
     for (tick, (height, times)) in (0..).zip(into.chain(dips).chain(out)) {
         let spring_n = -0.25 * height.min(0.0);
         let sample = at(tick, height, Vec3::Z * spring_n * times);
-        reported |= watch.look(&sample, is_calm).is_err();
+        reported |= watch.check(&sample, is_calm).is_err();
     }
-    (reported, watch.max_given_mj)
+    (reported, watch.max_gained_mj)
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn ramped(times: f32) -> Result<(), String> {
             limits,
             ..at(tick, -4.0, Vec3::Z * force_n)
         };
-        watch.look(&sample, true)
+        watch.check(&sample, true)
     };
     look(0, Mode::Confirming, 0.0, Limits::empty())?;
     for tick in 1..1000 {
@@ -209,9 +209,9 @@ fn energy_created_by_taps_in_the_ramp_is_reported() {
                 },
                 ..at(tick, height, Vec3::Z * spring_n)
             };
-            reported |= watch.look(&sample, true).is_err();
+            reported |= watch.check(&sample, true).is_err();
         }
-        (reported, watch.max_given_mj)
+        (reported, watch.max_gained_mj)
     };
     let (reported, given) = tapped(0.0);
     assert!(!reported, "{given}");
@@ -227,7 +227,7 @@ fn rising_force_during_fade_out_is_reported() {
             limits: Limits::FADING,
             ..at(tick, -4.0, Vec3::Z * force_n)
         };
-        watch.look(&fades(0, 1.0), true).is_ok() && watch.look(&fades(1, second_n), true).is_err()
+        watch.check(&fades(0, 1.0), true).is_ok() && watch.check(&fades(1, second_n), true).is_err()
     };
     assert!(!reported(0.99) && !reported(1.0) && reported(1.01));
 }
@@ -240,8 +240,8 @@ fn force_with_open_clutch_is_reported_unless_slew_limited() {
             limits,
             ..at(tick, -4.0, force_n)
         };
-        let _ = watch.look(&open(0, Vec3::ZERO), true);
-        watch.look(&open(1, Vec3::Z * 0.5), true).is_err()
+        let _ = watch.check(&open(0, Vec3::ZERO), true);
+        watch.check(&open(1, Vec3::Z * 0.5), true).is_err()
     };
     assert!(reported(Limits::CLUTCH_OPEN));
     assert!(!reported(Limits::CLUTCH_OPEN | Limits::SLEW_LIMITED));
@@ -256,7 +256,7 @@ fn limit_cycle_is_reported_but_hand_tremor_is_not() {
             let turn = std::f32::consts::TAU * hz * tick as f32 * 1e-3;
             let height = -4.0 + 2.0 * amplitude_mm * turn.sin();
             let sample = at(tick, height, Vec3::Z * -0.25 * height);
-            reported |= watch.look(&sample, true).is_err();
+            reported |= watch.check(&sample, true).is_err();
         }
         reported
     };

@@ -7,7 +7,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::TickRecord;
 use hapterra_tests::campaign::hostile_calibrations;
 use hapterra_tests::campaign::maxima::OFF_COUNTS;
-use hapterra_tests::campaign::tick_invariants::{Truth, Watch};
+use hapterra_tests::campaign::tick_invariants::{TickChecks, Truth};
 use hapterra_tests::random::Random;
 
 const ZERO: [i32; 3] = [100, -200, 300];
@@ -46,9 +46,9 @@ impl Tick {
         }
     }
 
-    fn judged(&self) -> (Watch, Result<(), String>) {
-        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        let stated = watch.drive(&self.drive, &self.sense, ZERO, &self.truth);
+    fn judged(&self) -> (TickChecks, Result<(), String>) {
+        let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        let stated = watch.check_outputs(&self.drive, &self.sense, ZERO, &self.truth);
         (watch, stated)
     }
 
@@ -126,9 +126,9 @@ fn held_outputs_require_permission_and_disabled_amplifiers() {
             enabled,
             held,
         };
-        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
         watch.may_hold = may_hold;
-        watch.drive(&tick.drive, &tick.sense, ZERO, &tick.truth)
+        watch.check_outputs(&tick.drive, &tick.sense, ZERO, &tick.truth)
     };
     let half = Vec3::splat(0.5);
     assert_eq!(held(false, half, true), Ok(()));
@@ -188,8 +188,8 @@ fn a_singular_pose_is_counted_not_judged() {
 #[test]
 fn a_command_that_is_held_is_judged_by_what_is_true() {
     let held = |tick: &Tick| {
-        let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        watch.held(&tick.drive, &tick.truth)
+        let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+        watch.check_held(&tick.drive, &tick.truth)
     };
     let mut tick = Tick::pushing(up(7.6));
     tick.sense.dead_man = false;
@@ -206,10 +206,11 @@ fn a_command_that_is_held_is_judged_by_what_is_true() {
 
 #[test]
 fn underestimated_winding_temperature_is_reported() {
-    let watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+    let watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let mut tick = Tick::pushing(up(1.0));
-    let reported =
-        |believed_c: f32, tick: &Tick| watch.warmth(Vec3::new(90.0, 90.0, believed_c), &tick.truth);
+    let reported = |believed_c: f32, tick: &Tick| {
+        watch.check_temperature(Vec3::new(90.0, 90.0, believed_c), &tick.truth)
+    };
     tick.truth.winding_c = [90.0, 30.0, 80.0];
     assert_eq!(reported(100.0, &tick), Ok(()));
     assert_eq!(reported(79.5, &tick), Ok(()));
@@ -226,11 +227,11 @@ fn underestimated_winding_temperature_is_reported() {
 fn hostile_calibrations_are_refused_and_most_exceed_limits() {
     assert_eq!(hostile_calibrations::harmless().validate(), Ok(()));
     assert_eq!(
-        hostile_calibrations::keeps_ceilings(&hostile_calibrations::harmless()),
+        hostile_calibrations::check_limits(&hostile_calibrations::harmless()),
         Ok(())
     );
     assert_eq!(
-        hostile_calibrations::keeps_ceilings(&Calibration::PREMIUM_1_5),
+        hostile_calibrations::check_limits(&Calibration::PREMIUM_1_5),
         Ok(())
     );
     let mut random = Random::new(7);
@@ -238,7 +239,7 @@ fn hostile_calibrations_are_refused_and_most_exceed_limits() {
     for _ in 0..2_000 {
         let record = hostile_calibrations::calibration(&mut random);
         assert!(record.validate().is_err(), "{record:?}");
-        above += u32::from(hostile_calibrations::keeps_ceilings(&record).is_err());
+        above += u32::from(hostile_calibrations::check_limits(&record).is_err());
     }
     // Only the device detects the others: a length that is NaN.
     assert!(above > 1_600, "{above}");
@@ -255,12 +256,12 @@ fn sample(tick: u32, force_n: Vec3) -> TickRecord {
 
 /// Returns the result for the last of these samples; the others pass.
 fn reported(samples: &[TickRecord]) -> Result<(), String> {
-    let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
+    let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let (last, before) = samples.split_last().expect("one");
     for sample in before {
-        assert_eq!(watch.sample(sample, 8.5), Ok(()));
+        assert_eq!(watch.check_sample(sample, 8.5), Ok(()));
     }
-    watch.sample(last, 8.5)
+    watch.check_sample(last, 8.5)
 }
 
 #[test]

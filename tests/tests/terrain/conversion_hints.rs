@@ -192,7 +192,7 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
         // The area beside the turned map is no-data.
         let summary = raster.summary();
         assert!(summary.lowest > 900.0, "{name}: {}", summary.lowest);
-        assert!(summary.holes > 0, "{name}");
+        assert!(summary.no_data > 0, "{name}");
     }
     made(
         at,
@@ -444,7 +444,7 @@ fn points_become_a_grid_by_the_hint() {
         let stem = name.split('.').next().expect("a name");
         let raster = taken(&at.join(format!("{stem}-converted.asc")));
         assert_eq!((raster.columns(), raster.rows()), (20, 12), "{name}");
-        assert_eq!(raster.summary().holes, 1, "{name}");
+        assert_eq!(raster.summary().no_data, 1, "{name}");
         assert!(raster.height(5, 3).is_nan(), "{name}");
         let off = raster.height(7, 4) - (100.0 + 15.0 + 4.5 + lifted);
         assert!(off.abs() < 1e-3, "{name}: {off}");

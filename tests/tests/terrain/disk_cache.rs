@@ -30,7 +30,7 @@ fn age(path: &Path, seconds: u64) {
 
 fn open(path: &Path, disk_cache: &DiskCache) -> Raster {
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         disk_cache: disk_cache.clone(),
         ..OpenOptions::default()
     };
@@ -153,7 +153,7 @@ fn a_file_that_is_another_now_has_its_own_heights() {
     fs::write(&mask, b"no mask at all").expect("written");
     age(&mask, 500);
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         disk_cache: bed.cache.clone(),
         ..OpenOptions::default()
     };

@@ -24,7 +24,7 @@ fn height(column: u32, row: u32) -> f64 {
 /// Each band is 1000 above the one before.
 fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &str) {
     assert_eq!((raster.columns(), raster.rows()), (columns, rows), "{name}");
-    assert_eq!(raster.summary().holes, 1, "{name}");
+    assert_eq!(raster.summary().no_data, 1, "{name}");
     for row in 0..rows {
         for column in 0..columns {
             let found = raster.height(column, rows - 1 - row);
@@ -70,7 +70,7 @@ fn holds_the_exact_field(reader: Reader) {
         "float.flt",
         "envi.dat",
     ] {
-        if !reader.knows(name) {
+        if !reader.supports(name) {
             continue;
         }
         let raster = open_by(reader, name, &OpenOptions::default());
@@ -85,7 +85,7 @@ fn holds_the_exact_field(reader: Reader) {
             "{name}"
         );
     }
-    if !reader.knows("n34w119.dt0") {
+    if !reader.supports("n34w119.dt0") {
         return;
     }
     let dted = open_by(reader, "n34w119.dt0", &OpenOptions::default());
@@ -109,7 +109,7 @@ fn a_band_is_chosen_by_its_number() {
         ("ehdr.bil", 2),
         ("envi.dat", 2),
     ] {
-        for reader in Reader::all().into_iter().filter(|it| it.knows(name)) {
+        for reader in Reader::all().into_iter().filter(|it| it.supports(name)) {
             for band in 1..=bands {
                 let raster = open_by(reader, name, &of_band(band));
                 assert_field(&raster, (40, 30), band, name);
@@ -145,7 +145,7 @@ fn a_cell_size_is_for_files_that_state_none() {
     };
     let error = Raster::open(path("lerc_i16.tif"), &sized).expect_err("it states 30 m");
     assert!(
-        matches!(error.fault(), RasterError::CellKnown(_)),
+        matches!(error.fault(), RasterError::CellSizeStated(_)),
         "{error}"
     );
     let folder = tempfile::tempdir().expect("a folder");

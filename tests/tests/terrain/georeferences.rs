@@ -75,7 +75,7 @@ fn files_lie_where_gdal_sees_them() {
         }
         for reader in Reader::all()
             .iter()
-            .filter(|reader| reader.knows(&row.file))
+            .filter(|reader| reader.supports(&row.file))
         {
             let raster = match reader.open(&path, &OpenOptions::default()) {
                 Ok(raster) => raster,

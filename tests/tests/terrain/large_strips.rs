@@ -103,7 +103,7 @@ fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
 /// Returns options with which samples stay in the file, and unpacked data is in a folder.
 fn in_file(disk: DiskCache) -> OpenOptions {
     OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         disk_cache: disk,
         ..OpenOptions::default()
     }
@@ -142,7 +142,7 @@ fn packed_mask_in_one_strip_is_unpacked_on_disk_or_reported() {
     let raster = Raster::open(&path, &in_file(DiskCache::off())).expect("opens");
     assert!(raster.samples().is_some(), "it is left in the file");
     has_remark(&raster, ["as a whole", "its mask are too large"]);
-    assert_eq!(raster.summary().holes, 0);
+    assert_eq!(raster.summary().no_data, 0);
 }
 
 /// 576 MB of bytes in one packed strip.
@@ -240,7 +240,7 @@ fn rows_of_an_overview_that_ends_early_are_read() {
     let path = folder.path().join("cut.tif");
     std::fs::write(&path, bytes).expect("written");
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     let raster = Raster::open(&path, &options).expect("all of the full image is there");

@@ -507,7 +507,7 @@ fn the_hint_for_files_that_do_not_fit_makes_one_of_them() {
     let (_, command) = printed.split_once("onto one grid: ").expect("a command");
     shell(at, command.trim());
     let one = open(at.join("one.tif"));
-    assert!(one.columns() > 500 && one.summary().holes < 200_000);
+    assert!(one.columns() > 500 && one.summary().no_data < 200_000);
 }
 
 /// A damaged block of a TIFF is no-data, and the warning names the file.

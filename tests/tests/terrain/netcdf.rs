@@ -49,7 +49,7 @@ fn height(column: u32, row: u32) -> f64 {
 
 fn windows() -> OpenOptions {
     OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     }
 }
@@ -359,7 +359,7 @@ fn open_options_reach_the_driver_and_unknown_ones_are_refused() {
     // Samples beyond the valid range are no-data, unless the range is ignored.
     let [honoured, ignored] = ["YES", "NO"].map(|value| {
         let options = with(&format!("HONOUR_VALID_RANGE={value}"));
-        open(&path("packed.nc"), &options).summary().holes
+        open(&path("packed.nc"), &options).summary().no_data
     });
     assert!(honoured >= ignored, "{honoured} {ignored}");
     let error = Raster::open(path("packed.nc"), &with("NO_SUCH=1")).expect_err("unknown");

@@ -35,7 +35,7 @@ fn files_that_only_gdal_reads_are_exact_and_in_place() {
         for band in 1..=bands {
             let raster = open(name, Some(band)).expect(name);
             assert_eq!((raster.columns(), raster.rows()), (5, 4), "{name}");
-            assert_eq!(raster.summary().holes, 1, "{name}");
+            assert_eq!(raster.summary().no_data, 1, "{name}");
             for (column, row) in (0..5).flat_map(|column| (0..4).map(move |row| (column, row))) {
                 // The file's first row is the northern one.
                 let found = raster.height(column, 3 - row);
@@ -64,13 +64,13 @@ fn large_files_stay_on_disk_and_overviews_survey_them() {
         return;
     }
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     let raster = Raster::open(file("overviews.img"), &options).expect("read");
     assert_eq!((raster.columns(), raster.rows()), (600, 500));
     // The coarsest overview has every fourth sample.
-    assert_eq!(raster.summary().looked_at, 150 * 125);
+    assert_eq!(raster.summary().examined, 150 * 125);
     for (column, row) in [(0, 0), (599, 499), (17, 300), (512, 33)] {
         let wanted = column / 16 + row / 16;
         assert_eq!(raster.height(column, 499 - row), f64::from(wanted));
@@ -368,7 +368,7 @@ fn grass_null_mark_is_refused_and_no_data_number_is_read() {
         ..OpenOptions::default()
     };
     let raster = Raster::open(&path, &options).expect("numbers");
-    assert_eq!((raster.height(0, 1), raster.summary().holes), (1.0, 1));
+    assert_eq!((raster.height(0, 1), raster.summary().no_data), (1.0, 1));
 }
 
 /// A libgdal that needs 300 ms for each block delays no tick: until the blocks arrive the coarse

@@ -70,7 +70,7 @@ fn assert_heights(raster: &Raster, truth: &[f64], name: &str) {
         assert!(same, "{name}: {height} for {expected} at {column}, {row}");
     }
     let holes = truth.iter().filter(|height| height.is_nan()).count();
-    assert_eq!(raster.summary().holes, holes as u64, "{name}: holes");
+    assert_eq!(raster.summary().no_data, holes as u64, "{name}: holes");
 }
 
 /// Returns the expected heights of a variant, by its name and its line in the manifest.
@@ -112,7 +112,7 @@ fn every_variant_decodes_to_the_exact_samples() {
     for (name, description) in variants(&folder) {
         if let Some(truth) = expected(&folder, &name, &description) {
             let path = folder.join(&name);
-            for reader in Reader::all().iter().filter(|reader| reader.knows(&name)) {
+            for reader in Reader::all().iter().filter(|reader| reader.supports(&name)) {
                 let raster = reader.open(&path, &OpenOptions::default());
                 let raster = raster.unwrap_or_else(|error| panic!("{reader:?}: {error}"));
                 assert_heights(&raster, &truth, &format!("{name} by {reader:?}"));
@@ -269,7 +269,7 @@ fn every_real_file_opens() {
         let raster = open(&folder.join(name));
         let summary = raster.summary();
         assert_eq!([raster.columns(), raster.rows()], [columns, rows], "{name}");
-        assert_eq!(summary.holes, holes, "{name}");
+        assert_eq!(summary.no_data, holes, "{name}");
         assert!(
             (summary.lowest - lowest).abs() < 1e-3,
             "{name}: {}",
@@ -376,7 +376,7 @@ fn every_tiff_reads_the_same_in_blocks_as_at_once() {
         return;
     };
     let in_blocks = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     let mut files = 0;
@@ -425,9 +425,9 @@ fn large_file_read_as_a_whole_has_a_remark_with_remedy() {
     let rows = "1 2 3 4 5 6 7 8\n".repeat(1000);
     let header = "ncols 8\nnrows 1000\nxllcorner 0\nyllcorner 0\ncellsize 1\n";
     std::fs::write(&path, format!("{header}{rows}")).expect("written");
-    let remarks = |most_in_memory_bytes| {
+    let remarks = |max_in_memory_bytes| {
         let options = OpenOptions {
-            most_in_memory_bytes,
+            max_in_memory_bytes,
             ..OpenOptions::default()
         };
         let raster = Raster::open(&path, &options).expect("opens");

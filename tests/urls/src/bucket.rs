@@ -24,13 +24,13 @@ pub const PUBLIC: &str = "open";
 /// A server on this machine.
 pub struct Server {
     url: String,
-    seen: Arc<Mutex<Seen>>,
+    log: Arc<Mutex<RequestLog>>,
     _runtime: Runtime,
 }
 
 /// Requests to a server, and its answers.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
+pub struct RequestLog {
     /// Methods, paths and answered statuses.
     pub requests: Vec<String>,
     /// Bytes of files that were sent.
@@ -51,7 +51,7 @@ pub(crate) enum Answer {
     /// The file at a path of the served folder.
     File(String),
     /// Another answer, as JSON.
-    Words(String),
+    Text(String),
 }
 
 /// The service that the server represents.
@@ -72,7 +72,7 @@ pub(crate) trait Service: Send + Sync + 'static {
 
 struct Shared<S> {
     service: S,
-    seen: Arc<Mutex<Seen>>,
+    log: Arc<Mutex<RequestLog>>,
 }
 
 impl Server {
@@ -81,10 +81,10 @@ impl Server {
     /// # Panics
     /// If no port is free.
     pub(crate) fn of(folder: &Path, service: impl Service) -> Self {
-        let seen = Arc::<Mutex<Seen>>::default();
+        let log = Arc::<Mutex<RequestLog>>::default();
         let shared = Arc::new(Shared {
             service,
-            seen: seen.clone(),
+            log: log.clone(),
         });
         let files = Router::new().fallback_service(ServeDir::new(folder));
         let router = files.layer(from_fn_with_state(shared, answered));
@@ -93,7 +93,7 @@ impl Server {
         });
         Self {
             url: format!("http://127.0.0.1:{port}"),
-            seen,
+            log,
             _runtime: runtime,
         }
     }
@@ -106,13 +106,13 @@ impl Server {
 
     /// Takes the requests since the last call.
     #[must_use]
-    pub fn take_seen(&self) -> Seen {
-        std::mem::take(&mut lock(&self.seen))
+    pub fn take_log(&self) -> RequestLog {
+        std::mem::take(&mut lock(&self.log))
     }
 }
 
-fn lock(seen: &Mutex<Seen>) -> MutexGuard<'_, Seen> {
-    seen.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(log: &Mutex<RequestLog>) -> MutexGuard<'_, RequestLog> {
+    log.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 async fn answered<S: Service>(
@@ -120,7 +120,7 @@ async fn answered<S: Service>(
     request: Request,
     next: Next,
 ) -> Response {
-    let asked = format!("{} {}", request.method(), request.uri().path());
+    let request_line = format!("{} {}", request.method(), request.uri().path());
     let (parts, body) = request.into_parts();
     let body = to_bytes(body, MAX).await.unwrap_or_default();
     let answer = shared
@@ -128,12 +128,13 @@ async fn answered<S: Service>(
         .answer(&parts, &String::from_utf8_lossy(&body));
     let (response, bytes) = match answer {
         Ok(Answer::File(path)) => served(&shared.service, path, parts, next).await,
-        Ok(Answer::Words(text)) => (Response::new(Body::from(text)), 0),
+        Ok(Answer::Text(text)) => (Response::new(Body::from(text)), 0),
         Err(refusal) => (refused(&shared.service, &refusal), 0),
     };
-    let mut seen = lock(&shared.seen);
-    seen.requests.push(format!("{asked} {}", response.status()));
-    seen.bytes += bytes;
+    let mut log = lock(&shared.log);
+    log.requests
+        .push(format!("{request_line} {}", response.status()));
+    log.bytes += bytes;
     response
 }
 
@@ -193,7 +194,7 @@ pub(crate) fn headers<const N: usize>(of: [(&'static str, &'static str); N]) -> 
 
 /// Returns the answer of a server to a key that it exchanges for a token.
 pub(crate) fn token(token: &str) -> Answer {
-    Answer::Words(format!(
+    Answer::Text(format!(
         r#"{{"access_token":"{token}","expires_in":3599,"token_type":"Bearer"}}"#
     ))
 }

@@ -45,7 +45,7 @@ fn halved(image: &Image) -> Image {
     let (columns, rows) = (image.columns.div_ceil(2), image.rows.div_ceil(2));
     let at = |column: u32, row: u32| {
         // The middle of four.
-        let place = |index: u32, most: u32| [index * 2, (index * 2 + 1).min(most - 1)];
+        let place = |index: u32, count: u32| [index * 2, (index * 2 + 1).min(count - 1)];
         let across = place(column, image.columns);
         let down = place(row, image.rows);
         let four = down
@@ -142,7 +142,7 @@ fn written(tile: u32, images: &[Image]) -> Vec<u8> {
     }
     assert_eq!(bytes.len() as u32, header);
     for image in images {
-        put_tiles(tile, image, &mut bytes);
+        write_tiles(tile, image, &mut bytes);
     }
     bytes
 }
@@ -151,11 +151,11 @@ fn tiles(tile: u32, image: &Image) -> u32 {
     image.columns.div_ceil(tile) * image.rows.div_ceil(tile)
 }
 
-fn put_tiles(tile: u32, image: &Image, bytes: &mut Vec<u8>) {
+fn write_tiles(tile: u32, image: &Image, bytes: &mut Vec<u8>) {
     for top in (0..image.rows).step_by(tile as usize) {
-        for left in (0..image.columns).step_by(tile as usize) {
+        for first_column in (0..image.columns).step_by(tile as usize) {
             for row in top..top + tile {
-                for column in left..left + tile {
+                for column in first_column..first_column + tile {
                     let is_in = column < image.columns && row < image.rows;
                     let index = (row * image.columns + column) as usize;
                     let sample = if is_in { image.samples[index] } else { 0.0 };

@@ -43,7 +43,7 @@ pub const SURVEYOR: Account = Account {
     pem: include_str!("keys/surveyor.pem"),
 };
 /// A valid account that may read none.
-pub const STRANGER: Account = Account {
+pub const UNPRIVILEGED: Account = Account {
     mail: "stranger@hills.iam.gserviceaccount.com",
     key_id: "08a7",
     pem: include_str!("keys/stranger.pem"),
@@ -101,15 +101,16 @@ impl Service for Google {
             return is_asked.then(|| token(TOKEN)).ok_or_else(|| denied("This"));
         }
         let file = Answer::File(path.to_owned());
-        let Some(stated) = request.headers.get(AUTHORIZATION) else {
+        let Some(authorization) = request.headers.get(AUTHORIZATION) else {
             return match bucket(path) {
                 PUBLIC => Ok(file),
                 _ => Err(denied("Anonymous caller")),
             };
         };
         // A token is checked even if none is needed.
-        let stated = stated.to_str().ok();
-        match stated.and_then(|stated| holder(stated.strip_prefix("Bearer ")?)) {
+        let authorization = authorization.to_str().ok();
+        match authorization.and_then(|authorization| holder(authorization.strip_prefix("Bearer ")?))
+        {
             Some(mail) if mail == SURVEYOR.mail => Ok(file),
             Some(mail) => Err(denied(mail)),
             None => Err(refusal(
@@ -157,7 +158,7 @@ fn holder(token: &str) -> Option<&'static str> {
     let (head, claims) = signed.split_once('.')?;
     let [head, claims] = [head, claims].map(decoded);
     let (head, claims) = (head?, claims?);
-    let account = [SURVEYOR, STRANGER]
+    let account = [SURVEYOR, UNPRIVILEGED]
         .into_iter()
         .find(|account| head["kid"] == account.key_id && claims["iss"] == account.mail)?;
     let signature = BASE64_URL_SAFE_NO_PAD.decode(signature).ok()?;

@@ -71,7 +71,7 @@ struct Faults {
     is_beyond: bool,
     latency: Duration,
     /// Suffixes of the files whose answers are held back; if empty, all are.
-    held: Vec<String>,
+    held_endings: Vec<String>,
     /// The version of all files.
     version: u32,
     requests: Vec<String>,
@@ -81,7 +81,7 @@ struct Faults {
     redirect: String,
     bytes: usize,
     /// Requests that wait for their answers: now, and the most at once.
-    at_once: [usize; 2],
+    concurrent: [usize; 2],
 }
 
 impl Server {
@@ -151,13 +151,13 @@ impl Server {
 
     /// Holds answers back, or releases them.
     pub fn hold(&self, hold: bool) {
-        self.shared.state().held.clear();
+        self.shared.state().held_endings.clear();
         self.shared.is_open.send_replace(!hold);
     }
 
     /// Holds answers about files with these suffixes back, in lower or upper case.
     pub fn hold_at(&self, endings: &[&str]) {
-        self.shared.state().held = endings.iter().map(ToString::to_string).collect();
+        self.shared.state().held_endings = endings.iter().map(ToString::to_string).collect();
         self.shared.is_open.send_replace(false);
     }
 
@@ -168,13 +168,13 @@ impl Server {
 
     /// Returns the most requests that waited for their answers at once.
     #[must_use]
-    pub fn most_at_once(&self) -> usize {
-        self.shared.state().at_once[1]
+    pub fn max_concurrent(&self) -> usize {
+        self.shared.state().concurrent[1]
     }
 
     /// Returns the methods and paths of the requests up to now, and the bytes of the answers.
     #[must_use]
-    pub fn seen(&self) -> (Vec<String>, usize) {
+    pub fn log(&self) -> (Vec<String>, usize) {
         let state = self.shared.state();
         (state.requests.clone(), state.bytes)
     }
@@ -192,9 +192,9 @@ impl Shared {
         state.requests.push(line);
         let names = request.headers().keys().map(ToString::to_string);
         state.headers.extend(names);
-        let [now, most] = &mut state.at_once;
+        let [now, max] = &mut state.concurrent;
         *now += 1;
-        *most = (*most).max(*now);
+        *max = (*max).max(*now);
         let mut fault = Fault::None;
         let range = request.headers().get(RANGE);
         let begins = range.is_none_or(|range| range.as_bytes().starts_with(b"bytes=0-"));
@@ -211,13 +211,15 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
     let (fault, latency, version) = shared.next(&request);
     tokio::time::sleep(latency).await;
     let path = request.uri().path().to_lowercase();
-    let is_held = |held: &[String]| held.is_empty() || held.iter().any(|end| path.ends_with(end));
-    let is_held = is_held(&shared.state().held);
+    let is_held = |held_endings: &[String]| {
+        held_endings.is_empty() || held_endings.iter().any(|end| path.ends_with(end))
+    };
+    let is_held = is_held(&shared.state().held_endings);
     if is_held {
         let mut gate = shared.is_open.subscribe();
         let _ = gate.wait_for(|is_open| *is_open).await;
     }
-    shared.state().at_once[0] -= 1;
+    shared.state().concurrent[0] -= 1;
     match fault {
         Fault::Error500 => return StatusCode::INTERNAL_SERVER_ERROR.into_response(),
         Fault::Forbidden => return StatusCode::FORBIDDEN.into_response(),

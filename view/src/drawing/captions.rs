@@ -59,10 +59,10 @@ impl Words {
         let words =
             TextDocument::new(self.text(scene, sample)).with_media_type(MediaType::markdown());
         match scene.is_live {
-            true => log.standing(WORDS, "", &words).map(Some),
+            true => log.log_static(WORDS, "", &words).map(Some),
             false => {
                 let columns = words.columns_of_unit_batches()?;
-                log.happened(WORDS, &[sample.t_s], columns).map(Some)
+                log.log_timed(WORDS, &[sample.t_s], columns).map(Some)
             }
         }
     }
@@ -114,12 +114,12 @@ fn facts(scene: &Scene) -> String {
 
 /// Returns the file's coordinates of a position, mm; `None` if the file states none.
 pub(super) fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
-    let known = scene.coordinates.as_ref()?;
+    let coordinates = scene.coordinates.as_ref()?;
     let at = |axis: usize| {
-        let [origin, east, north] = [&known.origin, &known.east, &known.north];
+        let [origin, east, north] = [&coordinates.origin, &coordinates.east, &coordinates.north];
         Some(origin.get(axis)? + x * east.get(axis)? + y * north.get(axis)?)
     };
-    let decimals = usize::from(known.decimals.min(9));
+    let decimals = usize::from(coordinates.decimals.min(9));
     Some(format!("{:.decimals$}, {:.decimals$}", at(0)?, at(1)?))
 }
 

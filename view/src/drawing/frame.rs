@@ -29,14 +29,14 @@ const POINTS: usize = 96;
 /// Parts of the bar, light and dark.
 const PARTS: usize = 4;
 /// Height of border and bar over the surface, as a share of half of the visible size.
-const FLOAT: f64 = 0.008;
+const FLOAT_SHARE: f64 = 0.008;
 const LIGHT: Rgb = [255, 255, 255];
 const DARK: Rgb = [20, 22, 28];
 
 /// The current frame.
 #[derive(Default)]
 pub(super) struct Frame {
-    laid: Option<Square>,
+    square: Option<Square>,
 }
 
 /// A square on the ground, in the picture's units from the south-west sample.
@@ -67,7 +67,7 @@ impl Square {
 impl Frame {
     /// Drops the frame, because the terrain or the placement has changed.
     pub(super) fn change(&mut self) {
-        self.laid = None;
+        self.square = None;
     }
 
     /// Redraws the frame if the hand has left its middle. `ground` is of the current placement,
@@ -85,7 +85,7 @@ impl Frame {
         };
         let [x, y, _] = sample.proxy_mm;
         let place = [x, y].map(|mm| mm * ground.per_mm);
-        if { self.laid.as_ref() }.is_some_and(|laid| laid.is_around(place)) {
+        if { self.square.as_ref() }.is_some_and(|square| square.is_around(place)) {
             return Ok(Vec::new());
         }
         // Before the first layer there is no surface.
@@ -93,7 +93,7 @@ impl Frame {
         else {
             return Ok(Vec::new());
         };
-        self.laid = Some(square);
+        self.square = Some(square);
         let picture = Picture {
             scene,
             ground,
@@ -102,15 +102,15 @@ impl Frame {
             sides: square.cut(extent.map(|cells| terrain.step(cells))),
         };
         let entry = |entity: &str, what: &dyn AsComponents| match scene.is_live {
-            true => log.standing(entity, "", what),
+            true => log.log_static(entity, "", what),
             false => log.at(entity, sample.t_s, what),
         };
         let cells = picture.sides.map(|[west, south, east, north]| {
             [[west, south], [east, north]].map(|corner| terrain.cells(corner))
         });
         let mut entries = Vec::new();
-        if let Some(looked_at) = map.looked_at(cells) {
-            entries.push(entry("map/frame", &looked_at)?);
+        if let Some(visible) = map.visible_box(cells) {
+            entries.push(entry("map/frame", &visible)?);
         }
         entries.extend([
             entry("frame/border", &picture.border())?,
@@ -148,7 +148,7 @@ struct Picture<'p> {
 
 impl Picture<'_> {
     fn float(&self) -> f32 {
-        (FLOAT * self.terrain.near) as f32
+        (FLOAT_SHARE * self.terrain.near) as f32
     }
 
     /// Returns a position of the surface in the picture; `None` for no-data.
@@ -253,7 +253,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_new_frame_has_the_hand_in_its_middle_wherever_that_is() {
+    fn new_frame_has_the_hand_in_its_middle() {
         for near in [0.3, 1.0, 77.0, 313.0, 4200.0] {
             for i in 0..200 {
                 let place = [0.173 * near * f64::from(i), -0.071 * near * f64::from(i)];
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_ends_where_the_terrain_ends() {
+    fn frame_is_cut_at_the_terrains_edge() {
         let square = Square {
             low: [-20.0, 30.0],
             side: 100.0,

@@ -40,19 +40,19 @@ impl Ground {
     pub(super) fn new(scene: &Scene) -> Self {
         let per_mm = scene.ground_m_per_mm.unwrap_or(1.0);
         let [x, y, _] = scene.home_mm;
-        Self::laid(scene, per_mm, [x * per_mm, y * per_mm])
+        Self::placed(scene, per_mm, [x * per_mm, y * per_mm])
     }
 
     /// Creates the ground of another placement, after this one.
     pub(super) fn after(&self, scene: &Scene) -> Self {
         // Millimetres of the first placement, if the ground's size is unknown.
         let per_mm = scene.ground_m_per_mm.unwrap_or(self.cell / scene.cell_mm);
-        Self::laid(scene, per_mm, self.origin)
+        Self::placed(scene, per_mm, self.origin)
     }
 
-    fn laid(scene: &Scene, per_mm: f64, origin: [f64; 2]) -> Self {
-        let [west, south, east, north] = scene.laid_mm;
-        let laid = 0.5 * (east - west).max(north - south);
+    fn placed(scene: &Scene, per_mm: f64, origin: [f64; 2]) -> Self {
+        let [west, south, east, north] = scene.fitted_mm;
+        let half_side = 0.5 * (east - west).max(north - south);
         Self {
             origin,
             home_mm: scene.home_mm,
@@ -62,23 +62,23 @@ impl Ground {
             ball: scene.tip_mm * per_mm,
             per_mm,
             up_per_mm: per_mm,
-            near: laid.clamp(1e-3, NEAR_MM) * per_mm,
+            near: half_side.clamp(1e-3, NEAR_MM) * per_mm,
         }
     }
 
     /// Returns this placement over the terrain of another one, with its heights: for a recording,
     /// whose terrain is drawn once.
     pub(super) fn over(self, terrain: &Self) -> Self {
-        let stretched = terrain.relief / self.relief;
-        let up_per_mm = match stretched.is_finite() {
-            true => self.per_mm * stretched,
+        let ratio = terrain.relief / self.relief;
+        let up_per_mm = match ratio.is_finite() {
+            true => self.per_mm * ratio,
             false => self.per_mm,
         };
         Self { up_per_mm, ..self }
     }
 
     /// Returns true if the terrain has the same heights in the picture in both placements.
-    pub(super) fn is_as_high_as(&self, other: &Self) -> bool {
+    pub(super) fn has_heights_of(&self, other: &Self) -> bool {
         (self.relief - other.relief).abs() <= SAME * self.relief.abs()
     }
 
@@ -162,7 +162,7 @@ pub(super) mod tests {
             mm_per_unit: 0.01,
             tip_mm: 0.0,
             home_mm: [40.0, 30.0, 12.0],
-            laid_mm: [0.0, 0.0, 80.0, 80.0],
+            fitted_mm: [0.0, 0.0, 80.0, 80.0],
             ground_m_per_mm: Some(60.0),
             height_per_mm: 100.0,
             height_unit: "m".into(),
@@ -182,7 +182,7 @@ pub(super) mod tests {
             level: 1,
             mm_per_unit: 0.02,
             home_mm: [80.0, 60.0, 24.0],
-            laid_mm: [0.0, 0.0, 160.0, 160.0],
+            fitted_mm: [0.0, 0.0, 160.0, 160.0],
             ground_m_per_mm: ground_m_per_mm.map(|metres| 0.5 * metres),
             ..scene.clone()
         };
@@ -190,7 +190,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn another_scale_leaves_the_terrain_where_it_is() {
+    fn scale_change_leaves_the_terrain_in_place() {
         for ground in [Some(60.0), None] {
             let (scene, twice) = zoomed(ground);
             let before = Ground::new(&scene);
@@ -201,7 +201,7 @@ pub(super) mod tests {
                 before.sample([7.0, 9.0], 1.0),
                 after.sample([7.0, 9.0], 1.0)
             );
-            assert!(after.is_as_high_as(&before));
+            assert!(after.has_heights_of(&before));
             // Haptic cells are of another level; the eye moves nearer, or stays if the palm is
             // still smaller than the area.
             assert_eq!((before.tile_cells(), after.tile_cells()), (32, 64));
@@ -230,7 +230,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn other_heights_are_another_terrain_unless_it_was_drawn_once() {
+    fn other_heights_redraw_the_terrain_unless_recorded() {
         let scene = scene();
         let steeper = Scene {
             mm_per_unit: 3.0 * scene.mm_per_unit,
@@ -238,7 +238,7 @@ pub(super) mod tests {
         };
         let before = Ground::new(&scene);
         let after = before.after(&steeper);
-        assert!(!after.is_as_high_as(&before));
+        assert!(!after.has_heights_of(&before));
         let [now, then] = [after, before].map(|ground| ground.heights_of(&[1.0])[0]);
         assert!((now - 3.0 * then).abs() < 1e-5);
         // The hand of a recording is on the terrain of the beginning.

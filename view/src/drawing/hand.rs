@@ -41,24 +41,24 @@ pub(super) struct Hand {
 }
 
 /// Returns the appearance of the parts of the hand.
-pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
+pub(super) fn style_entries(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
     let points = |entity: &str, colour: Rgb, width: f32| {
-        let looks = Points3D::update_fields()
+        let style = Points3D::update_fields()
             .with_colors([colour])
             .with_radii([Radius::new_ui_points(width)]);
-        log.standing(entity, "looks", &looks)
+        log.log_static(entity, "looks", &style)
     };
     let lines = |entity: &str, colour: Rgb, width: f32| {
-        let looks = LineStrips3D::update_fields()
+        let style = LineStrips3D::update_fields()
             .with_colors([colour])
             .with_radii([Radius::new_ui_points(width)]);
-        log.standing(entity, "looks", &looks)
+        log.log_static(entity, "looks", &style)
     };
     let proxy = match ground.ball > 0.0 {
         // Its radius is sent with its positions, because it depends on the placement.
         true => {
-            let looks = Points3D::update_fields().with_colors([PROXY]);
-            log.standing("hand/proxy", "looks", &looks)?
+            let style = Points3D::update_fields().with_colors([PROXY]);
+            log.log_static("hand/proxy", "looks", &style)?
         }
         false => points("hand/proxy", PROXY, 8.0)?,
     };
@@ -72,10 +72,10 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
     Ok(vec![
         proxy,
         points("hand/hip", HIP, 7.0)?,
-        log.standing("hand/hip", "name", &name)?,
+        log.log_static("hand/hip", "name", &name)?,
         lines("hand/ray", RAY, 2.0)?,
         lines("hand/trace", TRACE, 1.5)?,
-        log.standing("hand/force", "looks", &arrow)?,
+        log.log_static("hand/force", "looks", &arrow)?,
     ])
 }
 
@@ -93,7 +93,7 @@ struct Rows {
 
 impl Hand {
     /// Changes to another placement: the hand's position in the terrain jumps.
-    pub(super) fn leap(&mut self) {
+    pub(super) fn start_new_line(&mut self) {
         self.before = None;
         self.trace.clear();
     }
@@ -128,7 +128,7 @@ impl Hand {
             let (times, lines): (Vec<f64>, Vec<_>) = traces.into_iter().unzip();
             let strips = LineStrips3D::update_fields().with_strips(lines);
             let columns = strips.columns_of_unit_batches()?;
-            entries.push(log.happened("hand/trace", &times, columns)?);
+            entries.push(log.log_timed("hand/trace", &times, columns)?);
         }
         Ok(entries)
     }
@@ -177,7 +177,7 @@ impl Rows {
                 true => points,
                 false => points.with_radii(radii),
             };
-            log.happened(entity, times, points.columns_of_unit_batches()?)
+            log.log_timed(entity, times, points.columns_of_unit_batches()?)
         };
         let rays =
             LineStrips3D::update_fields().with_strips(self.rays.iter().map(|ray| ray.to_vec()));
@@ -187,8 +187,8 @@ impl Rows {
         Ok([
             points("hand/proxy", &self.proxies, self.radii)?,
             points("hand/hip", &self.hips, vec![])?,
-            log.happened("hand/ray", times, rays.columns_of_unit_batches()?)?,
-            log.happened("hand/force", times, arrows.columns_of_unit_batches()?)?,
+            log.log_timed("hand/ray", times, rays.columns_of_unit_batches()?)?,
+            log.log_timed("hand/force", times, arrows.columns_of_unit_batches()?)?,
         ])
     }
 }
@@ -200,7 +200,7 @@ mod tests {
 
     /// On the ground the ball is as large as in the hand, in each placement.
     #[test]
-    fn a_ball_is_drawn_in_its_size_and_a_point_as_a_dot() {
+    fn ball_is_drawn_in_its_size_and_point_as_a_dot() {
         let sample = Sample {
             t_s: 0.0,
             hip_mm: [40.0, 30.0, 0.0],

@@ -64,18 +64,18 @@ impl Layers {
             // A finer layer without a coarser one.
             return Ok(Vec::new());
         }
-        let gone = self.layers.split_off(number);
+        let removed = self.layers.split_off(number);
         self.reported.truncate(number);
         let mut entries = Vec::new();
-        if !gone.is_empty() {
+        if !removed.is_empty() {
             entries.extend(self.triangles(log, number.checked_sub(1))?);
         }
-        for block in gone.iter().flat_map(|layer| &layer.blocks) {
-            entries.push(block.nothing(log)?);
+        for block in removed.iter().flat_map(|layer| &layer.blocks) {
+            entries.push(block.clear_entry(log)?);
         }
         entries.extend(self.draw(log, ground, &layer)?);
         self.reported.push(layer);
-        for block in gone.iter().flat_map(|layer| &layer.blocks) {
+        for block in removed.iter().flat_map(|layer| &layer.blocks) {
             if !self.has(&block.entity) {
                 entries.push(block.forgotten(log)?);
             }
@@ -129,7 +129,7 @@ impl Layers {
                 };
                 let number = shown.blocks.len();
                 let entity = format!("terrain/layer{}/{number}", self.layers.len());
-                entries.push(log.standing(&entity, MESH, &part.mesh(ground, &shade))?);
+                entries.push(log.log_static(&entity, MESH, &part.mesh(ground, &shade))?);
                 shown.blocks.push(part.block(entity));
             }
         }
@@ -295,8 +295,8 @@ impl Part<'_> {
         let every = mesh_step(self.heights.columns.max(self.heights.rows));
         let near = |middle: usize| middle.saturating_sub(every)..=middle + every;
         let around = near(row).flat_map(|row| near(column).map(move |column| (column, row)));
-        let known = around.filter_map(|(column, row)| self.heights.at(column, row));
-        let (sum, count) = known.fold((0.0, 0), |(sum, count), height| (sum + height, count + 1));
+        let heights = around.filter_map(|(column, row)| self.heights.at(column, row));
+        let (sum, count) = heights.fold((0.0, 0), |(sum, count), height| (sum + height, count + 1));
         // Without samples between the corners, the mesh has a gap for no-data.
         (every > 1 && count > 0).then(|| sum / count as f32)
     }
@@ -339,8 +339,8 @@ impl Part<'_> {
                     continue;
                 };
                 let corners = [(west, south), (east, south), (east, north), (west, north)];
-                let known = corners.iter().all(|(x, y)| self.height(**x, **y).is_some());
-                if known {
+                let is_known = corners.iter().all(|(x, y)| self.height(**x, **y).is_some());
+                if is_known {
                     let [low, high] = [
                         cell_of(self.layer, *west, *south),
                         cell_of(self.layer, *east, *north),
@@ -385,19 +385,19 @@ impl Block {
             .flat_map(|(_, [a, b, c, d])| [[*a, *b, *c], [*a, *c, *d]])
             .collect();
         match triangles.is_empty() {
-            true => self.nothing(log),
+            true => self.clear_entry(log),
             false => {
                 let mesh = Mesh3D::update_fields().with_triangle_indices(triangles);
-                log.standing(&self.entity, TRIANGLES, &mesh)
+                log.log_static(&self.entity, TRIANGLES, &mesh)
             }
         }
     }
 
     /// Returns the entry without triangles. The viewer would draw the vertices of an empty mesh as
     /// triangles.
-    fn nothing(&self, log: &Log) -> Result<Entry> {
+    fn clear_entry(&self, log: &Log) -> Result<Entry> {
         let mesh = Mesh3D::update_fields().with_triangle_indices([[0, 0, 0]]);
-        log.standing(&self.entity, TRIANGLES, &mesh)
+        log.log_static(&self.entity, TRIANGLES, &mesh)
     }
 
     /// Returns the entry without samples, for a block without triangles.
@@ -406,7 +406,7 @@ impl Block {
             .with_vertex_positions([[0.0; 3]])
             .with_vertex_texcoords([[0.0; 2]])
             .with_albedo_texture_image(Image::from_rgb24(vec![0; 3], [1, 1]));
-        log.standing(&self.entity, MESH, &mesh)
+        log.log_static(&self.entity, MESH, &mesh)
     }
 }
 
@@ -441,7 +441,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mesh_takes_the_last_sample_and_is_not_too_fine() {
+    fn mesh_includes_the_last_sample_and_is_not_too_fine() {
         for samples in [2, 3, 33, 321, 322, 1000, 1025] {
             let every = mesh_step(samples);
             let lines = lines(samples, every);
@@ -455,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_hides_what_lies_under_it_and_nothing_else() {
+    fn tile_hides_only_the_cells_under_it() {
         let cut = Cut {
             side: 32,
             tiles: BTreeSet::from([[32, 32]]),
@@ -468,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_of_another_level_change_all_that_either_hides() {
+    fn tiles_of_another_level_update_the_hidden_cells() {
         let cut = |side, tile| Cut {
             side,
             tiles: BTreeSet::from([tile]),
@@ -497,7 +497,7 @@ mod tests {
     }
 
     /// Returns the visible triangles of each key after these entries.
-    fn taken(layers: &Layers) -> Vec<usize> {
+    fn cell_counts(layers: &Layers) -> Vec<usize> {
         let shown = |(number, layer): (usize, &Shown)| {
             let inner = layers.inner(number);
             let cells = layer.blocks.iter().flat_map(|block| &block.cells);
@@ -508,7 +508,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_has_the_height_of_the_finest_layer_there() {
+    fn position_has_the_height_of_its_finest_layer() {
         let ground = Ground::new(&super::super::ground::tests::scene());
         // Heights that encode their position and layer.
         let reported = |number: u32, first: i32, step: i32, posts: i32| Layer {
@@ -555,29 +555,29 @@ mod tests {
             keys.collect::<Vec<_>>()
         };
         put(&mut layers, layer(0, 0, 16, 65));
-        assert_eq!(taken(&layers), [64 * 64]);
+        assert_eq!(cell_counts(&layers), [64 * 64]);
         // 512 cells replace 32 × 32 coarse ones, in several blocks.
         put(&mut layers, layer(1, 0, 8, 65));
-        assert_eq!(taken(&layers), [64 * 64 - 32 * 32, 64 * 64]);
+        assert_eq!(cell_counts(&layers), [64 * 64 - 32 * 32, 64 * 64]);
         let blocks = layers.layers[1].blocks.len();
         assert_eq!(blocks, 4);
         // Smaller, and elsewhere: the area of the previous one is drawn again.
         let keys = put(&mut layers, layer(1, 512, 8, 33));
-        assert_eq!(taken(&layers), [64 * 64 - 16 * 16, 32 * 32]);
+        assert_eq!(cell_counts(&layers), [64 * 64 - 16 * 16, 32 * 32]);
         let [whole, cut] = ["terrain/layer0/0 triangles"; 2];
         let at = |key: &str| keys.iter().position(|other| other == key);
         let last = |key: &str| keys.iter().rposition(|other| other == key);
         let (whole, cut) = (at(whole).expect("whole"), last(cut).expect("cut"));
         for block in 0..blocks {
             let mesh = at(&format!("terrain/layer1/{block} mesh")).expect("drawn");
-            let without = at(&format!("terrain/layer1/{block} triangles"));
-            let without = without.expect("taken out");
-            assert!(whole < without && without < mesh && mesh < cut, "{keys:?}");
+            let removed = at(&format!("terrain/layer1/{block} triangles"));
+            let removed = removed.expect("taken out");
+            assert!(whole < removed && removed < mesh && mesh < cut, "{keys:?}");
         }
         // A layer that does not follow the last number is ignored.
         assert!(put(&mut layers, layer(3, 0, 2, 33)).is_empty());
         // The coarsest again: the finer ones belong to another terrain.
         put(&mut layers, layer(0, 0, 16, 65));
-        assert_eq!(taken(&layers), [64 * 64]);
+        assert_eq!(cell_counts(&layers), [64 * 64]);
     }
 }

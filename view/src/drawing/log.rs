@@ -43,7 +43,7 @@ impl Log {
     }
 
     /// Returns a static state of an entity, valid until the same `part` of it is sent again.
-    pub(super) fn standing(
+    pub(super) fn log_static(
         &self,
         entity: &str,
         part: &str,
@@ -67,7 +67,7 @@ impl Log {
     }
 
     /// Returns the states of an entity at times, s, one row of each column a time.
-    pub(super) fn happened(
+    pub(super) fn log_timed(
         &self,
         entity: &str,
         times_s: &[f64],

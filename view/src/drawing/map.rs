@@ -19,7 +19,7 @@ const MAX: usize = 512;
 /// Updates of the hand in a second.
 const RATE_HZ: f64 = 20.0;
 const HELD: Rgb = [64, 224, 208];
-const LAID: Rgb = [190, 200, 210];
+const FITTED: Rgb = [190, 200, 210];
 const WHITE: Rgb = [255, 255, 255];
 /// Maximum length of the scale bar, as a share of the relief's width.
 const BAR: f64 = 0.4;
@@ -76,15 +76,15 @@ impl Frame {
             [[width + 2.0 * room[0], height + 2.0 * room[1]]],
         );
         let mut entries = vec![
-            log.standing("map/room", "", &whole.with_colors([[0, 0, 0]]))?,
-            log.standing(
+            log.log_static("map/room", "", &whole.with_colors([[0, 0, 0]]))?,
+            log.log_static(
                 "map/corners",
                 "",
                 &self.corners(scene, ground, size, room[1]),
             )?,
         ];
         if let Some(bar) = self.bar(scene, ground, size, room[1]) {
-            entries.push(log.standing("map/bar", "", &bar)?);
+            entries.push(log.log_static("map/bar", "", &bar)?);
         }
         Ok(entries)
     }
@@ -159,16 +159,16 @@ impl Map {
         }
         let (columns, rows) = (layer.columns as usize, layer.rows as usize);
         let every = columns.max(rows).div_ceil(MAX).max(1);
-        let taken = |count: usize| (0..count).step_by(every);
-        let up: Vec<f32> = taken(rows)
-            .flat_map(|row| taken(columns).map(move |column| row * columns + column))
+        let subsampled = |count: usize| (0..count).step_by(every);
+        let up: Vec<f32> = subsampled(rows)
+            .flat_map(|row| subsampled(columns).map(move |column| row * columns + column))
             .map(|index| layer.heights.get(index).copied().unwrap_or(f32::NAN))
             .collect();
         let up = ground.heights_of(&up);
         let step = layer.step.saturating_mul(every as i32);
         let heights = Heights {
-            columns: taken(columns).count(),
-            rows: taken(rows).count(),
+            columns: subsampled(columns).count(),
+            rows: subsampled(rows).count(),
             step: ground.step(step),
             up: &up,
         };
@@ -186,34 +186,34 @@ impl Map {
         let rgb: Vec<u8> = places
             .flat_map(|(column, row)| shade.colour(&heights, column, row))
             .collect();
-        let looks = Points2D::update_fields()
+        let style = Points2D::update_fields()
             .with_colors([HIP])
             .with_radii([Radius::new_ui_points(6.0)]);
         let mut entries = vec![
-            log.standing("map/relief", "", &Image::from_rgb24(rgb, size))?,
-            log.standing("map/hip", "looks", &looks)?,
+            log.log_static("map/relief", "", &Image::from_rgb24(rgb, size))?,
+            log.log_static("map/hip", "looks", &style)?,
         ];
         entries.extend(frame.scale(log, scene, ground, size)?);
-        entries.extend(self.laid(log, scene)?);
+        entries.extend(self.fitted_area(log, scene)?);
         Ok(entries)
     }
 
     /// Returns the outline of the terrain in front of the arm.
-    pub(super) fn laid(&self, log: &Log, scene: &Scene) -> Result<Option<Entry>> {
+    pub(super) fn fitted_area(&self, log: &Log, scene: &Scene) -> Result<Option<Entry>> {
         let Some(frame) = self.frame else {
             return Ok(None);
         };
-        let [west, south, east, north] = scene.laid_mm.map(|mm| mm / scene.cell_mm);
+        let [west, south, east, north] = scene.fitted_mm.map(|mm| mm / scene.cell_mm);
         let (middle, half) = frame.square([west, south], [east, north]);
         let reach = Boxes2D::from_centers_and_half_sizes([middle], [half])
-            .with_colors([LAID])
+            .with_colors([FITTED])
             .with_radii([Radius::new_ui_points(0.7)]);
-        log.standing("map/laid", "", &reach).map(Some)
+        log.log_static("map/laid", "", &reach).map(Some)
     }
 
     /// Returns the square of the visible part, as the frame on the terrain, by its south-west and
     /// north-east corner in cells of level 0; `None` without a frame.
-    pub(super) fn looked_at(&self, corners: Option<[[f64; 2]; 2]>) -> Option<Boxes2D> {
+    pub(super) fn visible_box(&self, corners: Option<[[f64; 2]; 2]>) -> Option<Boxes2D> {
         let frame = self.frame?;
         let squares = corners.map(|[low, high]| frame.square(low, high));
         let (middles, halves): (Vec<_>, Vec<_>) = squares.into_iter().unzip();
@@ -237,7 +237,7 @@ impl Map {
         let boxes = Boxes2D::from_centers_and_half_sizes(middles, halves)
             .with_colors([HELD])
             .with_radii([Radius::new_ui_points(0.7)]);
-        Ok(vec![log.standing("map/held", "", &boxes)?])
+        Ok(vec![log.log_static("map/held", "", &boxes)?])
     }
 
     /// Draws the HIP.
@@ -264,6 +264,6 @@ impl Map {
         }
         let points = Points2D::update_fields().with_positions(places);
         let columns = points.columns_of_unit_batches()?;
-        Ok(vec![log.happened("map/hip", &times, columns)?])
+        Ok(vec![log.log_timed("map/hip", &times, columns)?])
     }
 }

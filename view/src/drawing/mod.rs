@@ -80,7 +80,7 @@ impl Drawing {
             return Ok(entries);
         }
         match drawing {
-            Some(drawing) => drawing.go_on(message),
+            Some(drawing) => drawing.draw_message(message),
             // Message before any scene.
             None => Ok(Vec::new()),
         }
@@ -105,8 +105,8 @@ impl Drawing {
         let ground = Ground::new(&scene);
         entries.push(log.opened());
         entries.extend(layout::entries(&scene, &ground)?);
-        entries.extend(hand::looks(&log, &ground)?);
-        entries.extend(plots::looks(&log)?);
+        entries.extend(hand::style_entries(&log, &ground)?);
+        entries.extend(plots::style_entries(&log)?);
         Ok(Self {
             plots: Plots::new(&scene),
             hand: Hand::default(),
@@ -128,11 +128,11 @@ impl Drawing {
         let ground = self.ground.after(&scene);
         entries.extend(self.plots.change(log, &scene)?);
         self.words.change(&scene);
-        self.hand.leap();
+        self.hand.start_new_line();
         self.frame.change();
         match scene.is_live {
             true => {
-                self.look_at(&scene, &ground, entries)?;
+                self.draw_placement(&scene, &ground, entries)?;
                 self.ground = ground;
             }
             // The terrain of a recording is the same for all of its time.
@@ -143,26 +143,31 @@ impl Drawing {
     }
 
     /// Draws the terrain as it is rendered from now on, and sets the eye's distance by its size.
-    fn look_at(&mut self, scene: &Scene, ground: &Ground, entries: &mut Vec<Entry>) -> Result<()> {
+    fn draw_placement(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        entries: &mut Vec<Entry>,
+    ) -> Result<()> {
         let log = &self.log;
         if !scene.keeps_tiles {
             // First the layers under the tiles, so that there is no gap.
             entries.extend(self.layers.cut(log, ground, &BTreeSet::new())?);
             entries.extend(self.tiles.clear(log)?);
         }
-        if !ground.is_as_high_as(&self.terrain) {
+        if !ground.has_heights_of(&self.terrain) {
             entries.extend(self.layers.redraw(log, ground)?);
         }
         if (ground.near - self.terrain.near).abs() > 1e-6 * ground.near {
             entries.extend(layout::entries(scene, ground)?);
-            entries.extend(hand::looks(log, ground)?);
+            entries.extend(hand::style_entries(log, ground)?);
         }
-        entries.extend(self.map.laid(log, scene)?);
+        entries.extend(self.map.fitted_area(log, scene)?);
         self.terrain = *ground;
         Ok(())
     }
 
-    fn go_on(&mut self, message: Message) -> Result<Vec<Entry>> {
+    fn draw_message(&mut self, message: Message) -> Result<Vec<Entry>> {
         let (log, ground, terrain) = (&self.log, &self.ground, &self.terrain);
         match message {
             Message::Layer(layer) => {
@@ -221,10 +226,10 @@ pub(crate) mod tests {
         let log = Log::new();
         let points = Points3D::new((0..100).map(|i| [i as f32, 0.0, 1.0]));
         match key {
-            Some(key) => log.standing(key, "", &points).expect("encodes"),
+            Some(key) => log.log_static(key, "", &points).expect("encodes"),
             None => {
                 let columns = points.columns_of_unit_batches().expect("columns");
-                log.happened("it", &(0..100).map(f64::from).collect::<Vec<_>>(), columns)
+                log.log_timed("it", &(0..100).map(f64::from).collect::<Vec<_>>(), columns)
                     .expect("encodes")
             }
         }
@@ -272,7 +277,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn another_view_draws_anew_what_it_changes_and_no_more() {
+    fn new_placement_redraws_only_what_it_changes() {
         let mut drawing = None;
         let mut all = BTreeSet::new();
         for message in [scene(|_| {}), layer(), tile()] {
@@ -289,7 +294,7 @@ pub(crate) mod tests {
         let zoom = |scene: &mut Scene| {
             scene.cell_mm *= 2.0;
             scene.mm_per_unit *= 2.0;
-            scene.laid_mm = scene.laid_mm.map(|mm| 2.0 * mm);
+            scene.fitted_mm = scene.fitted_mm.map(|mm| 2.0 * mm);
             scene.ground_m_per_mm = scene.ground_m_per_mm.map(|metres| 0.5 * metres);
         };
         let zoomed = scene(|scene| {
@@ -330,7 +335,7 @@ pub(crate) mod tests {
         for message in [scene(|_| {}), layer()] {
             keys(&mut drawing, message);
         }
-        let laid = [
+        let fitted = [
             "frame/bar ",
             "frame/border ",
             "frame/corners ",
@@ -338,8 +343,8 @@ pub(crate) mod tests {
         ];
         let mut is_laid = |message: Message| {
             let drawn = keys(&mut drawing, message);
-            let count = laid.iter().filter(|key| drawn.contains(**key)).count();
-            assert!(count == 0 || count == laid.len(), "{drawn:?}");
+            let count = fitted.iter().filter(|key| drawn.contains(**key)).count();
+            assert!(count == 0 || count == fitted.len(), "{drawn:?}");
             count > 0
         };
         assert!(is_laid(samples(40.0, 1.0)));
@@ -351,7 +356,7 @@ pub(crate) mod tests {
             scene.cell_mm *= 2.0;
             scene.mm_per_unit *= 2.0;
             scene.home_mm = scene.home_mm.map(|mm| 2.0 * mm);
-            scene.laid_mm = scene.laid_mm.map(|mm| 2.0 * mm);
+            scene.fitted_mm = scene.fitted_mm.map(|mm| 2.0 * mm);
             scene.ground_m_per_mm = scene.ground_m_per_mm.map(|metres| 0.5 * metres);
         }));
         // At the same position of the ground.
@@ -359,7 +364,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_terrain_of_a_recording_stands() {
+    fn terrain_of_a_recording_is_drawn_once() {
         let mut drawing = None;
         let recorded = |steeper: f64| {
             scene(move |scene| {

@@ -62,26 +62,26 @@ const PLOTS: [Plot; 6] = [
 ];
 
 /// Returns the appearance of the series.
-pub(super) fn looks(log: &Log) -> Result<Vec<Entry>> {
-    let looks = PLOTS.iter().map(|plot| {
+pub(super) fn style_entries(log: &Log) -> Result<Vec<Entry>> {
+    let style = PLOTS.iter().map(|plot| {
         let names = plot.series.iter().map(|(name, _)| Name::from(*name));
         let lines = SeriesLines::new()
             .with_names(names)
             .with_colors(plot.series.iter().map(|(_, colour)| *colour));
-        log.standing(plot.entity, "looks", &lines)
+        log.log_static(plot.entity, "looks", &lines)
     });
-    looks.collect()
+    style.collect()
 }
 
 /// Number of samples that are plotted at once.
-const AT_A_TIME: usize = 200;
+const BATCH_SAMPLES: usize = 200;
 
 /// Last plotted values.
 pub(super) struct Plots {
     height_per_mm: f64,
     tick: Option<TickCost>,
     /// Energy transferred to the hand since the beginning, mJ.
-    given_mj: f64,
+    gained_mj: f64,
     /// Samples that are not plotted yet.
     waiting: Vec<Sample>,
     before: Option<Sample>,
@@ -93,7 +93,7 @@ impl Plots {
         Self {
             height_per_mm: scene.height_per_mm,
             tick: scene.tick.clone(),
-            given_mj: 0.0,
+            gained_mj: 0.0,
             waiting: Vec::new(),
             before: None,
             link: None,
@@ -105,17 +105,17 @@ impl Plots {
     /// # Errors
     /// As [`Self::finish`].
     pub(super) fn change(&mut self, log: &Log, scene: &Scene) -> Result<Vec<Entry>> {
-        let rest = self.finish(log)?;
+        let remaining = self.finish(log)?;
         self.height_per_mm = scene.height_per_mm;
         // The hand's jump over the terrain was not under a force.
         self.before = None;
-        Ok(rest)
+        Ok(remaining)
     }
 
     /// Plots every sample, several at a time: one entry costs a page as much as a hundred samples.
     pub(super) fn take(&mut self, log: &Log, samples: &[Sample]) -> Result<Vec<Entry>> {
         self.waiting.extend(samples);
-        match self.waiting.len() < AT_A_TIME {
+        match self.waiting.len() < BATCH_SAMPLES {
             true => Ok(Vec::new()),
             false => self.finish(log),
         }
@@ -171,13 +171,13 @@ impl Plots {
     /// Returns the energy in the spring and the energy transferred to the hand, mJ, which is N·mm.
     fn energy(&mut self, sample: &Sample) -> Vec<f64> {
         let force = sample.force_n.map(f64::from);
-        let held = 0.5 * length(force) * penetration(sample);
+        let stored_mj = 0.5 * length(force) * penetration(sample);
         if let Some(before) = self.before.replace(*sample) {
             let pairs = sample.hip_mm.iter().zip(before.hip_mm);
             let moved = pairs.map(|(now, before)| now - before);
-            self.given_mj += force.iter().zip(moved).map(|(f, d)| f * d).sum::<f64>();
+            self.gained_mj += force.iter().zip(moved).map(|(f, d)| f * d).sum::<f64>();
         }
-        vec![held, self.given_mj]
+        vec![stored_mj, self.gained_mj]
     }
 }
 
@@ -198,5 +198,5 @@ fn length(v: [f64; 3]) -> f64 {
 fn series(log: &Log, entity: &str, times_s: &[f64], rows: &[Vec<f64>]) -> Result<Entry> {
     let lengths: Vec<usize> = rows.iter().map(Vec::len).collect();
     let scalars = Scalars::new(rows.iter().flatten().copied());
-    log.happened(entity, times_s, scalars.columns(lengths)?)
+    log.log_timed(entity, times_s, scalars.columns(lengths)?)
 }

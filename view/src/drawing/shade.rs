@@ -82,8 +82,10 @@ impl Shade {
     /// Fits the colours to heights: nearly all of them are between the first and the last tint, so
     /// that one spike does not reduce the rest to one colour.
     pub(super) fn of(heights: &Heights<'_>) -> Self {
-        let known = || heights.up.iter().copied().filter(|h| h.is_finite());
-        let mut sorted: Vec<f32> = known().step_by(1 + heights.up.len() / 200_000).collect();
+        let known_heights = || heights.up.iter().copied().filter(|h| h.is_finite());
+        let mut sorted: Vec<f32> = known_heights()
+            .step_by(1 + heights.up.len() / 200_000)
+            .collect();
         sorted.sort_by(f32::total_cmp);
         let (low, high) = (quantile(&sorted, 0.002), quantile(&sorted, 0.998));
         let (low, high) = (low.unwrap_or(0.0), high.unwrap_or(1.0));
@@ -99,11 +101,11 @@ impl Shade {
         let mut steep: Vec<f32> = steepness.filter(|slope| *slope > 0.0).collect();
         steep.sort_by(f32::total_cmp);
         let slope = quantile(&steep, BELOW_45_SHARE).unwrap_or(1.0);
-        let (least, most) = EXAGGERATION;
+        let (min, max) = EXAGGERATION;
         Self {
             low,
             span: (high - low).max(1e-6),
-            exaggeration: (1.0 / f64::from(slope)).clamp(least, most) as f32,
+            exaggeration: (1.0 / f64::from(slope)).clamp(min, max) as f32,
         }
     }
 

@@ -94,7 +94,7 @@ impl Tiles {
         let mesh = posts.mesh(&colour);
         let around = ring().iter().map(|(x, y)| colour(*x, *y)).collect();
         self.tiles.insert(tile.index, (lifted, around));
-        let mut entries = vec![log.standing(&entity(tile.slot), MESH, &mesh)?];
+        let mut entries = vec![log.log_static(&entity(tile.slot), MESH, &mesh)?];
         entries.extend(self.skirts(log, ground, layers, &changed)?);
         Ok(entries)
     }
@@ -115,7 +115,7 @@ impl Tiles {
     ) -> Result<Vec<Entry>> {
         let every = (layers.mesh_cell() / ground.haptic_cell()).clamp(1, TILE_CELLS);
         let near = changed.iter().flat_map(|index| {
-            [[0, 0], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|step| beside(*index, step))
+            [[0, 0], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|step| neighbour(*index, step))
         });
         let near: BTreeSet<_> = near.collect();
         let shown = near.iter().filter_map(|index| self.tiles.get(index));
@@ -128,9 +128,9 @@ impl Tiles {
             };
             // In the order of the ring.
             let open = [[0, -1], [1, 0], [0, 1], [-1, 0]]
-                .map(|step| !self.tiles.contains_key(&beside(tile.index, step)));
+                .map(|step| !self.tiles.contains_key(&neighbour(tile.index, step)));
             let mesh = posts.skirt(colours, open, every as usize);
-            log.standing(&skirt(tile.slot), "", &mesh)
+            log.log_static(&skirt(tile.slot), "", &mesh)
         });
         entries.collect()
     }
@@ -140,14 +140,14 @@ impl Tiles {
         let Self {
             slots, outlined, ..
         } = std::mem::take(self);
-        let nothing = Mesh3D::new([[0.0; 3]]).with_triangle_indices(at_least_one(Vec::new()));
+        let empty = Mesh3D::new([[0.0; 3]]).with_triangle_indices(or_one_degenerate(Vec::new()));
         let mut entries = Vec::new();
         for slot in slots.keys() {
-            entries.push(log.standing(&entity(*slot), MESH, &nothing)?);
-            entries.push(log.standing(&skirt(*slot), "", &nothing)?);
+            entries.push(log.log_static(&entity(*slot), MESH, &empty)?);
+            entries.push(log.log_static(&skirt(*slot), "", &empty)?);
         }
         for slot in outlined.keys() {
-            entries.push(drawn(log, &held_in(*slot), vec![], HELD)?);
+            entries.push(drawn(log, &held_entity(*slot), vec![], HELD)?);
         }
         Ok(entries)
     }
@@ -166,24 +166,27 @@ impl Tiles {
         reported: &Reported,
     ) -> Result<Vec<Entry>> {
         let mut entries = Vec::new();
-        let held: BTreeSet<_> = reported.held.iter().copied().collect();
+        let held_keys: BTreeSet<_> = reported.held.iter().copied().collect();
         for (slot, index) in &self.slots {
-            let lines = self.outlines.get(index).filter(|_| held.contains(index));
+            let lines = self
+                .outlines
+                .get(index)
+                .filter(|_| held_keys.contains(index));
             let before = self.outlined.get(slot);
             match lines {
                 Some(_) if before == Some(index) => {}
                 Some(lines) => {
-                    entries.push(drawn(log, &held_in(*slot), lines.clone(), HELD)?);
+                    entries.push(drawn(log, &held_entity(*slot), lines.clone(), HELD)?);
                     self.outlined.insert(*slot, *index);
                 }
                 None if before.is_none() => {}
                 None => {
-                    entries.push(drawn(log, &held_in(*slot), vec![], HELD)?);
+                    entries.push(drawn(log, &held_entity(*slot), vec![], HELD)?);
                     self.outlined.remove(slot);
                 }
             }
         }
-        let unknown = held
+        let unknown = held_keys
             .iter()
             .filter(|index| !self.outlines.contains_key(*index));
         let squares = unknown.map(|index| flat(ground, *index)).collect();
@@ -204,7 +207,7 @@ fn drawn(log: &Log, entity: &str, lines: Vec<Vec<[f32; 3]>>, colour: Rgb) -> Res
     let strips = LineStrips3D::new(lines)
         .with_colors([colour])
         .with_radii([Radius::new_ui_points(width)]);
-    log.standing(entity, "", &strips)
+    log.log_static(entity, "", &strips)
 }
 
 /// Returns the outline of an unknown tile: a square at the home position's height.
@@ -267,7 +270,7 @@ impl Posts<'_> {
         }
         Mesh3D::new(positions)
             .with_vertex_colors(colours)
-            .with_triangle_indices(at_least_one(triangles))
+            .with_triangle_indices(or_one_degenerate(triangles))
     }
 
     /// Returns walls at the tile's open sides, which close the gap to the coarse mesh: it is
@@ -284,15 +287,15 @@ impl Posts<'_> {
         let mut triangles = Vec::new();
         for (i, pair) in ring.windows(2).enumerate() {
             let is_open = open.get(i / (SIDE - 1)).copied().unwrap_or(false);
-            let known = pair.iter().all(|(x, y)| self.height(*x, *y).is_some());
-            if is_open && known {
+            let is_known = pair.iter().all(|(x, y)| self.height(*x, *y).is_some());
+            if is_open && is_known {
                 let (a, c) = (i as u32, (i + ring.len()) as u32);
                 triangles.extend([[a, c, a + 1], [a + 1, c, c + 1]]);
             }
         }
         Mesh3D::new(positions)
             .with_vertex_colors(colours)
-            .with_triangle_indices(at_least_one(triangles))
+            .with_triangle_indices(or_one_degenerate(triangles))
     }
 
     /// Returns the height of the coarse mesh at a position of the ring; `None` beside no-data.
@@ -310,9 +313,9 @@ impl Posts<'_> {
     fn outline(&self) -> Vec<Vec<[f32; 3]>> {
         let float = (FLOAT_CELLS * self.ground.step(self.ground.haptic_cell())) as f32;
         let ring = ring();
-        let known = |place: &(usize, usize)| self.height(place.0, place.1).is_some();
+        let is_known = |place: &(usize, usize)| self.height(place.0, place.1).is_some();
         let lines = ring
-            .split(|place| !known(place))
+            .split(|place| !is_known(place))
             .filter(|line| line.len() > 1);
         lines
             .map(|line| {
@@ -335,18 +338,18 @@ fn skirt(slot: u32) -> String {
 }
 
 /// Returns the name of the outline of the stored tile in a slot.
-fn held_in(slot: u32) -> String {
+fn held_entity(slot: u32) -> String {
     format!("terrain/held/{slot}")
 }
 
 /// Returns the tile at a distance of columns and rows.
-fn beside([col, row]: [i32; 2], [east, north]: [i32; 2]) -> [i32; 2] {
+fn neighbour([col, row]: [i32; 2], [east, north]: [i32; 2]) -> [i32; 2] {
     [col.saturating_add(east), row.saturating_add(north)]
 }
 
 /// Adds a degenerate triangle if there is none: the viewer would draw the vertices of an empty mesh
 /// as triangles.
-fn at_least_one(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+fn or_one_degenerate(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     if triangles.is_empty() {
         triangles.push([0, 0, 0]);
     }
@@ -417,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_that_are_cleared_leave_nothing_in_their_slots() {
+    fn cleared_tiles_leave_empty_slots() {
         let (log, layers) = (Log::new(), Layers::default());
         let ground = Ground::new(&super::super::ground::tests::scene());
         let mut tiles = Tiles::default();
@@ -442,7 +445,7 @@ mod tests {
         let (log, layers) = (Log::new(), Layers::default());
         let ground = Ground::new(&super::super::ground::tests::scene());
         let mut tiles = Tiles::default();
-        let came = |tiles: &mut Tiles, slot, index| {
+        let add_tile = |tiles: &mut Tiles, slot, index| {
             let heights_mm = vec![1.0; TILE_POSTS * TILE_POSTS];
             let tile = Tile {
                 slot,
@@ -461,13 +464,13 @@ mod tests {
             keys.filter(|key| key.starts_with("terrain/held/"))
                 .collect()
         };
-        came(&mut tiles, 3, [1, 2]);
-        came(&mut tiles, 4, [2, 2]);
+        add_tile(&mut tiles, 3, [1, 2]);
+        add_tile(&mut tiles, 4, [2, 2]);
         let [third, fourth] = ["terrain/held/3 ", "terrain/held/4 "];
         assert_eq!(reported(&mut tiles, &[[1, 2], [2, 2]]), [third, fourth]);
         assert!(reported(&mut tiles, &[[1, 2], [2, 2]]).is_empty());
         // Another in the same slot, and one that is no longer stored.
-        came(&mut tiles, 3, [9, 2]);
+        add_tile(&mut tiles, 3, [9, 2]);
         assert_eq!(reported(&mut tiles, &[[9, 2], [2, 2]]), [third]);
         assert_eq!(reported(&mut tiles, &[[9, 2]]), [fourth]);
         assert!(reported(&mut tiles, &[[9, 2]]).is_empty());

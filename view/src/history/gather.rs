@@ -13,15 +13,15 @@ use super::{Blob, encoded};
 use crate::drawing::TIMELINE;
 
 /// Max entries that are joined: the device's time may stand still.
-const MAX: usize = 1000;
+const MAX_ENTRIES: usize = 1000;
 
 /// A piece of the events.
-pub(super) struct Piece {
+pub(super) struct Batch {
     pub(super) blob: Blob,
     entries: Vec<LogMsg>,
 }
 
-impl Piece {
+impl Batch {
     /// Creates a piece; `None` without entries.
     pub(super) fn of(entries: Vec<LogMsg>) -> Result<Option<Self>> {
         if entries.is_empty() {
@@ -33,22 +33,22 @@ impl Piece {
 }
 
 /// Entries that wait for others, and the pieces in which they arrived.
-pub(super) struct Gather {
+pub(super) struct Batcher {
     /// Minimum span of a piece in the device's time, ns.
-    least_ns: u64,
-    pieces: Vec<Blob>,
+    min_ns: u64,
+    batches: Vec<Blob>,
     waiting: BTreeMap<EntityPath, Vec<(StoreId, Chunk)>>,
     count: usize,
     /// Time from the first to the last of them.
     span: Option<AbsoluteTimeRange>,
 }
 
-impl Gather {
+impl Batcher {
     /// Creates a gatherer for pieces of `span_s` of the device's time.
     pub(super) fn new(span_s: u32) -> Self {
         Self {
-            least_ns: u64::from(span_s) * 1_000_000_000,
-            pieces: Vec::new(),
+            min_ns: u64::from(span_s) * 1_000_000_000,
+            batches: Vec::new(),
             waiting: BTreeMap::new(),
             count: 0,
             span: None,
@@ -56,14 +56,14 @@ impl Gather {
     }
 
     /// Returns the pieces of the waiting entries.
-    pub(super) fn pieces(&self) -> &[Blob] {
-        &self.pieces
+    pub(super) fn batches(&self) -> &[Blob] {
+        &self.batches
     }
 
     /// Adds a piece of events; returns the joined piece if one is complete.
-    pub(super) fn take(&mut self, piece: &Piece) -> Result<Option<Piece>> {
-        self.pieces.push(Blob::clone(&piece.blob));
-        for entry in &piece.entries {
+    pub(super) fn add(&mut self, batch: &Batch) -> Result<Option<Batch>> {
+        self.batches.push(Blob::clone(&batch.blob));
+        for entry in &batch.entries {
             // Events consist only of rows.
             let LogMsg::ArrowMsg(store, rows) = entry else {
                 continue;
@@ -82,26 +82,26 @@ impl Gather {
         }
         let is_long = self
             .span
-            .is_some_and(|span| span.abs_length() >= self.least_ns);
-        match is_long || self.count >= MAX {
-            true => self.rest(),
+            .is_some_and(|span| span.abs_length() >= self.min_ns);
+        match is_long || self.count >= MAX_ENTRIES {
+            true => self.flush(),
             false => Ok(None),
         }
     }
 
     /// Returns all waiting entries as one piece.
-    pub(super) fn rest(&mut self) -> Result<Option<Piece>> {
+    pub(super) fn flush(&mut self) -> Result<Option<Batch>> {
         (self.count, self.span) = (0, None);
-        self.pieces.clear();
-        let mut together = Vec::new();
+        self.batches.clear();
+        let mut joined_batch = Vec::new();
         for (store, chunk) in std::mem::take(&mut self.waiting)
             .into_values()
             .flat_map(joined)
         {
             let rows = chunk.to_arrow_msg().context("entries put together")?;
-            together.push(LogMsg::ArrowMsg(store, rows));
+            joined_batch.push(LogMsg::ArrowMsg(store, rows));
         }
-        Piece::of(together)
+        Batch::of(joined_batch)
     }
 }
 
@@ -109,11 +109,11 @@ impl Gather {
 fn joined(chunks: Vec<(StoreId, Chunk)>) -> Vec<(StoreId, Chunk)> {
     let mut joined: Vec<(StoreId, Chunk)> = Vec::new();
     for (store, chunk) in chunks {
-        let before = joined.last_mut().map(|(_, before)| before);
-        let before = before.filter(|before| before.concatenable(&chunk));
-        let both = before.map(|before| (Chunk::concat_and_sort(before, &chunk), before));
+        let previous = joined.last_mut().map(|(_, previous)| previous);
+        let previous = previous.filter(|previous| previous.concatenable(&chunk));
+        let both = previous.map(|previous| (Chunk::concat_and_sort(previous, &chunk), previous));
         match both {
-            Some((Ok(both), before)) => *before = both,
+            Some((Ok(both), previous)) => *previous = both,
             _ => joined.push((store, chunk)),
         }
     }

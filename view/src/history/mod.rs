@@ -20,8 +20,8 @@ use re_log_encoding::{Encoder, EncodingOptions};
 use re_log_types::LogMsg;
 
 use crate::drawing::Entry;
-use gather::{Gather, Piece};
-pub use page::{Next, Page, Pieces};
+use gather::{Batch, Batcher};
+pub use page::{Batching, Next, Page};
 
 /// A piece of a page's stream: a complete small `.rrd`.
 pub type Blob = Arc<Vec<u8>>;
@@ -43,23 +43,23 @@ pub struct History {
     limit: usize,
     state: Mutex<State>,
     /// Number of pages that were cut off.
-    cut: AtomicU64,
+    dropped: AtomicU64,
 }
 
 struct State {
-    standing: BTreeMap<String, Blob>,
+    static_entries: BTreeMap<String, Blob>,
     /// Events, [`LONG_S`] at a time.
-    happened: VecDeque<Blob>,
-    happened_bytes: usize,
+    events: VecDeque<Blob>,
+    event_bytes: usize,
     /// Later events, [`SHORT_S`] at a time.
-    recent: Gather,
+    recent: Batcher,
     /// The latest events, as received.
-    latest: Gather,
+    latest: Batcher,
     is_bounded: bool,
     ended: Option<End>,
     pages: Vec<Arc<Page>>,
     /// Number of pages that have connected up to now.
-    came: u64,
+    connected: u64,
 }
 
 /// End of a session.
@@ -73,17 +73,17 @@ pub enum End {
 
 /// Figures of a history.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Kept {
+pub struct HistoryStats {
     /// Bytes of static entries.
-    pub standing: usize,
+    pub static_entries: usize,
     /// Bytes of events.
-    pub happened: usize,
+    pub events: usize,
     /// Number of connected pages.
     pub pages: usize,
     /// Number of pages that have connected up to now.
-    pub came: u64,
+    pub connected: u64,
     /// Pages that were cut off because they were too slow.
-    pub cut: u64,
+    pub dropped: u64,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -98,31 +98,31 @@ impl History {
         Arc::new(Self {
             limit,
             state: Mutex::new(State {
-                standing: BTreeMap::new(),
-                happened: VecDeque::new(),
-                happened_bytes: 0,
-                recent: Gather::new(LONG_S),
-                latest: Gather::new(SHORT_S),
+                static_entries: BTreeMap::new(),
+                events: VecDeque::new(),
+                event_bytes: 0,
+                recent: Batcher::new(LONG_S),
+                latest: Batcher::new(SHORT_S),
                 is_bounded: false,
                 ended: None,
                 pages: Vec::new(),
-                came: 0,
+                connected: 0,
             }),
-            cut: AtomicU64::new(0),
+            dropped: AtomicU64::new(0),
         })
     }
 
     /// Begins a scene and drops the history of the previous one. A recording is kept completely.
     pub fn begin(&self, is_live: bool) {
         let mut state = locked(&self.state);
-        state.standing.clear();
-        state.happened.clear();
-        state.happened_bytes = 0;
-        state.recent = Gather::new(LONG_S);
-        state.latest = Gather::new(SHORT_S);
+        state.static_entries.clear();
+        state.events.clear();
+        state.event_bytes = 0;
+        state.recent = Batcher::new(LONG_S);
+        state.latest = Batcher::new(SHORT_S);
         state.is_bounded = is_live;
         for page in &state.pages {
-            page.cut();
+            page.disconnect();
         }
     }
 
@@ -131,26 +131,26 @@ impl History {
     /// # Errors
     /// An entry that cannot be encoded.
     pub fn put(&self, entries: Vec<Entry>) -> Result<()> {
-        let (standing, happened): (Vec<_>, Vec<_>) =
+        let (static_entries, events): (Vec<_>, Vec<_>) =
             entries.into_iter().partition(|entry| entry.key.is_some());
-        let happened = happened.into_iter().map(|entry| entry.message).collect();
+        let events = events.into_iter().map(|entry| entry.message).collect();
         let mut state = locked(&self.state);
-        for Entry { key, message } in standing {
+        for Entry { key, message } in static_entries {
             let blob = encoded([&message])?;
             for page in &state.pages {
                 page.offer(key.as_deref(), &blob);
             }
-            state.standing.extend(key.map(|key| (key, blob)));
+            state.static_entries.extend(key.map(|key| (key, blob)));
         }
-        if let Some(piece) = Piece::of(happened)? {
-            state.tell(Pieces::Fine, &piece.blob);
-            let together = state.latest.take(&piece)?;
-            state.gather(together, self.limit)?;
+        if let Some(piece) = Batch::of(events)? {
+            state.send(Batching::Fine, &piece.blob);
+            let joined_batch = state.latest.add(&piece)?;
+            state.add_joined(joined_batch, self.limit)?;
         }
-        let before = state.pages.len();
-        state.pages.retain(|page| !page.is_cut());
-        let cut = (before - state.pages.len()) as u64;
-        self.cut.fetch_add(cut, Ordering::Relaxed);
+        let previous = state.pages.len();
+        state.pages.retain(|page| !page.is_dropped());
+        let dropped = (previous - state.pages.len()) as u64;
+        self.dropped.fetch_add(dropped, Ordering::Relaxed);
         Ok(())
     }
 
@@ -158,85 +158,86 @@ impl History {
     ///
     /// # Errors
     /// An entry that cannot be encoded.
-    pub fn end(&self, how: End) -> Result<()> {
+    pub fn end(&self, end: End) -> Result<()> {
         let mut state = locked(&self.state);
-        let rest = state.latest.rest()?;
-        state.gather(rest, self.limit)?;
-        state.ended = Some(how);
+        let remaining = state.latest.flush()?;
+        state.add_joined(remaining, self.limit)?;
+        state.ended = Some(end);
         for page in &state.pages {
-            page.end(how);
+            page.end(end);
         }
         Ok(())
     }
 
     /// Adds a page and returns its queue, which begins with the whole history.
     #[must_use]
-    pub fn come(&self, pieces: Pieces) -> Arc<Page> {
+    pub fn add_page(&self, batching: Batching) -> Arc<Page> {
         let mut state = locked(&self.state);
-        let standing = state.standing.iter();
-        let standing = standing.map(|(key, blob)| (Some(key.clone()), Arc::clone(blob)));
-        let latest = state.latest.pieces().iter();
-        let latest = latest.filter(|_| pieces == Pieces::Fine);
-        let happened = { state.happened.iter() }
-            .chain(state.recent.pieces())
+        let static_entries = state.static_entries.iter();
+        let static_entries =
+            static_entries.map(|(key, blob)| (Some(key.clone()), Arc::clone(blob)));
+        let latest = state.latest.batches().iter();
+        let latest = latest.filter(|_| batching == Batching::Fine);
+        let events = { state.events.iter() }
+            .chain(state.recent.batches())
             .chain(latest);
-        let happened = happened.map(|blob| (None, Arc::clone(blob)));
-        let page = Page::new(pieces, standing.chain(happened), state.ended);
-        state.came += 1;
+        let events = events.map(|blob| (None, Arc::clone(blob)));
+        let page = Page::new(batching, static_entries.chain(events), state.ended);
+        state.connected += 1;
         state.pages.push(Arc::clone(&page));
         page
     }
 
     /// Removes a page that has disconnected.
-    pub fn gone(&self, page: &Arc<Page>) {
+    pub fn remove_page(&self, page: &Arc<Page>) {
         let mut state = locked(&self.state);
         state.pages.retain(|other| !Arc::ptr_eq(other, page));
     }
 
     /// Returns the size of the history, and the number of pages.
     #[must_use]
-    pub fn kept(&self) -> Kept {
+    pub fn stats(&self) -> HistoryStats {
         let state = locked(&self.state);
-        Kept {
-            standing: state.standing.values().map(|blob| blob.len()).sum(),
-            happened: state.happened_bytes,
+        HistoryStats {
+            static_entries: state.static_entries.values().map(|blob| blob.len()).sum(),
+            events: state.event_bytes,
             pages: state.pages.len(),
-            came: state.came,
-            cut: self.cut.load(Ordering::Relaxed),
+            connected: state.connected,
+            dropped: self.dropped.load(Ordering::Relaxed),
         }
     }
 }
 
 impl State {
     /// Sends the gathered entries to the pages that receive such pieces.
-    fn tell(&self, pieces: Pieces, blob: &Blob) {
-        for page in self.pages.iter().filter(|page| page.pieces() == pieces) {
+    fn send(&self, batching: Batching, blob: &Blob) {
+        for page in self.pages.iter().filter(|page| page.batching() == batching) {
             page.offer(None, blob);
         }
     }
 
     /// Sends a joined piece, and joins it with more.
-    fn gather(&mut self, together: Option<Piece>, limit: usize) -> Result<()> {
-        if let Some(piece) = together {
-            self.tell(Pieces::Gathered, &piece.blob);
-            let together = self.recent.take(&piece)?;
-            self.keep(together, limit);
+    fn add_joined(&mut self, joined_batch: Option<Batch>, limit: usize) -> Result<()> {
+        if let Some(piece) = joined_batch {
+            self.send(Batching::Joined, &piece.blob);
+            let joined_batch = self.recent.add(&piece)?;
+            self.store(joined_batch, limit);
         }
         Ok(())
     }
 
     /// Stores events, and drops the oldest.
-    fn keep(&mut self, together: Option<Piece>, limit: usize) {
-        let Some(Piece { blob, .. }) = together else {
+    fn store(&mut self, joined_batch: Option<Batch>, limit: usize) {
+        let Some(Batch { blob, .. }) = joined_batch else {
             return;
         };
-        self.happened_bytes += blob.len();
-        self.happened.push_back(blob);
-        while self.is_bounded && self.happened_bytes > limit {
-            let Some(oldest) = self.happened.pop_front() else {
+        self.event_bytes += blob.len();
+        self.events.push_back(blob);
+        while self.is_bounded && self.event_bytes > limit {
+            let Some(oldest) = self.events.pop_front() else {
                 break;
             };
-            self.happened_bytes -= oldest.len();
+            self.event_bytes -= oldest.len();
         }
     }
 }
@@ -277,43 +278,46 @@ mod tests {
     fn keyed_entries_are_kept_once_and_other_entries_are_bounded() {
         let history = History::new(20_000);
         history.begin(true);
-        let (mut standing, mut happened) = (0, 0);
+        let (mut static_entries, mut events) = (0, 0);
         for round in 0..300 {
             let place = format!("place{}", round % 3);
             history
                 .put(vec![entry(Some(&place)), entry(None)])
                 .expect("encodes");
-            let kept = history.kept();
+            let stats = history.stats();
             if round == 100 {
-                (standing, happened) = (kept.standing, kept.happened);
+                (static_entries, events) = (stats.static_entries, stats.events);
             }
         }
-        let kept = history.kept();
+        let stats = history.stats();
         assert!(
-            kept.standing <= standing + 64,
-            "{kept:?}, {standing} before"
+            stats.static_entries <= static_entries + 64,
+            "{stats:?}, {static_entries} before"
         );
-        assert!(kept.happened <= 20_000 && kept.happened + 2_000 > happened);
+        assert!(stats.events <= 20_000 && stats.events + 2_000 > events);
         // Three entries, and the rest of the limit.
-        let page = history.come(Pieces::Fine);
+        let page = history.add_page(Batching::Fine);
         assert!(reported(&page) < 100);
     }
 
     #[test]
-    fn a_recording_is_kept_as_a_whole() {
+    fn recording_is_kept_completely() {
         let history = History::new(100);
         history.begin(false);
         for _ in 0..50 {
             history.put(vec![entry(None)]).expect("encodes");
         }
-        assert_eq!(reported(&history.come(Pieces::Fine)), 50);
+        assert_eq!(reported(&history.add_page(Batching::Fine)), 50);
     }
 
     #[test]
-    fn a_page_that_does_not_read_is_cut_off_and_no_other() {
+    fn only_a_page_that_does_not_read_is_dropped() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let (slow, quick) = (history.come(Pieces::Fine), history.come(Pieces::Fine));
+        let (slow, quick) = (
+            history.add_page(Batching::Fine),
+            history.add_page(Batching::Fine),
+        );
         let big = |page: &Arc<Page>| {
             page.offer(None, &Arc::new(vec![0; QUEUE_BYTES / 2 + 1]));
         };
@@ -322,10 +326,10 @@ mod tests {
         big(&slow);
         big(&slow);
         history.put(vec![entry(None)]).expect("encodes");
-        assert_eq!(slow.next(NOW), Next::Cut);
+        assert_eq!(slow.next(NOW), Next::Dropped);
         assert_eq!(reported(&quick), 1);
-        let kept = history.kept();
-        assert_eq!((kept.pages, kept.came, kept.cut), (1, 2, 1));
+        let stats = history.stats();
+        assert_eq!((stats.pages, stats.connected, stats.dropped), (1, 2, 1));
     }
 
     #[test]
@@ -333,7 +337,7 @@ mod tests {
         let history = History::new(1 << 20);
         history.begin(true);
         history.put(vec![entry(Some("first"))]).expect("encodes");
-        let page = history.come(Pieces::Fine);
+        let page = history.add_page(Batching::Fine);
         let of = |fill: u8| Arc::new(vec![fill; QUEUE_BYTES / 3]);
         for (key, fill) in [("first ", 1), ("other ", 2), ("first ", 3), ("first ", 4)] {
             page.offer(Some(key), &of(fill));
@@ -347,16 +351,19 @@ mod tests {
         for fill in 0..3 {
             page.offer(None, &of(fill));
         }
-        assert!(!page.is_cut());
+        assert!(!page.is_dropped());
         page.offer(None, &of(3));
-        assert!(page.is_cut());
+        assert!(page.is_dropped());
     }
 
     #[test]
-    fn time_that_stands_still_gathers_no_more_than_so_many_entries() {
+    fn joined_entries_are_bounded_if_time_stands_still() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let (gathered, fine) = (history.come(Pieces::Gathered), history.come(Pieces::Fine));
+        let (gathered, fine) = (
+            history.add_page(Batching::Joined),
+            history.add_page(Batching::Fine),
+        );
         for _ in 0..2500 {
             history.put(vec![at(1.0)]).expect("encodes");
         }
@@ -366,22 +373,22 @@ mod tests {
     }
 
     #[test]
-    fn pages_receive_the_end_and_are_cut_off_by_a_new_scene() {
+    fn pages_receive_the_end_and_are_dropped_at_a_new_scene() {
         let history = History::new(1 << 20);
         history.begin(true);
-        let page = history.come(Pieces::Fine);
-        assert_eq!(page.next(NOW), Next::Nothing);
+        let page = history.add_page(Batching::Fine);
+        assert_eq!(page.next(NOW), Next::Idle);
         history.begin(true);
-        assert_eq!(page.next(NOW), Next::Cut);
-        let page = history.come(Pieces::Fine);
+        assert_eq!(page.next(NOW), Next::Dropped);
+        let page = history.add_page(Batching::Fine);
         history.put(vec![entry(None)]).expect("encodes");
-        for how in [End::Reported, End::Lost] {
-            history.end(how).expect("encodes");
-            let late = history.come(Pieces::Fine);
+        for end in [End::Reported, End::Lost] {
+            history.end(end).expect("encodes");
+            let late = history.add_page(Batching::Fine);
             assert_eq!(reported(&late), 1);
-            assert_eq!(late.next(NOW), Next::Over(how));
+            assert_eq!(late.next(NOW), Next::Ended(end));
         }
         assert_eq!(reported(&page), 1);
-        assert_eq!(page.next(NOW), Next::Over(End::Lost));
+        assert_eq!(page.next(NOW), Next::Ended(End::Lost));
     }
 }

@@ -12,19 +12,19 @@ pub(super) const QUEUE_BYTES: usize = 32 << 20;
 
 /// Sizes of the pieces in which a page receives the entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pieces {
+pub enum Batching {
     /// Each entry as it occurs.
     Fine,
     /// A second at a time: for a page that is drawn by software at a few pictures a second, and
     /// that handles only a few dozen entries with each.
-    Gathered,
+    Joined,
 }
 
 /// A page's queue.
 pub struct Page {
-    pieces: Pieces,
+    batching: Batching,
     queue: Mutex<Queue>,
-    woken: Condvar,
+    wake: Condvar,
 }
 
 struct Queue {
@@ -33,7 +33,7 @@ struct Queue {
     bytes: usize,
     limit: usize,
     /// True if it was too slow, or has disconnected.
-    is_cut: bool,
+    is_dropped: bool,
     ended: Option<End>,
 }
 
@@ -43,16 +43,16 @@ pub enum Next {
     /// A piece of the stream.
     Blob(Blob),
     /// None for now.
-    Nothing,
+    Idle,
     /// None any more: the session has ended.
-    Over(End),
+    Ended(End),
     /// The page was too slow, and must reconnect.
-    Cut,
+    Dropped,
 }
 
 impl Page {
     pub(super) fn new(
-        pieces: Pieces,
+        batching: Batching,
         first: impl Iterator<Item = (Option<String>, Blob)>,
         ended: Option<End>,
     ) -> Arc<Self> {
@@ -62,25 +62,25 @@ impl Page {
             blobs,
             bytes,
             limit: bytes + QUEUE_BYTES,
-            is_cut: false,
+            is_dropped: false,
             ended,
         };
         Arc::new(Self {
-            pieces,
+            batching,
             queue: Mutex::new(queue),
-            woken: Condvar::new(),
+            wake: Condvar::new(),
         })
     }
 
     /// Returns the size of its pieces.
     #[must_use]
-    pub fn pieces(&self) -> Pieces {
-        self.pieces
+    pub fn batching(&self) -> Batching {
+        self.batching
     }
 
     /// Returns true if its queue is empty.
     #[must_use]
-    pub fn is_told_all(&self) -> bool {
+    pub fn is_drained(&self) -> bool {
         locked(&self.queue).blobs.is_empty()
     }
 
@@ -88,54 +88,55 @@ impl Page {
     #[must_use]
     pub fn next(&self, wait: std::time::Duration) -> Next {
         let queue = locked(&self.queue);
-        let idle =
-            |queue: &mut Queue| queue.blobs.is_empty() && queue.ended.is_none() && !queue.is_cut;
-        let waited = self.woken.wait_timeout_while(queue, wait, idle);
+        let idle = |queue: &mut Queue| {
+            queue.blobs.is_empty() && queue.ended.is_none() && !queue.is_dropped
+        };
+        let waited = self.wake.wait_timeout_while(queue, wait, idle);
         let (mut queue, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        if queue.is_cut {
-            return Next::Cut;
+        if queue.is_dropped {
+            return Next::Dropped;
         }
         match queue.blobs.pop_front() {
             Some((_, blob)) => {
                 queue.bytes -= blob.len();
                 Next::Blob(blob)
             }
-            None => queue.ended.map_or(Next::Nothing, Next::Over),
+            None => queue.ended.map_or(Next::Idle, Next::Ended),
         }
     }
 
     pub(super) fn offer(&self, key: Option<&str>, blob: &Blob) {
         let mut queue = locked(&self.queue);
         if let Some(key) = key {
-            queue.forget(key);
+            queue.remove(key);
         }
         queue.bytes += blob.len();
         let key = key.map(str::to_owned);
         queue.blobs.push_back((key, Arc::clone(blob)));
         if queue.bytes > queue.limit {
-            queue.is_cut = true;
+            queue.is_dropped = true;
             queue.blobs.clear();
         }
-        self.woken.notify_all();
+        self.wake.notify_all();
     }
 
-    pub(super) fn cut(&self) {
-        locked(&self.queue).is_cut = true;
-        self.woken.notify_all();
+    pub(super) fn disconnect(&self) {
+        locked(&self.queue).is_dropped = true;
+        self.wake.notify_all();
     }
 
-    pub(super) fn is_cut(&self) -> bool {
-        locked(&self.queue).is_cut
+    pub(super) fn is_dropped(&self) -> bool {
+        locked(&self.queue).is_dropped
     }
 
-    pub(super) fn end(&self, how: End) {
-        locked(&self.queue).ended = Some(how);
-        self.woken.notify_all();
+    pub(super) fn end(&self, end: End) {
+        locked(&self.queue).ended = Some(end);
+        self.wake.notify_all();
     }
 }
 
 impl Queue {
-    fn forget(&mut self, key: &str) {
+    fn remove(&mut self, key: &str) {
         let waits = |(other, _): &(Option<String>, Blob)| other.as_deref() == Some(key);
         let earlier = self.blobs.iter().position(waits);
         if let Some((_, blob)) = earlier.and_then(|place| self.blobs.remove(place)) {

@@ -9,7 +9,7 @@ use std::net::IpAddr;
 
 /// The head of a request.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct RequestHead<'a> {
     /// The method.
     pub method: &'a str,
     /// `Host`.
@@ -22,7 +22,7 @@ pub struct Asked<'a> {
     pub path: &'a str,
 }
 
-impl Asked<'_> {
+impl RequestHead<'_> {
     /// Checks that a server on `port` may answer the request.
     ///
     /// # Errors
@@ -52,8 +52,8 @@ impl Asked<'_> {
 
 /// Returns true if `Host` is an address or `localhost`, with the server's port.
 fn is_own(host: &str, port: u16) -> bool {
-    let (name, stated) = match host.rsplit_once(':') {
-        Some((name, stated)) if !stated.ends_with(']') => (name, stated.parse().ok()),
+    let (name, host_port) = match host.rsplit_once(':') {
+        Some((name, host_port)) if !host_port.ends_with(']') => (name, host_port.parse().ok()),
         _ => (host, Some(80)),
     };
     let inner = name
@@ -63,14 +63,14 @@ fn is_own(host: &str, port: u16) -> bool {
         Some(inner) => inner.parse::<std::net::Ipv6Addr>().is_ok(),
         None => matches!(name.parse(), Ok(IpAddr::V4(_))),
     };
-    stated == Some(port) && (is_address || name.eq_ignore_ascii_case("localhost"))
+    host_port == Some(port) && (is_address || name.eq_ignore_ascii_case("localhost"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const PAGE: Asked<'static> = Asked {
+    const PAGE: RequestHead<'static> = RequestHead {
         method: "GET",
         host: Some("127.0.0.1:8760"),
         origin: None,
@@ -79,34 +79,34 @@ mod tests {
     };
 
     #[test]
-    fn the_page_and_its_parts_are_answered() {
-        let part = Asked {
+    fn page_and_its_parts_are_allowed() {
+        let part = RequestHead {
             path: "/feed",
             site: Some("same-origin"),
             ..PAGE
         };
-        let with_origin = Asked {
+        let with_origin = RequestHead {
             origin: Some("http://127.0.0.1:8760"),
             ..part
         };
-        let linked = Asked {
+        let linked = RequestHead {
             site: Some("cross-site"),
             ..PAGE
         };
-        for asked in [PAGE, part, with_origin, linked] {
-            assert_eq!(asked.check(8760), Ok(()), "{asked:?}");
+        for request_head in [PAGE, part, with_origin, linked] {
+            assert_eq!(request_head.check(8760), Ok(()), "{request_head:?}");
         }
         for host in ["localhost:8760", "[::1]:8760", "192.168.7.7:8760"] {
-            let asked = Asked {
+            let request_head = RequestHead {
                 host: Some(host),
                 ..PAGE
             };
-            assert_eq!(asked.check(8760), Ok(()), "{host}");
+            assert_eq!(request_head.check(8760), Ok(()), "{host}");
         }
     }
 
     #[test]
-    fn names_that_can_be_pointed_here_are_refused() {
+    fn rebindable_host_names_are_refused() {
         for host in [
             "evil.example:8760",
             "127.0.0.1.evil.example:8760",
@@ -117,40 +117,40 @@ mod tests {
             ":8760",
             "",
         ] {
-            let asked = Asked {
+            let request_head = RequestHead {
                 host: Some(host),
                 ..PAGE
             };
-            assert_eq!(asked.check(8760), Err(421), "{host}");
+            assert_eq!(request_head.check(8760), Err(421), "{host}");
         }
-        let asked = Asked { host: None, ..PAGE };
-        assert_eq!(asked.check(8760), Err(400));
+        let request_head = RequestHead { host: None, ..PAGE };
+        assert_eq!(request_head.check(8760), Err(400));
     }
 
     #[test]
     fn cross_site_reads_and_all_writes_are_refused() {
-        let part = Asked {
+        let part = RequestHead {
             path: "/feed",
             ..PAGE
         };
         for site in ["cross-site", "same-site", "?"] {
-            let asked = Asked {
+            let request_head = RequestHead {
                 site: Some(site),
                 ..part
             };
-            assert_eq!(asked.check(8760), Err(403), "{site}");
+            assert_eq!(request_head.check(8760), Err(403), "{site}");
         }
         for origin in ["null", "http://evil.example", "https://127.0.0.1:8760"] {
-            let asked = Asked {
+            let request_head = RequestHead {
                 origin: Some(origin),
                 site: None,
                 ..part
             };
-            assert_eq!(asked.check(8760), Err(403), "{origin}");
+            assert_eq!(request_head.check(8760), Err(403), "{origin}");
         }
         for method in ["POST", "PUT", "OPTIONS", "CONNECT"] {
-            let asked = Asked { method, ..PAGE };
-            assert_eq!(asked.check(8760), Err(405));
+            let request_head = RequestHead { method, ..PAGE };
+            assert_eq!(request_head.check(8760), Err(405));
         }
     }
 }

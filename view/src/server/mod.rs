@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, Result, anyhow};
 use tiny_http::{Header, Request, Response};
 
-use crate::history::{History, Pieces};
-use access_check::Asked;
+use crate::history::{Batching, History};
+use access_check::RequestHead;
 use files::Files;
 
 /// Max number of pages and files in transfer at the same time.
@@ -112,29 +112,29 @@ fn answer(request: Request, shared: &Shared) {
         Some((path, query)) => (path, query),
         None => (request.url(), ""),
     };
-    let pieces = match query {
-        "gathered" => Pieces::Gathered,
-        _ => Pieces::Fine,
+    let batching = match query {
+        "gathered" => Batching::Joined,
+        _ => Batching::Fine,
     };
-    let asked = Asked {
+    let request_head = RequestHead {
         method: request.method().as_str(),
         host: host.as_deref(),
         origin: origin.as_deref(),
         site: site.as_deref(),
         path,
     };
-    if let Err(status) = asked.check(shared.port) {
+    if let Err(status) = request_head.check(shared.port) {
         return refuse(request, status);
     }
-    let is_head = asked.method == "HEAD";
-    match asked.path {
+    let is_head = request_head.method == "HEAD";
+    match request_head.path {
         "/feed" if !is_head => {
-            let page = shared.history.come(pieces);
+            let page = shared.history.add_page(batching);
             let mut to = request.into_writer();
             // In all cases (end, cut off, disconnected) the page reconnects.
             let _ = stream::run(&mut to, &page);
             let _ = to.flush();
-            shared.history.gone(&page);
+            shared.history.remove_page(&page);
         }
         path => match shared.files.named(path) {
             Some(file) => {

@@ -7,7 +7,7 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use crate::history::{End, Next, Page, Pieces};
+use crate::history::{Batching, End, Next, Page};
 
 /// Time without a piece after which the page receives a sign of life, a length that no piece has.
 const SIGN_EVERY: Duration = Duration::from_secs(2);
@@ -32,7 +32,7 @@ const HEAD: &str = "HTTP/1.1 200 OK\r\n\
 pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
     to.write_all(HEAD.as_bytes())?;
     loop {
-        if page.pieces() == Pieces::Gathered && page.is_told_all() {
+        if page.batching() == Batching::Joined && page.is_drained() {
             std::thread::sleep(GATHERED);
         }
         match page.next(SIGN_EVERY) {
@@ -40,16 +40,16 @@ pub(super) fn run(to: &mut dyn Write, page: &Page) -> io::Result<()> {
                 to.write_all(&(blob.len() as u32).to_le_bytes())?;
                 to.write_all(&blob)?;
             }
-            Next::Nothing => to.write_all(&SIGN.to_le_bytes())?,
-            Next::Over(how) => {
-                let stated = match how {
+            Next::Idle => to.write_all(&SIGN.to_le_bytes())?,
+            Next::Ended(how) => {
+                let code = match how {
                     End::Reported => 0,
                     End::Lost => LOST,
                 };
-                to.write_all(&stated.to_le_bytes())?;
+                to.write_all(&code.to_le_bytes())?;
                 return to.flush();
             }
-            Next::Cut => return to.flush(),
+            Next::Dropped => return to.flush(),
         }
         to.flush()?;
     }

@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_that_is_cut_anywhere_ends() {
+    fn stream_cut_anywhere_ends() {
         let mut pipe = Vec::new();
         for message in &messages() {
             write(&mut pipe, message).expect("memory");

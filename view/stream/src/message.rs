@@ -61,7 +61,7 @@ pub struct Scene {
     /// The position under the tip in the arm's home pose, mm. The picture's origin.
     pub home_mm: [f64; 3],
     /// The part in front of the arm: west, south, east, north, mm.
-    pub laid_mm: [f64; 4],
+    pub fitted_mm: [f64; 4],
     /// Ground metres in a millimetre; `None` if the terrain's size is unknown, and all lengths are
     /// in millimetres.
     pub ground_m_per_mm: Option<f64>,

@@ -110,13 +110,13 @@ impl Browser {
             .open(&pipes[0])
             .expect("a pipe");
         let from = BufReader::new(File::open(&pipes[1]).expect("a pipe"));
-        let (say, received) = channel();
+        let (sender, received) = channel();
         std::thread::spawn(move || {
             let texts = from.split(0).map_while(Result::ok);
             let values = texts.filter_map(|text| serde_json::from_slice(&text).ok());
             values
                 .into_iter()
-                .try_for_each(|value: Value| say.send(value))
+                .try_for_each(|value: Value| sender.send(value))
         });
         Self {
             child,

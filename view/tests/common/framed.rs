@@ -98,9 +98,9 @@ pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
         assert_eq!((labels.len(), labels[2].as_str()), (3, "N"));
         for (at, label) in at.iter().zip(&labels).take(2) {
             for axis in 0..2 {
-                let stated = place(label)[axis] - base[axis];
-                let off = f64::from(at.0.0[axis]) + origin[axis] - stated;
-                assert!(off.abs() < ROUNDED + MAP_METRE * stated, "{label}: {off}");
+                let labelled = place(label)[axis] - base[axis];
+                let off = f64::from(at.0.0[axis]) + origin[axis] - labelled;
+                assert!(off.abs() < ROUNDED + MAP_METRE * labelled, "{label}: {off}");
             }
         }
     }
@@ -148,7 +148,7 @@ impl OnMap {
 
 /// Returns west, south, east and north of the outline in front of the arm on the map, m from the
 /// south-west sample.
-pub fn laid(csv: &Csv, shown: &Shown) -> [f64; 4] {
+pub fn stick_sides(csv: &Csv, shown: &Shown) -> [f64; 4] {
     let map = OnMap::new(shown, &on_ground(csv));
     let boxes = &shown["/map/laid"][0];
     let [middle] = read::<Position2D>(boxes, "Boxes2D:centers")[..] else {

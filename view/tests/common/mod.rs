@@ -20,43 +20,46 @@ use hapterra_view_stream::{Message, write};
 pub const HANG: Duration = Duration::from_secs(900);
 
 /// Options of a viewer without a browser, on any free port.
-const UNSEEN: &str = "--no-browser --port 0";
+const HEADLESS_OPTIONS: &str = "--no-browser --port 0";
 
 /// A program under observation by a test. It is killed if it has not ended by itself.
 pub struct Running {
     child: Child,
-    reported: Receiver<String>,
-    stated: Receiver<String>,
+    stdout: Receiver<String>,
+    stderr: Receiver<String>,
 }
 
 impl Running {
     /// Starts a program with options for its viewer, separated by spaces.
     pub fn start(command: &mut Command, options: &str) -> Self {
         let mut child = command
-            .env("HAPTERRA_VIEW_OPTIONS", format!("{UNSEEN} {options}"))
+            .env(
+                "HAPTERRA_VIEW_OPTIONS",
+                format!("{HEADLESS_OPTIONS} {options}"),
+            )
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
         Self {
-            reported: lines_of(child.stdout.take().expect("a pipe")),
-            stated: lines_of(child.stderr.take().expect("a pipe")),
+            stdout: lines_of(child.stdout.take().expect("a pipe")),
+            stderr: lines_of(child.stderr.take().expect("a pipe")),
             child,
         }
     }
 
     /// Starts `hapterra` with a viewer that ends with it.
-    pub fn shown(command: &mut Command, options: &str) -> Self {
+    pub fn start_with_viewer(command: &mut Command, options: &str) -> Self {
         Self::start(command, &format!("--linger 0 {options}"))
     }
 
     /// Runs `hapterra` with such a viewer to its end and returns the output of both.
-    pub fn whole(command: &mut Command, options: &str) -> String {
-        let mut running = Self::shown(command, options);
-        let ended_well = running.end();
-        let words = running.words();
-        assert!(ended_well, "{words}");
-        words
+    pub fn run_to_end(command: &mut Command, options: &str) -> String {
+        let mut running = Self::start_with_viewer(command, options);
+        let is_success = running.end();
+        let output = running.output();
+        assert!(is_success, "{output}");
+        output
     }
 
     pub fn id(&self) -> u32 {
@@ -65,13 +68,12 @@ impl Running {
 
     /// Returns the next line on standard error.
     pub fn line(&self) -> String {
-        self.stated.recv_timeout(HANG).expect("it says a line")
+        self.stderr.recv_timeout(HANG).expect("it says a line")
     }
 
     /// Waits for a line on standard output with this beginning.
-    pub fn tells(&self, beginning: &str) {
-        while !{ self.reported.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning)
-        {
+    pub fn wait_for_line(&self, beginning: &str) {
+        while !{ self.stdout.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {
         }
     }
 
@@ -93,7 +95,7 @@ impl Running {
     }
 
     /// Returns true if it still runs.
-    pub fn goes_on(&mut self) -> bool {
+    pub fn is_running(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }
 
@@ -111,7 +113,7 @@ impl Running {
     /// Waits for its end and returns true if it was successful.
     pub fn end(&mut self) -> bool {
         let until = Instant::now() + HANG;
-        while self.goes_on() {
+        while self.is_running() {
             assert!(Instant::now() < until, "it does not end");
             std::thread::sleep(Duration::from_millis(50));
         }
@@ -119,10 +121,10 @@ impl Running {
     }
 
     /// Returns its unread output, and waits until it and its viewer have ended.
-    pub fn words(&self) -> String {
-        self.reported
+    pub fn output(&self) -> String {
+        self.stdout
             .iter()
-            .chain(&self.stated)
+            .chain(&self.stderr)
             .collect::<Vec<_>>()
             .join("\n")
     }
@@ -161,13 +163,13 @@ impl Viewer {
     }
 
     /// Sends a message to it and returns true if it reads.
-    pub fn tell(&mut self, message: &Message) -> bool {
+    pub fn send(&mut self, message: &Message) -> bool {
         let to = self.to.as_mut().expect("the stream is open");
         write(to, message).is_ok() && to.flush().is_ok()
     }
 
     /// Ends the stream.
-    pub fn hang_up(&mut self) {
+    pub fn close_stream(&mut self) {
         self.to = None;
     }
 
@@ -203,7 +205,7 @@ pub fn memory_of(process: u32) -> u64 {
 }
 
 /// Returns the process of a program that another process started; `None` if there is none.
-pub fn started_by(process: u32, program: &str) -> Option<u32> {
+pub fn child_process(process: u32, program: &str) -> Option<u32> {
     let children = format!("/proc/{process}/task/{process}/children");
     let children = std::fs::read_to_string(children).ok()?;
     let mut children = { children.split_whitespace() }.filter_map(|child| child.parse().ok());
@@ -219,16 +221,16 @@ pub fn started_by(process: u32, program: &str) -> Option<u32> {
 
 /// Returns the lines of a stream, as they arrive.
 fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
-    let (say, stated) = channel();
+    let (sender, stderr) = channel();
     std::thread::spawn(move || {
         let lines = BufReader::new(from).lines().map_while(Result::ok);
-        lines.into_iter().try_for_each(|line| say.send(line))
+        lines.into_iter().try_for_each(|line| sender.send(line))
     });
-    stated
+    stderr
 }
 
 /// Sends a complete request and returns the whole answer.
-pub fn asked(port: u16, request: &str) -> String {
+pub fn send_request(port: u16, request: &str) -> String {
     let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
     line.set_read_timeout(Some(HANG)).expect("a limit");
     line.write_all(request.as_bytes()).expect("it is read");

@@ -80,14 +80,14 @@ impl Csv {
         Self {
             names: lines.next().expect("a header"),
             rows: lines.collect(),
-            units: [stated(&text, "cell_m"), stated(&text, "cell_mm")]
+            units: [parameters(&text, "cell_m"), parameters(&text, "cell_mm")]
                 .concat()
                 .first()
                 .copied()
                 .expect("settings"),
-            scales: stated(&text, "cell_mm")
+            scales: parameters(&text, "cell_mm")
                 .into_iter()
-                .zip(stated(&text, "height_mm_per_unit"))
+                .zip(parameters(&text, "height_mm_per_unit"))
                 .map(|(cell, height)| [cell, height])
                 .collect(),
         }
@@ -112,7 +112,7 @@ impl Csv {
 }
 
 /// Returns the numbers with this name in the remarks of a recording, in their order.
-pub fn stated(text: &str, name: &str) -> Vec<f64> {
+pub fn parameters(text: &str, name: &str) -> Vec<f64> {
     let lines = text.lines().filter_map(|line| line.strip_prefix("# "));
     let pairs = lines.filter_map(|line| line.split_once(" = "));
     pairs
@@ -172,9 +172,9 @@ pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
     // The hand, at most 60 times a second and at least half of that.
     let seconds = csv.number(count - 1, "t_s") - csv.number(0, "t_s");
     let proxies = places(&shown["/hand/proxy"]);
-    let (least, most) = (30.0 * seconds, 61.0 * seconds + 2.0);
+    let (min_count, max_count) = (30.0 * seconds, 61.0 * seconds + 2.0);
     assert!(
-        (least..=most).contains(&(proxies.len() as f64)),
+        (min_count..=max_count).contains(&(proxies.len() as f64)),
         "{}",
         proxies.len()
     );
@@ -212,11 +212,11 @@ pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: b
     let drawn = places(&shown["/hand/hip"]);
     let heights = scalars(&shown["/plot/height"]);
     let rows = csv.rows_by_time();
-    let (mut cells, mut seen) = (None, vec![0; csv.scales.len()]);
+    let (mut cells, mut counts) = (None, vec![0; csv.scales.len()]);
     for (time, place) in &drawn {
         let row = rows[time];
         let view = csv.number(row, "view") as usize;
-        seen[view] += 1;
+        counts[view] += 1;
         let ([cell, unit], first) = (csv.scales[view], csv.scales[0]);
         let [x, y, z] = csv.vector(row, HIP);
         let upright = match stretched {
@@ -234,7 +234,7 @@ pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: b
             "row {row}, view {view}: {off:?}"
         );
     }
-    assert!(seen.iter().all(|count: &i32| *count > 10), "{seen:?}");
+    assert!(counts.iter().all(|count: &i32| *count > 10), "{counts:?}");
     // Heights are in the file's unit, independent of the exaggeration.
     for (time, values) in &heights {
         let row = rows[time];

@@ -32,7 +32,7 @@ pub fn scene(is_live: bool) -> Message {
         mm_per_unit: 1.0 / METRES,
         tip_mm: 0.0,
         home_mm: [0.5 * side, 0.5 * side, 20.0],
-        laid_mm: [0.0, 0.0, side, side],
+        fitted_mm: [0.0, 0.0, side, side],
         ground_m_per_mm: Some(METRES),
         height_per_mm: METRES,
         height_unit: "m".into(),
@@ -122,7 +122,7 @@ pub fn zoomed_scene(scale: f64, east_mm: f64) -> Message {
     // The same size in the hand as before.
     let [x, y, _] = scene.home_mm;
     let half = 0.5 * side;
-    scene.laid_mm = [x - half, y - half, x + half, y + half];
+    scene.fitted_mm = [x - half, y - half, x + half, y + half];
     scene.ground_m_per_mm = Some(METRES / scale);
     scene.height_per_mm = METRES / scale;
     Message::Scene(scene)

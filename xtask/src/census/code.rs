@@ -66,7 +66,7 @@ fn is_public(line: &str) -> bool {
 
 /// Returns the cycles of modules in a crate's `src/`: files of which each uses the next, and the
 /// last the first. A module and its submodules count as one, so uses between them are no cycle.
-pub(super) fn circles(source: &Path) -> Result<Vec<Vec<String>>> {
+pub(super) fn import_cycles(source: &Path) -> Result<Vec<Vec<String>>> {
     let mut texts = BTreeMap::new();
     for path in files(source)? {
         let name = path.strip_prefix(source).unwrap_or(&path);
@@ -84,32 +84,33 @@ pub(super) fn circles(source: &Path) -> Result<Vec<Vec<String>>> {
         }
     }
     let edges: BTreeMap<&str, Vec<&str>> = { texts.iter() }
-        .map(|(name, text)| (name.as_str(), used(name, text, &texts)))
+        .map(|(name, text)| (name.as_str(), imports(name, text, &texts)))
         .collect();
     let reaches = |from: &str, to: &str| {
-        let (mut seen, mut open) = (vec![], edges[from].clone());
+        let (mut reached, mut open) = (vec![], edges[from].clone());
         while let Some(name) = open.pop() {
-            if !seen.contains(&name) {
-                seen.push(name);
+            if !reached.contains(&name) {
+                reached.push(name);
                 open.extend(&edges[name]);
             }
         }
-        seen.contains(&to)
+        reached.contains(&to)
     };
-    let mut circles: Vec<Vec<String>> = vec![];
+    let mut import_cycles: Vec<Vec<String>> = vec![];
     for name in edges.keys().copied().filter(|name| reaches(name, name)) {
-        let together =
-            |circle: &&mut Vec<String>| reaches(name, &circle[0]) && reaches(&circle[0], name);
-        match circles.iter_mut().find(together) {
-            Some(circle) => circle.push(name.to_owned()),
-            None => circles.push(vec![name.to_owned()]),
+        let together = |import_cycle: &&mut Vec<String>| {
+            reaches(name, &import_cycle[0]) && reaches(&import_cycle[0], name)
+        };
+        match import_cycles.iter_mut().find(together) {
+            Some(import_cycle) => import_cycle.push(name.to_owned()),
+            None => import_cycles.push(vec![name.to_owned()]),
         }
     }
-    Ok(circles)
+    Ok(import_cycles)
 }
 
 /// Returns the modules beside `name` that its `use` lines contain, before its tests.
-fn used<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'t str> {
+fn imports<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'t str> {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
     let mut found = vec![];
     for line in text.lines().map(str::trim_start) {
@@ -118,7 +119,7 @@ fn used<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'
             continue;
         };
         let path = absolute(name, path.trim_end_matches(';'));
-        let Some(module) = path.and_then(|path| longest(&path, all)) else {
+        let Some(module) = path.and_then(|path| longest_module(&path, all)) else {
             continue;
         };
         let inside = |a: &str, b: &str| b.is_empty() || a == b || a.starts_with(&format!("{b}::"));
@@ -146,16 +147,16 @@ fn absolute(name: &str, path: &str) -> Option<String> {
 }
 
 /// Returns the innermost module on a path.
-fn longest<'t>(path: &str, all: &'t BTreeMap<String, String>) -> Option<&'t str> {
+fn longest_module<'t>(path: &str, all: &'t BTreeMap<String, String>) -> Option<&'t str> {
     let path = path.split(['{', ' ']).next()?.trim_end_matches("::");
     let ends = path.match_indices("::").map(|(end, _)| end);
     let mut prefixes: Vec<&str> = ends.map(|end| &path[..end]).collect();
     prefixes.push(path);
-    let known = prefixes
+    let found = prefixes
         .into_iter()
         .rev()
         .find_map(|prefix| all.get_key_value(prefix));
-    known.map(|(module, _)| module.as_str())
+    found.map(|(module, _)| module.as_str())
 }
 
 #[cfg(test)]
@@ -170,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn items_for_everybody_are_public() {
+    fn public_items_are_counted() {
         assert!(is_public("    pub fn a() {") && is_public("pub const A: u8 = 1;"));
         assert!(!is_public("pub(crate) fn a() {") && !is_public("    pub width: u32,"));
     }
@@ -188,14 +189,14 @@ mod tests {
         write("b/mod.rs", "mod inner;\npub use inner::B;\n");
         write("b/inner.rs", "use super::C;\nuse super::super::c::D;\n");
         write("c.rs", "use crate::d::deep;\n");
-        assert_eq!(circles(folder.path()).expect("read"), [[""; 0]; 0]);
+        assert_eq!(import_cycles(folder.path()).expect("read"), [[""; 0]; 0]);
         write(
             "b/mod.rs",
             "use crate::c::D;\n#[cfg(test)]\nmod tests {\n    use crate::a::A;\n}\n",
         );
         write("d.rs", "use crate::a::A;\n");
         assert_eq!(
-            circles(folder.path()).expect("read"),
+            import_cycles(folder.path()).expect("read"),
             [["a", "b", "c", "d"]]
         );
     }

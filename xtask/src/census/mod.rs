@@ -71,19 +71,19 @@ pub(crate) fn census(write: bool) -> Result<()> {
         println!("{:8} words  {}", page.words, path.display());
     }
     for library in LIBRARIES {
-        for circle in code::circles(&root().join(library).join("src"))? {
-            println!("circle in {library}: {}", circle.join(", "));
+        for import_cycle in code::import_cycles(&root().join(library).join("src"))? {
+            println!("circle in {library}: {}", import_cycle.join(", "));
         }
     }
     let measures = measures(root(), &pages)?;
     let path = root().join(TABLE);
-    let kept = table(&fs::read_to_string(&path).context(TABLE)?);
+    let recorded = table(&fs::read_to_string(&path).context(TABLE)?);
     let mut faults = prose::faults(&pages);
     faults.extend(broken(&measures));
     let mut text = "measure,before,now\n".to_owned();
     for (name, now) in &measures {
-        let [before, old] =
-            { kept.iter().find(|row| row[0] == *name) }.map_or(["", ""], |row| [&row[1], &row[2]]);
+        let [before, old] = { recorded.iter().find(|row| row[0] == *name) }
+            .map_or(["", ""], |row| [&row[1], &row[2]]);
         println!("{before:>8} -> {now:<8} {name}");
         text += &format!("\"{name}\",{before},{now}\n");
         let is_old = old
@@ -142,8 +142,11 @@ fn measures(root: &Path, pages: &[(PathBuf, prose::Page)]) -> Result<Measures> {
     measures.extend(command_line(root)?);
     for library in LIBRARIES {
         let folder = root.join(library);
-        let circles = code::circles(&folder.join("src"))?.len();
-        measures.push((format!("circles of files in {library}"), circles as f64));
+        let import_cycles = code::import_cycles(&folder.join("src"))?.len();
+        measures.push((
+            format!("circles of files in {library}"),
+            import_cycles as f64,
+        ));
         let public = code::code(&folder)?.public;
         measures.push((format!("public items of {library}"), public as f64));
     }
@@ -217,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bound_is_of_a_measure() {
+    fn bounds_are_of_known_measures() {
         let measures = measures(root(), &prose::pages(root()).expect("pages")).expect("measured");
         for (name, _) in BOUNDS {
             assert!(measures.iter().any(|(known, _)| known == name), "{name}");

@@ -65,9 +65,9 @@ pub(super) fn pages(root: &Path) -> Result<Vec<(PathBuf, Page)>> {
 }
 
 fn page(text: &str) -> Page {
-    let shown = without_comments(text);
+    let visible = without_comments(text);
     let mut page = Page {
-        words: { shown.split_whitespace() }
+        words: { visible.split_whitespace() }
             .filter(|word| is_word(word))
             .count(),
         lines: text.lines().count(),
@@ -78,7 +78,7 @@ fn page(text: &str) -> Page {
             .unwrap_or(0),
         ..Page::default()
     };
-    for words in sentences(&shown) {
+    for words in sentences(&visible) {
         page.sentences += 1;
         page.words_in_sentences += words;
         page.longest_sentence = page.longest_sentence.max(words);
@@ -93,12 +93,12 @@ fn is_word(part: &str) -> bool {
 
 /// Returns a page without its comments, which readers do not see.
 fn without_comments(text: &str) -> String {
-    let (mut shown, mut left) = (String::new(), text);
-    while let Some((before, comment)) = left.split_once("<!--") {
-        shown += before;
-        left = comment.split_once("-->").map_or("", |(_, after)| after);
+    let (mut visible, mut rest) = (String::new(), text);
+    while let Some((before, comment)) = rest.split_once("<!--") {
+        visible += before;
+        rest = comment.split_once("-->").map_or("", |(_, after)| after);
     }
-    shown + left
+    visible + rest
 }
 
 /// Returns the words of each sentence of the prose, without code, tables and headings.

@@ -11,8 +11,8 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::run::{
-    OF_TESTS, cargo, hapterra, on_path, root, run, run_quietly, say, target_dir, tested_programs,
-    timed,
+    TEST_VARIABLES, cargo, hapterra, on_path, report, root, run, run_quietly, target_dir,
+    tested_programs, timed,
 };
 use crate::setup::{packages, toolchain};
 use crate::view;
@@ -46,14 +46,14 @@ pub(crate) fn demo(
         run(cut.args(extra))?;
     }
     if !is_served {
-        say(format!(
+        report(format!(
             "wrote the page: any web server can give out {}",
             folder.display()
         ));
         return Ok(());
     }
     let server = Server::bind(&folder).context("no port on the loopback address is free")?;
-    say(format!(
+    report(format!(
         "open {} in a browser; Ctrl-C ends it",
         server.address()
     ));
@@ -70,7 +70,7 @@ pub(crate) fn test() -> Result<()> {
                 .current_dir(root().join("page"))
                 .args(["--test", "tests/"]))
         })?,
-        Err(why) => say(format!("SKIPPED: the page's unit tests: {why:#}")),
+        Err(why) => report(format!("SKIPPED: the page's unit tests: {why:#}")),
     }
     let folder = target_dir().join("page-test");
     build(&folder)?;
@@ -78,14 +78,14 @@ pub(crate) fn test() -> Result<()> {
     let mut tests = cargo();
     tests
         .arg("test")
-        .args(OF_TESTS)
+        .args(TEST_VARIABLES)
         .args(["--test", "page"])
         .env("HAPTERRA", hapterra)
         .env("HAPTERRA_LAB", lab)
         .env("HAPTERRA_PAGE", folder);
     match view::browser() {
         Ok(browser) => drop(tests.env(view::BROWSER, browser)),
-        Err(why) => say(format!("SKIPPED: the page in a browser: {why:#}")),
+        Err(why) => report(format!("SKIPPED: the page in a browser: {why:#}")),
     }
     timed("running the page's tests in a browser", || run(&mut tests))
 }
@@ -109,7 +109,7 @@ fn build(folder: &Path) -> Result<()> {
     let _ = fs::remove_file(folder.join("terrain.npy"));
     write("terrain.json", b"{}\n".to_vec())?;
     if let Err(why) = geotiff(folder) {
-        say(format!(
+        report(format!(
             "SKIPPED: GeoTIFF files dropped on the page: {why:#}"
         ));
     }
@@ -142,21 +142,21 @@ fn kernel() -> Result<PathBuf> {
 /// Copies npm's reader of GeoTIFF, of the version in `page/package-lock.json`.
 fn geotiff(folder: &Path) -> Result<()> {
     let npm = on_path("npm").context("there is no npm on the PATH")?;
-    let kept = target_dir().join("page-npm");
-    fs::create_dir_all(&kept)?;
+    let cache = target_dir().join("page-npm");
+    fs::create_dir_all(&cache)?;
     let locks = ["package.json", "package-lock.json"];
     let is_same = |name: &&str| {
         let read = |folder: &Path| fs::read(folder.join(name)).ok();
-        read(&kept) == read(&root().join("page"))
+        read(&cache) == read(&root().join("page"))
     };
-    let library = kept.join("node_modules/geotiff");
+    let library = cache.join("node_modules/geotiff");
     if !locks.iter().all(is_same) || !library.join(GEOTIFF[0].0).is_file() {
         for name in locks {
-            copy(&root().join("page").join(name), &kept.join(name))?;
+            copy(&root().join("page").join(name), &cache.join(name))?;
         }
         let words = ["ci", "--ignore-scripts", "--no-audit", "--no-fund"];
         timed("getting geotiff.js from npm", || {
-            run_quietly(Command::new(npm).current_dir(&kept).args(words))
+            run_quietly(Command::new(npm).current_dir(&cache).args(words))
         })?;
     }
     GEOTIFF

@@ -57,7 +57,7 @@ pub(crate) fn read(elf: &[u8]) -> Result<Calls> {
         vectors: vectors(&file, &extents)?,
     };
     for (extent, aliases) in extents.iter().zip(&names) {
-        let (callees, has_indirect) = match led_to(aliases, &names) {
+        let (callees, has_indirect) = match bridge_target(aliases, &names) {
             Some(to) => (vec![to], false),
             None => flow_of(*extent, &code, &extents),
         };
@@ -131,7 +131,7 @@ fn functions(file: &object::File<'_>, code: &[Code<'_>]) -> (Vec<Extent>, Vec<Ve
     let mut names = vec![];
     for (i, (start, (size, aliases))) in found.into_iter().enumerate() {
         // Hand-written assembly may lack a size: it ends at the next function.
-        let section_end = code.iter().find_map(|c| c.holds(start).then(|| c.end()));
+        let section_end = code.iter().find_map(|c| c.contains(start).then(|| c.end()));
         let next = starts.get(i + 1).copied().unwrap_or(u32::MAX);
         let limit = next.min(section_end.unwrap_or(start));
         let end = if size == 0 { limit } else { start + size };
@@ -152,7 +152,7 @@ impl Function {
 }
 
 /// Returns the function that is the target of a bridge with these names.
-fn led_to(aliases: &[String], names: &[Vec<String>]) -> Option<usize> {
+fn bridge_target(aliases: &[String], names: &[Vec<String>]) -> Option<usize> {
     let to = aliases.iter().find_map(|name| name.strip_prefix(BRIDGE))?;
     names.iter().position(|n| n.iter().any(|name| name == to))
 }
@@ -162,7 +162,7 @@ fn led_to(aliases: &[String], names: &[Vec<String>]) -> Option<usize> {
 fn flow_of(extent: Extent, code: &[Code<'_>], extents: &[Extent]) -> (Vec<usize>, bool) {
     let mut callees = vec![];
     let mut has_indirect = false;
-    let Some(code) = code.iter().find(|c| c.holds(extent.start)) else {
+    let Some(code) = code.iter().find(|c| c.contains(extent.start)) else {
         return (callees, has_indirect);
     };
     let mut at = extent.start;
@@ -200,7 +200,7 @@ impl Code<'_> {
         self.start + self.bytes.len() as u32
     }
 
-    fn holds(&self, address: u32) -> bool {
+    fn contains(&self, address: u32) -> bool {
         (self.start..self.end()).contains(&address)
     }
 
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_branch_into_the_middle_of_a_function_finds_it() {
+    fn branch_into_a_function_finds_that_function() {
         let extents = [(0, 10), (16, 32)].map(|(start, end)| Extent { start, end });
         assert_eq!(holder(&extents, 20), Some(1));
         assert_eq!(holder(&extents, 12), None);

@@ -41,7 +41,7 @@ pub(crate) fn areas(elf: &[u8]) -> Result<Areas> {
 
 /// Returns a sentence about all functions that `interrupt` reaches, or an error if one of them is
 /// in neither area.
-pub(crate) fn judge(
+pub(crate) fn check(
     calls: &Calls,
     board: &Board,
     interrupt: &str,
@@ -88,7 +88,7 @@ mod tests {
         }
     }
 
-    fn judged(placed: [u32; 4]) -> Result<String> {
+    fn checked(placed: [u32; 4]) -> Result<String> {
         let [tick, bridge, rare, leaf] = placed;
         let calls = Calls {
             functions: vec![
@@ -104,32 +104,32 @@ mod tests {
             fast: 0x20..0x100,
             in_flash: 0x0800_0000..0x0800_0100,
         };
-        judge(&calls, EMULATED, "TIM7", &areas)
+        check(&calls, EMULATED, "TIM7", &areas)
     }
 
     #[test]
     fn reached_functions_lie_in_fast_memory_or_named_flash() {
-        let reported = judged([0x20, 0x40, 0x0800_0000, 0x80]).expect("all are placed");
+        let reported = checked([0x20, 0x40, 0x0800_0000, 0x80]).expect("all are placed");
         assert!(reported.starts_with("2 of the 3 functions"), "{reported}");
         // A bridge may be anywhere.
-        assert!(judged([0x20, 0x0800_2000, 0x0800_0000, 0x80]).is_ok());
+        assert!(checked([0x20, 0x0800_2000, 0x0800_0000, 0x80]).is_ok());
     }
 
     #[test]
-    fn a_function_that_was_forgotten_is_named() {
+    fn function_outside_fast_memory_is_named() {
         for placed in [
             [0x20, 0x40, 0x0800_0000, 0x0800_0100],
             [0x20, 0x40, 0x0800_0100, 0x80],
             [0x0800_0200, 0x40, 0x0800_0000, 0x80],
         ] {
-            let message = judged(placed).expect_err("one is elsewhere").to_string();
+            let message = checked(placed).expect_err("one is elsewhere").to_string();
             let outside = ["leaf", "rare", "TIM7"];
             let found = outside
                 .iter()
                 .filter(|name| message.contains(&format!("\n    {name}")));
             assert_eq!(found.count(), 1, "{message}");
         }
-        let message = judged([0x0800_0000, 0x40, 0x0800_0000, 0x80]);
+        let message = checked([0x0800_0000, 0x40, 0x0800_0000, 0x80]);
         let message = message.expect_err("the root in flash").to_string();
         assert!(message.contains("itself"), "{message}");
     }

@@ -17,7 +17,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use crate::board::{Board, Exception};
-use crate::run::say;
+use crate::run::report;
 use calls::{Calls, Function};
 use reach::Reached;
 
@@ -25,21 +25,21 @@ use reach::Reached;
 pub(crate) fn check(board: &Board, path: &Path) -> Result<()> {
     let elf = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let calls = calls::read(&elf).with_context(|| path.display().to_string())?;
-    let judged = judge(&calls, board).with_context(|| format!("image {}", board.name))?;
-    let (name, list) = (board.name, judged.join(", "));
-    say(format!("{name}: no panic can be reached from {list}"));
+    let checked = check_vectors(&calls, board).with_context(|| format!("image {}", board.name))?;
+    let (name, list) = (board.name, checked.join(", "));
+    report(format!("{name}: no panic can be reached from {list}"));
     if let Some(interrupt) = board.fast_interrupt {
         let areas = fast_memory::areas(&elf)?;
-        let reported = fast_memory::judge(&calls, board, interrupt, &areas);
+        let reported = fast_memory::check(&calls, board, interrupt, &areas);
         let reported = reported.with_context(|| format!("image {name}"))?;
-        say(format!("{name}: {reported}"));
+        report(format!("{name}: {reported}"));
     }
     Ok(())
 }
 
 /// Returns the names of all vectors with the number of functions that each reaches, or an error if
 /// one of these panics.
-fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
+fn check_vectors(calls: &Calls, board: &Board) -> Result<Vec<String>> {
     let functions = &calls.functions;
     // An image without any panic means that the searched names are wrong.
     ensure!(
@@ -48,7 +48,7 @@ fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
     );
     ensure!(!calls.vectors.is_empty(), "no vectors");
     let runs_tasks = |f: &Function| f.aliases.iter().any(|a| board.runs_tasks.contains(&&**a));
-    let (mut judged, mut wrong) = (vec![], vec![]);
+    let (mut checked, mut violations) = (vec![], vec![]);
     for &root in &calls.vectors {
         if runs_tasks(&functions[root]) {
             continue;
@@ -56,15 +56,15 @@ fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
         let found = reached(calls, board, root);
         let inner = || found.all().filter(|&i| !panics(&functions[i].name));
         for i in inner() {
-            wrong.extend(wrongs(calls, board, &found, i));
+            violations.extend(violations_of(calls, board, &found, i));
         }
-        judged.push(format!("{} ({})", functions[root].name, inner().count()));
+        checked.push(format!("{} ({})", functions[root].name, inner().count()));
     }
     // A function that several interrupts reach is reported once.
-    wrong.sort_unstable();
-    wrong.dedup();
-    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
-    Ok(judged)
+    violations.sort_unstable();
+    violations.dedup();
+    ensure!(violations.is_empty(), "{}", violations.join("\n"));
+    Ok(checked)
 }
 
 /// Returns all functions that a vector reaches. The walk ends at a panic, because its callees add
@@ -76,60 +76,66 @@ fn reached(calls: &Calls, board: &Board, root: usize) -> Reached {
         if panics(&caller.name) {
             return vec![];
         }
-        let unknown = |c: &usize| known(board.known_calls, caller, &functions[*c].name).is_none();
+        let unknown =
+            |c: &usize| find_exception(board.allowed_calls, caller, &functions[*c].name).is_none();
         let direct = caller.callees.iter().copied().filter(unknown);
-        let leads_to = known(board.known_indirect, caller, "").map_or(&[][..], |e| e.leads_to);
-        let is_led_to = |i: &usize| leads_to.iter().any(|to| functions[*i].name.contains(to));
-        let through_register = (0..functions.len()).filter(|i| caller.has_indirect && is_led_to(i));
+        let targets =
+            find_exception(board.allowed_indirect, caller, "").map_or(&[][..], |e| e.targets);
+        let is_target = |i: &usize| targets.iter().any(|to| functions[*i].name.contains(to));
+        let through_register = (0..functions.len()).filter(|i| caller.has_indirect && is_target(i));
         direct.chain(through_register).collect()
     })
 }
 
 /// Returns the faults of a reached function, each with the path to it.
-fn wrongs(calls: &Calls, board: &Board, found: &Reached, i: usize) -> Vec<String> {
+fn violations_of(calls: &Calls, board: &Board, found: &Reached, i: usize) -> Vec<String> {
     let functions = &calls.functions;
     let caller = &functions[i];
     let names = found
         .chain(i)
         .into_iter()
         .map(|j| short(&functions[j].name));
-    let way = names.collect::<Vec<_>>().join("\n    -> ");
-    let mut wrong = vec![];
+    let chain = names.collect::<Vec<_>>().join("\n    -> ");
+    let mut violations = vec![];
     for callee in caller.callees.iter().map(|&c| &functions[c].name) {
-        if panics(callee) && known(board.known_calls, caller, callee).is_none() {
-            wrong.push(format!("can panic:\n    {way}\n    -> {callee}"));
+        if panics(callee) && find_exception(board.allowed_calls, caller, callee).is_none() {
+            violations.push(format!("can panic:\n    {chain}\n    -> {callee}"));
         }
     }
     if !caller.has_indirect {
-        return wrong;
+        return violations;
     }
-    match known(board.known_indirect, caller, "") {
-        None => wrong.push(format!(
-            "calls through a register, which cannot be followed:\n    {way}"
+    match find_exception(board.allowed_indirect, caller, "") {
+        None => violations.push(format!(
+            "calls through a register, which cannot be followed:\n    {chain}"
         )),
         Some(entry) => {
             let is_there = |to: &&&str| !functions.iter().any(|f| f.name.contains(**to));
-            if let Some(to) = entry.leads_to.iter().find(is_there) {
-                wrong.push(format!(
-                    "no function {to}, which the table names for:\n    {way}"
+            if let Some(to) = entry.targets.iter().find(is_there) {
+                violations.push(format!(
+                    "no function {to}, which the table names for:\n    {chain}"
                 ));
             }
         }
     }
-    wrong
+    violations
 }
 
 /// Returns a name without the long parts of generic ones.
 fn short(name: &str) -> String {
-    const SHOWN: usize = 120;
-    match name.char_indices().nth(SHOWN) {
+    const MAX_CHARS: usize = 120;
+    match name.char_indices().nth(MAX_CHARS) {
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_string(),
     }
 }
 
 /// Returns the entry for this caller and callee in a table of exceptions, each by part of its name.
-fn known<'t>(table: &'t [Exception], caller: &Function, callee: &str) -> Option<&'t Exception> {
+fn find_exception<'t>(
+    table: &'t [Exception],
+    caller: &Function,
+    callee: &str,
+) -> Option<&'t Exception> {
     let is_caller = |parts: &[&str]| {
         let mut names = caller.aliases.iter().chain([&caller.name]);
         names.any(|name| parts.iter().all(|part| name.contains(part)))
@@ -180,7 +186,7 @@ mod tests {
     }
 
     fn complaint(calls: &Calls, board: &Board) -> String {
-        judge(calls, board).unwrap_err().to_string()
+        check_vectors(calls, board).unwrap_err().to_string()
     }
 
     #[test]
@@ -195,13 +201,13 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_elsewhere_in_the_image_is_no_matter() {
-        let judged = judge(&image(&[5]), EMULATED).unwrap();
-        assert_eq!(judged, ["HapticTick (3)", "SupplyLow (2)"]);
+    fn panic_outside_the_interrupts_is_allowed() {
+        let checked = check_vectors(&image(&[5]), EMULATED).unwrap();
+        assert_eq!(checked, ["HapticTick (3)", "SupplyLow (2)"]);
     }
 
     #[test]
-    fn a_panic_in_any_vector_is_found_but_for_those_that_run_tasks() {
+    fn panic_in_any_vector_without_tasks_is_found() {
         let mut calls = image(&[5]);
         calls.functions[8].callees.push(3);
         let message = complaint(&calls, EMULATED);
@@ -213,7 +219,7 @@ mod tests {
             runs_tasks: &["SupplyLow"],
             ..*EMULATED
         };
-        assert_eq!(judge(&calls, &board).unwrap(), ["HapticTick (3)"]);
+        assert_eq!(check_vectors(&calls, &board).unwrap(), ["HapticTick (3)"]);
     }
 
     #[test]
@@ -223,15 +229,15 @@ mod tests {
         let known = &[Exception {
             caller: &["Waker>::wake"],
             callee: "",
-            leads_to: &["wake_task"],
+            targets: &["wake_task"],
             because: "test",
         }];
         let board = Board {
-            known_indirect: known,
+            allowed_indirect: known,
             ..*EMULATED
         };
         let mut calls = image(&[6]);
-        assert_eq!(judge(&calls, &board).unwrap()[0], "HapticTick (4)");
+        assert_eq!(check_vectors(&calls, &board).unwrap()[0], "HapticTick (4)");
         calls.functions[7].callees.push(3);
         let message = complaint(&calls, &board);
         assert!(message.contains("wake_task\n    -> core"), "{message}");
@@ -242,18 +248,18 @@ mod tests {
 
     #[test]
     fn panic_exception_applies_to_one_caller_only() {
-        let known = |caller| Exception {
+        let allowed = |caller| Exception {
             caller,
             callee: "panic_fmt",
-            leads_to: &[],
+            targets: &[],
             because: "test",
         };
-        let table: &[Exception] = &[known(&["elsewhere"]), known(&["slice_index_fail"])];
+        let table: &[Exception] = &[allowed(&["elsewhere"]), allowed(&["slice_index_fail"])];
         let board = Board {
-            known_calls: Box::leak(table.to_vec().into_boxed_slice()),
+            allowed_calls: Box::leak(table.to_vec().into_boxed_slice()),
             ..*EMULATED
         };
-        assert!(judge(&image(&[2]), &board).is_ok());
+        assert!(check_vectors(&image(&[2]), &board).is_ok());
         let message = complaint(&image(&[2, 3]), &board);
         assert!(
             message.contains("tick\n    -> core::panicking"),
@@ -267,9 +273,9 @@ mod tests {
         stripped.functions.truncate(2);
         stripped.functions[1].callees.clear();
         stripped.vectors.truncate(1);
-        assert!(judge(&stripped, EMULATED).is_err());
+        assert!(check_vectors(&stripped, EMULATED).is_err());
         let mut without = image(&[5]);
         without.vectors.clear();
-        assert!(judge(&without, EMULATED).is_err());
+        assert!(check_vectors(&without, EMULATED).is_err());
     }
 }

@@ -6,29 +6,29 @@ use anyhow::{Context, Result};
 use heightfield_gdal::{Error, Library, Settings};
 
 use super::packages::{self, found_or_installed};
-use crate::run::say;
+use crate::run::report;
 
 /// Extensions of files that are read without GDAL.
-const OWN: [&str; 12] = [
+const OWN_EXTENSIONS: [&str; 12] = [
     "tif", "tiff", "hgt", "npy", "asc", "png", "flt", "bil", "bip", "bsq", "hdr", "raw",
 ];
 
 /// Ensures that there is a libgdal, or prints why not: without it, files of other formats are
 /// refused with the package to install, and their tests are skipped.
-pub(crate) fn ready_or_say_why() {
+pub(crate) fn ready_or_report() {
     if let Err(why) = found_or_installed(find, &packages::GDAL) {
-        say(format!(
+        report(format!(
             "terrain files of other formats are not read: {why:#}"
         ));
     }
 }
 
 /// Returns true if GDAL is needed for a terrain, by its name.
-pub(crate) fn is_wanted_for(file: &Path) -> bool {
+pub(crate) fn is_needed_for(file: &Path) -> bool {
     let extension = file
         .extension()
         .map(|end| end.to_string_lossy().to_lowercase());
-    extension.is_some_and(|end| !OWN.contains(&end.as_str()))
+    extension.is_some_and(|end| !OWN_EXTENSIONS.contains(&end.as_str()))
 }
 
 fn find() -> Result<Library> {
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_that_are_read_anyway_want_no_gdal() {
+    fn formats_read_without_gdal_need_no_gdal() {
         for name in [
             "dem.tif",
             "N34W119.HGT",
@@ -48,7 +48,7 @@ mod tests {
             "a.b/dem",
             "https://host/dem.tiff",
         ] {
-            assert!(!is_wanted_for(Path::new(name)), "{name}");
+            assert!(!is_needed_for(Path::new(name)), "{name}");
         }
         for name in [
             "erdas.img",
@@ -57,7 +57,7 @@ mod tests {
             "N34W119.hgt.zip",
             "all.vrt",
         ] {
-            assert!(is_wanted_for(Path::new(name)), "{name}");
+            assert!(is_needed_for(Path::new(name)), "{name}");
         }
     }
 }

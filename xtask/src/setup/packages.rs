@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::run::{on_path, output, run_quietly, say, shown};
+use crate::run::{command_line, on_path, output, report, run_quietly};
 
 /// Name of a package for each of the [`MANAGERS`]; empty where it has no package.
 pub(crate) type Packages = [&'static str; MANAGERS.len()];
@@ -50,17 +50,17 @@ pub(crate) fn found_or_installed<T>(
     packages: &Packages,
 ) -> Result<T> {
     find().or_else(|missing| {
-        say(format!("{missing:#}"));
+        report(format!("{missing:#}"));
         install(packages)?;
         find()
     })
 }
 
-/// Installs `wanted` with the first package manager found.
+/// Installs `packages` with the first package manager found.
 ///
 /// The error contains the command to type, if there is one.
-fn install(wanted: &Packages) -> Result<()> {
-    let mut managers = MANAGERS.iter().zip(wanted);
+fn install(packages: &Packages) -> Result<()> {
+    let mut managers = MANAGERS.iter().zip(packages);
     let here = managers.find(|((install, _), _)| on_path(program(install)).is_some());
     let Some(((install, unattended), names)) = here else {
         bail!("no package manager known to this program (apt-get, dnf, pacman, brew) is here");
@@ -70,14 +70,14 @@ fn install(wanted: &Packages) -> Result<()> {
     let line = format!("{install} {unattended} {names}");
     let attempt = || {
         let mut command = with_rights(&line)?;
-        say(format!("installing: {}", shown(&command)));
+        report(format!("installing: {}", command_line(&command)));
         run_quietly(command.env("DEBIAN_FRONTEND", "noninteractive"))
     };
     let done = attempt().or_else(|why| {
         if program != "apt-get" {
             return Err(why);
         }
-        say("refreshing apt's package lists, then once more");
+        report("refreshing apt's package lists, then once more");
         // A failing package list of a third party must not prevent this installation.
         let _ = run_quietly(&mut with_rights("apt-get update")?);
         attempt()
@@ -136,9 +136,9 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_run_word_by_word() {
+    fn command_line_is_split_into_words() {
         let command = with_rights("brew install  cmake llvm").unwrap();
-        assert_eq!(shown(&command), "brew install cmake llvm");
+        assert_eq!(command_line(&command), "brew install cmake llvm");
     }
 
     #[test]

@@ -34,7 +34,7 @@ fn find() -> Result<PathBuf> {
 fn checked(qemu: PathBuf) -> Result<PathBuf> {
     let machines = output(Command::new(&qemu).args(["-M", "help"]))
         .with_context(|| format!("{} does not run", qemu.display()))?;
-    if !knows_the_board(&machines) {
+    if !supports_board(&machines) {
         bail!(
             "{} does not know the machine {MACHINE}: a newer QEMU does",
             qemu.display()
@@ -43,7 +43,7 @@ fn checked(qemu: PathBuf) -> Result<PathBuf> {
     Ok(qemu)
 }
 
-fn knows_the_board(machines: &str) -> bool {
+fn supports_board(machines: &str) -> bool {
     machines
         .lines()
         .any(|line| line.split(' ').next() == Some(MACHINE))
@@ -54,14 +54,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_board_is_found_in_the_list_of_machines() {
+    fn board_is_found_in_the_list_of_machines() {
         let list = "Supported machines are:\nmps2-an385  ARM MPS2\nmps2-an386           ARM MPS2 with AN386\n";
-        assert!(knows_the_board(list));
-        assert!(!knows_the_board("mps2-an385   like mps2-an386\n"));
+        assert!(supports_board(list));
+        assert!(!supports_board("mps2-an385   like mps2-an386\n"));
     }
 
     #[test]
-    fn a_program_that_is_not_there_is_named() {
+    fn missing_emulator_is_named() {
         let message = checked("/no/such/qemu".into()).unwrap_err().to_string();
         assert!(message.contains("/no/such/qemu"), "{message}");
     }

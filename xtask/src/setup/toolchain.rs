@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use super::distribution;
-use crate::run::{cargo, on_path, output, run_quietly, say, target_dir};
+use crate::run::{cargo, on_path, output, report, run_quietly, target_dir};
 
 /// The boards' target: Cortex-M4F and M7 with single-precision FPU.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
@@ -14,7 +14,7 @@ pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 /// The target of browsers.
 pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 
-const BY_HAND: &str = "\
+const MANUAL_STEPS: &str = "\
 type: rustup target add thumbv7em-none-eabihf
       (rustup itself is on https://rustup.rs)";
 
@@ -83,7 +83,7 @@ fn short_paths() -> String {
 pub(crate) fn ready() -> Result<Toolchain> {
     match std::env::var("HAPTERRA_TOOLCHAIN").as_deref() {
         Err(_) | Ok("" | "auto") => either(),
-        Ok("rustup") => own().context(BY_HAND),
+        Ok("rustup") => own().context(MANUAL_STEPS),
         Ok("distribution") => from_distribution(),
         Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: say rustup, distribution or auto"),
     }
@@ -95,8 +95,8 @@ fn either() -> Result<Toolchain> {
         return from_distribution();
     }
     own().or_else(|why| {
-        say(format!("rustup cannot: {why:#}"));
-        from_distribution().context(BY_HAND)
+        report(format!("rustup cannot: {why:#}"));
+        from_distribution().context(MANUAL_STEPS)
     })
 }
 
@@ -119,9 +119,9 @@ fn add_target(target: &str) -> Result<()> {
     if own_has_target(target) {
         return Ok(());
     }
-    say(format!("the target {target} is not installed"));
+    report(format!("the target {target} is not installed"));
     let rustup = on_path("rustup").context("there is no rustup on the PATH")?;
-    say(format!("installing: rustup target add {target}"));
+    report(format!("installing: rustup target add {target}"));
     run_quietly(Command::new(rustup).args(["target", "add", target]))?;
     if !own_has_target(target) {
         bail!("rustup added the target, but not to the toolchain in use");
@@ -131,7 +131,7 @@ fn add_target(target: &str) -> Result<()> {
 
 fn from_distribution() -> Result<Toolchain> {
     distribution::ready()?;
-    say("building for the boards with the distribution's Rust and its own core library");
+    report("building for the boards with the distribution's Rust and its own core library");
     Ok(Toolchain::Distribution)
 }
 
@@ -139,10 +139,10 @@ fn own_has_target(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);
     ask.args(["--print", "target-libdir", "--target", target]);
-    output(&mut ask).is_some_and(|dir| holds_core(Path::new(dir.trim())))
+    output(&mut ask).is_some_and(|dir| has_core(Path::new(dir.trim())))
 }
 
-fn holds_core(dir: &Path) -> bool {
+fn has_core(dir: &Path) -> bool {
     let Ok(entries) = dir.read_dir() else {
         return false;
     };
@@ -155,14 +155,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_directory_without_core_is_no_target() {
-        assert!(!holds_core(Path::new(env!("CARGO_MANIFEST_DIR"))));
-        assert!(!holds_core(Path::new("/no/such/directory")));
+    fn directory_without_core_is_no_target() {
+        assert!(!has_core(Path::new(env!("CARGO_MANIFEST_DIR"))));
+        assert!(!has_core(Path::new("/no/such/directory")));
     }
 
     #[test]
     fn distribution_builds_core_in_its_own_directory() {
-        let args = |t: Toolchain| crate::run::shown(&t.cargo("build"));
+        let args = |t: Toolchain| crate::run::command_line(&t.cargo("build"));
         assert_eq!(
             args(Toolchain::Own),
             format!("cargo build --target {TARGET}")

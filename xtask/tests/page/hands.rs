@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::site::{Site, one, px};
 
 /// Returns a page with a ramp, up to the east by one in two.
-fn on_a_ramp() -> Option<Site> {
+fn site_on_a_ramp() -> Option<Site> {
     let mut site = Site::open(None)?;
     let row: String = (0..61).map(|i| format!("{} ", 25 * i)).collect();
     let rows = format!("{row}\n").repeat(41);
@@ -18,7 +18,9 @@ fn on_a_ramp() -> Option<Site> {
 #[test]
 fn mouse_moves_presses_and_turns_the_view() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     site.point([0.4, 0.5]);
     site.wait("hapterra.touch.state === 'touching'");
     let from = site.value("hapterra.touch.arm.hand[0]").as_f64();
@@ -49,7 +51,9 @@ fn mouse_moves_presses_and_turns_the_view() {
 #[test]
 fn finger_presses_while_it_is_down() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     site.slide("press", 0.0);
     site.wait("hapterra.touch.state === 'free' && hapterra.touch.arm.pressN === 0");
     let at = |place: [f64; 2]| {
@@ -72,7 +76,9 @@ fn finger_presses_while_it_is_down() {
 #[test]
 fn gamepad_moves_turns_and_presses() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     // The left stick to the right and forward, the right one to the right, half of the right
     // trigger.
     let _ = site.value(
@@ -96,7 +102,7 @@ fn received(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
             offline.resume = () => {{}};
             const sound = new Sound(() => offline);
             sound.toggle();
-            sound.hear({newtons}, {change});
+            sound.update({newtons}, {change});
             const data = (await offline.startRendering()).getChannelData(0).subarray(22050);
             const ups = data.filter((now, i) => i > 0 && data[i - 1] < 0 && now >= 0).length;
             return [2 * ups, Math.hypot(...data.filter((_, i) => i % 4 === 0)) / Math.sqrt(data.length / 4)];
@@ -108,7 +114,9 @@ fn received(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
 #[test]
 fn sound_follows_the_force_and_its_changes() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     let [_, silence] = received(&mut site, 0.0, 0.0);
     let [one_hz, one_newton] = received(&mut site, 1.0, 0.0);
     let [two_hz, two_newtons] = received(&mut site, 2.0, 0.0);
@@ -137,7 +145,9 @@ fn sound_follows_the_force_and_its_changes() {
 #[test]
 fn ball_rests_by_its_radius_and_is_drawn_in_its_size() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     let mut pixels = vec![];
     for tip_mm in [0.0, 2.0, 7.0] {
         let hand = site.value("hapterra.touch.arm.pointer");
@@ -158,7 +168,7 @@ fn ball_rests_by_its_radius_and_is_drawn_in_its_size() {
             (above - expected).abs() < 0.02 * tip_mm + 1e-3,
             "{above}, not {expected}"
         );
-        pixels.push(site.seen_near_the_ball().near[0]);
+        pixels.push(site.pixels_near_the_ball().near[0]);
     }
     assert!(
         pixels[0] > 0 && 4 * pixels[0] < pixels[2] && 3 * pixels[1] < pixels[2],
@@ -167,9 +177,11 @@ fn ball_rests_by_its_radius_and_is_drawn_in_its_size() {
 }
 
 #[test]
-fn tip_keeps_the_place_of_the_hand() {
+fn tip_change_keeps_the_position_of_the_hand() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     site.point([0.5, 0.5]);
     site.wait(
         "hapterra.touch.state === 'touching' && Math.hypot(...hapterra.touch.arm.speed) < 0.01",
@@ -205,7 +217,9 @@ fn tip_keeps_the_place_of_the_hand() {
 #[test]
 fn slider_of_the_surface_keeps_the_contact() {
     let _one = one();
-    let Some(mut site) = on_a_ramp() else { return };
+    let Some(mut site) = site_on_a_ramp() else {
+        return;
+    };
     site.point([0.5, 0.5]);
     site.wait(
         "hapterra.touch.state === 'touching' && Math.hypot(...hapterra.touch.arm.speed) < 0.01",

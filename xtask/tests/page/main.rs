@@ -40,7 +40,7 @@ fn forces(path: &Path) -> Vec<[u32; 3]> {
 
 /// Saves the path into a folder beside the site, replays it there, and fails unless the forces are
 /// the same, bit for bit. Returns the line that the page shows; `None` without the command.
-fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
+fn check_saved(site: &mut Site, folder: &str, min_touching: usize) -> Option<String> {
     let saved = site.folder.path().join(folder);
     fs::create_dir(&saved).expect("a folder");
     let allow = json!({ "behavior": "allow", "downloadPath": saved });
@@ -58,7 +58,7 @@ fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
     let (rendered, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
     let touching = rendered.iter().filter(|force| **force != [0; 3]).count();
     println!("{} rows, {touching} with a force: {line}", rendered.len());
-    assert!(touching > least, "{touching} of {}", rendered.len());
+    assert!(touching > min_touching, "{touching} of {}", rendered.len());
     assert_eq!(rendered.len(), replayed.len());
     let differing = rendered.iter().zip(&replayed).position(|(a, b)| a != b);
     assert_eq!(differing, None, "{line}");
@@ -87,7 +87,7 @@ fn saved_path_replays_with_bit_identical_forces() {
     let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
     site.wait("hapterra.touch.surface.friction === 0.5 && hapterra.touch.surface.texture === 0.22");
     stroke(&mut site);
-    let colours = site.seen_near_the_ball();
+    let colours = site.pixels_near_the_ball();
     assert!(colours.count > 400, "{colours:?}");
     assert!(colours.near.iter().all(|pixels| *pixels > 5), "{colours:?}");
     let Some(line) = check_saved(&mut site, "changed", 1000) else {
@@ -151,8 +151,8 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
         );
     }
     for others in &heights[1..] {
-        let apart = others.iter().zip(&heights[0]).map(|(a, b)| (a - b).abs());
-        assert!(apart.fold(0.0, f64::max) < 0.02);
+        let difference = others.iter().zip(&heights[0]).map(|(a, b)| (a - b).abs());
+        assert!(difference.fold(0.0, f64::max) < 0.02);
     }
     site.drop_file("notes.txt", b"not a terrain");
     site.wait("document.getElementById('said').textContent.startsWith('notes.txt: its kind is not known')");

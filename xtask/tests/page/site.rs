@@ -112,7 +112,7 @@ impl Site {
     }
 
     /// Counts colours of the ground seen from above the ball, near and with the hand at rest.
-    pub(crate) fn seen_near_the_ball(&mut self) -> Colours {
+    pub(crate) fn pixels_near_the_ball(&mut self) -> Colours {
         let _ = self.value(
             "(({ scene, pointer, touch }) => {
                 pointer.at = [];
@@ -154,8 +154,8 @@ pub(crate) fn program(name: &str, folder: &Path, words: &[&str], files: &[&Path]
     let mut command = Command::new(built(name)?);
     command.current_dir(folder).args(words).args(files);
     let done = command.output().expect("it starts");
-    let stated = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(done.status.success(), "{words:?}: {stated}");
+    let stderr = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{words:?}: {stderr}");
     Some(())
 }
 

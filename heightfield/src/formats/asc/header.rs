@@ -21,7 +21,7 @@ pub(super) struct Header {
 }
 
 /// Returns the first spelling of a lower-case key; `None` if it is unknown.
-fn known(key: &str) -> Option<&'static str> {
+fn known_key(key: &str) -> Option<&'static str> {
     Some(match key {
         "ncols" => "ncols",
         "nrows" => "nrows",
@@ -38,13 +38,13 @@ fn known(key: &str) -> Option<&'static str> {
 }
 
 /// Returns true if a file begins with a header's key.
-pub(super) fn looks_like_header(head: &[u8]) -> bool {
+pub(super) fn is_header(head: &[u8]) -> bool {
     let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
     let text = String::from_utf8_lossy(head);
     let mut words = text.split_ascii_whitespace();
     words
         .next()
-        .is_some_and(|word| known(&word.to_lowercase()).is_some())
+        .is_some_and(|word| known_key(&word.to_lowercase()).is_some())
         && words.next().is_some_and(|word| number(word).is_some())
 }
 
@@ -60,7 +60,7 @@ impl Header {
                 tokens.put_back();
                 break;
             }
-            let known = known(&key)
+            let known = known_key(&key)
                 .ok_or_else(|| RasterError::Unfamiliar(format!("header key '{key}'")))?;
             let value = tokens.next()?.ok_or_else(|| {
                 RasterError::Truncated(format!("it ends after the header key '{key}'"))
@@ -118,7 +118,7 @@ impl Header {
 
     fn count(&self, key: &str) -> Result<u32, RasterError> {
         match self.get(key).ok_or_else(|| missing(key))? {
-            value if value.fract() != 0.0 || value < 1.0 => Err(wrong(key, value)),
+            value if value.fract() != 0.0 || value < 1.0 => Err(invalid(key, value)),
             value if value > f64::from(i32::MAX) => {
                 Err(RasterError::AbsurdSize(format!("{key} is {value}")))
             }
@@ -135,7 +135,7 @@ impl Header {
             .ok_or_else(|| missing(both))?
         {
             value if value.is_finite() && value > 0.0 => Ok(value),
-            value => Err(wrong(both, value)),
+            value => Err(invalid(both, value)),
         }
     }
 }
@@ -144,6 +144,6 @@ fn missing(key: &str) -> RasterError {
     RasterError::damaged(format!("the header has no {key}"))
 }
 
-fn wrong(key: &str, value: f64) -> RasterError {
+fn invalid(key: &str, value: f64) -> RasterError {
     RasterError::damaged(format!("header: {key} is {value}"))
 }

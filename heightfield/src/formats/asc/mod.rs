@@ -13,14 +13,14 @@ use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::numbers::beginning;
 use crate::{CellSize, RasterError, SampleType, beside};
-use header::{Header, looks_like_header};
+use header::{Header, is_header};
 use tokens::Tokens;
 
 /// Esri ASCII grids.
 pub(super) const FORMAT: Format = Format {
     name: "Esri ASCII",
-    begins: looks_like_header,
-    extensions: &[("asc", Claim::Decides), ("txt", Claim::Suggests)],
+    begins: is_header,
+    extensions: &[("asc", Claim::Certain), ("txt", Claim::Possible)],
     parts: Parts::One,
     decode: |input, _| decode(input),
 };
@@ -53,7 +53,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, RasterError> {
         Some(corner) => {
             let map = GroundMap::from_south_west(corner, (east, north), rows);
             let map = map.ok_or_else(|| RasterError::damaged("its header places it nowhere"))?;
-            decoded.lay_out(map, None);
+            decoded.set_layout(map, None);
         }
         None => {
             let extent = (east * f64::from(columns), north * f64::from(rows));

@@ -107,11 +107,11 @@ fn infinite_nan_and_nodata_samples_are_no_data() {
         ("nodata_value -9999,0\n", "1 2 3 4 5 -9999.00", 1, ""),
     ] {
         let raster = open(&format!("{square}{header}{samples}")).expect("a grid");
-        assert_eq!(raster.summary().holes, holes, "{header}{samples}");
+        assert_eq!(raster.summary().no_data, holes, "{header}{samples}");
         assert_eq!(raster.summary().lowest, 1.0, "{header}{samples}");
-        let stated = raster.remarks().join(" ");
-        assert!(stated.contains(remark), "{stated}");
-        assert_eq!(stated.is_empty(), remark.is_empty(), "{stated}");
+        let remarks = raster.remarks().join(" ");
+        assert!(remarks.contains(remark), "{remarks}");
+        assert_eq!(remarks.is_empty(), remark.is_empty(), "{remarks}");
     }
     let fortran = open(&format!("{square}1.0D+02 2 3 4 5 6")).expect("a grid");
     assert_eq!(fortran.height(0, 1), 100.0);

@@ -12,7 +12,7 @@ pub(super) struct Tokens<R> {
     bytes: Bytes<BufReader<R>>,
     word: Vec<u8>,
     /// True if the current word is returned again.
-    again: bool,
+    repeats: bool,
 }
 
 impl<R: Read> Tokens<R> {
@@ -21,13 +21,13 @@ impl<R: Read> Tokens<R> {
             // This buffer makes reading single bytes fast for any reader.
             bytes: BufReader::with_capacity(1 << 16, reader).bytes(),
             word: Vec::new(),
-            again: false,
+            repeats: false,
         }
     }
 
     /// Returns the next word, or `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<&str>, RasterError> {
-        if !std::mem::take(&mut self.again) {
+        if !std::mem::take(&mut self.repeats) {
             self.read_word()?;
         }
         if self.word.is_empty() {
@@ -41,7 +41,7 @@ impl<R: Read> Tokens<R> {
 
     /// Makes `next` return the last word again.
     pub(super) fn put_back(&mut self) {
-        self.again = true;
+        self.repeats = true;
     }
 
     fn read_word(&mut self) -> Result<(), RasterError> {

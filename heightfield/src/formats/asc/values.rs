@@ -25,16 +25,16 @@ pub(super) fn read<R: Read>(
     let promised = u64::from(columns) * u64::from(rows);
     let possible = promised.min(file_bytes / 2 + 1);
     let mut growing = Growing::new(usize::try_from(possible).unwrap_or(0));
-    let mut held = 0;
+    let mut count = 0;
     while let Some(word) = tokens.next()? {
         let place = || {
             format!(
                 "row {}, column {}",
-                held / u64::from(columns),
-                held % u64::from(columns)
+                count / u64::from(columns),
+                count % u64::from(columns)
             )
         };
-        if held == promised {
+        if count == promised {
             return Err(RasterError::damaged(format!(
                 "more numbers than the {columns} × {rows} of its header: '{word}' follows the last"
             )));
@@ -45,11 +45,11 @@ pub(super) fn read<R: Read>(
                 RasterError::damaged(format!("{}: '{word}' is not a number", place()))
             })?;
         growing.push(value);
-        held += 1;
+        count += 1;
     }
-    if held < promised {
+    if count < promised {
         return Err(RasterError::Truncated(format!(
-            "its header promises {columns} × {rows} = {promised} numbers, {held} follow"
+            "its header promises {columns} × {rows} = {promised} numbers, {count} follow"
         )));
     }
     Ok(growing.samples)

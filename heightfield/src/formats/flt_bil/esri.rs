@@ -8,7 +8,7 @@ use super::layout::{Interleave, Layout};
 use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
 use crate::numbers::{self, NoDataText};
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{Endian, RasterError, SampleType};
 
 /// Returns true if a text is such a header: it has the number of columns and rows.
@@ -78,7 +78,7 @@ pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, Ra
             decoded.remarks.extend(remark);
             decoded.set_unit(unit.as_deref());
             if let Some(map) = map {
-                decoded.lay_out(map, None);
+                decoded.set_layout(map, None);
             }
             Ok(())
         }),
@@ -139,10 +139,10 @@ impl Keys {
         &self,
         extension: &str,
         by_length: Option<u64>,
-    ) -> Result<(Stored, Option<String>), RasterError> {
+    ) -> Result<(StoredType, Option<String>), RasterError> {
         let by_name = self.text("numbertype").map(number_type).transpose()?;
-        let stated = self.count("nbits")?;
-        let (bits, is_guess) = match (stated, by_name, by_length) {
+        let declared = self.count("nbits")?;
+        let (bits, is_guess) = match (declared, by_name, by_length) {
             (Some(bits), Some((other, _)), _) if bits != other => {
                 return Err(RasterError::damaged(format!(
                     "nbits is {bits} and numbertype is {}",
@@ -166,9 +166,9 @@ impl Keys {
             (false, true) => 's',
             (false, false) => 'u',
         });
-        let stored = Stored::Held(sample_type(kind, bits)?);
+        let stored = StoredType::Held(sample_type(kind, bits)?);
         let remark = (is_guess && extension != "flt").then(|| {
-            let name = stored.held().none().type_name();
+            let name = stored.memory_type().none().type_name();
             format!("its header states no type of samples: by the length of the data it is {name}")
         });
         Ok((stored, remark))

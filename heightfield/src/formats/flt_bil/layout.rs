@@ -1,7 +1,7 @@
 //! Layout of samples in a file without a header of its own.
 
 use crate::raw_samples::RawSamples;
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{Endian, RasterError};
 
 /// Interleaving of several bands.
@@ -21,7 +21,7 @@ pub(super) struct Layout {
     pub(super) columns: u32,
     pub(super) rows: u32,
     pub(super) bands: u32,
-    pub(super) stored: Stored,
+    pub(super) stored: StoredType,
     pub(super) endian: Endian,
     pub(super) interleave: Interleave,
     /// Bytes before the first sample.
@@ -46,12 +46,15 @@ impl Layout {
     /// Checks that the file holds the samples that the header `header` states.
     pub(super) fn check(&self, band: u32, bytes: u64, header: &str) -> Result<(), RasterError> {
         if band > self.bands {
-            let there = match self.bands {
+            let available = match self.bands {
                 1 => "the file has one band".to_owned(),
                 bands => format!("the file has bands 1 to {bands}"),
             };
-            let asked = format!("band {band}");
-            return Err(RasterError::NoSuchPart { asked, there });
+            let requested = format!("band {band}");
+            return Err(RasterError::NoSuchPart {
+                requested,
+                available,
+            });
         }
         let (columns, rows) = (self.columns, self.rows);
         let end = self.end(band).ok_or_else(|| {
@@ -66,12 +69,12 @@ impl Layout {
                 self.stored.bytes()
             )));
         }
-        self.check_rest(bytes, header)
+        self.check_size(bytes, header)
     }
 
     /// Checks that no whole row follows the stated samples: it would mean another sample type or
     /// size.
-    fn check_rest(&self, bytes: u64, header: &str) -> Result<(), RasterError> {
+    fn check_size(&self, bytes: u64, header: &str) -> Result<(), RasterError> {
         let (columns, rows, bands) = (self.columns, self.rows, self.bands);
         let row = u64::from(columns).saturating_mul(self.stored.bytes());
         let end = self.end(bands).unwrap_or(u64::MAX);

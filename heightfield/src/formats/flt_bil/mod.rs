@@ -17,10 +17,10 @@ pub(super) const FORMAT: Format = Format {
     name: "raster with a .hdr",
     begins: |_| false,
     extensions: &[
-        ("flt", Claim::Decides),
-        ("bil", Claim::Decides),
-        ("bip", Claim::Decides),
-        ("bsq", Claim::Decides),
+        ("flt", Claim::Certain),
+        ("bil", Claim::Certain),
+        ("bip", Claim::Certain),
+        ("bsq", Claim::Certain),
     ],
     parts: Parts::Bands,
     decode: |input, options| {

@@ -66,7 +66,7 @@ fn float_grid_is_read_with_bounds_and_no_data() {
         let raster = pair.open(None).expect("a grid");
         let found = heights(&raster);
         assert_eq!(found[..3], [1.5, -2.0, 3.0]);
-        assert!(found[3].is_nan() && raster.summary().holes == 1);
+        assert!(found[3].is_nan() && raster.summary().no_data == 1);
         let bounds = raster.bounds().expect("placed");
         let sides = [bounds.west, bounds.south, bounds.east, bounds.north];
         assert_eq!(sides, [500_000.0, 4_100_000.0, 500_090.0, 4_100_060.0]);
@@ -117,7 +117,7 @@ fn bands_by_line_by_pixel_and_after_each_other() {
 
 /// A folder may contain a database or a picture with the name of a header.
 #[test]
-fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
+fn header_beside_a_file_of_another_kind_is_ignored() {
     let header = "NROWS 2\nNCOLS 2\nNBITS 8\n";
     for (data, bytes) in [
         ("f.gpkg", &b"SQLite format 3\0 and more"[..]),
@@ -133,7 +133,7 @@ fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
 
 /// GTOPO30's `.DEM` is such an image, though USGS models have the same extension.
 #[test]
-fn a_header_beside_wins_over_the_extension() {
+fn header_has_priority_over_the_extension() {
     let header = "BYTEORDER      M\nLAYOUT       BIL\nNROWS         2\nNCOLS         2\n\
                   NBANDS        1\nNBITS         16\nBANDROWBYTES         4\n\
                   TOTALROWBYTES        4\nBANDGAPBYTES         0\nNODATA        -9999\n\
@@ -219,7 +219,7 @@ fn invalid_headers_and_truncated_data_are_named() {
 }
 
 #[test]
-fn a_missing_header_is_named() {
+fn missing_header_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("dem.flt");
     fs::write(&path, [0; 24]).expect("written");
@@ -259,7 +259,7 @@ fn number_type_and_unit_are_read() {
         let raster = raster.expect("a grid");
         let summary = raster.summary();
         assert_eq!(
-            (summary.lowest, summary.highest, summary.holes),
+            (summary.lowest, summary.highest, summary.no_data),
             (-5.0, 960.0, 1)
         );
         assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));

@@ -16,56 +16,56 @@ use crate::remote::{RemoteFetcher, RemoteFile, file_name, gdal_names, parts};
 
 /// First bytes of formats that GDAL reads only from a disk (NetCDF, HDF5, HDF4), or only
 /// sequentially (gzip): such files are downloaded whole.
-const FETCHED: [&[u8]; 4] = [
+const DOWNLOADED_FORMATS: [&[u8]; 4] = [
     b"CDF",
     b"\x89HDF\r\n\x1a\n",
     b"\x0e\x03\x13\x01",
     b"\x1f\x8b",
 ];
 /// Max size of a file that is downloaded whole, bytes.
-const MAX_FETCHED_BYTES: u64 = 1 << 30;
-/// It takes at most 1/`PARTS_OF_FREE` of the free disk space.
-const PARTS_OF_FREE: u64 = 2;
+const MAX_DOWNLOAD_BYTES: u64 = 1 << 30;
+/// It takes at most 1/`FREE_SHARE` of the free disk space.
+const FREE_SHARE: u64 = 2;
 
 /// The files at one host or in one bucket.
 #[derive(Clone)]
-pub(super) struct Served {
-    elsewhere: RemoteFetcher,
+pub(super) struct ServedFiles {
+    fetcher: RemoteFetcher,
     /// As `https://host/`.
     root: String,
     /// Query of each URL, possibly with a key.
-    rest: String,
+    query: String,
     roots: Arc<[String]>,
 }
 
-impl Served {
+impl ServedFiles {
     /// Returns the server of a URL, and the file's name there.
-    pub(super) fn of(url: &str, elsewhere: &RemoteFetcher) -> (Self, String) {
-        let [root, name, rest] = parts(url);
+    pub(super) fn of(url: &str, fetcher: &RemoteFetcher) -> (Self, String) {
+        let [root, name, query] = parts(url);
         let served = Self {
-            elsewhere: elsewhere.clone(),
+            fetcher: fetcher.clone(),
             root: root.to_owned(),
-            rest: rest.to_owned(),
+            query: query.to_owned(),
             roots: gdal_names(root).into(),
         };
         (served, name.to_owned())
     }
 
     fn url(&self, name: &str) -> String {
-        let rest = if name.contains('?') { "" } else { &self.rest };
-        format!("{}{name}{rest}", self.root)
+        let query = if name.contains('?') { "" } else { &self.query };
+        format!("{}{name}{query}", self.root)
     }
 }
 
-impl FileSystem for Served {
+impl FileSystem for ServedFiles {
     fn open(&self, name: &str) -> io::Result<Box<dyn ReadAt>> {
-        let file = self.elsewhere.open(&self.url(name))?;
+        let file = self.fetcher.open(&self.url(name))?;
         Ok(Box::new(Remote(file)))
     }
 
-    fn beside(&self, name: &str) -> io::Result<Vec<String>> {
+    fn neighbours(&self, name: &str) -> io::Result<Vec<String>> {
         let url = self.url(name);
-        let input = FileBytes::open(Path::new(&url), &self.elsewhere).map_err(io_error)?;
+        let input = FileBytes::open(Path::new(&url), &self.fetcher).map_err(io_error)?;
         beside::names_at_url(&input, &url).map_err(io_error)
     }
 
@@ -104,27 +104,29 @@ pub(super) fn fault(error: io::Error) -> RasterError {
 }
 
 /// Returns true if a file with these first bytes is downloaded whole.
-pub(super) fn is_fetched(head: &[u8]) -> bool {
-    FETCHED.iter().any(|bytes| head.starts_with(bytes))
+pub(super) fn needs_download(head: &[u8]) -> bool {
+    DOWNLOADED_FORMATS
+        .iter()
+        .any(|bytes| head.starts_with(bytes))
 }
 
 /// Downloads a file and GDAL's notes beside it into a folder, which is deleted on drop.
 ///
 /// # Errors
 /// [`RasterError::AbsurdSize`] if it is too large for that.
-pub(super) fn fetched(
+pub(super) fn download(
     url: &str,
-    elsewhere: &RemoteFetcher,
+    fetcher: &RemoteFetcher,
 ) -> Result<(TempDir, String), RasterError> {
-    let input = FileBytes::open(Path::new(url), elsewhere)?;
+    let input = FileBytes::open(Path::new(url), fetcher)?;
     let folder = tempfile::tempdir().map_err(RasterError::Unreadable)?;
     let free = fs4::available_space(folder.path()).unwrap_or(u64::MAX);
-    let most = MAX_FETCHED_BYTES.min(free / PARTS_OF_FREE);
-    if input.len() > most {
+    let max = MAX_DOWNLOAD_BYTES.min(free / FREE_SHARE);
+    if input.len() > max {
         return Err(RasterError::AbsurdSize(format!(
             "{} MB, of which {} MB fit here: a file of this format at a URL is fetched as a whole",
             input.len() >> 20,
-            most >> 20
+            max >> 20
         )));
     }
     let name = plain_name(url);

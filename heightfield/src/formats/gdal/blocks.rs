@@ -8,17 +8,19 @@ use twox_hash::XxHash64;
 
 use super::place::Place;
 use super::{NAME, at_url, fault};
-use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, usual_block};
+use crate::blocks::{
+    Block, BlockImage, BlockReader, MAX_BLOCK_BYTES, Part, SurveyParts, usual_block,
+};
 use crate::encoding::codes;
 use crate::raw_samples::{transposed, turned};
 use crate::samples::{NoDataMask, SampleType, with_samples};
 use crate::{RasterError, subsampled};
 
 /// Parts per direction that are read at opening, if a file stays on disk.
-const PLACES: u32 = 6;
+const PARTS_PER_AXIS: u32 = 6;
 
 /// Returns the type of the samples in memory.
-pub(super) const fn held(stored: Stored) -> SampleType {
+pub(super) const fn memory_type(stored: Stored) -> SampleType {
     match stored {
         Stored::U8 => SampleType::U8,
         Stored::I8 => SampleType::I8,
@@ -49,7 +51,7 @@ pub(super) struct GdalBlocks {
     dataset: Mutex<Option<Dataset>>,
     /// Number of the band.
     number: u32,
-    held: SampleType,
+    memory_type: SampleType,
     /// True if the first three bands are colours that encode the heights.
     has_codes: bool,
     images: Vec<BlockImage>,
@@ -67,12 +69,12 @@ impl GdalBlocks {
         stored: SampleType,
         has_codes: bool,
     ) -> Result<Self, RasterError> {
-        let held = if has_codes { SampleType::I32 } else { stored };
+        let memory_type = if has_codes { SampleType::I32 } else { stored };
         let band = dataset.band(number).map_err(fault)?;
         let is_masked = band.mask() == Mask::Band;
         let full = image(&band);
         let samples = band.block_size().map(u64::from).iter().product::<u64>();
-        if samples.saturating_mul(held.bytes()) > MAX_BLOCK_BYTES {
+        if samples.saturating_mul(memory_type.bytes()) > MAX_BLOCK_BYTES {
             let [columns, rows] = band.block_size();
             return Err(RasterError::Unsupported {
                 format: NAME,
@@ -104,7 +106,7 @@ impl GdalBlocks {
         hasher.write(dataset.driver().as_bytes());
         Ok(Self {
             number,
-            held,
+            memory_type,
             has_codes,
             images: [full].into_iter().chain(images).collect(),
             overviews: coarser,
@@ -115,14 +117,14 @@ impl GdalBlocks {
         })
     }
 
-    fn opened_again(&self) -> Result<Dataset, RasterError> {
+    fn reopen(&self) -> Result<Dataset, RasterError> {
         let Source {
             place,
             name,
             options,
         } = &self.source;
         let options: Vec<_> = options.iter().map(String::as_str).collect();
-        place.open_again(name, &options)
+        place.reopen(name, &options)
     }
 
     fn read_from(
@@ -146,17 +148,17 @@ impl GdalBlocks {
                 codes([colour(1)?, colour(2)?, colour(3)?])
             }
             false => {
-                let mut samples = self.held.none();
+                let mut samples = self.memory_type.none();
                 with_samples!(&mut samples, values => *values = read(&band, part)?);
                 samples
             }
         };
         let mask = self.is_masked.then(|| band.mask_band()).flatten();
-        let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
+        let no_data_mask = mask.map(|mask| no_data_mask(&mask, part)).transpose()?;
         Ok(Block {
             samples,
-            holes: holes.filter(|holes| !holes.is_clear()),
-            is_lacking: false,
+            no_data_mask: no_data_mask.filter(|no_data_mask| !no_data_mask.is_clear()),
+            is_incomplete: false,
         })
     }
 }
@@ -184,7 +186,7 @@ impl BlockReader for GdalBlocks {
     }
 
     fn sample_type(&self) -> SampleType {
-        self.held
+        self.memory_type
     }
 
     fn is_stored(&self, _: usize, _: &Part) -> bool {
@@ -196,7 +198,7 @@ impl BlockReader for GdalBlocks {
         let mut open = self.dataset.lock().unwrap_or_else(PoisonError::into_inner);
         let dataset = match open.take() {
             Some(dataset) => dataset,
-            None => self.opened_again()?,
+            None => self.reopen()?,
         };
         let block = self.read_from(&dataset, image, part);
         if let Some(error) = dataset.take_fault() {
@@ -210,10 +212,10 @@ impl BlockReader for GdalBlocks {
         self.index
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         // Overviews cover the whole image.
         match &self.images[..] {
-            [full] => Some(subsampled::places(full, PLACES)),
+            [full] => Some(subsampled::spread_parts(full, PARTS_PER_AXIS)),
             _ => None,
         }
     }
@@ -233,23 +235,23 @@ fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, RasterError> 
 }
 
 /// Returns the samples that a mask or an alpha band marks as no-data.
-fn holes(mask: &Band<'_>, part: &Part) -> Result<NoDataMask, RasterError> {
+fn no_data_mask(mask: &Band<'_>, part: &Part) -> Result<NoDataMask, RasterError> {
     let valid = read::<u8>(mask, part)?;
-    let mut holes = NoDataMask::with_capacity(valid.len());
+    let mut no_data_mask = NoDataMask::with_capacity(valid.len());
     for (at, valid) in valid.iter().enumerate() {
-        holes.set(at, *valid == 0);
+        no_data_mask.set(at, *valid == 0);
     }
-    Ok(holes)
+    Ok(no_data_mask)
 }
 
 /// A band stored with rows from north to south: its samples are transposed on reading. Such bands
 /// have neither masks nor overviews.
-pub(super) struct Turned {
+pub(super) struct Transposed {
     blocks: GdalBlocks,
     images: [BlockImage; 1],
 }
 
-impl Turned {
+impl Transposed {
     pub(super) fn new(blocks: GdalBlocks) -> Self {
         let full = blocks.images[0];
         let [across, down] = full.block;
@@ -263,7 +265,7 @@ impl Turned {
     }
 }
 
-impl BlockReader for Turned {
+impl BlockReader for Transposed {
     fn format(&self) -> &'static str {
         NAME
     }
@@ -273,7 +275,7 @@ impl BlockReader for Turned {
     }
 
     fn sample_type(&self) -> SampleType {
-        self.blocks.held
+        self.blocks.memory_type
     }
 
     fn is_stored(&self, _: usize, _: &Part) -> bool {
@@ -292,7 +294,7 @@ impl BlockReader for Turned {
         self.blocks.index
     }
 
-    fn looks(&self) -> Option<Looks> {
-        Some(subsampled::places(&self.images[0], PLACES))
+    fn survey_parts(&self) -> Option<SurveyParts> {
+        Some(subsampled::spread_parts(&self.images[0], PARTS_PER_AXIS))
     }
 }

@@ -29,7 +29,7 @@ use crate::geometry::{metres_in, unknown_unit};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::{OpenOptions, RasterError, ReferenceSystem, gdal};
-use blocks::{GdalBlocks, Source, Turned, held};
+use blocks::{GdalBlocks, Source, Transposed, memory_type};
 pub(crate) use names::by_beginning;
 use place::Place;
 
@@ -38,7 +38,7 @@ const NAME: &str = "GDAL";
 /// Drivers that read any file with a header beside it as samples.
 const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
 /// Drivers that combine many files.
-const OF_FILES: [&str; 2] = ["VRT", "STACIT"];
+const COMBINING_DRIVERS: [&str; 2] = ["VRT", "STACIT"];
 /// Enough bytes to recognise a file's kind.
 const HEAD_BYTES: u64 = 1024;
 /// Number of bands of a colour picture, of bytes.
@@ -49,18 +49,18 @@ const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
 /// Reads a file, folder or other source that a driver opens.
 ///
 /// # Errors
-/// [`RasterError::UnknownFormat`] if no driver does; [`RasterError::WantsGdal`] without a libgdal;
+/// [`RasterError::UnknownFormat`] if no driver does; [`RasterError::NeedsGdal`] without a libgdal;
 /// else the file's fault.
 pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let head = head(path, options)?;
     let library = gdal().map_err(|why| match names::of(path, &head) {
-        Some(format) => RasterError::WantsGdal { format, why },
+        Some(format) => RasterError::NeedsGdal { format, why },
         None => RasterError::UnknownFormat,
     })?;
-    let place = Place::of(&library, path, &head, &options.elsewhere)?;
+    let place = Place::of(&library, path, &head, &options.fetcher)?;
     let packing = packed::Packing::of(&head);
     let place = Arc::new(match packing {
-        Some(_) => place.under_a_new_name()?,
+        Some(_) => place.with_new_name()?,
         None => place,
     });
     let decoded = match packing {
@@ -102,7 +102,7 @@ pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
 /// Returns the reference system that GDAL finds in a file.
 pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
     let library = gdal().ok()?;
-    let place = Place::of(&library, input.path()?, &[], input.elsewhere()).ok()?;
+    let place = Place::of(&library, input.path()?, &[], input.fetcher()).ok()?;
     let dataset = library.open(&place.path, &[]).ok()?;
     ReferenceSystem::from_wkt(&dataset.wkt()?).0
 }
@@ -111,7 +111,7 @@ pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
 fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, RasterError> {
     match path.is_dir() {
         true => Ok(Vec::new()),
-        false => FileBytes::open(path, &options.elsewhere)?.head(HEAD_BYTES),
+        false => FileBytes::open(path, &options.fetcher)?.head(HEAD_BYTES),
     }
 }
 
@@ -129,7 +129,7 @@ fn opened(
         return Err(refused);
     }
     let dataset = match open(library, path, options) {
-        Err(RasterError::UnknownFormat) => match label_beside(path) {
+        Err(RasterError::UnknownFormat) => match find_label(path) {
             Some(label) => {
                 let mut decoded = opened(library, place, &label, head, options)?;
                 let name = label.file_name().unwrap_or_default().display().to_string();
@@ -184,7 +184,7 @@ fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset
 
 /// Returns true if a text contains a star, which GRASS writes for no-data.
 fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> {
-    let input = FileBytes::open(&place.source, &options.elsewhere)?;
+    let input = FileBytes::open(&place.source, &options.fetcher)?;
     let mut reader = input.reader()?;
     loop {
         let chunk = reader.fill_buf().map_err(RasterError::Unreadable)?;
@@ -197,7 +197,7 @@ fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> 
 }
 
 /// Returns the label of a planetary image, a separate file beside it.
-fn label_beside(path: &Path) -> Option<PathBuf> {
+fn find_label(path: &Path) -> Option<PathBuf> {
     let labels = ["lbl", "LBL", "xml", "XML"].map(|end| path.with_extension(end));
     labels
         .into_iter()
@@ -216,20 +216,22 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
         let last = name.rsplit([':', '/']).next().unwrap_or(name);
         last.trim_start_matches("asset=").to_owned()
     };
-    let asked = options.variable.as_deref();
+    let requested = options.variable.as_deref();
     let parts = dataset.subdatasets();
     let names: Vec<_> = parts.iter().map(|part| short(&part.name)).collect();
     let exact = parts
         .iter()
-        .position(|part| Some(part.name.as_str()) == asked);
-    if dataset.bands() > 0 && (asked.is_none() || asked == netcdf::variable(dataset).as_deref()) {
+        .position(|part| Some(part.name.as_str()) == requested);
+    if dataset.bands() > 0
+        && (requested.is_none() || requested == netcdf::variable(dataset).as_deref())
+    {
         return Ok(None);
     }
     if parts.is_empty() {
-        return Err(match asked {
-            Some(asked) => RasterError::NoSuchPart {
-                asked: format!("variable {asked}"),
-                there: "the file holds one raster".into(),
+        return Err(match requested {
+            Some(requested) => RasterError::NoSuchPart {
+                requested: format!("variable {requested}"),
+                available: "the file holds one raster".into(),
             },
             None => no_raster(&format!("its driver {}", dataset.driver())),
         });
@@ -240,7 +242,7 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
             // These are cell limits, not heights.
             let is_height = |name: &&String| !name.ends_with("_bnds") && !name.ends_with("_bounds");
             let named: Vec<_> = names.iter().filter(is_height).map(String::as_str).collect();
-            let at = height_name::choose("raster", &named, netcdf::HEIGHT_NAMES, asked)?;
+            let at = height_name::choose("raster", &named, netcdf::HEIGHT_NAMES, requested)?;
             let is_it = |name: &String| name == named[at];
             names.iter().position(is_it).unwrap_or_default()
         }
@@ -280,16 +282,16 @@ fn decoded(
         name,
         options: options.open_options.clone(),
     };
-    let blocks = GdalBlocks::new(source, dataset, number, held(stored), has_codes)?;
+    let blocks = GdalBlocks::new(source, dataset, number, memory_type(stored), has_codes)?;
     let overviews = blocks.images().iter().skip(1);
     let file_layout = FileLayout {
         bands,
         block: Some(block),
         overviews: overviews.map(|image| [image.columns, image.rows]).collect(),
-        samples_are: None,
+        raster_type: None,
     };
     let mut decoded = match conventions.is_turned {
-        true => read(Turned::new(blocks), &driver, options)?,
+        true => read(Transposed::new(blocks), &driver, options)?,
         false => read(blocks, &driver, options)?,
     };
     decoded.file_layout = file_layout;
@@ -301,7 +303,7 @@ fn decoded(
             "it has {bands} bands: the first is taken for the height (--input band=N)"
         ));
     }
-    if OF_FILES.contains(&driver.as_str()) && no_data.is_none() {
+    if COMBINING_DRIVERS.contains(&driver.as_str()) && no_data.is_none() {
         decoded.remarks.push(
             "it is read by GDAL, which has height 0 where none of its files is: to mark no data, build it with a no-data value (gdalbuildvrt -vrtnodata)"
                 .into(),
@@ -321,10 +323,10 @@ fn decoded(
     if let Some([x, x_column, x_row, y, y_column, y_row]) = map
         && let Some(map) = GroundMap::new([x, x_column, x_row], [y, y_column, y_row])
     {
-        decoded.lay_out(map, None);
+        decoded.set_layout(map, None);
     }
     if let Some(encoding) = options.encoding {
-        decoded.take_codes(encoding);
+        decoded.decode_as_codes(encoding);
     }
     Ok(decoded)
 }
@@ -333,8 +335,8 @@ fn decoded(
 fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), RasterError> {
     match options.band {
         Some(band) => Err(RasterError::NoSuchPart {
-            asked: format!("band {band} with --input encoding=…"),
-            there: "three bands together are one height".into(),
+            requested: format!("band {band} with --input encoding=…"),
+            available: "three bands together are one height".into(),
         }),
         None if stored == Stored::U8 && COLOURS.contains(&bands) => Ok(()),
         None => Err(no_codes("the file has other bands")),
@@ -349,23 +351,29 @@ fn read(
 ) -> Result<Decoded, RasterError> {
     let full = blocks.images()[0];
     let size = sides(full.columns.into(), full.rows.into())?;
-    let held = blocks.sample_type();
-    let format = format!("{driver} by GDAL, {}", held.none().type_name());
+    let sample_type = blocks.sample_type();
+    let format = format!("{driver} by GDAL, {}", sample_type.none().type_name());
     let samples = u64::from(full.columns) * u64::from(full.rows);
-    if samples * held.bytes() > options.most_in_memory_bytes {
+    if samples * sample_type.bytes() > options.max_in_memory_bytes {
         // Fails now if GDAL cannot decompress the samples; later, they would be no-data.
         blocks.read(0, &full.part([0, 0]))?;
         return Ok(Decoded::new(format, size, blocks));
     }
     let all = blocks.read(0, &Part::whole(full.columns, full.rows))?;
     let mut decoded = Decoded::new(format, size, all.samples);
-    decoded.storage.set_no_data(all.holes);
+    decoded.storage.set_no_data(all.no_data_mask);
     Ok(decoded)
 }
 
 fn fault(error: Error) -> RasterError {
     match error {
-        Error::NoSuchPart { asked, there } => RasterError::NoSuchPart { asked, there },
+        Error::NoSuchPart {
+            requested,
+            available,
+        } => RasterError::NoSuchPart {
+            requested,
+            available,
+        },
         Error::Refused(words) if UNKNOWN.iter().any(|unknown| words.contains(unknown)) => {
             RasterError::UnknownFormat
         }

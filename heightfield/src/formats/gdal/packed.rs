@@ -94,14 +94,14 @@ impl Packing {
         }
         entries.retain(|name| !is_hidden(name));
         let full = |name: &str| PathBuf::from(format!("{folder}/{name}"));
-        let mut left = options.clone();
+        let mut inner_options = options.clone();
         let name = match options
             .variable
             .as_deref()
             .and_then(|it| named(&entries, it))
         {
             Some(name) => {
-                left.variable = None;
+                inner_options.variable = None;
                 name
             }
             None => only(library, &entries, &full)?,
@@ -109,7 +109,7 @@ impl Packing {
         let entry = full(&name);
         match library.length(&entry) {
             Some(bytes) if bytes > MAX_BYTES => Err(too_large(&name)),
-            _ => Ok((entry, left)),
+            _ => Ok((entry, inner_options)),
         }
     }
 }
@@ -124,9 +124,9 @@ fn is_hidden(name: &str) -> bool {
 }
 
 /// Returns the requested entry, by its whole name or its last part.
-fn named(entries: &[String], asked: &str) -> Option<String> {
-    let is_it = |name: &&String| *name == asked || name.rsplit('/').next() == Some(asked);
-    entries.iter().find(is_it).cloned()
+fn named(entries: &[String], requested: &str) -> Option<String> {
+    let matches = |name: &&String| *name == requested || name.rsplit('/').next() == Some(requested);
+    entries.iter().find(matches).cloned()
 }
 
 /// Returns the only raster among entries.
@@ -135,7 +135,7 @@ fn only(
     entries: &[String],
     full: &dyn Fn(&str) -> PathBuf,
 ) -> Result<String, RasterError> {
-    let is_likely = |name: &&String| claim_of(name).is_some_and(|claim| claim != Claim::Suggests);
+    let is_likely = |name: &&String| claim_of(name).is_some_and(|claim| claim != Claim::Possible);
     let mut rasters: Vec<String> = entries.iter().filter(is_likely).cloned().collect();
     if rasters.is_empty() {
         let tried = entries.iter().take(MAX_TRIED);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use heightfield_gdal::{Dataset, Error, Library, Mount};
 use tempfile::TempDir;
 
-use super::at_url::{self, Served, fetched, is_fetched};
+use super::at_url::{self, ServedFiles, download, needs_download};
 use super::fault;
 use crate::RasterError;
 use crate::remote::{RemoteFetcher, is_url, without_key};
@@ -17,7 +17,7 @@ pub(super) struct Place {
     pub(super) source: PathBuf,
     /// GDAL's name for it.
     pub(super) path: PathBuf,
-    served: Option<(Served, Mount)>,
+    served: Option<(ServedFiles, Mount)>,
     /// A copy of a remote file, or a link to an archive.
     _folder: Option<TempDir>,
 }
@@ -28,7 +28,7 @@ impl Place {
         library: &Library,
         source: &Path,
         head: &[u8],
-        elsewhere: &RemoteFetcher,
+        fetcher: &RemoteFetcher,
     ) -> Result<Self, RasterError> {
         let here = Self {
             library: library.clone(),
@@ -40,15 +40,15 @@ impl Place {
         let Some(url) = source.to_str().filter(|source| is_url(source)) else {
             return Ok(here);
         };
-        if is_fetched(head) {
-            let (folder, name) = fetched(url, elsewhere)?;
+        if needs_download(head) {
+            let (folder, name) = download(url, fetcher)?;
             return Ok(Self {
                 path: folder.path().join(name),
                 _folder: Some(folder),
                 ..here
             });
         }
-        let (served, name) = Served::of(url, elsewhere);
+        let (served, name) = ServedFiles::of(url, fetcher);
         let mount = library.mount(Box::new(served.clone())).map_err(fault)?;
         Ok(Self {
             path: mount.path(&name).into(),
@@ -60,7 +60,7 @@ impl Place {
     /// Links the archive under a new name. GDAL caches the files of an archive by name, and reads
     /// beyond their end if another archive has replaced it (3.6 crashes).
     #[cfg(unix)]
-    pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
+    pub(super) fn with_new_name(self) -> Result<Self, RasterError> {
         if self.served.is_some() || self._folder.is_some() {
             return Ok(self);
         }
@@ -80,7 +80,7 @@ impl Place {
 
     /// Returns the archive under its own name, because links need a privilege on this system.
     #[cfg(not(unix))]
-    pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
+    pub(super) fn with_new_name(self) -> Result<Self, RasterError> {
         Ok(self)
     }
 
@@ -123,8 +123,8 @@ impl Place {
         let driver = dataset.driver();
         let signs = [("VRT", "<VRTDataset"), ("MRF", "<MRF_META")];
         let has = |sign: &str| head.windows(sign.len()).any(|part| part == sign.as_bytes());
-        let is_looked_at = |(name, sign)| name == driver && has(sign);
-        if self.served.is_some() && signs.into_iter().any(is_looked_at) {
+        let is_listed = |(name, sign)| name == driver && has(sign);
+        if self.served.is_some() && signs.into_iter().any(is_listed) {
             // Its mount checks every name.
             return Ok(());
         }
@@ -150,7 +150,7 @@ impl Place {
     }
 
     /// Reopens a part of the file after a failed read, which GDAL caches.
-    pub(super) fn open_again(&self, name: &str, options: &[&str]) -> Result<Dataset, RasterError> {
+    pub(super) fn reopen(&self, name: &str, options: &[&str]) -> Result<Dataset, RasterError> {
         let Some((served, mount)) = &self.served else {
             return self.library.open_part(name, options).map_err(fault);
         };

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::place::Place;
 use crate::input::FileBytes;
-use crate::remote::{is_url, without_rest};
+use crate::remote::{is_url, without_query};
 use crate::{OpenOptions, RasterError, file_name};
 
 /// Max size of a document, bytes. In memory it takes fifty times as much.
@@ -27,7 +27,7 @@ struct Item {
     /// Names and files.
     assets: Vec<(String, String)>,
     /// Columns and rows, and x and y of a sample's corner, as stated.
-    stated: Option<([u32; 2], [f64; 6])>,
+    georeference: Option<([u32; 2], [f64; 6])>,
 }
 
 /// Returns the reason why a document of items cannot be read; `None` if the file is something else.
@@ -44,7 +44,7 @@ pub(super) fn refused(
 /// Checks that files lie at the places in their items, and that GDAL has found the same files.
 ///
 /// # Errors
-/// [`RasterError::ToBuild`] if one does not.
+/// [`RasterError::NeedsVrt`] if one does not.
 pub(super) fn check_places(
     library: &Library,
     opened: &Dataset,
@@ -69,8 +69,8 @@ pub(super) fn check_places(
         }
         let is_found = full(Path::new(file)).is_some_and(|file| files.contains(&file));
         let dataset = library.open(Path::new(file), &[]);
-        let lies_there = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
-        if !(is_found && lies_there) {
+        let is_at_its_place = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
+        if !(is_found && is_at_its_place) {
             let why = format!(
                 "the item {} does not lie where its file {file} does",
                 item.id
@@ -88,7 +88,7 @@ fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
         match &item.assets[..] {
             [(_, file)] => files.push(file.clone()),
             assets => {
-                return Err(RasterError::WhichAsset {
+                return Err(RasterError::AmbiguousAssets {
                     why: match assets {
                         [] => format!(
                             "the item {} has no asset of that name, or no raster",
@@ -101,7 +101,7 @@ fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
             }
         }
     }
-    Ok(RasterError::ToBuild {
+    Ok(RasterError::NeedsVrt {
         why: why.to_owned(),
         files,
     })
@@ -117,7 +117,7 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
     if !is_named || path.is_dir() {
         return Ok(None);
     }
-    let input = FileBytes::open(path, &options.elsewhere)?;
+    let input = FileBytes::open(path, &options.fetcher)?;
     if input.len() > MAX_BYTES {
         return Err(RasterError::AbsurdSize(format!(
             "a JSON document of {} bytes",
@@ -127,10 +127,10 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
     let text = input.head(MAX_BYTES)?;
     let document: Value = serde_json::from_slice(&text)
         .map_err(|error| RasterError::Damaged(format!("it is no JSON: {error}")))?;
-    let asked = match &options.variable {
+    let requested = match &options.variable {
         Some(name) => Some(Pattern::new(name).map_err(|error| RasterError::NoSuchPart {
-            asked: format!("variable {name}"),
-            there: format!("it is no pattern: {error}"),
+            requested: format!("variable {name}"),
+            available: format!("it is no pattern: {error}"),
         })?),
         None => None,
     };
@@ -140,24 +140,24 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, Raster
         _ => return Ok(None),
     };
     // Also for a URL, without its query.
-    let named = url.map_or(path, |url| Path::new(without_rest(url)));
+    let named = url.map_or(path, |url| Path::new(without_query(url)));
     let folder = named.parent().unwrap_or(Path::new(""));
     let items = features
         .into_iter()
-        .map(|item| Item::of(item, asked.as_ref(), folder));
+        .map(|item| Item::of(item, requested.as_ref(), folder));
     Ok(Some(items.collect()))
 }
 
 impl Item {
-    fn of(item: &Value, asked: Option<&Pattern>, folder: &Path) -> Self {
+    fn of(item: &Value, requested: Option<&Pattern>, folder: &Path) -> Self {
         let empty = serde_json::Map::new();
         let assets = item["assets"].as_object().unwrap_or(&empty);
-        let is_asked = |(name, asset): &(&String, &Value)| match asked {
-            Some(asked) => asked.matches(name),
+        let is_requested = |(name, asset): &(&String, &Value)| match requested {
+            Some(requested) => requested.matches(name),
             None => is_raster(asset),
         };
         let of_item = |key: &str| {
-            let own = assets.iter().filter(|asset| is_asked(asset));
+            let own = assets.iter().filter(|asset| is_requested(asset));
             let mut values = own
                 .map(|(_, asset)| &asset[key])
                 .chain([&item["properties"][key]]);
@@ -181,14 +181,14 @@ impl Item {
                 [x, x_column, x_row, y, y_column, y_row],
             ))
         };
-        let named = assets.iter().filter(is_asked);
+        let named = assets.iter().filter(is_requested);
         let files = named.filter_map(|(name, asset)| {
             Some((name.clone(), file(asset["href"].as_str()?, folder)))
         });
         Self {
             id: item["id"].as_str().unwrap_or("without a name").to_owned(),
             assets: files.collect(),
-            stated: place(),
+            georeference: place(),
         }
     }
 }
@@ -196,7 +196,7 @@ impl Item {
 impl Item {
     /// Returns true if the file's place matches the item's, or the item states none.
     fn is_place_of(&self, file: &Dataset) -> bool {
-        let Some((size, stated)) = self.stated else {
+        let Some((size, georeference)) = self.georeference else {
             return true;
         };
         let has_size = file.band(1).is_ok_and(|band| band.size() == size);
@@ -210,9 +210,11 @@ impl Item {
                     [0, 3].map(|at| of[at] + of[at + 1] * column + of[at + 2] * row)
                 };
                 let is_near = |column: f64, row: f64| {
-                    let both = corner(found, column, row)
-                        .into_iter()
-                        .zip(corner(stated, column, row));
+                    let both = corner(found, column, row).into_iter().zip(corner(
+                        georeference,
+                        column,
+                        row,
+                    ));
                     both.into_iter()
                         .all(|(a, b)| (a - b).abs() <= TOLERANCE * cell)
                 };

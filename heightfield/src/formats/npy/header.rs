@@ -56,20 +56,20 @@ impl Header {
     }
 
     fn parse(text: &str, bytes: u64) -> Result<Self, RasterError> {
-        let mut rest = Rest(text);
+        let mut parser = Parser(text);
         let (mut descr, mut order, mut shape) = (None, None, None);
-        rest.expect("{")?;
-        while !rest.takes("}") {
-            let key = rest.text()?;
-            rest.expect(":")?;
+        parser.expect("{")?;
+        while !parser.skip("}") {
+            let key = parser.text()?;
+            parser.expect(":")?;
             match key {
-                "descr" => descr = Some(rest.descr()?.to_owned()),
-                "fortran_order" => order = Some(rest.truth()?),
-                "shape" => shape = Some(rest.sides()?),
+                "descr" => descr = Some(parser.descr()?.to_owned()),
+                "fortran_order" => order = Some(parser.truth()?),
+                "shape" => shape = Some(parser.sides()?),
                 key => return Err(unfamiliar(&format!("the key {key:?}"))),
             }
-            if !rest.takes(",") {
-                rest.expect("}")?;
+            if !parser.skip(",") {
+                parser.expect("}")?;
                 break;
             }
         }
@@ -90,11 +90,11 @@ fn unfamiliar(what: &str) -> RasterError {
 }
 
 /// Rest of a header.
-struct Rest<'t>(&'t str);
+struct Parser<'t>(&'t str);
 
-impl<'t> Rest<'t> {
+impl<'t> Parser<'t> {
     /// Returns true if a sign is next, and skips it.
-    fn takes(&mut self, sign: &str) -> bool {
+    fn skip(&mut self, sign: &str) -> bool {
         let rest = self.0.trim_start();
         let after = rest.strip_prefix(sign);
         self.0 = after.unwrap_or(rest);
@@ -102,7 +102,7 @@ impl<'t> Rest<'t> {
     }
 
     fn expect(&mut self, sign: &str) -> Result<(), RasterError> {
-        match self.takes(sign) {
+        match self.skip(sign) {
             true => Ok(()),
             false => {
                 let found: String = self.0.chars().take(12).collect();
@@ -113,7 +113,7 @@ impl<'t> Rest<'t> {
 
     /// Reads a quoted text.
     fn text(&mut self) -> Result<&'t str, RasterError> {
-        let quote = if self.takes("\"") { '"' } else { '\'' };
+        let quote = if self.skip("\"") { '"' } else { '\'' };
         if quote == '\'' {
             self.expect("'")?;
         }
@@ -127,14 +127,14 @@ impl<'t> Rest<'t> {
 
     /// Reads the type of a sample; records have a list.
     fn descr(&mut self) -> Result<&'t str, RasterError> {
-        match self.takes("[") {
+        match self.skip("[") {
             true => Err(RasterError::NoNumbers("an array of records".into())),
             false => self.text(),
         }
     }
 
     fn truth(&mut self) -> Result<bool, RasterError> {
-        match self.takes("True") {
+        match self.skip("True") {
             true => Ok(true),
             false => self.expect("False").map(|()| false),
         }
@@ -144,7 +144,7 @@ impl<'t> Rest<'t> {
     fn sides(&mut self) -> Result<Vec<u64>, RasterError> {
         let mut sides = Vec::new();
         self.expect("(")?;
-        while !self.takes(")") {
+        while !self.skip(")") {
             let rest = self.0.trim_start();
             let end = rest
                 .find(|c: char| !c.is_ascii_digit())
@@ -157,7 +157,7 @@ impl<'t> Rest<'t> {
             }
             // Python 2 wrote long integers so.
             self.0 = rest.strip_prefix('L').unwrap_or(rest);
-            if !self.takes(",") {
+            if !self.skip(",") {
                 self.expect(")")?;
                 break;
             }

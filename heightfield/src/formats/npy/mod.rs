@@ -6,7 +6,7 @@ use crate::decoded::{Decoded, sides};
 use crate::format::{Claim, Format, Parts};
 use crate::input::FileBytes;
 use crate::raw_samples::RawSamples;
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{Endian, OpenOptions, RasterError, SampleType};
 use header::Header;
 
@@ -14,7 +14,7 @@ use header::Header;
 pub(super) const FORMAT: Format = Format {
     name: "NumPy",
     begins: |head| head.starts_with(b"\x93NUMPY"),
-    extensions: &[("npy", Claim::Suggests)],
+    extensions: &[("npy", Claim::Possible)],
     parts: Parts::One,
     decode: |input, options| Array::in_file(input)?.heights(input, options),
 };
@@ -22,7 +22,7 @@ pub(super) const FORMAT: Format = Format {
 /// Layout of an array's samples.
 struct Array {
     shape: Vec<u64>,
-    stored: Stored,
+    stored: StoredType,
     endian: Endian,
     column_major: bool,
     /// Offset of the first sample, bytes.
@@ -30,7 +30,7 @@ struct Array {
 }
 
 /// Parses NumPy's type and byte order, as `<f4`.
-fn sample_type(descr: &str) -> Result<(Stored, Endian), RasterError> {
+fn sample_type(descr: &str) -> Result<(StoredType, Endian), RasterError> {
     let what = || format!("an array of {descr}");
     let (order, kind) = match descr.split_at_checked(1) {
         Some((order @ ("<" | ">" | "|" | "="), kind)) => (order, kind),
@@ -40,10 +40,10 @@ fn sample_type(descr: &str) -> Result<(Stored, Endian), RasterError> {
         ">" => Endian::Big,
         _ => Endian::Little,
     };
-    let held = match kind {
-        "i8" => return Ok((Stored::I64, endian)),
-        "u8" => return Ok((Stored::U64, endian)),
-        "f2" => return Ok((Stored::F16, endian)),
+    let memory_type = match kind {
+        "i8" => return Ok((StoredType::I64, endian)),
+        "u8" => return Ok((StoredType::U64, endian)),
+        "f2" => return Ok((StoredType::F16, endian)),
         "i1" => SampleType::I8,
         "i2" => SampleType::I16,
         "i4" => SampleType::I32,
@@ -55,7 +55,7 @@ fn sample_type(descr: &str) -> Result<(Stored, Endian), RasterError> {
         _ if kind.starts_with(['O', 'S', 'U', 'a']) => return Err(RasterError::NoNumbers(what())),
         _ => return Err(RasterError::NotAHeightField(what())),
     };
-    Ok((Stored::Held(held), endian))
+    Ok((StoredType::Held(memory_type), endian))
 }
 
 impl Array {
@@ -109,7 +109,10 @@ impl Array {
             true => packed((rows, columns)).turned(),
             false => packed((columns, rows)),
         };
-        let format = format!("NumPy array, {}", self.stored.held().none().type_name());
+        let format = format!(
+            "NumPy array, {}",
+            self.stored.memory_type().none().type_name()
+        );
         let storage = plain.storage(input, options)?;
         Ok(Decoded::new(format, (columns, rows), storage))
     }
@@ -137,17 +140,17 @@ mod tests {
 
     fn samples(descr: &str, bytes: &[u8]) -> Result<Samples, RasterError> {
         let decoded = (FORMAT.decode)(&npy(descr, bytes), &crate::OpenOptions::default())?;
-        Ok(decoded.storage.held().expect("in memory").clone())
+        Ok(decoded.storage.in_memory().expect("in memory").clone())
     }
 
     #[test]
     fn integers_of_64_bits_and_halves_are_read() {
         let numbers = [1_i64, -2, 8848, 1 << 40, -(1 << 53), 0];
-        let wanted = Samples::F64(numbers.map(|number| number as f64).to_vec());
+        let expected = Samples::F64(numbers.map(|number| number as f64).to_vec());
         let little: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
-        assert_eq!(samples("<i8", &little).expect("int64"), wanted);
+        assert_eq!(samples("<i8", &little).expect("int64"), expected);
         let big: Vec<u8> = numbers.iter().flat_map(|n| n.to_be_bytes()).collect();
-        assert_eq!(samples(">i8", &big).expect("int64"), wanted);
+        assert_eq!(samples(">i8", &big).expect("int64"), expected);
         let large = u64::MAX.to_le_bytes().repeat(6);
         let found = samples("<u8", &large).expect("uint64");
         assert_eq!(found, Samples::F64(vec![u64::MAX as f64; 6]));
@@ -162,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn an_array_that_the_file_does_not_hold_is_refused() {
+    fn array_larger_than_the_file_is_refused() {
         let fault = samples("<i8", &[0; 47]).expect_err("too short");
         assert!(matches!(fault, RasterError::Truncated(_)), "{fault}");
         let fault = samples("<c8", &[0; 48]).expect_err("complex numbers");

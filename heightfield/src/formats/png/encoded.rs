@@ -13,13 +13,13 @@ use crate::{Encoding, RasterError, Samples};
 pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, RasterError> {
     let codes = Codes::read(input)?;
     let mut decoded = Decoded::new("PNG".into(), codes.size, Samples::from(codes.codes));
-    decoded.take_codes(encoding);
+    decoded.decode_as_codes(encoding);
     decoded.storage.set_no_data(Some(codes.transparent));
     Ok(decoded)
 }
 
 /// Converts the fault of ambiguous channels if the picture looks like encoded heights.
-pub(super) fn suspected(fault: RasterError, input: &FileBytes) -> RasterError {
+pub(super) fn suspect_encoded_heights(fault: RasterError, input: &FileBytes) -> RasterError {
     if !matches!(fault, RasterError::AmbiguousChannels(_)) {
         return fault;
     }
@@ -29,7 +29,7 @@ pub(super) fn suspected(fault: RasterError, input: &FileBytes) -> RasterError {
     let encodings = [Encoding::Terrarium, Encoding::TerrainRgb];
     let alike = encodings
         .into_iter()
-        .find(|encoding| codes.look_like(*encoding));
+        .find(|encoding| codes.resembles(*encoding));
     alike.map_or(fault, RasterError::EncodedPicture)
 }
 
@@ -52,7 +52,7 @@ impl Codes {
             ));
         }
         let pixel = color.samples();
-        input.check_holds(size.0, size.1, pixel as u64)?;
+        input.check_size(size.0, size.1, pixel as u64)?;
         let mut frame = vec![0; reader.output_buffer_size().unwrap_or(0)];
         reader.next_frame(&mut frame).map_err(fault)?;
         let count = size.0 as usize * size.1 as usize;
@@ -71,20 +71,20 @@ impl Codes {
 
     /// Returns true if the heights are possible on Earth, and mostly near their neighbours', unlike
     /// the colours of a photograph.
-    fn look_like(&self, encoding: Encoding) -> bool {
+    fn resembles(&self, encoding: Encoding) -> bool {
         /// Range from below the deepest sea to above the highest mountain, m.
         const GROUND: std::ops::RangeInclusive<f64> = -11_500.0..=9_000.0;
         /// Height difference of neighbours that is steep even for cells of a kilometre, m.
         const STEEP: f64 = 700.0;
         let (lowest, step) = encoding.metres();
         let height = |code: i32| lowest + f64::from(code) * step;
-        let known = |code: i32| code != 0;
+        let has_height = |code: i32| code != 0;
         let rows = self.codes.chunks(self.size.0 as usize);
         let pairs = || rows.clone().flat_map(|row| row.windows(2));
-        let both = || pairs().filter(|pair| known(pair[0]) && known(pair[1]));
+        let both = || pairs().filter(|pair| has_height(pair[0]) && has_height(pair[1]));
         let steep = both().filter(|pair| (height(pair[1]) - height(pair[0])).abs() > STEEP);
         let all = both().count();
-        let on_earth = self.codes.iter().filter(|code| known(**code));
+        let on_earth = self.codes.iter().filter(|code| has_height(**code));
         let on_earth = on_earth
             .map(|code| height(*code))
             .all(|height| GROUND.contains(&height));
@@ -154,8 +154,8 @@ mod tests {
             };
             for with_alpha in [true, false] {
                 let raster = open(&picture(colour, with_alpha), Some(encoding)).expect("heights");
-                let holes = 1 + u64::from(with_alpha);
-                assert_eq!(raster.summary().holes, holes, "{encoding:?}");
+                let no_data = 1 + u64::from(with_alpha);
+                assert_eq!(raster.summary().no_data, no_data, "{encoding:?}");
                 assert!(raster.height(3, SIDE - 1 - 4).is_nan());
                 for (column, row) in [(0, 0), (7, 30), (31, 31)] {
                     let height = raster.height(column, SIDE - 1 - row);
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grey_picture_encodes_nothing() {
+    fn grey_picture_encodes_no_heights() {
         let mut file = Vec::new();
         let mut encoder = ::png::Encoder::new(&mut file, 2, 2);
         encoder.set_color(ColorType::Grayscale);

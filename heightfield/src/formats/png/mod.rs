@@ -6,7 +6,7 @@ use std::io::{BufRead, Seek};
 
 use ::png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Reader, Transformations};
 
-use crate::beside::lay_out_by_world_file;
+use crate::beside::apply_world_file;
 use crate::decoded::Decoded;
 use crate::format::{Claim, Format, Parts};
 use crate::input::{FileBytes, ReadSeek};
@@ -17,14 +17,14 @@ use crate::{Endian, PngChannel, RasterError, Samples};
 pub(super) const FORMAT: Format = Format {
     name: "PNG",
     begins: |head| head.starts_with(b"\x89PNG\r\n\x1a\n"),
-    extensions: &[("png", Claim::Promises)],
+    extensions: &[("png", Claim::Expected)],
     parts: Parts::One,
     decode: |input, options| {
         let mut decoded = match options.encoding {
             Some(encoding) => encoded::decode(input, encoding)?,
             None => decode(input, options.png_channel)?,
         };
-        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
+        apply_world_file(input, &WORLD_FILES, &mut decoded)?;
         Ok(decoded)
     },
 };
@@ -59,10 +59,10 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
         }
     };
     let pixel_bytes = sample_bytes * color.samples();
-    input.check_holds(size.0, size.1, pixel_bytes as u64)?;
+    input.check_size(size.0, size.1, pixel_bytes as u64)?;
     let transparent = transparent_grey(info);
     let chosen = Choice::new(color, channel).map_err(|fault| match channel {
-        None => encoded::suspected(fault, input),
+        None => encoded::suspect_encoded_heights(fault, input),
         Some(_) => fault,
     })?;
     let count = size.0 as usize * size.1 as usize;
@@ -81,7 +81,8 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Ras
     };
     pixels.read(&mut reader)?;
     if channel.is_none() && chosen.height == PngChannel::Alpha {
-        refuse_opaque(&pixels.samples).map_err(|fault| encoded::suspected(fault, input))?;
+        refuse_opaque(&pixels.samples)
+            .map_err(|fault| encoded::suspect_encoded_heights(fault, input))?;
     }
     let what = chosen.described(color);
     let format = format!("PNG, {}-bit {what}", 8 * sample_bytes);
@@ -118,7 +119,7 @@ struct Choice {
 }
 
 impl Choice {
-    fn new(color: ColorType, asked: Option<PngChannel>) -> Result<Self, RasterError> {
+    fn new(color: ColorType, requested: Option<PngChannel>) -> Result<Self, RasterError> {
         use PngChannel::{Alpha, Blue, Green, Grey, Red};
         let (present, usual): (&[PngChannel], _) = match color {
             ColorType::Grayscale => (&[Grey], Some(Grey)),
@@ -132,10 +133,10 @@ impl Choice {
             }
         };
         let ambiguous = |what: String| RasterError::AmbiguousChannels(what);
-        let height = asked
+        let height = requested
             .or(usual)
             .ok_or_else(|| ambiguous("a colour picture".into()))?;
-        let find = |wanted| present.iter().position(|&channel| channel == wanted);
+        let find = |requested| present.iter().position(|&channel| channel == requested);
         Ok(Self {
             height,
             height_index: find(height)
@@ -170,16 +171,16 @@ impl Pixels {
             let mut frame = vec![0; reader.output_buffer_size().unwrap_or(0)];
             reader.next_frame(&mut frame).map_err(fault)?;
             let rows = frame.chunks_exact(self.columns * self.pixel_bytes);
-            rows.for_each(|row| self.take_row(row));
+            rows.for_each(|row| self.add_row(row));
         } else {
             while let Some(row) = reader.next_row().map_err(fault)? {
-                self.take_row(row.data());
+                self.add_row(row.data());
             }
         }
         Ok(())
     }
 
-    fn take_row(&mut self, row: &[u8]) {
+    fn add_row(&mut self, row: &[u8]) {
         let first = self.samples.len();
         let channel = |index: usize| {
             let bytes = index * self.sample_bytes..(index + 1) * self.sample_bytes;
@@ -196,8 +197,10 @@ impl Pixels {
         }
         if let Some((mask, alpha)) = self.mask.as_mut().zip(self.chosen.no_data_index) {
             let transparent = channel(alpha).map(|bytes| bytes.iter().all(|&byte| byte == 0));
-            let holes = (first..).zip(transparent).filter(|&(_, hole)| hole);
-            holes.for_each(|(index, _)| mask.insert(index));
+            let no_data = (first..)
+                .zip(transparent)
+                .filter(|&(_, is_no_data)| is_no_data);
+            no_data.for_each(|(index, _)| mask.insert(index));
         }
     }
 }

@@ -22,7 +22,7 @@ fn open(input: &FileBytes, channel: Option<PngChannel>) -> Result<[f64; 4], Rast
 }
 
 #[test]
-fn the_alpha_of_a_colour_picture_is_the_height() {
+fn alpha_of_a_colour_picture_is_the_height() {
     use ::png::{BitDepth, ColorType};
     let bytes = [9, 9, 9, 1, 9, 9, 9, 2, 9, 9, 9, 0, 7, 8, 9, 255];
     let depth_in_alpha = picture(ColorType::Rgba, BitDepth::Eight, &bytes);
@@ -41,7 +41,7 @@ fn the_alpha_of_a_colour_picture_is_the_height() {
 }
 
 #[test]
-fn an_opaque_colour_picture_is_not_a_height_field() {
+fn opaque_colour_picture_is_not_a_height_field() {
     use ::png::{BitDepth, ColorType};
     let opaque = picture(ColorType::Rgba, BitDepth::Eight, &[255; 16]);
     assert!(matches!(

@@ -5,13 +5,13 @@ use crate::RasterError;
 use crate::blocks::{BlockImage, BlockReader, Part, stored_parts};
 
 /// Number of blocks of the coarsest overview that are checked.
-const LOOKS: usize = 16;
+const MAX_PARTS: usize = 16;
 /// Max samples of the full image that are compared with one of an overview.
 const MAX_COMPARED: u64 = 1 << 22;
 /// Lossy compression may change stored values by this difference ...
-const SLACK: f64 = 1.0;
+const TOLERANCE: f64 = 1.0;
 /// ... or by this share of the value.
-const SLACK_SHARE: f64 = 1e-3;
+const RELATIVE_TOLERANCE: f64 = 1e-3;
 
 /// Compares the extremes of the coarsest overview with the full image around them, if a no-data
 /// value is declared. Returns a remark if the overview is unreliable.
@@ -30,14 +30,14 @@ pub(super) fn blended(
         return Ok(None);
     }
     for (value, place) in outermost(blocks, coarsest, no_data)? {
-        let around = around(&images[coarsest], full, place);
-        if u64::from(around.columns) * u64::from(around.rows) > MAX_COMPARED {
+        let area_below = area_below(&images[coarsest], full, place);
+        if u64::from(area_below.columns) * u64::from(area_below.rows) > MAX_COMPARED {
             continue;
         }
-        let [lowest, highest] = range(blocks, 0, &around, no_data)?;
+        let [lowest, highest] = range(blocks, 0, &area_below, no_data)?;
         let slack = (highest - lowest)
-            .max(SLACK_SHARE * lowest.abs().max(highest.abs()))
-            .max(SLACK);
+            .max(RELATIVE_TOLERANCE * lowest.abs().max(highest.abs()))
+            .max(TOLERANCE);
         if lowest > highest {
             continue;
         }
@@ -60,7 +60,7 @@ fn outermost(
     let parts = stored_parts(&blocks.images()[image], |part| {
         blocks.is_stored(image, part)
     });
-    let step = parts.len().div_ceil(LOOKS).max(1);
+    let step = parts.len().div_ceil(MAX_PARTS).max(1);
     let mut lowest = (f64::INFINITY, [0; 2]);
     let mut highest = (f64::NEG_INFINITY, [0; 2]);
     for part in parts.iter().step_by(step) {
@@ -82,7 +82,7 @@ fn outermost(
 }
 
 /// Returns the part of the full image under a sample of an overview and its neighbours.
-fn around(coarse: &BlockImage, full: &BlockImage, [column, row]: [u32; 2]) -> Part {
+fn area_below(coarse: &BlockImage, full: &BlockImage, [column, row]: [u32; 2]) -> Part {
     let along = |at: u32, coarse: u32, full: u32| {
         let times = f64::from(full) / f64::from(coarse);
         let first = ((f64::from(at) - 1.0) * times).floor().max(0.0) as u32;

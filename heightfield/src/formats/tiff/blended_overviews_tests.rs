@@ -29,7 +29,7 @@ fn opened(folder: &Path, rim: f32) -> Raster {
     std::fs::write(&path, tiff(&[full, coarse].concat(), &images)).expect("written");
     let options = OpenOptions {
         no_data: Some(NO_DATA),
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     Raster::open(path, &options).expect("a terrain")
@@ -44,10 +44,10 @@ fn overviews_mixed_with_no_data_are_not_used() {
         let summary = raster.summary();
         assert_eq!((summary.lowest, summary.highest), (1000.0, 1000.0));
         assert_eq!(raster.surface(1, [33.0, 10.0]), 1000.0);
-        let stated = raster.remarks().join(" ");
+        let remarks = raster.remarks().join(" ");
         assert!(
-            stated.contains(&rim.to_string()) && stated.contains("gdaladdo"),
-            "{stated}"
+            remarks.contains(&rim.to_string()) && remarks.contains("gdaladdo"),
+            "{remarks}"
         );
     }
 }

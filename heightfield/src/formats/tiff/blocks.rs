@@ -9,12 +9,14 @@ use tiff_reader::{TagValue, TiffFile};
 use twox_hash::XxHash64;
 
 use super::images::Directory;
-use super::layout::{Layout, Wanted};
+use super::layout::{Layout, NumberKind};
 use super::masks::Mask;
-use super::samples::{heights, holes};
+use super::samples::{heights, no_data_mask};
 use super::uncompressed::rows;
 use super::{budget, images, unpack};
-use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, stored_parts};
+use crate::blocks::{
+    Block, BlockImage, BlockReader, MAX_BLOCK_BYTES, Part, SurveyParts, stored_parts,
+};
 use crate::decoder_panic::guarded;
 use crate::disk_cache::{DiskCache, FileStamp};
 use crate::input::FileBytes;
@@ -30,7 +32,7 @@ const MAX_ROW: u32 = 32_768;
 
 /// Returns true if single blocks of an image can be read: its rows can, or a strip or tile is small
 /// enough.
-fn suit(layout: &Layout) -> bool {
+fn can_read_blocks(layout: &Layout) -> bool {
     layout.is_read_by_rows() || is_small(layout, chunks(layout))
 }
 
@@ -44,11 +46,11 @@ fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
 /// Returns the columns and rows of a block. For uncompressed samples it is a square, or for a
 /// remote file a wide rectangle, because adjacent bytes arrive in one response; its size with all
 /// bands is limited.
-fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
+fn block(layout: &Layout, is_remote: bool) -> [u32; 2] {
     if !layout.is_read_by_rows() {
         return chunks(layout);
     }
-    let usual = if is_elsewhere { MAX_ROW } else { USUAL_BLOCK };
+    let usual = if is_remote { MAX_ROW } else { USUAL_BLOCK };
     let texels = (MAX_BLOCK_BYTES / layout.texel_bytes()).min(u32::MAX.into()) as u32;
     let columns = layout.chunk.0.min(usual).min(texels).max(1);
     let rows = USUAL_BLOCK * USUAL_BLOCK / columns;
@@ -109,11 +111,11 @@ const MAIN: usize = 0;
 
 /// Properties of a file that are read before its blocks.
 #[derive(Clone, Copy)]
-pub(super) struct Known<'k> {
+pub(super) struct FileContext<'k> {
     /// Its name for warnings.
     pub(super) name: &'k str,
     /// The kind of numbers to read from it.
-    pub(super) wanted: Wanted,
+    pub(super) kind: NumberKind,
     /// The mask's file beside it.
     pub(super) mask: Option<&'k Arc<TiffFile>>,
     /// Folder for decompressed large strips and tiles, or the reason why there is none.
@@ -130,26 +132,29 @@ pub(super) struct Image {
 
 impl Image {
     /// Returns an image of the main file.
-    pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, RasterError> {
+    pub(super) fn of(
+        directory: &Directory,
+        context: &FileContext<'_>,
+    ) -> Result<Self, RasterError> {
         Ok(Self {
             file: MAIN,
-            layout: Layout::read(directory, known.wanted)?,
-            masks: Mask::all(directory, known.mask),
+            layout: Layout::read(directory, context.kind)?,
+            masks: Mask::all(directory, context.mask),
         })
     }
 
     /// Returns true if parts of it can be read without decompressing it to disk.
     pub(super) fn has_parts(&self) -> bool {
-        suit(&self.layout)
+        can_read_blocks(&self.layout)
     }
 
     /// Prepares reading the image in blocks.
     ///
     /// # Errors
     /// The reason why that is impossible.
-    pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
+    pub(super) fn prepare_blocks(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let chunks = self.layout.chunks_name();
-        if !suit(&self.layout) {
+        if !can_read_blocks(&self.layout) {
             let unpacked = match disk {
                 Ok(disk) => {
                     unpack::into_file(&mut self.layout, disk).map_err(|error| error.to_string())
@@ -161,8 +166,8 @@ impl Image {
             })?;
         }
         let mut masks = self.masks.iter_mut();
-        let left = masks.try_for_each(|mask| mask.leave_in_file(disk));
-        left.map_err(|why| {
+        let prepared = masks.try_for_each(|mask| mask.prepare_blocks(disk));
+        prepared.map_err(|why| {
             self.layout.unpacked = None;
             format!("the strips or tiles of its mask are too large to be read in parts, and {why}")
         })
@@ -177,13 +182,13 @@ impl Image {
 }
 
 impl TiffBlocks {
-    /// Returns the full image of a file, [left in it](Image::leave_in_file), and the overviews of
+    /// Returns the full image of a file, [left in it](Image::prepare_blocks), and the overviews of
     /// the same kind in the file and in the one beside it.
     pub(super) fn new(
         (file, remote): Opened,
         full: Image,
         overviews: Option<Opened>,
-        known: &Known<'_>,
+        context: &FileContext<'_>,
         inputs: &[&FileBytes],
     ) -> Result<Self, RasterError> {
         let (also, also_remote) = overviews.unzip();
@@ -193,7 +198,7 @@ impl TiffBlocks {
         for (index, file) in files.iter().enumerate() {
             for directory in images::overviews(file) {
                 // An unusable overview must not make the field unusable.
-                let Ok(image) = Image::of(&directory, known) else {
+                let Ok(image) = Image::of(&directory, context) else {
                     continue;
                 };
                 let mut image = Image {
@@ -203,7 +208,7 @@ impl TiffBlocks {
                 let bytes = file.source().len();
                 let suits = budget::check(&image.layout, bytes, true).is_ok()
                     && image.is_overview_of(&found[MAIN])
-                    && image.leave_in_file(known.disk).is_ok();
+                    && image.prepare_blocks(context.disk).is_ok();
                 if suits {
                     found.push(image);
                 }
@@ -211,18 +216,18 @@ impl TiffBlocks {
         }
         found.sort_by_key(|image| std::cmp::Reverse(image.layout.columns));
         found.dedup_by_key(|image| image.layout.columns);
-        let is_elsewhere = remote.iter().any(Option::is_some);
+        let is_remote = remote.iter().any(Option::is_some);
         let blocks = found.iter().map(|image| BlockImage {
             columns: image.layout.columns,
             rows: image.layout.rows,
-            block: block(&image.layout, is_elsewhere),
+            block: block(&image.layout, is_remote),
             every: None,
             first: [0; 2],
         });
         Ok(Self {
             blocks: blocks.collect(),
             remote,
-            unread: UnreadableParts::of(known.name),
+            unread: UnreadableParts::of(context.name),
             inputs: stamped(inputs)?,
             index: OnceLock::new(),
             images: found,
@@ -235,7 +240,7 @@ impl TiffBlocks {
     }
 
     /// Drops the overviews: coarse levels are then computed from the full image.
-    pub(super) fn leave_overviews_out(&mut self) {
+    pub(super) fn drop_overviews(&mut self) {
         self.images.truncate(1);
         self.blocks.truncate(1);
     }
@@ -245,15 +250,15 @@ impl TiffBlocks {
         let Image { layout, masks, .. } = &self.images[image];
         Ok(Block {
             samples: heights(layout, part)?,
-            holes: holes(layout, masks, part)?,
-            is_lacking: false,
+            no_data_mask: no_data_mask(layout, masks, part)?,
+            is_incomplete: false,
         })
     }
 
     /// Reads a part of an image chunk by chunk after an error: only unreadable strips and tiles
     /// become no-data, with a warning.
     fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
-        let mut all = self.nothing_of(part);
+        let mut all = self.no_data_block(part);
         let stored = self.images[image].layout.chunks_in(part);
         for chunk in stored.filter(|chunk| chunk.bytes > 0) {
             let inside = chunk.covers.within(part);
@@ -269,11 +274,11 @@ impl TiffBlocks {
     /// masks are decoded once.
     fn by_rows(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let Image { layout, masks, .. } = &self.images[image];
-        let mut all = self.nothing_of(part);
-        let masked = || holes(layout, masks, part);
+        let mut all = self.no_data_block(part);
+        let masked = || no_data_mask(layout, masks, part);
         let masked = match guarded(super::FORMAT.name, masked) {
             Ok(masked) => masked,
-            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) if fault.is_connection_error() => return Err(fault),
             Err(fault) => {
                 self.unread.warn(image, part, &fault);
                 return Ok(all);
@@ -289,14 +294,14 @@ impl TiffBlocks {
             if let Some(samples) = self.try_read(image, &row, read)? {
                 let block = Block {
                     samples,
-                    holes: None,
-                    is_lacking: false,
+                    no_data_mask: None,
+                    is_incomplete: false,
                 };
                 copy(&block, &row, &mut all, part);
             }
         }
-        if let (Some(holes), Some(masked)) = (&mut all.holes, masked) {
-            holes.union_with(&masked);
+        if let (Some(no_data_mask), Some(masked)) = (&mut all.no_data_mask, masked) {
+            no_data_mask.union_with(&masked);
         }
         Ok(all)
     }
@@ -305,50 +310,50 @@ impl TiffBlocks {
     fn try_read<T>(
         &self,
         image: usize,
-        piece: &Part,
+        chunk: &Part,
         read: impl FnOnce() -> Result<T, RasterError>,
     ) -> Result<Option<T>, RasterError> {
-        let first = [piece.column, piece.row];
+        let first = [chunk.column, chunk.row];
         if self.unread.has(image, first) {
             return Ok(None);
         }
         match guarded(super::FORMAT.name, read) {
             Ok(read) => Ok(Some(read)),
-            Err(fault) if fault.is_of_the_line() => Err(fault),
+            Err(fault) if fault.is_connection_error() => Err(fault),
             Err(fault) => {
-                self.unread.warn(image, piece, &fault);
+                self.unread.warn(image, chunk, &fault);
                 Ok(None)
             }
         }
     }
 
     /// Returns a part with all samples no-data.
-    fn nothing_of(&self, part: &Part) -> Block {
+    fn no_data_block(&self, part: &Part) -> Block {
         let count = part.columns as usize * part.rows as usize;
-        let mut samples = self.images[MAIN].layout.held().none();
+        let mut samples = self.images[MAIN].layout.memory_type().none();
         with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
-        let mut holes = NoDataMask::with_capacity(count);
-        holes.insert_range(..);
+        let mut no_data_mask = NoDataMask::with_capacity(count);
+        no_data_mask.insert_range(..);
         Block {
             samples,
-            holes: Some(holes),
-            is_lacking: true,
+            no_data_mask: Some(no_data_mask),
+            is_incomplete: true,
         }
     }
 }
 
 /// Copies a piece into a part. Samples with data become data in the part.
-fn copy(block: &Block, piece: &Part, to: &mut Block, part: &Part) {
-    let (columns, width) = (piece.columns as usize, part.columns as usize);
-    for index in 0..columns * piece.rows as usize {
+fn copy(block: &Block, chunk: &Part, to: &mut Block, part: &Part) {
+    let (columns, width) = (chunk.columns as usize, part.columns as usize);
+    for index in 0..columns * chunk.rows as usize {
         let Some(value) = block.stored(index) else {
             continue;
         };
-        let row = (piece.row - part.row) as usize + index / columns;
-        let at = row * width + (piece.column - part.column) as usize + index % columns;
+        let row = (chunk.row - part.row) as usize + index / columns;
+        let at = row * width + (chunk.column - part.column) as usize + index % columns;
         with_samples!(&mut to.samples, values => values[at] = SampleValue::nearest(value));
-        if let Some(holes) = &mut to.holes {
-            holes.remove(at);
+        if let Some(no_data_mask) = &mut to.no_data_mask {
+            no_data_mask.remove(at);
         }
     }
 }
@@ -359,7 +364,7 @@ fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>,
     for input in inputs {
         // The decoder opened the path separately.
         let stamp = input.stamp().filter(|_| input.is_at_its_path());
-        match (input.again()?, stamp) {
+        match (input.try_clone()?, stamp) {
             (Some(own), Some(stamp)) => all.push((own, stamp)),
             _ => return Ok(None),
         }
@@ -370,18 +375,18 @@ fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>,
 impl Image {
     /// Returns true if it covers the other image with fewer samples of the same type and layout.
     fn is_overview_of(&self, full: &Self) -> bool {
-        let (ours, theirs) = (&self.layout, &full.layout);
+        let (own, theirs) = (&self.layout, &full.layout);
         let times = [
-            f64::from(theirs.columns) / f64::from(ours.columns),
-            f64::from(theirs.rows) / f64::from(ours.rows),
+            f64::from(theirs.columns) / f64::from(own.columns),
+            f64::from(theirs.rows) / f64::from(own.rows),
         ];
         // Half of an odd number of samples is rounded up or down.
-        let one = 1.0 / f64::from(ours.columns.min(ours.rows).max(1));
-        ours.stored == theirs.stored
-            && ours.bands == theirs.bands
+        let one = 1.0 / f64::from(own.columns.min(own.rows).max(1));
+        own.stored == theirs.stored
+            && own.bands == theirs.bands
             && times[0] > 1.0
             && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
-            && ours.of_band().is_some()
+            && own.of_band().is_some()
             && self.has_place_of(full, times)
     }
 
@@ -400,7 +405,7 @@ impl Image {
         const TRANSFORM: u16 = 34264;
         const GEO_KEYS: u16 = 34735;
         // Max difference, in cells of the overview.
-        const OF_A_CELL: f64 = 0.5;
+        const MAX_DIFFERENCE: f64 = 0.5;
         let keys = |image: &Self| Some(image.tag(GEO_KEYS)?.as_u16_slice()?.to_vec());
         if keys(self).is_some_and(|own| keys(full) != Some(own)) {
             return false;
@@ -431,7 +436,7 @@ impl Image {
                 Some(at(tie, axis + 3)? - at(tie, axis)? * along)
             };
             let corners = corner(&tie, own).zip(corner(&full_tie, of_full));
-            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= OF_A_CELL * own.abs())
+            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= MAX_DIFFERENCE * own.abs())
         })
     }
 }
@@ -446,7 +451,7 @@ impl BlockReader for TiffBlocks {
     }
 
     fn sample_type(&self) -> SampleType {
-        self.images[MAIN].layout.held()
+        self.images[MAIN].layout.memory_type()
     }
 
     fn is_stored(&self, image: usize, part: &Part) -> bool {
@@ -454,18 +459,18 @@ impl BlockReader for TiffBlocks {
         chunks.any(|chunk| chunk.bytes > 0)
     }
 
-    fn want(&self, image: usize, parts: &[Part]) {
+    fn prefetch(&self, image: usize, parts: &[Part]) {
         let Image { file, layout, .. } = &self.images[image];
         if let Some(remote) = &self.remote[*file] {
-            remote.want(parts.iter().flat_map(|part| ranges(layout, part)));
+            remote.prefetch(parts.iter().flat_map(|part| ranges(layout, part)));
         }
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         // The decoder requests the chunks one by one, so they are prefetched together.
-        self.want(image, std::slice::from_ref(part));
+        self.prefetch(image, std::slice::from_ref(part));
         match self.block(image, part) {
-            Err(fault) if !fault.is_of_the_line() => {
+            Err(fault) if !fault.is_connection_error() => {
                 match self.images[image].layout.is_read_by_rows() {
                     true => self.by_rows(image, part),
                     false => self.by_chunks(image, part),
@@ -480,27 +485,27 @@ impl BlockReader for TiffBlocks {
         for (input, stamp) in self.inputs.as_ref()? {
             let is_same = input.stamp().as_ref() == Some(stamp);
             text += " ";
-            text += stamp.settled().filter(|_| is_same)?;
+            text += stamp.stable_text().filter(|_| is_same)?;
         }
         Some(text)
     }
 
-    fn kept_bytes(&self) -> usize {
+    fn max_memory_bytes(&self) -> usize {
         let pages = match self.remote.iter().any(Option::is_some) {
-            true => RemoteFile::kept_bytes(),
+            true => RemoteFile::max_memory_bytes(),
             false => 0,
         };
         let lists = self.images.iter().map(|image| image.layout.index_bytes());
         pages + lists.sum::<usize>()
     }
 
-    fn looks(&self) -> Option<Looks> {
+    fn survey_parts(&self) -> Option<SurveyParts> {
         let image = self.images.len() - 1;
         let layout = &self.images[image].layout;
         // The same parts of a file are read whether it is local or remote, and in whole strips or
         // tiles if these are small, so that the hash matches that of earlier versions.
         let decoded = chunks(layout);
-        let looked_at = BlockImage {
+        let surveyed = BlockImage {
             block: match is_small(layout, decoded) {
                 true => decoded,
                 false => block(layout, true),
@@ -508,9 +513,9 @@ impl BlockReader for TiffBlocks {
             ..self.blocks[image]
         };
         let is_stored = |part: &Part| self.is_stored(image, part);
-        layout.is_plain.then(|| Looks {
+        layout.is_plain.then(|| SurveyParts {
             image,
-            parts: stored_parts(&looked_at, is_stored),
+            parts: stored_parts(&surveyed, is_stored),
         })
     }
 

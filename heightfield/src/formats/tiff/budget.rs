@@ -21,7 +21,7 @@ const MAX_CHUNK: u64 = 1 << 30;
 pub(super) fn check_memory(layout: &Layout) -> Result<(), RasterError> {
     let (columns, rows, bytes) = (layout.columns.into(), layout.rows.into(), layout.bytes());
     let all = Part::whole(layout.columns, layout.rows);
-    let is_in_parts = layout.is_plain || unpack::suits_whole(layout, &all);
+    let is_in_parts = layout.is_plain || unpack::suits_whole_band(layout, &all);
     let is_large = bytes > MAX_BYTES || (layout.chunk_size() > MAX_CHUNK && !is_in_parts);
     let bytes = bytes.max(layout.chunk_size());
     match is_large && layout.of_band().is_some() {
@@ -66,16 +66,16 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
         return Err(absurd("in rows longer than the file could hold"));
     }
     let chunk = u128::from(layout.chunk.0) * u128::from(layout.chunk.1) * texel;
-    let left_out = u128::from(missing) * chunk;
+    let omitted = u128::from(missing) * chunk;
     let room = promised.min(in_file) * u128::from(SPARSE_RATIO);
-    let holes = match stays {
-        true => left_out,
-        false => left_out.min(room.max(u128::from(SPARSE_FLOOR))),
+    let no_data_bytes = match stays {
+        true => omitted,
+        false => omitted.min(room.max(u128::from(SPARSE_FLOOR))),
     };
-    if image > promised.saturating_add(holes) {
+    if image > promised.saturating_add(no_data_bytes) {
         return Err(absurd("are more than the bytes in its index can hold"));
     }
-    if image > in_file.saturating_add(holes) {
+    if image > in_file.saturating_add(no_data_bytes) {
         return Err(RasterError::Truncated(format!(
             "{columns} × {rows} samples do not fit into its {file_bytes} bytes"
         )));

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use tiff_reader::{Ifd, TiffFile};
 
 use super::gdal_metadata::Metadata;
-use super::layout::Wanted;
+use super::layout::NumberKind;
 use super::{georef, images};
-use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
+use crate::beside::{apply_world_file, find_appended, remark_other_place};
 use crate::decoded::Decoded;
 use crate::input::{Data, FileBytes};
 use crate::{OpenOptions, RasterError};
@@ -31,12 +31,12 @@ pub(super) fn describe(
     let by_gdal = options.gdal.then_some(input);
     georef::apply(image, decoded, metadata.metres_per_vertical_unit, by_gdal);
     match decoded.place {
-        None => lay_out_by_world_file(input, &WORLD_FILES, decoded)?,
+        None => apply_world_file(input, &WORLD_FILES, decoded)?,
         Some(_) if input.is_outline() => {}
         Some(_) => remark_other_place(input, &WORLD_FILES, decoded),
     }
     if let Some(encoding) = options.encoding {
-        decoded.take_codes(encoding);
+        decoded.decode_as_codes(encoding);
     }
     remark_orientation(image, decoded);
     Ok(())
@@ -60,15 +60,15 @@ pub(super) fn overview_sizes(
 }
 
 /// Returns the kind of numbers that the user chose.
-pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, RasterError> {
+pub(super) fn number_kind(options: &OpenOptions) -> Result<NumberKind, RasterError> {
     match (options.encoding, options.band) {
         (Some(_), Some(band)) => Err(RasterError::NoSuchPart {
-            asked: format!("band {band} with --input encoding=…"),
-            there: "three bands together are one height".into(),
+            requested: format!("band {band} with --input encoding=…"),
+            available: "three bands together are one height".into(),
         }),
-        (Some(_), None) => Ok(Wanted::Codes),
-        (None, band) if options.classes => Ok(Wanted::Classes(band)),
-        (None, band) => Ok(Wanted::Heights(band)),
+        (Some(_), None) => Ok(NumberKind::Codes),
+        (None, band) if options.classes => Ok(NumberKind::Classes(band)),
+        (None, band) => Ok(NumberKind::Heights(band)),
     }
 }
 

@@ -29,10 +29,10 @@ impl Metadata {
             Some(xml) => Self::from_xml(xml, band),
             None => Self::default(),
         };
-        if let Some(stated) = text(image, GDAL_NODATA) {
-            let stated = no_data(stated, band, bands.into());
-            metadata.no_data = stated.value;
-            metadata.remarks.extend(stated.remark);
+        if let Some(text) = text(image, GDAL_NODATA) {
+            let parsed = no_data(text, band, bands.into());
+            metadata.no_data = parsed.value;
+            metadata.remarks.extend(parsed.remark);
         }
         metadata
     }
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn notes_that_are_no_xml_are_left_alone() {
+    fn notes_that_are_no_xml_are_ignored() {
         let read = Metadata::from_xml("<a", 0);
         assert_eq!(
             (read.scale, read.offset, read.remarks.len()),

@@ -7,7 +7,7 @@ use geotiff_core::geokeys::{
 use tiff_reader::Ifd;
 
 use crate::Certainty;
-use crate::file_layout::SamplesAre;
+use crate::file_layout::RasterType;
 use crate::placed::GroundUnit;
 
 const GEO_ASCII_PARAMS: u16 = 34737;
@@ -54,16 +54,16 @@ impl GeoKeys {
 
     /// Returns the meaning of a sample: coordinates refer to the centres of points, and to the
     /// corners of areas.
-    pub(super) fn samples_are(&self) -> Option<SamplesAre> {
+    pub(super) fn raster_type(&self) -> Option<RasterType> {
         match self.code(GT_RASTER_TYPE)? {
-            1 => Some(SamplesAre::Areas),
-            2 => Some(SamplesAre::Points),
+            1 => Some(RasterType::Area),
+            2 => Some(RasterType::Point),
             _ => None,
         }
     }
 
     /// Returns a code if it is EPSG's.
-    pub(super) fn known(&self, key: u16) -> Option<u16> {
+    pub(super) fn epsg_code(&self, key: u16) -> Option<u16> {
         const USER_DEFINED: u16 = 32767;
         self.code(key).filter(|code| *code != USER_DEFINED)
     }

@@ -10,7 +10,7 @@ use super::geo_keys::{GeoKeys, metres_of_code, numbers};
 use super::user_defined;
 use crate::crs::{self, ReferenceSystem};
 use crate::decoded::Decoded;
-use crate::file_layout::SamplesAre;
+use crate::file_layout::RasterType;
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 
@@ -33,7 +33,7 @@ pub(super) fn apply(
     let of_code = |key| keys.code(key);
     let both = [PROJECTED_CRS_TYPE, GEODETIC_CRS_TYPE];
     let beside = || {
-        let mut found = (both.iter()).filter_map(|key| crs::vertical_beside(of_code(*key)?));
+        let mut found = (both.iter()).filter_map(|key| crs::vertical_of_compound(of_code(*key)?));
         found.next()
     };
     let system = of_code(VERTICAL_CS_TYPE)
@@ -42,10 +42,10 @@ pub(super) fn apply(
     let stated = stated.or_else(|| of_code(VERTICAL_UNITS).and_then(metres_of_code));
     decoded.set_vertical(system, stated);
     decoded.system = reference_system(&keys, by_gdal);
-    decoded.file_layout.samples_are = keys.samples_are();
+    decoded.file_layout.raster_type = keys.raster_type();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
-        decoded.lay_out(map, keys.unit());
+        decoded.set_layout(map, keys.unit());
         if !has_place(image) {
             decoded.place = None;
         }
@@ -78,7 +78,7 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
         (_, &[east, north, ..], _) => ([0.0, east, 0.0], [0.0, 0.0, -north]),
         _ => return None,
     };
-    match keys.samples_are() == Some(SamplesAre::Points) {
+    match keys.raster_type() == Some(RasterType::Point) {
         true => GroundMap::from_centre(x, y),
         false => GroundMap::new(x, y),
     }
@@ -87,8 +87,8 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
 /// Returns the horizontal reference system, by its code or its name.
 fn reference_system(keys: &GeoKeys, by_gdal: Option<&FileBytes>) -> Option<ReferenceSystem> {
     let code = match keys.is_projected()? {
-        true => keys.known(PROJECTED_CRS_TYPE),
-        false => keys.known(GEODETIC_CRS_TYPE),
+        true => keys.epsg_code(PROJECTED_CRS_TYPE),
+        false => keys.epsg_code(GEODETIC_CRS_TYPE),
     };
     let known = code.and_then(ReferenceSystem::from_code);
     if let Some(system) = known.or_else(|| system_in_text(keys)) {

@@ -47,15 +47,18 @@ pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, RasterError> {
 /// a file `beside`. 0 is no-data.
 pub(super) fn masks(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Directory> {
     let size = |image: &Ifd| (image.width(), image.height());
-    let wanted = size(image.ifd());
+    let own_size = size(image.ifd());
     let mut inside = image.file().ifds().iter().skip(1);
-    let inside = inside.position(|other| kind(other) & MASK != 0 && size(other) == wanted);
+    let inside = inside.position(|other| kind(other) & MASK != 0 && size(other) == own_size);
     let inside = inside.map(|number| Directory {
         file: image.file.clone(),
         number: number + 1,
     });
     let outside = beside.and_then(|file| {
-        let number = file.ifds().iter().position(|other| size(other) == wanted)?;
+        let number = file
+            .ifds()
+            .iter()
+            .position(|other| size(other) == own_size)?;
         let file = file.clone();
         Some(Directory { file, number })
     });

@@ -52,15 +52,15 @@ impl<'f> Index<'f> {
     }
 
     /// Returns the size of the lists in memory.
-    pub(super) fn held_bytes(&self) -> usize {
-        let held = |list: &TagValue| match list {
+    pub(super) fn memory_bytes(&self) -> usize {
+        let list_bytes = |list: &TagValue| match list {
             TagValue::Byte(all) => all.len(),
             TagValue::Short(all) => size_of_val(&all[..]),
             TagValue::Long(all) => size_of_val(&all[..]),
             TagValue::Long8(all) => size_of_val(&all[..]),
             _ => 0,
         };
-        held(self.places) + held(self.bytes)
+        list_bytes(self.places) + list_bytes(self.bytes)
     }
 }
 

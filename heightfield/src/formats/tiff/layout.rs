@@ -11,7 +11,7 @@ use super::index::{Chunk, Index};
 use super::unpacked_on_disk::Unpacked;
 use crate::blocks::Part;
 use crate::encoding::no_codes;
-use crate::read::Stored;
+use crate::read::StoredType;
 use crate::{RasterError, SampleType};
 
 /// Larger chunks are not decoded whole if there is an alternative, bytes.
@@ -51,7 +51,7 @@ pub(super) const COLOURS: usize = 3;
 
 /// The kind of numbers to read from a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wanted {
+pub(super) enum NumberKind {
     /// Heights in a band, the first being 1; by default, in the first.
     Heights(Option<u32>),
     /// As `Heights`, for numbers that are classes: the numbers of a palette are used directly.
@@ -60,7 +60,7 @@ pub(super) enum Wanted {
     Codes,
 }
 
-impl Wanted {
+impl NumberKind {
     const fn band(self) -> Option<u32> {
         match self {
             Self::Heights(band) | Self::Classes(band) => band,
@@ -100,20 +100,20 @@ fn compression(code: u16) -> Result<(&'static str, u64), RasterError> {
 
 impl Layout {
     /// Reads and checks the layout of an image for the requested kind of numbers.
-    pub(super) fn read(directory: &Directory, wanted: Wanted) -> Result<Self, RasterError> {
+    pub(super) fn read(directory: &Directory, kind: NumberKind) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let bands = image.samples_per_pixel();
-        match wanted {
-            Wanted::Codes => check_codes(image, bands)?,
-            Wanted::Classes(_) if is_palette(image) => {}
-            Wanted::Heights(band) | Wanted::Classes(band) => {
+        match kind {
+            NumberKind::Codes => check_codes(image, bands)?,
+            NumberKind::Classes(_) if is_palette(image) => {}
+            NumberKind::Heights(band) | NumberKind::Classes(band) => {
                 refuse_colour(image, bands, band.is_some())?;
             }
         }
-        let band = chosen_band(wanted.band(), bands)?;
+        let band = chosen_band(kind.band(), bands)?;
         let layout = Self {
             band,
-            has_codes: wanted == Wanted::Codes,
+            has_codes: kind == NumberKind::Codes,
             alpha: alpha(image, bands).filter(|alpha| *alpha != band),
             ..Self::of(directory, stored_type(image)?)?
         };
@@ -187,7 +187,7 @@ impl Layout {
 
     /// Returns true if a part can be read without decompressing to disk first.
     #[cfg(test)]
-    pub(super) fn is_at_hand(&self, part: &Part) -> bool {
+    pub(super) fn is_available(&self, part: &Part) -> bool {
         self.unpacked.as_ref().is_none_or(|unpacked| {
             let bands = self.bands_read();
             let chunks = bands.flat_map(|band| self.chunks_of(band, part));
@@ -229,28 +229,28 @@ impl Layout {
     }
 
     /// Returns the type of a sample in the file, and in memory.
-    pub(super) const fn sample(&self) -> Stored {
+    pub(super) const fn sample(&self) -> StoredType {
         use SampleFormat::{Float, Signed, Unsigned};
         match self.stored {
-            (Unsigned, 8) => Stored::Held(SampleType::U8),
-            (Signed, 8) => Stored::Held(SampleType::I8),
-            (Unsigned, 16) => Stored::Held(SampleType::U16),
-            (Signed, 16) => Stored::Held(SampleType::I16),
-            (Float, 16) => Stored::F16,
-            (Unsigned, 32) => Stored::Held(SampleType::U32),
-            (Signed, 32) => Stored::Held(SampleType::I32),
-            (Float, 32) => Stored::Held(SampleType::F32),
-            (Unsigned, _) => Stored::U64,
-            (Signed, _) => Stored::I64,
-            (Float, _) => Stored::Held(SampleType::F64),
+            (Unsigned, 8) => StoredType::Held(SampleType::U8),
+            (Signed, 8) => StoredType::Held(SampleType::I8),
+            (Unsigned, 16) => StoredType::Held(SampleType::U16),
+            (Signed, 16) => StoredType::Held(SampleType::I16),
+            (Float, 16) => StoredType::F16,
+            (Unsigned, 32) => StoredType::Held(SampleType::U32),
+            (Signed, 32) => StoredType::Held(SampleType::I32),
+            (Float, 32) => StoredType::Held(SampleType::F32),
+            (Unsigned, _) => StoredType::U64,
+            (Signed, _) => StoredType::I64,
+            (Float, _) => StoredType::Held(SampleType::F64),
         }
     }
 
     /// Returns the type of the heights in memory.
-    pub(super) const fn held(&self) -> SampleType {
+    pub(super) const fn memory_type(&self) -> SampleType {
         match self.has_codes {
             true => SampleType::I32,
-            false => self.sample().held(),
+            false => self.sample().memory_type(),
         }
     }
 
@@ -294,7 +294,7 @@ impl Layout {
     /// Returns the size of all samples in memory, bytes.
     pub(super) fn bytes(&self) -> u64 {
         let samples = u64::from(self.columns) * u64::from(self.rows);
-        samples.saturating_mul(self.held().bytes())
+        samples.saturating_mul(self.memory_type().bytes())
     }
 
     /// Returns offset and size of each chunk of the heights' band; `None` if the index is too
@@ -319,7 +319,7 @@ impl Layout {
 
     /// Returns the size of its lists in memory.
     pub(super) fn index_bytes(&self) -> usize {
-        self.index().map_or(0, |index| index.held_bytes())
+        self.index().map_or(0, |index| index.memory_bytes())
     }
 
     fn index(&self) -> Option<Index<'_>> {
@@ -337,13 +337,15 @@ impl Layout {
 
     /// Returns the bands whose chunks are read for heights, including the transparency.
     pub(super) fn bands_read(&self) -> impl Iterator<Item = usize> + use<> {
-        let apart = self.alpha.filter(|_| self.planar);
+        let separate_alpha = self.alpha.filter(|_| self.planar);
         let colours = if self.has_codes && self.planar {
             1..COLOURS
         } else {
             1..1
         };
-        std::iter::once(self.band).chain(colours).chain(apart)
+        std::iter::once(self.band)
+            .chain(colours)
+            .chain(separate_alpha)
     }
 
     /// Returns the bytes of a texel before a band's sample.
@@ -385,11 +387,13 @@ impl Layout {
 
 /// Checks the predictor: floats support only predictor 3.
 fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError> {
-    const OF_FLOATS: u16 = 3;
+    const FLOAT_PREDICTOR: u16 = 3;
     match (image.predictor(), format) {
-        (OF_FLOATS, SampleFormat::Signed | SampleFormat::Unsigned) => Err(RasterError::damaged(
-            "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
-        )),
+        (FLOAT_PREDICTOR, SampleFormat::Signed | SampleFormat::Unsigned) => {
+            Err(RasterError::damaged(
+                "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
+            ))
+        }
         _ => Ok(()),
     }
 }
@@ -410,15 +414,18 @@ fn alpha(image: &Ifd, bands: u16) -> Option<usize> {
 }
 
 /// Returns the band that the user chose, or the first, which is 0.
-fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, RasterError> {
-    let band = asked.unwrap_or(1).max(1);
+fn chosen_band(requested: Option<u32>, bands: u16) -> Result<usize, RasterError> {
+    let band = requested.unwrap_or(1).max(1);
     if band > u32::from(bands) {
-        let there = match bands {
+        let available = match bands {
             1 => "the file has one band".to_owned(),
             bands => format!("the file has bands 1 to {bands}"),
         };
-        let asked = format!("band {band}");
-        return Err(RasterError::NoSuchPart { asked, there });
+        let requested = format!("band {band}");
+        return Err(RasterError::NoSuchPart {
+            requested,
+            available,
+        });
     }
     Ok(band as usize - 1)
 }

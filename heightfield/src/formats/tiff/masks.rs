@@ -45,7 +45,7 @@ impl Mask {
     ///
     /// # Errors
     /// The reason why that is impossible.
-    pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
+    pub(super) fn prepare_blocks(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let samples = self.chunk_samples();
         let is_large = samples > MAX_DECODED;
         let unpacked = match (&mut self.layout, disk) {
@@ -77,7 +77,7 @@ impl Mask {
     ) -> Result<(), RasterError> {
         match &self.layout {
             Some(mask) if mask.is_read_by_rows() => by_rows(mask, part, set),
-            Some(mask) if unpack::suits_whole(mask, part) => whole(mask, part, set),
+            Some(mask) if unpack::suits_whole_band(mask, part) => whole(mask, part, set),
             _ => {
                 let band = Band::new(&self.directory, 0);
                 let has_data = band.read(part, |value: u8| value != 0)?;
@@ -105,7 +105,7 @@ fn by_rows(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(),
             }
         }
     }
-    all_there(found, part)
+    check_all_found(found, part)
 }
 
 /// Reads a whole mask, strip by strip.
@@ -114,7 +114,7 @@ fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), R
     for chunk in mask.chunks_in(part) {
         let covers = chunk.covers;
         found += u64::from(covers.columns) * u64::from(covers.rows);
-        let nothing = vec![0; mask.row_bytes() as usize];
+        let zeros = vec![0; mask.row_bytes() as usize];
         let mut rows = match chunk.bytes {
             0 => None,
             _ => Some(Rows::of(mask, &chunk)?),
@@ -127,15 +127,15 @@ fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), R
             };
             let bytes = match &mut rows {
                 Some(rows) => rows.next()?,
-                None => &nothing,
+                None => &zeros,
             };
             row_missing(mask, &chunk, &row, part, bytes, &mut set);
         }
     }
-    all_there(found, part)
+    check_all_found(found, part)
 }
 
-fn all_there(found: u64, part: &Part) -> Result<(), RasterError> {
+fn check_all_found(found: u64, part: &Part) -> Result<(), RasterError> {
     match found == u64::from(part.columns) * u64::from(part.rows) {
         true => Ok(()),
         false => Err(RasterError::damaged(

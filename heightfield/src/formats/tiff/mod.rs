@@ -47,9 +47,9 @@ use crate::input::{Data, FileBytes};
 use crate::storage::Storage;
 use crate::{OpenOptions, RasterError};
 use blended_overviews::blended;
-use blocks::{Image, Known, TiffBlocks};
+use blocks::{FileContext, Image, TiffBlocks};
 use decoder_error::fault;
-use describe::{describe, overview_sizes, wanted};
+use describe::{describe, number_kind, overview_sizes};
 use gdal_metadata::Metadata;
 use layout::Layout;
 use remote_source::RemoteSource;
@@ -58,7 +58,7 @@ use remote_source::RemoteSource;
 pub(super) const FORMAT: Format = Format {
     name: "TIFF",
     begins: |head| starts_with_any(head, &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]),
-    extensions: &[("tif", Claim::Promises), ("tiff", Claim::Promises)],
+    extensions: &[("tif", Claim::Expected), ("tiff", Claim::Expected)],
     parts: Parts::Bands,
     decode,
 };
@@ -78,16 +78,16 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     let full = images::full(&file)?;
     let mask_file = find_appended(input, "msk")?;
     let mask = mask_file.as_ref().map(open).transpose()?.map(Arc::new);
-    let known = Known {
+    let context = FileContext {
         name: input.name(),
-        wanted: wanted(options)?,
+        kind: number_kind(options)?,
         mask: mask.as_ref(),
         disk: match input.remote() {
             Some(_) => Err("it is at a URL"),
             None => Ok(&options.disk_cache),
         },
     };
-    let image = Image::of(&full, &known)?;
+    let image = Image::of(&full, &context)?;
     let layout = &image.layout;
     let (size, band, bands) = ((layout.columns, layout.rows), layout.band, layout.bands);
     let has_alpha = layout.alpha.is_some();
@@ -99,19 +99,19 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
         bands: bands.into(),
         block: Some(layout.chunk.into()),
         overviews: overview_sizes(&file, input)?,
-        samples_are: None,
+        raster_type: None,
     };
     let metadata = Metadata::read(full.ifd(), band, bands);
     let files: Vec<_> = once(input).chain(&mask_file).collect();
-    let held = layout.held().none();
+    let sample_type = layout.memory_type().none();
     let no_data = options.no_data.or(metadata.no_data);
-    let no_data = no_data.and_then(|value| held.comparable_no_data(value));
-    let (storage, reported) = stored(&files, options, &file, image, &known, no_data)?;
+    let no_data = no_data.and_then(|value| sample_type.comparable_no_data(value));
+    let (storage, storage_remarks) = stored(&files, options, &file, image, &context, no_data)?;
     let mut decoded = Decoded::new(format, size, storage);
-    for reported in reported {
-        match reported {
-            Reported::Remark(remark) => decoded.remarks.push(remark),
-            Reported::Whole(why) => decoded.why_whole = Some(why),
+    for remark in storage_remarks {
+        match remark {
+            StorageRemark::Remark(remark) => decoded.remarks.push(remark),
+            StorageRemark::MemoryReason(why) => decoded.memory_reason = Some(why),
         }
     }
     if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
@@ -125,11 +125,11 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
 }
 
 /// Remark on the storage of the samples.
-enum Reported {
+enum StorageRemark {
     /// A remark on how they are read.
     Remark(String),
     /// Reason why all are in memory.
-    Whole(String),
+    MemoryReason(String),
 }
 
 /// Returns the samples of the full image: left in the file if they are many and it allows that,
@@ -140,87 +140,94 @@ fn stored(
     options: &OpenOptions,
     file: &Arc<TiffFile>,
     mut image: Image,
-    known: &Known<'_>,
+    context: &FileContext<'_>,
     no_data: Option<f64>,
-) -> Result<(Storage, Vec<Reported>), RasterError> {
+) -> Result<(Storage, Vec<StorageRemark>), RasterError> {
     let input = files[0];
-    let most = match input.remote() {
+    let max = match input.remote() {
         // Parts that are not accessed are not downloaded.
-        Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
-        None => options.most_in_memory_bytes,
+        Some(_) => options.max_in_memory_bytes.min(FEW_BYTES),
+        None => options.max_in_memory_bytes,
     };
-    let mut reported = None;
-    if image.layout.bytes() > most {
+    let mut storage_remarks = None;
+    if image.layout.bytes() > max {
         if let Err(fault) = budget::check(&image.layout, input.len(), true) {
             if !image.has_parts() {
                 budget::check_memory(&image.layout)?;
             }
             return Err(fault);
         }
-        match image.leave_in_file(known.disk) {
+        match image.prepare_blocks(context.disk) {
             Ok(()) => {
                 if !input.is_outline() {
                     unpack::check_first(&image.layout)?;
                 }
-                reported = unpacked_told(&image);
+                storage_remarks = remark_unpacked(&image);
                 let overviews = match find_appended(input, "ovr")? {
                     Some(beside) => Some((Arc::new(open(&beside)?), beside.remote())),
                     None => None,
                 };
                 let file = (file.clone(), input.remote());
-                let mut blocks = TiffBlocks::new(file, image, overviews, known, files)?;
-                let mut remarks: Vec<_> = reported.into_iter().collect();
+                let mut blocks = TiffBlocks::new(file, image, overviews, context, files)?;
+                let mut remarks: Vec<_> = storage_remarks.into_iter().collect();
                 if options.encoding.is_some() && blocks.has_overviews() {
-                    blocks.leave_overviews_out();
-                    remarks.push(Reported::Remark(
+                    blocks.drop_overviews();
+                    remarks.push(StorageRemark::Remark(
                         "its overviews are not used: the mean of encoded colours is no height"
                             .into(),
                     ));
                 } else if let Some(no_data) = no_data.filter(|_| !input.is_outline())
                     && let Some(remark) = blended(&blocks, no_data)?
                 {
-                    blocks.leave_overviews_out();
-                    remarks.push(Reported::Remark(remark));
+                    blocks.drop_overviews();
+                    remarks.push(StorageRemark::Remark(remark));
                 }
                 return Ok((blocks.into(), remarks));
             }
-            Err(why) => reported = Some(Reported::Whole(why + at_once(&image.layout))),
+            Err(why) => {
+                storage_remarks = Some(StorageRemark::MemoryReason(
+                    why + peak_memory_remark(&image.layout),
+                ))
+            }
         }
     }
     let layout = &image.layout;
     budget::check_memory(layout)?;
     budget::check(layout, input.len(), false)?;
     if input.is_outline() {
-        return Ok((layout.held().none().into(), reported.into_iter().collect()));
+        return Ok((
+            layout.memory_type().none().into(),
+            storage_remarks.into_iter().collect(),
+        ));
     }
     let all = Part::whole(layout.columns, layout.rows);
     if let Some(remote) = input.remote() {
-        remote.want(once(0..input.len()));
+        remote.prefetch(once(0..input.len()));
     }
     let mut storage = Storage::from(samples::heights(layout, &all)?);
-    storage.set_no_data(samples::holes(layout, &image.masks, &all)?);
-    Ok((storage, reported.into_iter().collect()))
+    storage.set_no_data(samples::no_data_mask(layout, &image.masks, &all)?);
+    Ok((storage, storage_remarks.into_iter().collect()))
 }
 
 /// Returns a remark on the peak memory, if reading needs more than the samples themselves.
-fn at_once(layout: &Layout) -> &'static str {
+fn peak_memory_remark(layout: &Layout) -> &'static str {
     let all = Part::whole(layout.columns, layout.rows);
-    match layout.is_plain || unpack::suits_whole(layout, &all) {
+    match layout.is_plain || unpack::suits_whole_band(layout, &all) {
         true => "",
         false => "; while it is opened it takes more than that",
     }
 }
 
 /// Returns a remark on strips or tiles that are decompressed to disk, if there are any.
-fn unpacked_told(image: &Image) -> Option<Reported> {
+fn remark_unpacked(image: &Image) -> Option<StorageRemark> {
     let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
-    let whose = match &image.layout.unpacked {
+    let owner = match &image.layout.unpacked {
         Some(_) => format!("its {}", image.layout.chunks_name()),
         None => "the strips or tiles of its mask".into(),
     };
     (megabytes > 0).then(|| {
-        Reported::Remark(format!(
-            "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache), up to {megabytes} MB, until the program ends"
+        StorageRemark::Remark(format!(
+            "{owner} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache), up to {megabytes} MB, until the program ends"
         ))
     })
 }
@@ -260,7 +267,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, RasterError> {
 fn is_long(reason: &str) -> bool {
     [MAX_LIST, ALL_LISTS]
         .iter()
-        .any(|most| reason.ends_with(&format!("parse budget {most}")))
+        .any(|max| reason.ends_with(&format!("parse budget {max}")))
 }
 
 #[cfg(test)]

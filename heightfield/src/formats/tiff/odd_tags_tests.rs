@@ -38,17 +38,17 @@ fn tie_points_without_a_grid_and_orientation_get_a_remark() {
     let ties = |count: usize| vec![(33922, Values::Doubles(vec![1.0; 6 * count]))];
     for count in [1, 4] {
         let raster = with_tags(ties(count)).expect("a terrain");
-        let stated = raster.remarks().join(" ");
+        let remarks = raster.remarks().join(" ");
         assert!(
-            stated.contains(&format!("places of {count} samples")),
-            "{stated}"
+            remarks.contains(&format!("places of {count} samples")),
+            "{remarks}"
         );
     }
     let whole = with_tags(placed([0.0, 0.0], 30.0, 32632)).expect("a terrain");
     assert_eq!(whole.remarks(), [""; 0]);
     let turned = vec![(274, Values::Shorts(vec![4]))];
-    let stated = with_tags(turned).expect("a terrain").remarks().join(" ");
-    assert!(stated.contains("the first row at the bottom"), "{stated}");
+    let remarks = with_tags(turned).expect("a terrain").remarks().join(" ");
+    assert!(remarks.contains("the first row at the bottom"), "{remarks}");
 }
 
 #[test]
@@ -70,10 +70,10 @@ fn colours_encode_heights_in_memory_and_in_the_file() {
         long(278, SIZE[1]),
         long(279, data.len() as u32),
     ];
-    for most_in_memory_bytes in [0, 1 << 20] {
+    for max_in_memory_bytes in [0, 1 << 20] {
         let options = OpenOptions {
             encoding: Some(Encoding::TerrainRgb),
-            most_in_memory_bytes,
+            max_in_memory_bytes,
             ..OpenOptions::default()
         };
         let raster = opened(&data, tags.clone(), &options).expect("a terrain");

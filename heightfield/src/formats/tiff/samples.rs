@@ -30,7 +30,7 @@ fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterErro
     if layout.is_read_by_rows() {
         return uncompressed::read(layout, band, part);
     }
-    if unpack::suits_whole(layout, part) {
+    if unpack::suits_whole_band(layout, part) {
         return unpack::read_whole(layout, band);
     }
     let band = Band::new(&layout.directory, band);
@@ -51,21 +51,21 @@ fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterErro
 
 /// Returns the no-data of a part: chunks missing in a sparse file, masked samples, and samples with
 /// zero alpha.
-pub(super) fn holes(
+pub(super) fn no_data_mask(
     layout: &Layout,
     masks: &[Mask],
     part: &Part,
 ) -> Result<Option<NoDataMask>, RasterError> {
     let columns = part.columns as usize;
-    let mut holes = None;
+    let mut no_data_mask = None;
     let mut set = |index| {
         let size = columns * part.rows as usize;
-        let holes = holes.get_or_insert_with(|| NoDataMask::with_capacity(size));
-        holes.insert(index);
+        let no_data_mask = no_data_mask.get_or_insert_with(|| NoDataMask::with_capacity(size));
+        no_data_mask.insert(index);
     };
     let (first, last) = (part.row, part.row + part.rows);
-    for left_out in layout.chunks_in(part).filter(|chunk| chunk.bytes == 0) {
-        let covers = left_out.covers;
+    for omitted in layout.chunks_in(part).filter(|chunk| chunk.bytes == 0) {
+        let covers = omitted.covers;
         let rows = covers.row.max(first)..(covers.row + covers.rows).min(last);
         let west = covers.column.max(part.column) - part.column;
         let east = (covers.column + covers.columns).min(part.column + part.columns) - part.column;
@@ -83,5 +83,5 @@ pub(super) fn holes(
             clear.for_each(|(index, _)| set(index));
         });
     }
-    Ok(holes)
+    Ok(no_data_mask)
 }

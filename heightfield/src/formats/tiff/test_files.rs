@@ -63,7 +63,7 @@ pub(super) struct Made {
     /// A tag with other values.
     pub(super) other: Option<(u16, &'static [u32])>,
     /// A chunk to leave out, as in a sparse file.
-    pub(super) left_out: Option<usize>,
+    pub(super) omitted: Option<usize>,
     pub(super) packing: Packing,
 }
 
@@ -89,7 +89,7 @@ pub(super) const ONE_STRIP: Made = Made {
     bands: 1,
     is_planar: false,
     other: None,
-    left_out: None,
+    omitted: None,
     packing: PLAIN,
 };
 
@@ -175,7 +175,7 @@ impl Made {
         let mut places = vec![];
         let mut data = vec![0; 8];
         for (number, chunk) in chunks.iter().enumerate() {
-            let is_there = self.left_out != Some(number);
+            let is_there = self.omitted != Some(number);
             places.push(if is_there { data.len() as u32 } else { 0 });
             if is_there {
                 data.extend(chunk);
@@ -220,7 +220,7 @@ impl Made {
         data[..8].copy_from_slice(&[head, &short(self, 42), &long(self, at)].concat());
         data.extend(short(self, tags.len() as u32));
         let mut beyond = at + 2 + 12 * tags.len() as u32 + 4;
-        let mut far = vec![];
+        let mut out_of_line = vec![];
         for (tag, values) in tags {
             let bytes: Vec<u8> = values.iter().flat_map(|value| long(self, *value)).collect();
             data.extend(short(self, (*tag).into()));
@@ -231,19 +231,19 @@ impl Made {
             } else {
                 data.extend(long(self, beyond));
                 beyond += bytes.len() as u32;
-                far.extend(bytes);
+                out_of_line.extend(bytes);
             }
         }
         data.extend([0; 4]);
-        data.extend(far);
+        data.extend(out_of_line);
         data
     }
 }
 
-pub(super) fn open(made: &Made, most_in_memory_bytes: u64) -> Result<Raster, RasterError> {
+pub(super) fn open(made: &Made, max_in_memory_bytes: u64) -> Result<Raster, RasterError> {
     let options = OpenOptions {
         band: (made.bands > 1).then_some(BAND),
-        most_in_memory_bytes,
+        max_in_memory_bytes,
         ..OpenOptions::default()
     };
     let input = FileBytes::unpacked("test.tif", made.bytes());

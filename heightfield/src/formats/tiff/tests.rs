@@ -60,7 +60,7 @@ const FULL: Part<'_> = Part {
 };
 
 #[test]
-fn an_overview_before_the_full_image_is_passed_over() {
+fn overview_before_the_full_image_is_skipped() {
     let overview = Part {
         kind: 1,
         size: (2, 2),
@@ -84,7 +84,7 @@ fn mask_image_in_the_same_file_marks_no_data() {
         samples: &[0; 4],
     };
     let raster = open(file(&[FULL, other, mask])).expect("a masked image");
-    assert_eq!(raster.summary().holes, 2);
+    assert_eq!(raster.summary().no_data, 2);
     assert!(raster.height(1, 1).is_nan() && raster.height(2, 0).is_nan());
     assert_eq!(raster.height(2, 1), 3.0);
 }
@@ -109,15 +109,15 @@ fn with_palette() -> Vec<u8> {
 }
 
 #[test]
-fn the_numbers_of_a_palette_are_classes_and_no_heights() {
+fn palette_numbers_are_classes_and_no_heights() {
     assert!(matches!(
         open(with_palette()),
         Err(RasterError::NotAHeightField(what)) if what.contains("palette")
     ));
-    for most_in_memory_bytes in [0, 1 << 20] {
+    for max_in_memory_bytes in [0, 1 << 20] {
         let options = OpenOptions {
             classes: true,
-            most_in_memory_bytes,
+            max_in_memory_bytes,
             ..OpenOptions::default()
         };
         let input = FileBytes::unpacked("test.tif", with_palette());
@@ -131,7 +131,7 @@ fn the_numbers_of_a_palette_are_classes_and_no_heights() {
 /// Returns options that leave samples in the file, whatever their size.
 fn in_blocks() -> OpenOptions {
     OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     }
 }
@@ -153,7 +153,7 @@ fn with_overview(size: (u32, u32), height: u8) -> Vec<u8> {
 }
 
 #[test]
-fn an_overview_serves_coarse_levels_if_it_shows_the_same_field() {
+fn overview_serves_coarse_levels_of_the_same_field() {
     for (size, is_used) in [((32, 24), true), ((31, 24), true), ((32, 10), false)] {
         let input = FileBytes::unpacked("test.tif", with_overview(size, 201));
         let decoded = decode(&input, &in_blocks()).expect("decoded");
@@ -191,7 +191,7 @@ fn overviews_and_masks_beside_a_file_are_its_own() {
     assert_eq!(raster.surface(1, [30.0, 30.0]), 7.0);
     assert_eq!(raster.surface(2, [30.0, 30.0]), 9.0);
     assert!(raster.surface(2, [0.0, 47.0]).is_nan());
-    assert_eq!(raster.summary().holes, 1);
+    assert_eq!(raster.summary().no_data, 1);
 }
 
 #[test]
@@ -254,21 +254,21 @@ fn by_hand(tags: &[(u16, u16, u32, Vec<u8>)], samples: &[u8]) -> Vec<u8> {
     bytes.extend((8 + samples.len() as u32).to_le_bytes());
     bytes.extend(samples);
     bytes.extend((tags.len() as u16).to_le_bytes());
-    let mut far: Vec<u8> = Vec::new();
+    let mut out_of_line: Vec<u8> = Vec::new();
     let after = bytes.len() + 12 * tags.len() + 4;
     for (tag, kind, count, value) in tags {
         bytes.extend(tag.to_le_bytes());
         bytes.extend(kind.to_le_bytes());
         bytes.extend(count.to_le_bytes());
         if value.len() > 4 {
-            bytes.extend(((after + far.len()) as u32).to_le_bytes());
-            far.extend(value);
+            bytes.extend(((after + out_of_line.len()) as u32).to_le_bytes());
+            out_of_line.extend(value);
         } else {
             bytes.extend(value.iter().chain(&[0; 4]).take(4));
         }
     }
     bytes.extend([0; 4]);
-    bytes.extend(far);
+    bytes.extend(out_of_line);
     bytes
 }
 
@@ -300,16 +300,16 @@ fn grey(size: [u16; 2], bands: u16) -> Vec<(u16, u16, u32, Vec<u8>)> {
 #[test]
 fn transparent_alpha_samples_are_no_data() {
     let samples = [1, 255, 2, 0, 3, 7, 4, 255];
-    for (kind, holes) in [(1, 1), (2, 1), (0, 0)] {
+    for (kind, no_data_count) in [(1, 1), (2, 1), (0, 0)] {
         let mut tags = grey([2, 2], 2);
         tags.push(shorts(338, &[kind]));
         let raster = open(by_hand(&tags, &samples)).expect("a band and its alpha");
         assert_eq!(
-            raster.summary().holes,
-            holes,
+            raster.summary().no_data,
+            no_data_count,
             "extra samples of kind {kind}"
         );
-        assert_eq!(raster.height(1, 1).is_nan(), holes == 1);
+        assert_eq!(raster.height(1, 1).is_nan(), no_data_count == 1);
         assert_eq!(raster.height(0, 0), 3.0);
     }
 }
@@ -327,7 +327,7 @@ fn msk_sidecar_file_marks_no_data() {
     };
     std::fs::write(folder.path().join("terrain.tif.msk"), file(&[mask])).expect("written");
     let raster = Raster::open(&path, &crate::OpenOptions::default()).expect("opens");
-    assert_eq!(raster.summary().holes, 2);
+    assert_eq!(raster.summary().no_data, 2);
     assert!(raster.height(1, 1).is_nan() && raster.height(2, 0).is_nan());
 }
 
@@ -398,7 +398,7 @@ fn coordinates_of_points_are_those_of_the_samples_centres() {
 }
 
 #[test]
-fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
+fn chosen_band_of_a_colour_image_is_a_height() {
     let mut tags = grey([2, 2], 3);
     tags[4] = shorts(262, &[2]);
     let bytes = by_hand(&tags, &[1, 20, 3, 4, 50, 6, 7, 80, 9, 10, 110, 12]);
@@ -439,7 +439,7 @@ fn in_tiles(side: u32, tile: u32, [offsets, sizes]: [&[u32]; 2]) -> Vec<(u16, u1
 
 /// One stored tile in six thousand, without compression, is a valid file.
 #[test]
-fn a_file_with_few_of_its_tiles_is_whole_where_it_stays_on_disk() {
+fn sparse_file_on_disk_has_its_whole_size() {
     let (side, tile) = (20_000_u32, 256_u32);
     let count = side.div_ceil(tile).pow(2) as usize;
     let at_the_last = |value: u32| {
@@ -469,7 +469,7 @@ fn sparse_file_beyond_memory_is_oversized_not_damaged() {
 }
 
 #[test]
-fn a_world_file_places_what_has_no_place_of_its_own() {
+fn world_file_places_a_file_without_own_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plain.tif");
     std::fs::write(&path, file(&[FULL])).expect("written");

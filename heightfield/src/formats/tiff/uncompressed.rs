@@ -24,10 +24,10 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
         ByteOrder::LittleEndian => Endian::Little,
         ByteOrder::BigEndian => Endian::Big,
     };
-    let apart = layout.texel_bytes() as usize;
+    let stride = layout.texel_bytes() as usize;
     let first = layout.bytes_before(band);
     let count = u64::from(part.columns) * u64::from(part.rows);
-    let mut samples = stored.room(count)?;
+    let mut samples = stored.reserve(count)?;
     for row in part.row..part.row + part.rows {
         let row = Part {
             row,
@@ -37,7 +37,7 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
         for chunk in layout.chunks_of(band, &row) {
             for range in rows(layout, &chunk, &row) {
                 let bytes = bytes(layout, &chunk, range)?;
-                stored.append(&mut samples, &bytes[first..], apart, endian);
+                stored.append(&mut samples, &bytes[first..], stride, endian);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::super::test_files::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open,
 use crate::RasterError;
 
 #[test]
-fn every_sample_type_decodes_in_both_byte_orders() {
+fn sample_types_decode_in_both_byte_orders() {
     for kind in KINDS {
         for is_big_endian in [false, true] {
             let made = Made {
@@ -12,15 +12,15 @@ fn every_sample_type_decodes_in_both_byte_orders() {
                 is_big_endian,
                 ..ONE_STRIP
             };
-            for most_in_memory_bytes in [0, 1 << 30] {
-                check(&made, &open(&made, most_in_memory_bytes).expect("a field"));
+            for max_in_memory_bytes in [0, 1 << 30] {
+                check(&made, &open(&made, max_in_memory_bytes).expect("a field"));
             }
         }
     }
 }
 
 #[test]
-fn strips_and_tiles_of_several_bands_are_what_was_written() {
+fn strips_and_tiles_of_several_bands_round_trip() {
     for chunk in [SIZE, [SIZE[0], 640], [1024, 640], [2048, 2048]] {
         for (bands, is_planar) in [(1, false), (BANDS, false), (BANDS, true)] {
             let made = Made {
@@ -29,8 +29,8 @@ fn strips_and_tiles_of_several_bands_are_what_was_written() {
                 is_planar,
                 ..ONE_STRIP
             };
-            for most_in_memory_bytes in [0, 1 << 30] {
-                check(&made, &open(&made, most_in_memory_bytes).expect("a field"));
+            for max_in_memory_bytes in [0, 1 << 30] {
+                check(&made, &open(&made, max_in_memory_bytes).expect("a field"));
             }
         }
     }
@@ -40,11 +40,11 @@ fn strips_and_tiles_of_several_bands_are_what_was_written() {
 fn only_the_omitted_tile_is_no_data() {
     let made = Made {
         chunk: [1024, 640],
-        left_out: Some(1),
+        omitted: Some(1),
         ..ONE_STRIP
     };
-    for most_in_memory_bytes in [0, 1 << 30] {
-        let raster = open(&made, most_in_memory_bytes).expect("sparse");
+    for max_in_memory_bytes in [0, 1 << 30] {
+        let raster = open(&made, max_in_memory_bytes).expect("sparse");
         let height = |[column, row]: [u32; 2]| raster.height(column, SIZE[1] - 1 - row);
         for place in [[0, 0], [1023, 639], [1024, 640], [1200, 1102]] {
             assert_eq!(height(place), value(place, 0) as f64);

@@ -14,7 +14,7 @@ use crate::disk_cache::{DiskCache, TemporaryFile};
 use crate::input::read_exact_at;
 
 /// Size of a write, bytes.
-const AT_ONCE: usize = 1 << 20;
+const WRITE_BYTES: usize = 1 << 20;
 
 /// Receives the rows of a strip or tile, in order.
 pub(super) type RowSink<'s> = dyn FnMut(&[u8]) -> Result<(), RasterError> + 's;
@@ -25,57 +25,57 @@ pub(super) struct Unpacked {
     /// Number of slots in the file.
     count: u64,
     /// Size of a slot, bytes.
-    each: u64,
-    kept: Mutex<Kept>,
+    slot_bytes: u64,
+    state: Mutex<SlotTable>,
     /// Locked during decompression.
-    turn: Mutex<()>,
+    unpack_lock: Mutex<()>,
 }
 
 /// Content of the file.
-struct Kept {
+struct SlotTable {
     /// The strip or tile in each slot.
     slots: Vec<Option<Slot>>,
     /// Number of reads so far.
-    asked: u64,
+    reads: u64,
 }
 
 /// A decompressed strip or tile.
 struct Slot {
     /// Its offset in the TIFF, and its number of rows.
-    is_of: (u64, u32),
+    chunk_id: (u64, u32),
     /// Number of decompressed bytes, and the fault of the others.
     bytes: u64,
     fault: Option<String>,
-    /// `asked` at its last use.
+    /// `reads` at its last use.
     used: u64,
 }
 
 impl Unpacked {
-    /// Creates an empty file for strips or tiles of `each` bytes: as many as the bound of the cache
-    /// allows, within `counts`.
+    /// Creates an empty file for strips or tiles of `slot_bytes` bytes: as many as the bound of the
+    /// cache allows, within `counts`.
     ///
     /// # Errors
     /// The reason why there is no space for them.
     pub(super) fn new(
-        each: u64,
+        slot_bytes: u64,
         counts: RangeInclusive<u64>,
         disk: &DiskCache,
     ) -> io::Result<Self> {
-        let count = (disk.max_bytes() / each.max(1)).clamp(*counts.start(), *counts.end());
-        let unnamed = disk.file_without_name(each.saturating_mul(count))?;
+        let count = (disk.max_bytes() / slot_bytes.max(1)).clamp(*counts.start(), *counts.end());
+        let unnamed = disk.create_unnamed(slot_bytes.saturating_mul(count))?;
         let slots = (0..count).map(|_| None).collect();
         Ok(Self {
             unnamed,
             count,
-            each,
-            kept: Mutex::new(Kept { slots, asked: 0 }),
-            turn: Mutex::new(()),
+            slot_bytes,
+            state: Mutex::new(SlotTable { slots, reads: 0 }),
+            unpack_lock: Mutex::new(()),
         })
     }
 
     /// Returns its max size on disk, bytes.
     pub(super) const fn max_bytes(&self) -> u64 {
-        self.each.saturating_mul(self.count)
+        self.slot_bytes.saturating_mul(self.count)
     }
 
     /// Returns a byte range of a strip or tile. `unpack` decompresses its rows.
@@ -85,44 +85,48 @@ impl Unpacked {
         range: Range<u64>,
         unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
     ) -> Result<Vec<u8>, RasterError> {
-        if let Some(read) = self.read_kept(chunk, &range) {
+        if let Some(read) = self.read_unpacked(chunk, &range) {
             return read;
         }
-        let turn = self.turn.lock();
+        let unpack_lock = self.unpack_lock.lock();
         // The panics of decoders are caught.
-        let _turn = turn.unwrap_or_else(PoisonError::into_inner);
+        let _guard = unpack_lock.unwrap_or_else(PoisonError::into_inner);
         // The previous owner of the lock may have decompressed it.
-        if let Some(read) = self.read_kept(chunk, &range) {
+        if let Some(read) = self.read_unpacked(chunk, &range) {
             return read;
         }
-        let index = self.kept().leave_oldest();
-        let slot = self.unpack(chunk, self.each * index as u64, unpack);
-        self.kept().slots[index] = Some(slot);
-        let read = self.read_kept(chunk, &range);
+        let index = self.state().evict_oldest();
+        let slot = self.unpack(chunk, self.slot_bytes * index as u64, unpack);
+        self.state().slots[index] = Some(slot);
+        let read = self.read_unpacked(chunk, &range);
         read.unwrap_or_else(|| Err(RasterError::damaged("TIFF: nothing was unpacked")))
     }
 
     /// Returns true if a strip or tile is already decompressed.
     #[cfg(test)]
     pub(super) fn has(&self, chunk: &Chunk) -> bool {
-        self.kept().find(chunk).is_some()
+        self.state().find(chunk).is_some()
     }
 
     /// Returns the bytes if they are already decompressed.
-    fn read_kept(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, RasterError>> {
+    fn read_unpacked(
+        &self,
+        chunk: &Chunk,
+        range: &Range<u64>,
+    ) -> Option<Result<Vec<u8>, RasterError>> {
         // Locked until the bytes are read, so that the slot is not reused.
-        let mut kept = self.kept();
-        let index = kept.find(chunk)?;
-        kept.asked += 1;
-        let asked = kept.asked;
-        let slot = kept.slots[index].as_mut()?;
-        slot.used = asked;
+        let mut state = self.state();
+        let index = state.find(chunk)?;
+        state.reads += 1;
+        let reads = state.reads;
+        let slot = state.slots[index].as_mut()?;
+        slot.used = reads;
         if range.end > slot.bytes {
             let why = slot.fault.as_deref().unwrap_or("TIFF: a row too many");
             return Some(Err(RasterError::damaged(why)));
         }
         let mut bytes = vec![0; (range.end - range.start) as usize];
-        let place = self.each * index as u64 + range.start;
+        let place = self.slot_bytes * index as u64 + range.start;
         let read = read_exact_at(&self.unnamed.file, &mut bytes, place);
         let read = read.map_err(|error| RasterError::from_io(error, "what was unpacked"));
         Some(read.map(|()| bytes))
@@ -137,7 +141,7 @@ impl Unpacked {
         unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
     ) -> Slot {
         let no_room = |error: io::Error| {
-            let megabytes = self.each.div_ceil(1_000_000);
+            let megabytes = self.slot_bytes.div_ceil(1_000_000);
             RasterError::Damaged(format!(
                 "TIFF: {megabytes} MB could not be unpacked into the folder of --cache: {error}"
             ))
@@ -145,7 +149,7 @@ impl Unpacked {
         let mut bytes = 0;
         let done = guarded(super::FORMAT.name, || {
             let file = &self.unnamed.file;
-            let mut to = BufWriter::with_capacity(AT_ONCE, Placed { file, place });
+            let mut to = BufWriter::with_capacity(WRITE_BYTES, OffsetWriter { file, place });
             let mut count = 0;
             let unpacked = unpack(&mut |row| {
                 to.write_all(row).map_err(no_room)?;
@@ -157,7 +161,7 @@ impl Unpacked {
             unpacked
         });
         Slot {
-            is_of: (chunk.place, chunk.covers.rows),
+            chunk_id: (chunk.place, chunk.covers.rows),
             bytes,
             fault: done.err().map(|fault| match fault {
                 RasterError::Damaged(what) => what,
@@ -167,22 +171,23 @@ impl Unpacked {
         }
     }
 
-    fn kept(&self) -> MutexGuard<'_, Kept> {
+    fn state(&self) -> MutexGuard<'_, SlotTable> {
         // No code that panics runs while the lock is held.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Kept {
+impl SlotTable {
     /// Returns the slot of a strip or tile.
     fn find(&self, chunk: &Chunk) -> Option<usize> {
-        let is_of = (chunk.place, chunk.covers.rows);
-        let known = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.is_of == is_of);
-        self.slots.iter().position(known)
+        let chunk_id = (chunk.place, chunk.covers.rows);
+        let is_same =
+            |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.chunk_id == chunk_id);
+        self.slots.iter().position(is_same)
     }
 
     /// Empties a free slot or the least recently used one, and returns it.
-    fn leave_oldest(&mut self) -> usize {
+    fn evict_oldest(&mut self) -> usize {
         let used = |index: &usize| self.slots[*index].as_ref().map_or(0, |slot| slot.used);
         let oldest = (0..self.slots.len()).min_by_key(used).unwrap_or(0);
         self.slots[oldest] = None;
@@ -191,12 +196,12 @@ impl Kept {
 }
 
 /// Writes at an offset of a file, independent of concurrent reads.
-struct Placed<'f> {
+struct OffsetWriter<'f> {
     file: &'f File,
     place: u64,
 }
 
-impl Write for Placed<'_> {
+impl Write for OffsetWriter<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let count = write_at(self.file, bytes, self.place)?;
         self.place += count as u64;

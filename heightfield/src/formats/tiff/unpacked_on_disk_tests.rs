@@ -7,7 +7,7 @@ use flate2::write::ZlibEncoder;
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
 use super::super::images;
-use super::super::layout::{Layout, Wanted};
+use super::super::layout::{Layout, NumberKind};
 use super::super::test_files::{
     BAND, BANDS, KINDS, Made, ONE_STRIP, Packing, SIZE, check, open, value,
 };
@@ -55,8 +55,8 @@ fn layout(made: &Made, bytes: Vec<u8>, max_bytes: u64) -> (tempfile::TempDir, La
     let input = FileBytes::unpacked("test.tif", bytes);
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
-    let asked = (made.bands > 1).then_some(BAND);
-    let mut layout = Layout::read(&full, Wanted::Heights(asked)).expect("a layout");
+    let requested = (made.bands > 1).then_some(BAND);
+    let mut layout = Layout::read(&full, NumberKind::Heights(requested)).expect("a layout");
     unpack::into_file(&mut layout, &disk).expect("a file");
     (folder, layout)
 }
@@ -87,7 +87,7 @@ fn check_parts(made: &Made, layout: &Layout) {
 }
 
 #[test]
-fn each_compression_and_predictor_decodes_to_written_samples() {
+fn compressions_and_predictors_decode_to_written_samples() {
     let mut all = vec![];
     for (code, pack) in [
         (5, lzw as fn(&[u8]) -> Vec<u8>),
@@ -118,7 +118,7 @@ fn each_compression_and_predictor_decodes_to_written_samples() {
 }
 
 #[test]
-fn strips_and_tiles_of_several_bands_are_what_was_written() {
+fn strips_and_tiles_of_several_bands_round_trip() {
     for chunk in [SIZE, [SIZE[0], 640], [1024, 640]] {
         for (bands, is_planar, predictor) in [(1, false, 2), (BANDS, false, 3), (BANDS, true, 2)] {
             let made = Made {
@@ -144,15 +144,15 @@ const TILES: Made = Made {
 #[test]
 fn two_tile_rows_stay_unpacked_at_any_limit_and_more_within_it() {
     let tile = 1024 * 400 * 4;
-    for (most, kept) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
-        let (_folder, layout) = layout(&TILES, TILES.bytes(), most);
+    for (max_bytes, max_tiles) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
+        let (_folder, layout) = layout(&TILES, TILES.bytes(), max_bytes);
         // Each tile is read twice, alternately.
         check_parts(&TILES, &layout);
         check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
-        assert_eq!(unpacked.max_bytes(), kept * tile);
+        assert_eq!(unpacked.max_bytes(), max_tiles * tile);
         let file = unpacked.unnamed.file.metadata().expect("told");
-        assert!(file.len() <= kept * tile, "{} {most}", file.len());
+        assert!(file.len() <= max_tiles * tile, "{} {max_bytes}", file.len());
     }
 }
 
@@ -169,12 +169,12 @@ fn strips_and_tiles_under_a_row_of_blocks_stay_unpacked() {
         chunk: [SIZE[0], 400],
         ..TILES
     };
-    let apart = Made {
+    let planar = Made {
         bands: BANDS,
         is_planar: true,
         ..strips
     };
-    for made in [TILES, strips, apart] {
+    for made in [TILES, strips, planar] {
         let (folder, mut layout) = layout(&made, made.bytes(), 1);
         if made.is_planar {
             // Its third band is the transparency.
@@ -192,13 +192,13 @@ fn strips_and_tiles_under_a_row_of_blocks_stay_unpacked() {
                 uncompressed::read(&layout, *band, &part).expect("read");
             }
         }
-        assert!(layout.is_at_hand(&at_border), "{made:?}");
+        assert!(layout.is_available(&at_border), "{made:?}");
     }
 }
 
 /// A read that does not wait never decompresses a tile.
 #[test]
-fn a_tile_is_at_hand_once_it_is_unpacked() {
+fn tile_is_available_once_it_is_unpacked() {
     let made = Made {
         chunk: [1024, 640],
         packing: DEFLATE,
@@ -211,12 +211,12 @@ fn a_tile_is_at_hand_once_it_is_unpacked() {
         columns: 10,
         rows: 2,
     };
-    let is_at_hand = |column| layout.is_at_hand(&part(column));
-    assert!(!is_at_hand(0) && !is_at_hand(1020));
+    let is_available = |column| layout.is_available(&part(column));
+    assert!(!is_available(0) && !is_available(1020));
     uncompressed::read(&layout, 0, &part(0)).expect("read");
-    assert!(is_at_hand(0) && !is_at_hand(1020) && !is_at_hand(1100));
+    assert!(is_available(0) && !is_available(1020) && !is_available(1100));
     uncompressed::read(&layout, 0, &part(1020)).expect("read");
-    assert!(is_at_hand(1020) && is_at_hand(1100));
+    assert!(is_available(1020) && is_available(1100));
 }
 
 #[test]
@@ -232,8 +232,8 @@ fn least_recently_read_tile_is_evicted_first() {
     for tile in [0, 1, 2, 3, 0, 4] {
         uncompressed::read(&layout, 0, &part(tiles[tile])).expect("read");
     }
-    let kept = tiles.map(|tile| layout.is_at_hand(&part(tile)));
-    assert_eq!(kept, [true, false, true, true, true]);
+    let available = tiles.map(|tile| layout.is_available(&part(tile)));
+    assert_eq!(available, [true, false, true, true, true]);
 }
 
 #[test]
@@ -271,7 +271,7 @@ fn unpacking_by_rows_refuses_lerc() {
     let input = FileBytes::unpacked("test.tif", made.bytes());
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
-    let mut layout = Layout::read(&full, Wanted::Heights(None)).expect("a layout");
+    let mut layout = Layout::read(&full, NumberKind::Heights(None)).expect("a layout");
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1);
     let error = unpack::into_file(&mut layout, &disk).expect_err("it comes as a whole");

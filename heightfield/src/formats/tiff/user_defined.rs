@@ -39,7 +39,7 @@ pub(super) fn system(
 
 /// Returns the datum of the keys' geographic system, by its code or by the keys' own ellipsoid.
 fn datum(keys: &GeoKeys) -> Option<Datum> {
-    let base = keys.known(GEODETIC_CRS_TYPE);
+    let base = keys.epsg_code(GEODETIC_CRS_TYPE);
     if let Some(system) = base.and_then(ReferenceSystem::from_code) {
         return system.datum().cloned();
     }

@@ -26,7 +26,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
                 converted(path, "")
             );
         }
-        RasterError::WantsGdal { .. } => {
+        RasterError::NeedsGdal { .. } => {
             return format!(
                 "{}; then this works: hapterra info {}; or {}",
                 GdalError::how_to_install(),
@@ -43,7 +43,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
                 names(path).0
             );
         }
-        RasterError::ToBuild { files, .. } => return built(path, files),
+        RasterError::NeedsVrt { files, .. } => return built(path, files),
         RasterError::Unsupported { .. } => return with_gdal(path) + &converted(path, PLAIN),
         RasterError::InTile { file, fault } => return hint(file, fault),
         RasterError::TilesDiffer { file, other, .. } => {
@@ -62,10 +62,10 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::NoTiles(_) => {
             "name a folder with terrain files, or a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif'"
         }
-        RasterError::WhichAsset { names, .. } if names.is_empty() => {
+        RasterError::AmbiguousAssets { names, .. } if names.is_empty() => {
             "take a STAC whose items have assets with heights"
         }
-        RasterError::WhichAsset { names, .. } => {
+        RasterError::AmbiguousAssets { names, .. } => {
             return format!(
                 "name the one with the heights, or a pattern in quotes for one of each item: --input variable={}",
                 names.join("|")
@@ -92,7 +92,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
             );
         }
         RasterError::NoSuchPart { .. } => "name one that is there, or leave that option out",
-        RasterError::CellKnown(_) => {
+        RasterError::CellSizeStated(_) => {
             "leave --input cell=… out: it is for files that do not state a cell size"
         }
         RasterError::EncodedPicture(encoding) => {

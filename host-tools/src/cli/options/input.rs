@@ -127,7 +127,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
         return Err(format!("--input {key}=… is given twice")).or_hint("give it once");
     }
     let mut options = OpenOptions {
-        most_in_memory_bytes: u64::from(OpenOptions::IN_MEMORY_MB) << 20,
+        max_in_memory_bytes: u64::from(OpenOptions::IN_MEMORY_MB) << 20,
         ..OpenOptions::default()
     };
     for InputSetting { value, .. } in settings {
@@ -149,7 +149,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
             InputValue::Encoding(encoding) => options.encoding = Some(*encoding),
             InputValue::Channel(channel) => options.png_channel = Some(*channel),
             InputValue::Cells(_) => {}
-            InputValue::InMemoryMb(mb) => options.most_in_memory_bytes = u64::from(*mb) << 20,
+            InputValue::InMemoryMb(mb) => options.max_in_memory_bytes = u64::from(*mb) << 20,
             InputValue::Gdal(option) => options.open_options.push(option.clone()),
         }
     }

@@ -143,7 +143,7 @@ impl ReadingOptions {
         let terrain = self.options()?;
         Ok(OpenOptions {
             classes: true,
-            most_in_memory_bytes: terrain.most_in_memory_bytes,
+            max_in_memory_bytes: terrain.max_in_memory_bytes,
             disk_cache: terrain.disk_cache,
             ..OpenOptions::default()
         })

@@ -24,7 +24,7 @@ const LINE: usize = 32;
 /// The cache, represented by the content of the memory behind it while it is on. Off at first.
 #[derive(Default)]
 pub(super) struct DataCache {
-    behind: Option<Vec<u8>>,
+    memory: Option<Vec<u8>>,
     /// The line in the memory's buffer: its offset and bytes.
     buffered: Option<(usize, Vec<u8>)>,
 }
@@ -33,21 +33,21 @@ impl DataCache {
     /// Handles the core's write of a register.
     pub(super) fn follow(&mut self, core: &Unicorn<'_, ()>, register: u32, value: u32) {
         let (start, bytes) = CACHED;
-        let held = |at: usize, bytes: usize| {
-            let held = core.mem_read_as_vec(u64::from(start) + at as u64, bytes);
-            held.expect("in a memory")
+        let read = |at: usize, bytes: usize| {
+            let read = core.mem_read_as_vec(u64::from(start) + at as u64, bytes);
+            read.expect("in a memory")
         };
-        match (register, &mut self.behind) {
-            (CCR, None) if value & DC != 0 => self.behind = Some(held(0, bytes)),
-            (CCR, Some(_)) if value & DC == 0 => (self.behind, self.buffered) = (None, None),
-            (DCCMVAC | DCCIMVAC, Some(behind)) => {
+        match (register, &mut self.memory) {
+            (CCR, None) if value & DC != 0 => self.memory = Some(read(0, bytes)),
+            (CCR, Some(_)) if value & DC == 0 => (self.memory, self.buffered) = (None, None),
+            (DCCMVAC | DCCIMVAC, Some(memory)) => {
                 let at = value.wrapping_sub(start) as usize / LINE * LINE;
-                if behind.len() < at + LINE {
+                if memory.len() < at + LINE {
                     return;
                 }
-                let before = self.buffered.replace((at, held(at, LINE)));
+                let before = self.buffered.replace((at, read(at, LINE)));
                 if let Some((at, bytes)) = before {
-                    behind[at..at + LINE].copy_from_slice(&bytes);
+                    memory[at..at + LINE].copy_from_slice(&bytes);
                 }
             }
             _ => {}
@@ -57,8 +57,8 @@ impl DataCache {
     /// Changes memory for a test: both the cached data and the data behind it.
     pub(super) fn patch(&mut self, address: u32, bytes: &[u8]) {
         let at = address.wrapping_sub(CACHED.0) as usize;
-        let behind = self.behind.as_mut();
-        if let Some(place) = behind.and_then(|all| all.get_mut(at..at.checked_add(bytes.len())?)) {
+        let memory = self.memory.as_mut();
+        if let Some(place) = memory.and_then(|all| all.get_mut(at..at.checked_add(bytes.len())?)) {
             place.copy_from_slice(bytes);
         }
     }
@@ -66,6 +66,6 @@ impl DataCache {
     /// Switches it off at a reset. Returns the address of the covered memory, and its content.
     pub(super) fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
         self.buffered = None;
-        self.behind.take().map(|behind| (CACHED.0, behind))
+        self.memory.take().map(|memory| (CACHED.0, memory))
     }
 }

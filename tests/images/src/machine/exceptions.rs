@@ -102,16 +102,16 @@ impl Machine {
         {
             stopwatch.end();
         }
-        let back = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
+        let return_address = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
         let masks = [RegisterARM::BASEPRI, RegisterARM::PRIMASK];
-        let kept = masks.map(|mask| self.register(mask));
+        let saved = masks.map(|mask| self.register(mask));
         self.core
             .context_restore(&active.context)
             .expect("restored");
-        for (mask, value) in masks.into_iter().zip(kept) {
+        for (mask, value) in masks.into_iter().zip(saved) {
             self.set_register(mask, value);
         }
-        self.set_register(RegisterARM::PC, u64::from(back) | 1);
+        self.set_register(RegisterARM::PC, u64::from(return_address) | 1);
     }
 
     pub(super) fn fault(&mut self, why: &str) -> Option<Stop> {
@@ -145,13 +145,13 @@ impl Machine {
                 let (register, shift) = BUS_FAULTS_PRIORITY;
                 let priority = (self.bus().read(register) >> shift & 0xF0) as i16;
                 if self.bus().read(on) & bit == 0 || self.priority() <= priority {
-                    self.load.set(Load::None);
+                    self.load.set(Load::Inactive);
                     return self.fault("bus fault");
                 }
                 self.enter(BUS_FAULT, priority);
             }
         }
-        self.load.set(Load::None);
+        self.load.set(Load::Inactive);
         None
     }
 }

@@ -16,9 +16,9 @@ const NVIC_ICER: u32 = 0xE000_E180;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Load {
     #[default]
-    None,
+    Inactive,
     /// A load from this address is next.
-    Of(u32),
+    Armed(u32),
     /// The load is completed.
     Done,
 }
@@ -77,8 +77,8 @@ impl Machine {
         let bytes = self.chip.flash.word;
         let load = Rc::clone(&self.load);
         let on_load = move |core: &mut Unicorn<'_, ()>, _: MemType, _: u64, _: usize, _: i64| {
-            if load.get() == Load::None {
-                load.set(Load::Of(address));
+            if load.get() == Load::Inactive {
+                load.set(Load::Armed(address));
                 // Before the load.
                 core.emu_stop().expect("stops");
             }

@@ -4,7 +4,7 @@
 use super::{Machine, Stop};
 
 /// Nanoseconds between two checks.
-const LOOK_NS: u64 = 5_000;
+const STEP_NS: u64 = 5_000;
 
 impl Machine {
     /// Configures the chip as a debugger does when it attaches: the watchdog, the clock of
@@ -42,7 +42,7 @@ impl Machine {
             if bus.now_ns >= end_ns {
                 return Stop::Time;
             }
-            bus.advance(LOOK_NS);
+            bus.advance(STEP_NS);
         }
     }
 

@@ -36,7 +36,7 @@ pub enum Stop {
     /// The program has reset the chip.
     Software,
     /// The caller's condition was met.
-    Asked,
+    Requested,
     /// A fault in the handler of a hard fault, with its location.
     Lockup(String),
 }
@@ -67,7 +67,7 @@ pub struct Machine {
     /// in a critical section or in another interrupt.
     pub raises_tick_every: Option<u32>,
     /// Number of checks that found the core there.
-    pub found_busy: u32,
+    pub busy_ticks: u32,
     /// Number of times the haptic interrupt was raised out of turn.
     pub raised: u32,
     /// Number of times the haptic interrupt was pending and could not be taken although no tick was
@@ -114,7 +114,7 @@ impl Machine {
             hard_faults: 0,
             slice: SLICE,
             raises_tick_every: None,
-            found_busy: 0,
+            busy_ticks: 0,
             raised: 0,
             delayed: 0,
             masked: 0,
@@ -146,8 +146,8 @@ impl Machine {
         if cause != Reset::PowerUp {
             self.bus().converter = before.converter.after_reset();
         }
-        let behind = self.cache.borrow_mut().reset();
-        if let Some((address, bytes)) = behind {
+        let memory = self.cache.borrow_mut().reset();
+        if let Some((address, bytes)) = memory {
             self.patch(address, &bytes);
         }
         self.protect();
@@ -256,7 +256,7 @@ impl Port for Machine {
     fn wait(&mut self) -> Result<(), String> {
         let until_ns = self.bus().now_ns + 1_000_000 / MOMENTS_A_MS;
         match self.run_until(1, |m| m.bus().now_ns >= until_ns) {
-            Stop::Asked | Stop::Time => Ok(()),
+            Stop::Requested | Stop::Time => Ok(()),
             stop => Err(format!("{stop:?}")),
         }
     }

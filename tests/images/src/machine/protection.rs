@@ -26,7 +26,7 @@ const STKERR: u32 = 1 << 12;
 pub(super) struct Protection {
     /// Base and attributes of each region, from the registers.
     registers: [(u32, u32); 16],
-    met: Rc<Cell<Option<u32>>>,
+    forbidden_access: Rc<Cell<Option<u32>>>,
 }
 
 /// Returns a region with less access than in the default map, and its access, from base and
@@ -44,9 +44,9 @@ fn restricted((base, attributes): (u32, u32)) -> Option<(Range<u32>, Prot)> {
 impl Machine {
     /// Records the address of each forbidden access.
     pub(super) fn watch_forbidden(&mut self) {
-        let met = Rc::clone(&self.protection.met);
+        let forbidden_access = Rc::clone(&self.protection.forbidden_access);
         let note = move |_: &mut Unicorn<'_, ()>, _: MemType, at: u64, _: usize, _: i64| {
-            met.set(Some(at as u32));
+            forbidden_access.set(Some(at as u32));
             false
         };
         let all = HookType::MEM_READ_PROT | HookType::MEM_WRITE_PROT;
@@ -85,7 +85,7 @@ impl Machine {
 
     /// Reports the failed access to the program.
     pub(super) fn report_forbidden(&mut self) {
-        if let Some(address) = self.protection.met.take() {
+        if let Some(address) = self.protection.forbidden_access.take() {
             self.raise_status(DACCVIOL | MMARVALID);
             self.bus().write(MMFAR, address, u32::MAX);
         }

@@ -32,14 +32,14 @@ impl Machine {
         let end_ns = self.bus().now_ns + ms * 1_000_000;
         loop {
             if is_met(self) {
-                return Stop::Asked;
+                return Stop::Requested;
             }
-            let (now_ns, has_expired, asks) = {
+            let (now_ns, has_expired, requests_reset) = {
                 let bus = self.bus();
                 let has_expired = bus.watchdog.has_expired(bus.now_ns);
-                (bus.now_ns, has_expired, bus.nvic.asks_for_reset)
+                (bus.now_ns, has_expired, bus.nvic.requests_reset)
             };
-            if asks {
+            if requests_reset {
                 return Stop::Software;
             }
             if has_expired {
@@ -57,13 +57,13 @@ impl Machine {
     /// Runs until this many more haptic ticks have begun and ended.
     pub fn run_ticks(&mut self, ticks: usize) -> Stop {
         let vector = self.chip.tick_interrupt as u32 + 16;
-        let mut left = ticks;
+        let mut remaining = ticks;
         let mut was_in_tick = false;
         self.run_until(2 * ticks as u64 + 5, move |machine| {
             let in_tick = machine.active.iter().any(|a| a.vector == vector);
-            left -= usize::from(was_in_tick && !in_tick);
+            remaining -= usize::from(was_in_tick && !in_tick);
             was_in_tick = in_tick;
-            left == 0
+            remaining == 0
         })
     }
 
@@ -77,7 +77,7 @@ impl Machine {
         self.watch_masks();
         let pc = self.register(RegisterARM::PC) | 1;
         let ended = self.core.emu_start(pc, EXC_RETURN, 0, self.slice);
-        if let Load::Of(address) = self.load.get() {
+        if let Load::Armed(address) = self.load.get() {
             return self.fail_load(address);
         }
         let pc = self.register(RegisterARM::PC);
@@ -118,14 +118,14 @@ impl Machine {
 
     fn raise_tick(&mut self) {
         let busy = !self.active.is_empty() || self.register(RegisterARM::BASEPRI) != 0;
-        let let_through = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
-        if !busy || !let_through || self.is_ticking() {
+        let is_unmasked = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
+        if !busy || !is_unmasked || self.is_ticking() {
             return;
         }
-        self.found_busy += 1;
+        self.busy_ticks += 1;
         if self
             .raises_tick_every
-            .is_some_and(|n| self.found_busy.is_multiple_of(n))
+            .is_some_and(|n| self.busy_ticks.is_multiple_of(n))
         {
             self.raised += 1;
             self.bus().nvic.pend(self.chip.tick_interrupt);
@@ -133,11 +133,11 @@ impl Machine {
     }
 
     fn watch_masks(&mut self) {
-        let waits = self.bus().nvic.waits(self.chip.tick_interrupt);
+        let waits = self.bus().nvic.is_waiting(self.chip.tick_interrupt);
         self.delayed += u32::from(waits && !self.is_ticking());
-        let let_through = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
+        let is_unmasked = self.bus().nvic.is_enabled(self.chip.tick_interrupt);
         let masked = self.register(RegisterARM::PRIMASK) & 1 != 0;
-        self.masked += u32::from(let_through && masked);
+        self.masked += u32::from(is_unmasked && masked);
     }
 
     /// Returns true if the last instruction was a WFE or WFI.
@@ -161,7 +161,7 @@ impl Machine {
         }
         let mut bus = self.bus();
         bus.raise_interrupts();
-        let woken = bus.nvic.has_pending();
-        bus.advance(if woken { EXCEPTION_NS } else { SLEEP_NS });
+        let wakes = bus.nvic.has_pending();
+        bus.advance(if wakes { EXCEPTION_NS } else { SLEEP_NS });
     }
 }

@@ -23,7 +23,7 @@ pub struct Cable {
     /// A control transfer without data, which takes effect at its end.
     under_way: Option<[u8; 8]>,
     /// Number of the device's packets that were dropped.
-    pub thrown_away: u32,
+    pub discarded: u32,
 }
 
 impl Cable {
@@ -35,7 +35,7 @@ impl Cable {
             to_device: [false; ENDPOINTS],
             to_host: [false; ENDPOINTS],
             under_way: None,
-            thrown_away: 0,
+            discarded: 0,
         }
     }
 
@@ -98,7 +98,7 @@ impl Cable {
         let expected = &mut self.to_host[endpoint];
         match answer {
             Answer::Data(_) if toggle != *expected => {
-                self.thrown_away += 1;
+                self.discarded += 1;
                 return Answer::Nak;
             }
             Answer::Data(_) => *expected ^= true,

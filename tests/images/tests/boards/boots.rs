@@ -26,9 +26,9 @@ fn after_reset(cause: Reset, mut disturb: impl FnMut(&mut Device<'_>)) -> Vec<(M
     on_each(|machine, terrain, scene| {
         let mut device = Device::open(machine, terrain, scene);
         disturb(&mut device);
-        let mut again = Device::open(device.reset_by(cause), terrain, scene);
-        let status = again.ask_status();
-        all.push((again.reset(), status));
+        let mut restarted = Device::open(device.reset_by(cause), terrain, scene);
+        let status = restarted.query_status();
+        all.push((restarted.reset(), status));
     });
     all
 }
@@ -129,9 +129,9 @@ fn watchdog_reset_is_reported_without_crash_record() {
 }
 
 #[test]
-fn a_stored_calibration_is_there_after_the_reset() {
+fn stored_calibration_is_loaded_after_a_reset() {
     let reported = after_reset(Reset::Watchdog, |device| {
-        let before = device.ask_status();
+        let before = device.query_status();
         assert_eq!(before.boot.cause, ResetCause::PowerOn);
         assert_eq!(before.calibration, CalibrationSource::None);
         assert_eq!(store(device), Ok(()));
@@ -183,12 +183,12 @@ fn full_memory_is_erased_at_the_next_start() {
         let full = device.machine.borrow().bytes(areas[0], PLACE);
         assert_eq!(full, record, "{board}: nothing was erased");
         // The start takes as long as the erase, and succeeds.
-        let mut again = Device::open(device.reset(), terrain, scene);
-        let status = again.ask_status();
+        let mut restarted = Device::open(device.reset(), terrain, scene);
+        let status = restarted.query_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
-        let blank = again.machine.borrow().bytes(areas[0], bytes as usize);
+        let blank = restarted.machine.borrow().bytes(areas[0], bytes as usize);
         assert!(blank.iter().all(|byte| *byte == 0xFF), "{board}: no room");
-        assert_eq!(store(&mut again), Ok(()), "{board}");
+        assert_eq!(store(&mut restarted), Ok(()), "{board}");
     });
 }
 
@@ -212,17 +212,20 @@ fn interrupted_calibration_write_keeps_previous_record() {
         // Half of a word, and nothing after it.
         device.machine.borrow_mut().patch(cut, &[0x5A]);
         device.machine.borrow_mut().make_unreadable(cut);
-        let mut again = Device::open(device.reset(), terrain, scene);
-        let status = again.ask_status();
+        let mut restarted = Device::open(device.reset(), terrain, scene);
+        let status = restarted.query_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
         assert_eq!(status.health.report.fault, Some(Fault::WatchdogReset));
         assert_eq!(status.boot.crash, None, "{board}");
-        let met = |vector| again.machine.borrow().taken.contains(&vector);
-        assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
-        let reported = again.machine.borrow().bus().reports_unreadable();
+        let forbidden_access = |vector| restarted.machine.borrow().taken.contains(&vector);
+        assert!(
+            forbidden_access(NMI) || forbidden_access(BUS_FAULT),
+            "{board}: it was not read"
+        );
+        let reported = restarted.machine.borrow().bus().reports_unreadable();
         assert!(!reported, "{board}: left for the next write to fail by");
-        assert_eq!(store(&mut again), Ok(()), "{board}: no room beside it");
-        assert_eq!(again.machine.borrow().hard_faults, 0, "{board}");
+        assert_eq!(store(&mut restarted), Ok(()), "{board}: no room beside it");
+        assert_eq!(restarted.machine.borrow().hard_faults, 0, "{board}");
     });
 }
 
@@ -234,7 +237,7 @@ fn interrupted_first_calibration_write_leaves_no_record() {
         machine.patch(cut, &[0x5A]);
         machine.make_unreadable(cut);
         let mut device = Device::open(machine, terrain, scene);
-        let status = device.ask_status();
+        let status = device.query_status();
         assert_eq!(status.calibration, CalibrationSource::None, "{board}");
         assert_eq!(status.health.report.fault, None, "{board}");
         assert_eq!(store(&mut device), Ok(()), "{board}: the area was erased");
@@ -242,7 +245,7 @@ fn interrupted_first_calibration_write_leaves_no_record() {
 }
 
 #[test]
-fn a_word_of_the_program_that_cannot_be_read_stops_it() {
+fn unreadable_program_word_stops_the_program() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let device = Device::open(machine, terrain, scene);
@@ -262,19 +265,22 @@ fn a_word_of_the_program_that_cannot_be_read_stops_it() {
             false
         });
         assert_eq!(stop, Stop::Software, "{board}");
-        let met = |vector| machine.taken.contains(&vector);
-        assert!(met(NMI) || met(BUS_FAULT), "{board}: it was not read");
+        let forbidden_access = |vector| machine.taken.contains(&vector);
+        assert!(
+            forbidden_access(NMI) || forbidden_access(BUS_FAULT),
+            "{board}: it was not read"
+        );
     });
 }
 
 #[test]
-fn a_third_of_the_stack_is_never_used() {
+fn third_of_the_stack_is_never_used() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let mut device = Device::arm(machine, terrain, scene);
         device.move_to([300, -200, 250]);
         device.run_ms(1_200);
-        let stack = device.ask_status().stack;
+        let stack = device.query_status().stack;
         println!(
             "{board}: {} of {} bytes of stack used",
             stack.high_water, stack.size
@@ -294,7 +300,7 @@ fn single_bank_g474_starts_and_refuses_to_store() {
         // FLASH_OPTR.DBANK.
         machine.bus().cleared_options = Some((0x4002_2020, 1 << 22));
         let mut device = Device::open(machine, terrain, scene);
-        assert_eq!(device.ask_status().health.report.fault, None);
+        assert_eq!(device.query_status().health.report.fault, None);
         assert_eq!(store(&mut device), Err(Refusal::NoMemory));
     });
 }

@@ -9,19 +9,19 @@ use hapterra_image_tests::supply::Reset;
 use hapterra_tests::usb::Port;
 
 /// DBGMCU_IDC.REV_ID of an H743's revisions Z, Y, X and V.
-const TOO_OLD: [u16; 3] = [0x1001, 0x1003, 0x2001];
+const OLD_REVISIONS: [u16; 3] = [0x1001, 0x1003, 0x2001];
 const REVISION_V: u16 = 0x2003;
 /// FLASH_ACR of a G474, and its bit PRFTEN.
 const PREFETCH: (u32, u32) = (0x4002_2000, 1 << 8);
 
 #[test]
-fn a_chip_before_revision_v_is_refused_with_a_pattern() {
+fn chip_before_revision_v_is_refused_with_a_pattern() {
     for mut machine in machines() {
         if !machine.chip.is_m7 {
             continue;
         }
         let board = machine.chip.board;
-        for revision in TOO_OLD {
+        for revision in OLD_REVISIONS {
             machine.reset(Reset::Software);
             machine.bus().set_revision(revision);
             assert_eq!(machine.run_ms(50), Stop::Time, "{board}");
@@ -38,7 +38,7 @@ fn a_chip_before_revision_v_is_refused_with_a_pattern() {
             level = now;
             changes == 3
         });
-        assert_eq!(flashes, Stop::Asked, "{board}: off, on and off again");
+        assert_eq!(flashes, Stop::Requested, "{board}: off, on and off again");
         machine.reset(Reset::Software);
         machine.bus().set_revision(REVISION_V);
         assert_eq!(machine.run_ms(50), Stop::Time, "{board}");
@@ -47,7 +47,7 @@ fn a_chip_before_revision_v_is_refused_with_a_pattern() {
 }
 
 #[test]
-fn the_flash_of_a_g474_prefetches() {
+fn g474_flash_prefetch_is_enabled() {
     for mut machine in machines() {
         if machine.chip.is_m7 {
             continue;
@@ -65,15 +65,19 @@ fn status_reports_whether_usb_clock_follows_the_host() {
         let board = machine.chip.board;
         let mut device = Device::open(machine, terrain, scene);
         device.run_ms(1_100);
-        assert_eq!(device.ask_status().usb_clock, UsbClock::Locked, "{board}");
+        assert_eq!(device.query_status().usb_clock, UsbClock::Locked, "{board}");
         device.machine.borrow().bus().usb_clock_follows = false;
         device.run_ms(1_100);
-        assert_eq!(device.ask_status().usb_clock, UsbClock::Unlocked, "{board}");
+        assert_eq!(
+            device.query_status().usb_clock,
+            UsbClock::Unlocked,
+            "{board}"
+        );
     });
 }
 
 #[test]
-fn a_probe_that_stops_reading_the_log_stops_no_task() {
+fn probe_that_stops_reading_the_log_blocks_no_task() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;

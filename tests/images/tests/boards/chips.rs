@@ -47,7 +47,7 @@ fn holds(memories: &[Range<u64>], start: u32, bytes: usize) -> bool {
 }
 
 #[test]
-fn every_segment_lies_in_the_chips_memory() {
+fn segments_lie_in_the_chips_memory() {
     for machine in machines() {
         let (chip, target) = (machine.chip, target(&machine));
         let (ram, flash) = (ram(&target), flash(&target));
@@ -96,7 +96,7 @@ fn stack_is_lowest_in_ram_and_overlaps_no_segment() {
 }
 
 #[test]
-fn the_emulated_chip_has_the_memories_of_the_real_one() {
+fn emulated_chip_has_the_memories_of_the_real_one() {
     for machine in machines() {
         let target = target(&machine);
         let real: Vec<_> = [flash(&target), ram(&target)].concat();
@@ -121,8 +121,8 @@ fn board_pages_state_the_size_of_the_tiles() {
             .symbol_like(&["TILES"])
             .expect("the tiles")
             .size;
-        let stated = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
-        assert!(page.contains(&stated), "{board}: {stated}");
+        let statement = format!("take {},{:03} bytes of RAM", tiles / 1000, tiles % 1000);
+        assert!(page.contains(&statement), "{board}: {statement}");
     }
 }
 
@@ -131,8 +131,8 @@ fn images_contain_no_build_paths() {
     for machine in machines() {
         for segment in &machine.image.segments {
             let text = String::from_utf8_lossy(&segment.bytes);
-            let way = text.find("/registry/src/");
-            assert_eq!(way, None, "{}", machine.chip.board);
+            let registry_path = text.find("/registry/src/");
+            assert_eq!(registry_path, None, "{}", machine.chip.board);
         }
     }
 }

@@ -8,7 +8,7 @@ use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::device::Device;
 
 /// Limits set by the clutch.
-const OF_CLUTCH: Limits = Limits::CLUTCH_INPUT
+const CLUTCH_LIMITS: Limits = Limits::CLUTCH_INPUT
     .union(Limits::CLUTCH_OPEN)
     .union(Limits::CLUTCH_MOVES);
 
@@ -26,7 +26,7 @@ fn latest(device: &Device<'_>) -> TickRecord {
 }
 
 fn limits(device: &Device<'_>) -> Limits {
-    latest(device).limits & OF_CLUTCH
+    latest(device).limits & CLUTCH_LIMITS
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn clutch_switch_removes_force_and_its_release_restores_it() {
         device.run_ms(150);
         assert_eq!(limits(device), Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN);
         assert_eq!(latest(device).force_n.length(), 0.0);
-        assert!(device.ask_status().health.sense.clutch);
+        assert!(device.query_status().health.sense.clutch);
         // The host holds it as well: both must release it.
         let hold = |hold| Request::Clutch { hold };
         device.request(hold(ClutchHold::WithHand));
@@ -61,19 +61,19 @@ fn clutch_switch_removes_force_and_its_release_restores_it() {
 }
 
 #[test]
-fn a_switch_that_bounces_or_sticks_adds_no_force() {
+fn bouncing_or_stuck_switch_adds_no_force() {
     Bench::new().on_each(|device| {
         device.wait_for_full_force();
         device.run_ms(40);
         let rendered = latest(device).force_n.length();
-        let mut most: f32 = 0.0;
+        let mut max: f32 = 0.0;
         // Bounces of every length from 1 to 40 ms.
         for ms in (1..=40).chain((1..=40).rev()) {
             switch(device, ms % 2 == 0);
             device.run_ms(ms);
-            most = most.max(latest(device).force_n.length());
+            max = max.max(latest(device).force_n.length());
         }
-        assert!(most <= rendered + 1e-3, "{most} N of {rendered} N");
+        assert!(max <= rendered + 1e-3, "{max} N of {rendered} N");
         switch(device, true);
         device.run_ms(2_000);
         assert_eq!(latest(device).force_n.length(), 0.0, "stuck");

@@ -5,7 +5,7 @@ use hapterra_image_tests::device::machines;
 use hapterra_image_tests::machine::{Machine, Stop};
 
 /// Counts a second beyond which the guard reports a fault.
-const FASTEST: f64 = 128_000.0;
+const MAX_SPEED: f64 = 128_000.0;
 /// Longest disturbance that is never counted, ns, on the board with the shorter filter.
 const DISTURBANCE_NS: f64 = 1_800.0;
 
@@ -29,16 +29,16 @@ fn on_each(mut then: impl FnMut(Machine)) {
 }
 
 #[test]
-fn the_fastest_motion_is_counted_and_five_times_that() {
+fn five_times_the_fastest_motion_is_counted() {
     on_each(|machine| {
         let board = machine.chip.board;
         for axis in 0..3 {
             for (speed, skew) in [
-                (FASTEST, 0.0),
-                (-FASTEST, 0.0),
-                (FASTEST, 0.5),
-                (-FASTEST, -0.5),
-                (5.0 * FASTEST, 0.0),
+                (MAX_SPEED, 0.0),
+                (-MAX_SPEED, 0.0),
+                (MAX_SPEED, 0.5),
+                (-MAX_SPEED, -0.5),
+                (5.0 * MAX_SPEED, 0.0),
             ] {
                 let counted = machine.bus().play_encoder(axis, 10, turning(speed, skew));
                 let expected = speed * 0.01;
@@ -54,11 +54,11 @@ fn the_fastest_motion_is_counted_and_five_times_that() {
 }
 
 #[test]
-fn a_disturbance_shorter_than_the_filter_is_not_counted() {
+fn disturbance_shorter_than_the_filter_is_not_counted() {
     on_each(|machine| {
         let board = machine.chip.board;
         for axis in 0..3 {
-            for speed in [1_000.0, -10_000.0, FASTEST] {
+            for speed in [1_000.0, -10_000.0, MAX_SPEED] {
                 let clean = turning(speed, 0.0);
                 // On channel A around every edge of channel B, the worst case: there a pulse is
                 // four counts of drift.

@@ -22,7 +22,7 @@ const LINK: usize = 1;
 /// The control endpoint's two directions, and the link's.
 const ADDRESSES: [u16; 4] = [0x00, 0x80, 0x01, 0x81];
 
-fn ask(
+fn send_request(
     machine: &mut Machine,
     (kind, number, value): (u8, u8, u16),
     address: u16,
@@ -55,7 +55,7 @@ fn is_hello(content: &[u8]) -> bool {
 
 /// Sends an open in one packet. Returns true if an answer arrives. With a wrong toggle, either is
 /// dropped.
-fn answers(machine: &mut Machine) -> bool {
+fn responds(machine: &mut Machine) -> bool {
     send_packet(machine, LINK, &hello()).expect("taken");
     let mut reader = FrameReader::<MAX_FRAME>::new();
     for _ in 0..20 {
@@ -87,7 +87,7 @@ fn drain(machine: &mut Machine) {
 }
 
 #[test]
-fn clearing_no_halt_hangs_nothing_and_resets_the_toggle() {
+fn clearing_no_halt_only_resets_the_toggle() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");
@@ -95,39 +95,39 @@ fn clearing_no_halt_hangs_nothing_and_resets_the_toggle() {
         for packets in 1..4 {
             for address in ADDRESSES {
                 for _ in 0..packets {
-                    assert!(answers(&mut machine), "{board}");
+                    assert!(responds(&mut machine), "{board}");
                     drain(&mut machine);
                 }
-                let cleared = ask(&mut machine, CLEAR_HALT, address);
+                let cleared = send_request(&mut machine, CLEAR_HALT, address);
                 assert_eq!(cleared, Ok(()), "{board}: {address:#04x}");
-                assert!(answers(&mut machine), "{board}: after {address:#04x}");
+                assert!(responds(&mut machine), "{board}: after {address:#04x}");
                 drain(&mut machine);
                 assert_eq!(descriptor(&mut machine, 1, 0, 18).map(|d| d.len()), Ok(18));
             }
         }
-        assert_eq!(machine.bus().usb.thrown_away, 0, "{board}");
+        assert_eq!(machine.bus().usb.discarded, 0, "{board}");
     }
 }
 
 #[test]
-fn a_halted_endpoint_refuses_until_the_halt_is_ended() {
+fn halted_endpoint_refuses_until_the_halt_is_cleared() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");
         for _ in 0..3 {
             for address in [0x01, 0x81] {
-                assert!(answers(&mut machine), "{board}");
+                assert!(responds(&mut machine), "{board}");
                 drain(&mut machine);
-                ask(&mut machine, SET_HALT, address).expect("done");
+                send_request(&mut machine, SET_HALT, address).expect("done");
                 assert!(is_halted(&mut machine, address), "{board}");
                 let refused = match address {
                     0x01 => send_packet(&mut machine, LINK, &[0]),
                     _ => fetch_packet(&mut machine, LINK).map(|_| ()),
                 };
                 assert_eq!(refused, Err(Failure::Stalled), "{board}: {address:#04x}");
-                ask(&mut machine, CLEAR_HALT, address).expect("done");
+                send_request(&mut machine, CLEAR_HALT, address).expect("done");
                 assert!(!is_halted(&mut machine, address), "{board}");
-                assert!(answers(&mut machine), "{board}: after {address:#04x}");
+                assert!(responds(&mut machine), "{board}: after {address:#04x}");
                 drain(&mut machine);
             }
         }
@@ -135,42 +135,42 @@ fn a_halted_endpoint_refuses_until_the_halt_is_ended() {
 }
 
 #[test]
-fn an_endpoint_that_is_not_in_use_stays_so() {
+fn unused_endpoint_stays_unused() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");
         // Removes the configuration.
         control(&mut machine, (0x00, 9, 0, 0)).expect("done");
         for address in [0x01, 0x81, 0x05, 0x8F] {
-            ask(&mut machine, CLEAR_HALT, address).expect("done");
+            send_request(&mut machine, CLEAR_HALT, address).expect("done");
         }
         assert_eq!(machine.out(LINK, &[0]), Handshake::Nak, "{board}");
         assert_eq!(machine.take_in(LINK), Answer::Nak, "{board}");
         control(&mut machine, (0x00, 9, 1, 0)).expect("configured again");
-        assert!(answers(&mut machine), "{board}: with new toggles");
+        assert!(responds(&mut machine), "{board}: with new toggles");
     }
 }
 
 #[test]
-fn a_second_configuration_starts_the_toggles_anew() {
+fn second_configuration_resets_the_toggles() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");
         for packets in 1..4 {
             for _ in 0..packets {
-                assert!(answers(&mut machine), "{board}");
+                assert!(responds(&mut machine), "{board}");
                 drain(&mut machine);
             }
             control(&mut machine, (0x00, 9, 1, 0)).expect("configured");
-            assert!(answers(&mut machine), "{board}");
+            assert!(responds(&mut machine), "{board}");
             drain(&mut machine);
         }
-        assert_eq!(machine.bus().usb.thrown_away, 0, "{board}");
+        assert_eq!(machine.bus().usb.discarded, 0, "{board}");
     }
 }
 
 #[test]
-fn ending_halts_in_mid_stream_costs_a_frame_and_no_session() {
+fn clearing_halts_costs_a_frame_but_no_session() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;
@@ -178,7 +178,7 @@ fn ending_halts_in_mid_stream_costs_a_frame_and_no_session() {
         for round in 0..8 {
             device.move_to([40 * (round % 3), 0, 20 * (round % 2)]);
             for address in ADDRESSES {
-                let cleared = ask(&mut device.machine.borrow_mut(), CLEAR_HALT, address);
+                let cleared = send_request(&mut device.machine.borrow_mut(), CLEAR_HALT, address);
                 assert_eq!(cleared, Ok(()), "{board}: {address:#04x}");
                 device.run_ms(7);
             }
@@ -189,6 +189,6 @@ fn ending_halts_in_mid_stream_costs_a_frame_and_no_session() {
         assert!(sample.tick > before, "{board}: nothing comes any more");
         assert_eq!(sample.fault, None, "{board}");
         assert!(device.machine.borrow().is_enabled(), "{board}: still on");
-        assert_eq!(device.ask_status().health.report.fault, None, "{board}");
+        assert_eq!(device.query_status().health.report.fault, None, "{board}");
     });
 }

@@ -31,7 +31,7 @@ fn idle(machine: &Machine) -> i32 {
 /// Returns the whole ticks until the amplifiers are off, `at_most` at most.
 fn ticks_until_off(machine: &mut Machine, at_most: usize) -> usize {
     for ticks in 1..=at_most {
-        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        assert_eq!(machine.run_ticks(1), Stop::Requested);
         if !machine.is_enabled() {
             return ticks;
         }
@@ -41,7 +41,7 @@ fn ticks_until_off(machine: &mut Machine, at_most: usize) -> usize {
 
 /// Checks that the amplifiers were switched off before any other change, and left with zero
 /// commands.
-fn assert_off_came_first(machine: &mut Machine) {
+fn assert_off_first(machine: &mut Machine) {
     let idle = idle(machine);
     let effects = machine.take_effects();
     let off = effects.iter().position(|e| *e == Effect::Enable(false));
@@ -60,7 +60,7 @@ fn assert_off_came_first(machine: &mut Machine) {
 }
 
 /// Checks that this fault is reported to the host.
-fn assert_told(device: &mut Device<'_>, fault: Fault) {
+fn assert_reported(device: &mut Device<'_>, fault: Fault) {
     device.run_ms(40);
     let reported = device.latest.and_then(|sample| sample.fault);
     assert_eq!(reported, Some(fault));
@@ -79,14 +79,14 @@ fn assert_trips_in_one_tick(
     assert_eq!(ticks_until_off(&mut machine, 2), 1);
     undo(&mut machine);
     machine.run_ticks(20);
-    assert_off_came_first(&mut machine);
+    assert_off_first(&mut machine);
     assert!(!machine.is_enabled(), "latched");
     drop(machine);
-    assert_told(device, fault);
+    assert_reported(device, fault);
 }
 
 #[test]
-fn the_emergency_stop_takes_one_tick() {
+fn emergency_stop_trips_in_one_tick() {
     Bench::new().on_each(|device| {
         let pin = device.machine.borrow().chip.emergency_stop;
         let press = |machine: &mut Machine| machine.set_input(pin, true);
@@ -105,7 +105,7 @@ fn deadman_release_trips_in_one_tick() {
 }
 
 #[test]
-fn an_encoder_that_jumps_takes_one_tick() {
+fn encoder_jump_trips_in_one_tick() {
     for axis in 0..3 {
         Bench::new().on_each(|device| {
             let mut counts = device.counts;
@@ -117,7 +117,7 @@ fn an_encoder_that_jumps_takes_one_tick() {
 }
 
 #[test]
-fn a_converter_that_gets_no_frames_takes_two_ticks() {
+fn cut_converter_link_trips_in_two_ticks() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         if !matches!(machine.chip.commands, Commands::Serial { .. }) {
@@ -127,7 +127,7 @@ fn a_converter_that_gets_no_frames_takes_two_ticks() {
         // The tick that detects it has already read its inputs.
         assert_eq!(ticks_until_off(&mut machine, 3), 2);
         drop(machine);
-        assert_told(device, Fault::Hardware);
+        assert_reported(device, Fault::Hardware);
     });
 }
 
@@ -150,14 +150,14 @@ fn ms_until_reset(machine: &mut Machine, function: Function) -> Option<(Option<u
 }
 
 fn assert_in_time(machine: &mut Machine, ms: u64) {
-    let (soonest_ns, latest_ns) = {
+    let (min_timeout_ns, latest_ns) = {
         let watchdog = &machine.bus().watchdog;
-        (watchdog.soonest_ns(), watchdog.timeout_ns())
+        (watchdog.min_timeout_ns(), watchdog.timeout_ns())
     };
     assert!(latest_ns <= WATCHDOG_MS * 1_000_000, "{latest_ns} ns");
     // The tick is first, with a tick or two to spare.
-    let spare_ns = soonest_ns.saturating_sub(STALL_MS * 1_000_000);
-    assert!(spare_ns >= 2_000_000, "{soonest_ns} ns at the soonest");
+    let spare_ns = min_timeout_ns.saturating_sub(STALL_MS * 1_000_000);
+    assert!(spare_ns >= 2_000_000, "{min_timeout_ns} ns at the soonest");
     assert!(ms <= WATCHDOG_MS + CHECK_MS, "reset after {ms} ms");
     // The reset releases every pin, and the external pull-down acts.
     machine.reset(Reset::Watchdog);
@@ -165,7 +165,7 @@ fn assert_in_time(machine: &mut Machine, ms: u64) {
 }
 
 #[test]
-fn while_nothing_hangs_the_watchdog_is_fed() {
+fn watchdog_is_fed_while_nothing_hangs() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         machine.bus().usb.bus_reset();
@@ -174,7 +174,7 @@ fn while_nothing_hangs_the_watchdog_is_fed() {
 }
 
 #[test]
-fn a_task_that_hangs_ends_in_the_watchdogs_reset() {
+fn hung_task_is_reset_by_the_watchdog() {
     let bench = Bench::new();
     let tasks = |machine: &Machine| {
         machine
@@ -209,7 +209,7 @@ fn a_task_that_hangs_ends_in_the_watchdogs_reset() {
 }
 
 #[test]
-fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
+fn hung_tick_is_reset_by_the_watchdog() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
@@ -220,13 +220,13 @@ fn a_tick_that_hangs_ends_in_the_watchdogs_reset() {
 }
 
 /// Runs until the amplifiers are off, at once, and checks that only the program's reset follows.
-fn assert_off_at_once_and_for_good(machine: &mut Machine) {
+fn assert_off_at_once_and_permanently(machine: &mut Machine) {
     // The link sends when the host reads.
     let stop = machine.run_until(50, |m| {
         let _ = m.bus().usb.take_in(1);
         !m.is_enabled()
     });
-    assert_eq!(stop, Stop::Asked, "{}", machine.chip.board);
+    assert_eq!(stop, Stop::Requested, "{}", machine.chip.board);
     assert_eq!(machine.take_effects().last(), Some(&Effect::Enable(false)));
     assert_eq!(machine.run_ms(200), Stop::Software);
     assert_eq!(machine.take_effects(), [], "nothing after it");
@@ -238,19 +238,19 @@ fn hard_fault_switches_amplifiers_off_first() {
         let mut machine = device.machine.borrow_mut();
         let at = machine.image.message_encoder();
         machine.patch(at.address, &UNDEFINED);
-        assert_off_at_once_and_for_good(&mut machine);
+        assert_off_at_once_and_permanently(&mut machine);
         assert_eq!(machine.hard_faults, 1);
     });
 }
 
 #[test]
-fn a_panic_switches_the_amplifiers_off_before_anything_else() {
+fn panic_switches_the_amplifiers_off_first() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let at = machine.image.message_encoder();
         let panic = machine.image.panicking();
         machine.call_instead(at, panic);
-        assert_off_at_once_and_for_good(&mut machine);
+        assert_off_at_once_and_permanently(&mut machine);
         assert_eq!(machine.hard_faults, 0);
     });
 }
@@ -270,7 +270,7 @@ fn start_after_crash_commands_no_current_first() {
         machine.patch(areas[0], &[0x5A]);
         let at = machine.image.message_encoder();
         machine.patch(at.address, &UNDEFINED);
-        assert_off_at_once_and_for_good(&mut machine);
+        assert_off_at_once_and_permanently(&mut machine);
         machine.restore(at);
         machine.reset(Reset::Software);
         // Clearing its memory takes the emulated core a few of them.

@@ -13,7 +13,7 @@ const HALTS_MS: [u64; 4] = [2, 5, 20, 44];
 const OFF_NS: u64 = 20_000;
 
 #[test]
-fn the_first_tick_after_a_halt_has_no_force() {
+fn first_tick_after_a_halt_has_no_force() {
     let bench = Bench::new();
     for ms in HALTS_MS {
         bench.on_each(|device| {
@@ -21,12 +21,12 @@ fn the_first_tick_after_a_halt_has_no_force() {
             let board = machine.chip.board;
             let idle = machine.bus().code(0.0);
             let is_idle = |code: i32| (f64::from(code) - idle).abs() < 1.0;
-            let held = machine.bus().commands();
-            assert!(!held.into_iter().all(is_idle), "{board}: force is out");
+            let commanded = machine.bus().commands();
+            assert!(!commanded.into_iter().all(is_idle), "{board}: force is out");
             // The supervisor has just fed it, so the halt ends before the watchdog's time.
             machine.feed_watchdog();
             assert_eq!(machine.halt_ms(ms), Stop::Time, "{board}");
-            assert_eq!(machine.bus().commands(), held, "{board}: halted");
+            assert_eq!(machine.bus().commands(), commanded, "{board}: halted");
             machine.resume();
             machine.slice = 10;
             let resumed_ns = machine.bus().now_ns;
@@ -35,11 +35,11 @@ fn the_first_tick_after_a_halt_has_no_force() {
                 assert!(!(pulses && m.is_enabled()), "{board}, {ms} ms: pulses");
                 !m.is_enabled()
             });
-            assert_eq!(off, Stop::Asked, "{board}, {ms} ms: still on");
+            assert_eq!(off, Stop::Requested, "{board}, {ms} ms: still on");
             let took_ns = machine.bus().now_ns - resumed_ns;
             assert!(took_ns < OFF_NS, "{board}, {ms} ms: off after {took_ns} ns");
             machine.slice = 200;
-            assert_eq!(machine.run_ticks(2), Stop::Asked, "{board}");
+            assert_eq!(machine.run_ticks(2), Stop::Requested, "{board}");
             let on = machine
                 .take_effects()
                 .into_iter()
@@ -57,7 +57,7 @@ fn the_first_tick_after_a_halt_has_no_force() {
 }
 
 #[test]
-fn a_halt_is_noticed_although_the_debugger_stops_the_clock() {
+fn halt_is_detected_although_the_debugger_stops_the_clock() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let board = machine.chip.board;
@@ -69,11 +69,11 @@ fn a_halt_is_noticed_although_the_debugger_stops_the_clock() {
             "{board}: attaching alone does nothing"
         );
         // The halt is between two ticks.
-        assert_eq!(machine.run_ticks(1), Stop::Asked, "{board}");
+        assert_eq!(machine.run_ticks(1), Stop::Requested, "{board}");
         machine.feed_watchdog();
         assert_eq!(machine.halt_ms(20), Stop::Time, "{board}");
         machine.resume();
-        assert_eq!(machine.run_ticks(1), Stop::Asked, "{board}");
+        assert_eq!(machine.run_ticks(1), Stop::Requested, "{board}");
         assert!(!machine.is_enabled(), "{board}");
         drop(machine);
         device.run_ms(40);

@@ -43,7 +43,7 @@ fn is_at(machine: &Machine, address: u32) -> bool {
 }
 
 /// Requests over USB that a board enters its loader, and runs it until it resets itself.
-fn ask_to_enter(mut machine: Machine) -> Machine {
+fn request_loader(mut machine: Machine) -> Machine {
     let found = enumerate(&mut machine).expect("enumerated");
     let configuration = ConfigurationDescriptor::new(&found.configuration).expect("well formed");
     let endpoints = BulkEndpoints::find(&configuration).expect("the link's");
@@ -76,7 +76,7 @@ fn board_enters_its_loader_before_any_setup() {
     for mut machine in machines() {
         let board = machine.chip.board;
         let begin = fill_rom(&mut machine);
-        let mut machine = ask_to_enter(machine);
+        let mut machine = request_loader(machine);
         assert!(!machine.is_enabled(), "{board}");
         machine.reset(Reset::Software);
         assert_eq!(machine.run_ms(5), Stop::Time, "{board}");
@@ -91,7 +91,7 @@ fn board_enters_its_loader_before_any_setup() {
 }
 
 #[test]
-fn a_program_that_the_loader_starts_begins_with_a_reset() {
+fn program_started_by_the_loader_begins_with_a_reset() {
     for mut machine in machines() {
         let board = machine.chip.board;
         let (_, (register, bit)) = rom(&machine);
@@ -104,7 +104,7 @@ fn a_program_that_the_loader_starts_begins_with_a_reset() {
 }
 
 #[test]
-fn an_armed_board_does_not_enter_its_loader() {
+fn armed_board_does_not_enter_its_loader() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;

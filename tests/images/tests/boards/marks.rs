@@ -22,20 +22,20 @@ fn is_high_once(levels: &[(f64, bool)]) -> bool {
 }
 
 #[test]
-fn each_mark_raises_the_pin_for_ten_ticks_from_its_tick_on() {
+fn mark_raises_the_pin_for_ten_ticks() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;
         let mut device = Device::open(machine, terrain, scene);
-        let mut seen = levels(&mut device, 30);
-        assert!(!is_high_once(&seen), "{board}");
+        let mut recorded = levels(&mut device, 30);
+        assert!(!is_high_once(&recorded), "{board}");
         let before = device.latest.expect("samples").tick;
         for _ in 0..3 {
             device.request(Request::Mark);
         }
-        seen.extend(levels(&mut device, 150));
+        recorded.extend(levels(&mut device, 150));
         // Each edge lies between two checks, which are a millisecond or two apart.
-        let pairs = seen.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+        let pairs = recorded.windows(2).filter(|pair| pair[0].1 != pair[1].1);
         let edges: Vec<_> = pairs.map(|pair| [pair[0].0, pair[1].0]).collect();
         assert_eq!(edges.len(), 6, "{board}: three pulses {edges:?}");
         let from_to = |from: [f64; 2], to: [f64; 2]| to[0] - from[1]..=to[1] - from[0];
@@ -50,14 +50,17 @@ fn each_mark_raises_the_pin_for_ten_ticks_from_its_tick_on() {
         assert!(before < first && third <= latest, "{board}");
         for (ticks, ups) in [(second - first, 0), (third - second, 2)] {
             assert!(ticks >= MARK_PULSE_MS + MARK_GAP_MS, "{board}: {ticks}");
-            let apart = from_to(edges[ups], edges[ups + 2]);
-            assert!(apart.contains(&ticks.into()), "{board}: {apart:?} {ticks}");
+            let period = from_to(edges[ups], edges[ups + 2]);
+            assert!(
+                period.contains(&ticks.into()),
+                "{board}: {period:?} {ticks}"
+            );
         }
     });
 }
 
 #[test]
-fn the_pin_is_low_after_a_reset_within_a_pulse() {
+fn pin_is_low_after_a_reset_within_a_pulse() {
     let (raster, home_mm) = rough_ground();
     on_each_board(&raster, home_mm, |machine, terrain, scene| {
         let board = machine.chip.board;

@@ -59,18 +59,18 @@ fn assert_hot(status: &Status, board: &str) {
 }
 
 #[test]
-fn a_power_up_takes_the_motors_to_be_hot_whatever_the_ram_holds() {
+fn motors_count_as_hot_after_power_up() {
     on_each(|mut machine, _, terrain, scene| {
         let board = machine.chip.board;
         reset_with(&mut machine, &cold(), Reset::PowerUp);
-        let status = Device::open(machine, terrain, scene).ask_status();
+        let status = Device::open(machine, terrain, scene).query_status();
         assert_eq!(status.boot.cause, ResetCause::PowerOn, "{board}");
         assert_hot(&status, board);
     });
 }
 
 #[test]
-fn a_damaged_ram_takes_the_motors_to_be_hot() {
+fn motors_count_as_hot_if_the_ram_is_damaged() {
     on_each(|mut machine, _, terrain, scene| {
         let board = machine.chip.board;
         let mut copies = cold();
@@ -78,29 +78,29 @@ fn a_damaged_ram_takes_the_motors_to_be_hot() {
             copy[3] ^= 1 << 20;
         }
         reset_with(&mut machine, &copies, Reset::Watchdog);
-        let status = Device::open(machine, terrain, scene).ask_status();
+        let status = Device::open(machine, terrain, scene).query_status();
         assert_eq!(status.boot.cause, ResetCause::Watchdog, "{board}");
         assert_hot(&status, board);
     });
 }
 
 #[test]
-fn a_reset_under_load_keeps_the_motors_temperatures() {
+fn motor_temperatures_survive_a_reset_under_load() {
     on_each(|mut machine, plane, terrain, scene| {
         let board = machine.chip.board;
         // It has run for long, and its motors are cold.
         reset_with(&mut machine, &cold(), Reset::Watchdog);
         let mut device = Device::arm(machine, terrain, scene);
-        let begun = device.ask_status().health.winding_c;
+        let initial_c = device.query_status().health.winding_c;
         assert!(
-            begun.max_element() < 25.0 + UNSEEN_K + 0.1,
-            "{board}: {begun}"
+            initial_c.max_element() < 25.0 + UNSEEN_K + 0.1,
+            "{board}: {initial_c}"
         );
         device.move_to(plane.counts_at([100.0, 100.0], -3.0));
         device.wait_for_full_force();
         device.move_to(plane.counts_at([100.0, 100.0], 6.0));
         device.run_ms(1_500);
-        let before = device.ask_status().health.winding_c;
+        let before = device.query_status().health.winding_c;
         {
             // The tick hangs with the force on, and the watchdog resets the chip.
             let mut machine = device.machine.borrow_mut();
@@ -110,17 +110,17 @@ fn a_reset_under_load_keeps_the_motors_temperatures() {
             assert_eq!(machine.run_ms(200), Stop::Watchdog, "{board}");
             machine.restore(tick);
         }
-        let mut again = Device::open(device.reset(), terrain, scene);
-        let after = again.ask_status().health.winding_c;
+        let mut restarted = Device::open(device.reset(), terrain, scene);
+        let after = restarted.query_status().health.winding_c;
         println!("{board}: {before} °C before the reset, {after} after it");
-        let kept = after - before;
+        let recorded = after - before;
         // The start takes a moment, in which the windings cool a little.
         assert!(
-            kept.cmpgt(Vec3::splat(0.0)).all(),
+            recorded.cmpgt(Vec3::splat(0.0)).all(),
             "{board}: {before} {after}"
         );
         assert!(
-            kept.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
+            recorded.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
             "{board}: {before} {after}"
         );
         // Each axis has its own temperature: the one that pushed is the warmest.

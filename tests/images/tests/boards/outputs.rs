@@ -25,7 +25,7 @@ fn on_each_armed(before: impl Fn(&mut Machine), mut then: impl FnMut(&mut Device
         let mut device = Device::arm(machine, terrain, scene);
         device.run_ms(60);
         let mut machine = device.machine.borrow_mut();
-        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        assert_eq!(machine.run_ticks(1), Stop::Requested);
         let _ = machine.take_effects();
         drop(machine);
         then(&mut device);
@@ -41,7 +41,7 @@ fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
     let mut machine = device.machine.borrow_mut();
     let board = machine.chip.board;
     let took = (1..=at_most).find(|_| {
-        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        assert_eq!(machine.run_ticks(1), Stop::Requested);
         !machine.is_enabled()
     });
     drop(machine);
@@ -67,16 +67,16 @@ fn converter_frames_keep_the_data_sheets_minimum_gap() {
             let mut machine = device.machine.borrow_mut();
             machine.slice = 1;
             // To the end of a tick, so that the next three are whole.
-            assert_eq!(machine.run_ticks(1), Stop::Asked);
+            assert_eq!(machine.run_ticks(1), Stop::Requested);
             let _ = machine.take_effects();
-            assert_eq!(machine.run_ticks(3), Stop::Asked);
+            assert_eq!(machine.run_ticks(3), Stop::Requested);
             let sent = machine.take_effects().len();
             assert!(sent >= 9, "{sent} commands");
             let bus = machine.bus();
             assert_eq!(bus.converter.lost, 0);
             // The measured gaps are at least the data sheet's, and at most a frame's length above
             // it.
-            let (after_write_ns, after_read_ns) = bus.converter.shortest_high_ns;
+            let (after_write_ns, after_read_ns) = bus.converter.min_high_ns;
             assert!((100..1_000).contains(&after_write_ns), "{after_write_ns}");
             assert!((200..1_000).contains(&after_read_ns), "{after_read_ns}");
         },
@@ -84,7 +84,7 @@ fn converter_frames_keep_the_data_sheets_minimum_gap() {
 }
 
 #[test]
-fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
+fn converter_without_read_back_keeps_the_amplifiers_off() {
     on_each_board(&ground(), HOME_MM, |machine, terrain, scene| {
         if !has_converter(&machine) {
             return;
@@ -93,7 +93,7 @@ fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
         let blocked = |device: &mut Device<'_>| {
             device.run_ms(150);
             // The guard's own report may have been sent before the session opened.
-            let report = device.ask_status().health.report;
+            let report = device.query_status().health.report;
             report.blockers.contains(Blockers::OUTPUTS_NOT_AS_SET)
         };
         assert!(!blocked(&mut device));
@@ -102,21 +102,21 @@ fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
         device.machine.borrow().bus().converter.is_silent = false;
         assert!(!blocked(&mut device), "set up anew");
         // It lost its supply for a moment.
-        device.machine.borrow().bus().converter.forget();
+        device.machine.borrow().bus().converter.clear();
         assert!(!blocked(&mut device), "set up anew");
         assert_eq!(device.commands(), [0; 3]);
     });
 }
 
 #[test]
-fn a_converter_that_forgets_takes_eight_ticks() {
+fn cleared_converter_trips_within_eight_ticks() {
     on_each_armed(
         |_| (),
         |device| {
             if !has_converter(&device.machine.borrow()) {
                 return;
             }
-            device.machine.borrow().bus().converter.forget();
+            device.machine.borrow().bus().converter.clear();
             let (took, reported) = ends(device, 9);
             assert!(took <= 8, "{took}");
             assert_eq!(reported, Some(Fault::OutputsNotAsSet));
@@ -125,7 +125,7 @@ fn a_converter_that_forgets_takes_eight_ticks() {
 }
 
 #[test]
-fn a_broken_wire_from_the_converter_takes_two_ticks() {
+fn broken_read_back_wire_trips_in_two_ticks() {
     on_each_armed(
         |_| (),
         |device| {
@@ -139,7 +139,7 @@ fn a_broken_wire_from_the_converter_takes_two_ticks() {
 }
 
 #[test]
-fn an_amplifier_that_is_not_ready_takes_three_ticks() {
+fn unready_amplifier_trips_in_three_ticks() {
     for axis in 0..3 {
         on_each_armed(
             |_| (),
@@ -180,7 +180,7 @@ fn monitor_pins_are_ignored_without_monitors() {
         |device| {
             device.run_ms(300);
             assert!(device.machine.borrow().is_enabled(), "{:?}", device.guard);
-            let status = device.ask_status();
+            let status = device.query_status();
             assert_eq!(status.health.sense.measured_ma, None);
         },
     );
@@ -199,7 +199,7 @@ fn measured_currents_are_reported_in_milliamperes() {
             machine.set_input(pin, false);
             machine.bus().set_monitors([0.1, -0.2, 0.4]);
             let mut device = Device::open(machine, terrain, scene);
-            let measured = device.ask_status().health.sense.measured_ma;
+            let measured = device.query_status().health.sense.measured_ma;
             let measured = measured.expect("there are monitors");
             for (got, expected) in measured.into_iter().zip([100, -200, 400]) {
                 assert!((got - expected).abs() <= 3, "{board}: {measured:?}");
@@ -250,7 +250,7 @@ fn max_currents_stay_within_the_specified_code_range() {
 }
 
 #[test]
-fn duty_cycles_are_as_fast_as_an_escon_reads_well() {
+fn duty_cycle_frequency_suits_an_escon() {
     for mut machine in machines() {
         let Commands::DutyCycles(_, largest) = machine.chip.commands else {
             continue;
@@ -292,12 +292,12 @@ fn on_chip_converters_are_enabled_only_at_zero_current() {
             }
             were_on == [true; 3]
         });
-        assert_eq!(all_on, Stop::Asked);
+        assert_eq!(all_on, Stop::Requested);
     }
 }
 
 #[test]
-fn converters_on_the_chip_are_buffered() {
+fn on_chip_converters_are_buffered() {
     for mut machine in machines() {
         if !matches!(machine.chip.commands, Commands::Converters(_)) {
             continue;

@@ -32,7 +32,7 @@ fn table(page: &str, heading: &str) -> Pins {
 }
 
 /// Returns the pins of a board on its page.
-fn stated(board: &str) -> Pins {
+fn documented_pins(board: &str) -> Pins {
     let page = |name: &str| {
         let path = repository().join(format!("docs/reference/boards/{name}.md"));
         std::fs::read_to_string(path).expect("the page")
@@ -86,11 +86,11 @@ fn pins_are_configured_as_on_the_board_page() {
     for mut machine in machines() {
         let board = machine.chip.board;
         let mut expected = modes(&machine);
-        let stated = stated(board);
-        assert!(stated.len() >= 15, "{board}: {stated:?}");
+        let documented = documented_pins(board);
+        assert!(documented.len() >= 15, "{board}: {documented:?}");
         assert_eq!(machine.run_ms(10), Stop::Time, "{board}");
         // Pins that are not on the page keep their reset state.
-        expected.extend(stated);
+        expected.extend(documented);
         let is = modes(&machine);
         let other = expected
             .iter()

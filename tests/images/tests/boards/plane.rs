@@ -82,7 +82,7 @@ fn pose_runs_once_per_tick_within_instruction_budget() {
         let mut machine = device.machine.borrow_mut();
         let pose = machine.image.function_like(&["Pose", "from_angles"]);
         let counted = machine.count(pose);
-        assert_eq!(machine.run_ticks(100), Stop::Asked);
+        assert_eq!(machine.run_ticks(100), Stop::Requested);
         let (calls, instructions) = counted.get();
         let each = instructions / calls;
         println!("{board}: {each} instructions a pose, {calls} in 100 ticks");

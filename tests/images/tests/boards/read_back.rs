@@ -10,7 +10,7 @@ use hapterra_image_tests::machine::Stop;
 fn ends(device: &mut Device<'_>, max: usize) -> (Option<usize>, Option<Fault>) {
     let mut machine = device.machine.borrow_mut();
     let took = (1..=max).find(|_| {
-        assert_eq!(machine.run_ticks(1), Stop::Asked);
+        assert_eq!(machine.run_ticks(1), Stop::Requested);
         !machine.is_enabled()
     });
     drop(machine);
@@ -19,7 +19,7 @@ fn ends(device: &mut Device<'_>, max: usize) -> (Option<usize>, Option<Fault>) {
 }
 
 #[test]
-fn a_command_pin_that_reads_otherwise_is_a_fault() {
+fn wrong_command_pin_reading_is_a_fault() {
     for axis in 0..3 {
         Bench::new().on_each(|device| {
             let mut machine = device.machine.borrow_mut();
@@ -29,7 +29,7 @@ fn a_command_pin_that_reads_otherwise_is_a_fault() {
             // As commanded, within the error of a good output.
             let commanded = machine.bus().commands()[axis] as u16;
             machine.bus().command_held_at = Some((axis, commanded + 40));
-            assert_eq!(machine.run_ticks(20), Stop::Asked);
+            assert_eq!(machine.run_ticks(20), Stop::Requested);
             assert!(machine.is_enabled(), "axis {axis}: within its error");
             machine.bus().command_held_at = Some((axis, commanded + 200));
             drop(machine);
@@ -41,7 +41,7 @@ fn a_command_pin_that_reads_otherwise_is_a_fault() {
 }
 
 #[test]
-fn an_enable_pin_held_low_from_outside_is_a_fault() {
+fn enable_pin_held_low_externally_is_a_fault() {
     Bench::new().on_each(|device| {
         let board = device.machine.borrow().chip.board;
         device.machine.borrow().bus().enable_held_at = Some(false);
@@ -52,7 +52,7 @@ fn an_enable_pin_held_low_from_outside_is_a_fault() {
 }
 
 #[test]
-fn an_enable_pin_held_high_from_outside_keeps_the_arm_disarmed() {
+fn enable_pin_held_high_externally_blocks_arming() {
     let bench = Bench::new();
     let terrain = bench.terrain();
     for machine in hapterra_image_tests::device::machines() {
@@ -60,7 +60,7 @@ fn an_enable_pin_held_high_from_outside_keeps_the_arm_disarmed() {
         let mut device = Device::open(machine, &terrain, bench.scene(&terrain));
         let is_blocked = |device: &mut Device<'_>| {
             device.run_ms(150);
-            let report = device.ask_status().health.report;
+            let report = device.query_status().health.report;
             report.blockers.contains(Blockers::OUTPUTS_NOT_AS_SET)
         };
         assert!(!is_blocked(&mut device), "{board}");

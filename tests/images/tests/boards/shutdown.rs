@@ -28,20 +28,20 @@ fn on_each(then: impl FnMut(Machine, &Terrain<'_>, Scene)) {
     on_each_board(&raster, home_mm, then);
 }
 
-/// Arms every board, calls `disturb`, resets the board, and passes its status to `asked`.
+/// Arms every board, calls `disturb`, resets the board, and passes its status to `check`.
 fn after(
     cause: Reset,
     mut disturb: impl FnMut(&mut Device<'_>, Scene),
-    mut asked: impl FnMut(&str, &Status),
+    mut check: impl FnMut(&str, &Status),
 ) {
     on_each(|machine, terrain, scene| {
         let mut device = Device::arm(machine, terrain, scene);
         let _ = device.machine.borrow_mut().take_effects();
         disturb(&mut device, scene);
-        let mut again = Device::open(device.reset_by(cause), terrain, scene);
-        let status = again.ask_status();
-        let board = again.machine.borrow().chip.board;
-        asked(board, &status);
+        let mut restarted = Device::open(device.reset_by(cause), terrain, scene);
+        let status = restarted.query_status();
+        let board = restarted.machine.borrow().chip.board;
+        check(board, &status);
     });
 }
 
@@ -69,12 +69,12 @@ fn supply_drop_disables_amplifiers_before_the_tick_resumes() {
     let fall = |device: &mut Device<'_>, _: Scene| {
         let mut machine = device.machine.borrow_mut();
         machine.slice = 1;
-        assert_eq!(machine.run_until(5, |m| m.is_ticking()), Stop::Asked);
+        assert_eq!(machine.run_until(5, |m| m.is_ticking()), Stop::Requested);
         machine.run_until(1, |m| !m.place().contains("TIM7"));
         assert!(machine.is_ticking() && machine.is_enabled());
         machine.set_supply_mv(TOO_LOW_MV);
         let before_ns = machine.bus().now_ns;
-        assert_eq!(run_until_off(&mut machine, 1), Stop::Asked, "off");
+        assert_eq!(run_until_off(&mut machine, 1), Stop::Requested, "off");
         assert!(machine.is_ticking(), "the tick has not gone on");
         // A few instructions, and the cost of an exception.
         let after_ns = machine.bus().now_ns - before_ns;
@@ -135,19 +135,19 @@ fn missing_brown_out_level_in_option_bytes_is_reported() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let mut device = Device::open(machine, terrain, scene);
-        let set = device.ask_status().boot;
+        let set = device.query_status().boot;
         assert!(!set.lacks_brown_out_reset(), "{board}: {set:?}");
         assert!(set.resets_below_mv >= 2_700, "{board}: {set:?}");
         let machine = device.reset();
         machine.bus().set_brown_out_level(0);
         let mut device = Device::open(machine, terrain, scene);
-        let as_sold = device.ask_status().boot;
+        let as_sold = device.query_status().boot;
         assert!(as_sold.lacks_brown_out_reset(), "{board}: {as_sold:?}");
     });
 }
 
 #[test]
-fn a_core_that_a_debugger_halts_is_stopped_by_the_chip() {
+fn chip_disables_amplifiers_if_a_debugger_halts_the_core() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let device = Device::arm(machine, terrain, scene);
@@ -201,7 +201,7 @@ fn on_each_hung(play: impl Fn(&mut Machine)) {
 }
 
 #[test]
-fn a_tick_that_hangs_has_no_duty_cycles_after_two_periods() {
+fn hung_tick_has_no_duty_cycles_after_two_periods() {
     on_each_hung(|machine| {
         machine.run_ms(1);
         let pulses = |m: &Machine| m.bus().drives_duty_cycles();
@@ -215,7 +215,7 @@ fn a_tick_that_hangs_has_no_duty_cycles_after_two_periods() {
 }
 
 #[test]
-fn the_stop_ends_the_duty_cycles_without_the_program() {
+fn emergency_stop_ends_duty_cycles_without_the_program() {
     on_each_hung(|machine| {
         assert!(machine.is_enabled(), "nothing else switches off");
         assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
@@ -230,7 +230,7 @@ fn the_stop_ends_the_duty_cycles_without_the_program() {
 }
 
 #[test]
-fn a_supply_that_falls_ends_the_duty_cycles_without_the_program() {
+fn supply_drop_ends_duty_cycles_without_the_program() {
     on_each_hung(|machine| {
         machine.mask_supply_interrupt();
         assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
@@ -246,7 +246,7 @@ fn a_supply_that_falls_ends_the_duty_cycles_without_the_program() {
 }
 
 #[test]
-fn memory_that_cannot_be_read_ends_the_duty_cycles() {
+fn unreadable_memory_ends_the_duty_cycles() {
     for memory in 0..4 {
         on_each_hung(|machine| {
             assert_eq!(machine.bus().drives_duty_cycles(), Some(true));
@@ -259,7 +259,7 @@ fn memory_that_cannot_be_read_ends_the_duty_cycles() {
 }
 
 #[test]
-fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
+fn stop_shorter_than_a_tick_is_latched() {
     on_each(|machine, terrain, scene| {
         let mut device = Device::arm(machine, terrain, scene);
         let mut machine = device.machine.borrow_mut();
@@ -308,7 +308,7 @@ fn null_pointer_write_disables_amplifiers_and_changes_no_code() {
         let encoder = machine.image.message_encoder();
         machine.patch(encoder.address, &WRITE);
         let stop = run_until_off(&mut machine, 50);
-        assert_eq!(stop, Stop::Asked, "{board}: off");
+        assert_eq!(stop, Stop::Requested, "{board}: off");
         assert_eq!(machine.hard_faults, 1, "{board}");
         assert_eq!(code(&machine), before, "{board}");
         let _ = machine.take_effects();
@@ -325,7 +325,7 @@ fn null_pointer_write_disables_amplifiers_and_changes_no_code() {
 }
 
 #[test]
-fn a_stack_that_overruns_switches_off_and_overwrites_nothing() {
+fn stack_overflow_switches_off_and_overwrites_nothing() {
     // push {r0-r7, lr}; and again.
     const RECURSE: [u8; 4] = [0xFF, 0xB5, 0xFD, 0xE7];
     let overrun = |device: &mut Device<'_>, _: Scene| {
@@ -334,7 +334,7 @@ fn a_stack_that_overruns_switches_off_and_overwrites_nothing() {
         let encoder = machine.image.message_encoder();
         machine.patch(encoder.address, &RECURSE);
         let stop = run_until_off(&mut machine, 50);
-        assert_eq!(stop, Stop::Asked, "{board}: off");
+        assert_eq!(stop, Stop::Requested, "{board}: off");
         assert_eq!(machine.hard_faults, 1, "{board}");
         assert_eq!(machine.run_ms(200), Stop::Software, "{board}");
         machine.restore(encoder);
@@ -377,7 +377,7 @@ fn hard_fault_during_logging_is_reported_as_hard_fault() {
 }
 
 #[test]
-fn a_panic_before_the_watchdog_runs_resets_the_chip() {
+fn panic_before_the_watchdog_runs_resets_the_chip() {
     on_each(|mut machine, terrain, scene| {
         let board = machine.chip.board;
         let scan = machine.image.function_like(&["CalibrationStore", "scan"]);
@@ -388,7 +388,7 @@ fn a_panic_before_the_watchdog_runs_resets_the_chip() {
         machine.restore(scan);
         machine.reset(Reset::Software);
         let mut device = Device::open(machine, terrain, scene);
-        let status = device.ask_status();
+        let status = device.query_status();
         let fault = status.health.report.fault;
         assert_eq!(fault, Some(Fault::Panicked), "{board}");
     });
@@ -424,7 +424,7 @@ fn heartbeat_toggles_each_tick_only_with_amplifiers_on() {
 }
 
 #[test]
-fn a_tick_that_hangs_has_no_heartbeat() {
+fn hung_tick_has_no_heartbeat() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let device = Device::arm(machine, terrain, scene);
@@ -483,12 +483,12 @@ fn core_clock_stays_in_bounds_with_a_fast_oscillator() {
         let hz = core_hz(&machine);
         assert_eq!(hz, chip.core_hz, "{board}");
         let fastest_hz = hz + hz / 100;
-        assert!(fastest_hz <= chip.core_at_most_hz, "{board}: {fastest_hz}");
+        assert!(fastest_hz <= chip.max_core_hz, "{board}: {fastest_hz}");
     }
 }
 
 #[test]
-fn usbs_oscillator_follows_the_usb_that_is_used() {
+fn usb_oscillator_follows_the_usb_in_use() {
     for mut machine in machines() {
         let board = machine.chip.board;
         assert_eq!(machine.run_ms(20), Stop::Time, "{board}");

@@ -14,7 +14,7 @@ const MIN_N: f64 = 1e-12;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TickConditions<'p> {
     /// Vector from the HIP to the proxy, cells.
-    pub(super) way: DVec3,
+    pub(super) displacement: DVec3,
     /// Its error bound, cells.
     pub(super) allowed: f64,
     /// The proxy, for textures.
@@ -29,7 +29,7 @@ pub(super) struct TickConditions<'p> {
 
 /// An expected force and its error bound.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
+pub(super) struct ExpectedForce {
     /// The force.
     pub(super) force_n: DVec3,
     /// Its error bound, N.
@@ -38,32 +38,35 @@ pub(super) struct Wanted {
 
 impl TickConditions<'_> {
     /// Returns the force without shading and edge fade.
-    pub(super) fn force(&self, material: &ActiveMaterial) -> Wanted {
-        let (mut stretch, mut allowed) = (self.way, self.allowed + ROUNDING * self.way.length());
-        if self.way.length() > MIN_N
-            && let Some((judge, share)) = material.texture()
+    pub(super) fn force(&self, material: &ActiveMaterial) -> ExpectedForce {
+        let (mut stretch, mut allowed) = (
+            self.displacement,
+            self.allowed + ROUNDING * self.displacement.length(),
+        );
+        if self.displacement.length() > MIN_N
+            && let Some((oracle, share)) = material.texture()
         {
-            let added = judge.adds(self.way, self.proxy, share);
-            stretch += added.wanted * share;
+            let added = oracle.adds(self.displacement, self.proxy, share);
+            stretch += added.expected * share;
             // The relief turns with the displacement, and at most doubles the slope.
             allowed += added.allowed + 2.0 * self.allowed;
         }
         let newtons = material.stiffness() * self.cell_mm;
         let spring = shortened(stretch * newtons, self.max_n);
-        let unsure = material.unsure_stiffness() * self.cell_mm * stretch.length();
-        let allowed = 2.0 * allowed * newtons + unsure;
+        let uncertainty = material.stiffness_uncertainty() * self.cell_mm * stretch.length();
+        let allowed = 2.0 * allowed * newtons + uncertainty;
         self.damped(material, spring, allowed)
     }
 
     /// Returns the spring's force, damped along its direction.
-    fn damped(&self, material: &ActiveMaterial, spring: DVec3, allowed: f64) -> Wanted {
+    fn damped(&self, material: &ActiveMaterial, spring: DVec3, allowed: f64) -> ExpectedForce {
         let (size, damping) = (spring.length(), 1e-3 * material.damping());
         let fast_mm_s = self.velocity_mm_s.length();
-        let unsure = (1e-3 * material.unsure_damping() * fast_mm_s).min(size);
-        let rounding = allowed + ROUNDING * size + unsure + MIN_N;
+        let uncertainty = (1e-3 * material.damping_uncertainty() * fast_mm_s).min(size);
+        let rounding = allowed + ROUNDING * size + uncertainty + MIN_N;
         if damping == 0.0 || size <= MIN_N {
             let (force_n, allowed_n) = (spring, rounding.min(2.0 * self.max_n));
-            return Wanted { force_n, allowed_n };
+            return ExpectedForce { force_n, allowed_n };
         }
         let along = spring / size;
         let against = (damping * self.velocity_mm_s.dot(along)).clamp(-size, size);
@@ -72,7 +75,7 @@ impl TickConditions<'_> {
         let fast = damping * fast_mm_s;
         let turned = (rounding / size).min(2.0);
         let allowed = (rounding + 2.0 * fast * (turned + ROUNDING)).min(3.0 * (size + rounding));
-        Wanted {
+        ExpectedForce {
             force_n: force,
             allowed_n: (rounding + allowed).min(2.0 * self.max_n),
         }
@@ -81,45 +84,45 @@ impl TickConditions<'_> {
     /// Returns the smallest and largest size of a force turned by shading; the smallest is zero if
     /// it fades.
     pub(super) fn sizes(&self, material: &ActiveMaterial, fades: bool) -> [f64; 2] {
-        let depth = self.way.length();
+        let depth = self.displacement.length();
         let off = self.allowed + ROUNDING * depth;
-        let (mut least, mut most) = (depth - off, depth + off);
+        let (mut min, mut max) = (depth - off, depth + off);
         if depth > MIN_N
-            && let Some((judge, share)) = material.texture()
+            && let Some((oracle, share)) = material.texture()
         {
-            let added = judge.adds(self.way, self.proxy, share);
-            let relief = judge.relief(self.proxy, depth);
+            let added = oracle.adds(self.displacement, self.proxy, share);
+            let relief = oracle.relief(self.proxy, depth);
             let (rise, slope) = (share * relief.rise, share * relief.along);
             let allowed = added.allowed + off;
-            least += rise - allowed;
-            most = (depth + rise.max(if fades { relief.amplitude } else { rise })).hypot(slope)
+            min += rise - allowed;
+            max = (depth + rise.max(if fades { relief.amplitude } else { rise })).hypot(slope)
                 + off
                 + allowed;
         }
         let newtons = material.stiffness() * self.cell_mm;
-        let unsure = material.unsure_stiffness() * self.cell_mm;
+        let uncertainty = material.stiffness_uncertainty() * self.cell_mm;
         let spring = |stretch: f64, newtons: f64| (stretch.max(0.0) * newtons).min(self.max_n);
-        let (least, most) = (
-            spring(least, newtons - unsure),
-            spring(most, newtons + unsure),
+        let (min, max) = (
+            spring(min, newtons - uncertainty),
+            spring(max, newtons + uncertainty),
         );
-        let damping = material.damping() + material.unsure_damping();
+        let damping = material.damping() + material.damping_uncertainty();
         // Damping of a fast HIP cancels nearly all force: a difference of two rounded values.
         let fast = 1e-3 * damping * self.velocity_mm_s.length() * (1.0 + ROUNDING);
-        let least = if fades { 0.0 } else { (least - fast).max(0.0) };
-        let most = (most + fast.min(most)).min(self.max_n);
+        let min = if fades { 0.0 } else { (min - fast).max(0.0) };
+        let max = (max + fast.min(max)).min(self.max_n);
         [
-            least * (1.0 - ROUNDING) - MIN_N,
-            most * (1.0 + ROUNDING) + MIN_N,
+            min * (1.0 - ROUNDING) - MIN_N,
+            max * (1.0 + ROUNDING) + MIN_N,
         ]
     }
 }
 
-/// Returns a vector, shortened to a length of `most` if it is longer.
-fn shortened(vector: DVec3, most: f64) -> DVec3 {
+/// Returns a vector, shortened to a length of `max` if it is longer.
+fn shortened(vector: DVec3, max: f64) -> DVec3 {
     let length = vector.length();
-    match length > most {
-        true => vector * (most / length),
+    match length > max {
+        true => vector * (max / length),
         false => vector,
     }
 }

@@ -27,19 +27,19 @@ use active_material::ActiveMaterial;
 use force::TickConditions;
 
 /// Distance from the line half way between two samples, cells, within which both classes are valid.
-const HALF_WAY: f64 = 1e-6;
+const TIE: f64 = 1e-6;
 /// Most alternatives that are followed.
-const FOLLOWED: usize = 256;
+const MAX_CANDIDATES: usize = 256;
 /// Ticks a second.
 const RATE_HZ: f64 = 1e3;
 
 /// Measurements of an oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Judged {
+pub struct MaterialCounts {
     /// Points in contact whose full force was checked.
-    pub in_whole: u64,
+    pub compared_as_vectors: u64,
     /// Points in contact whose force was checked by size only, as shading turned it or it faded.
-    pub by_size: u64,
+    pub compared_by_size: u64,
     /// Points in contact that were not checked, after too many alternatives.
     pub open: u64,
     /// Points in contact during a change of material.
@@ -47,34 +47,34 @@ pub struct Judged {
     /// Points at which a proxy slid over a plane.
     pub sliding: u64,
     /// Points in contact with friction.
-    pub rubbed: u64,
+    pub with_friction: u64,
 }
 
-impl Judged {
+impl MaterialCounts {
     /// Adds another oracle's measurements.
     pub fn add(&mut self, other: &Self) {
-        self.in_whole += other.in_whole;
-        self.by_size += other.by_size;
+        self.compared_as_vectors += other.compared_as_vectors;
+        self.compared_by_size += other.compared_by_size;
         self.open += other.open;
         self.changing += other.changing;
         self.sliding += other.sliding;
-        self.rubbed += other.rubbed;
+        self.with_friction += other.with_friction;
     }
 }
 
 /// Checks the points of one scene in turn.
 pub struct MaterialOracle<'g> {
-    place: TickOracle<'g>,
+    position_oracle: TickOracle<'g>,
     materials: &'g Materials,
     kind: Kind,
     shading: Shading,
     shift: [i32; 3],
     /// Materials that may be active; empty if they are unknown.
-    courses: Vec<ActiveMaterial>,
+    candidates: Vec<ActiveMaterial>,
     before: Option<Replied>,
     point: usize,
     /// Its measurements.
-    pub judged: Judged,
+    pub counts: MaterialCounts,
 }
 
 impl<'g> MaterialOracle<'g> {
@@ -82,15 +82,15 @@ impl<'g> MaterialOracle<'g> {
     #[must_use]
     pub fn new(scene: &'g Scene, materials: &'g Materials, shift: [i32; 3]) -> Self {
         Self {
-            place: TickOracle::new(&scene.terrain),
+            position_oracle: TickOracle::new(&scene.terrain),
             materials,
             kind: scene.terrain.kind,
             shading: scene.shading,
             shift,
-            courses: vec![ActiveMaterial::default(materials)],
+            candidates: vec![ActiveMaterial::default(materials)],
             before: None,
             point: 0,
-            judged: Judged::default(),
+            counts: MaterialCounts::default(),
         }
     }
 
@@ -98,60 +98,62 @@ impl<'g> MaterialOracle<'g> {
     ///
     /// # Errors
     /// The first invariant that it breaks.
-    pub fn look(&mut self, replied: &Replied) -> Verdict {
-        let seen = seen(replied, self.shift);
-        self.is_bounded(replied)?;
-        self.place_is_right(&seen)?;
-        self.force_is_right(replied, &seen)?;
+    pub fn check(&mut self, replied: &Replied) -> Verdict {
+        let observed = observed(replied, self.shift);
+        self.check_bounds(replied)?;
+        self.check_position(&observed)?;
+        self.check_force(replied, &observed)?;
         self.before = Some(*replied);
         self.point += 1;
         Ok(())
     }
 
     /// Checks every force: its limit, and none without a contact.
-    fn is_bounded(&self, replied: &Replied) -> Verdict {
+    fn check_bounds(&self, replied: &Replied) -> Verdict {
         let (force, state) = (replied.sample.force_n.as_dvec3(), replied.sample.state);
-        let most = f64::from(self.materials.params.max_force_n);
-        let is_bounded = force.length() <= most * (1.0 + 1e-6);
+        let max = f64::from(self.materials.params.max_force_n);
+        let is_bounded = force.length() <= max * (1.0 + 1e-6);
         let may_press = matches!(state, ContactState::Touching | ContactState::Releasing);
         if !is_bounded || !(may_press || force == DVec3::ZERO) {
             return self.fail(
                 Invariant::Material,
-                format!("{force} N, {most} at most: {replied:?}"),
+                format!("{force} N, {max} at most: {replied:?}"),
             );
         }
         Ok(())
     }
 
     /// Checks that the proxy is where the friction of its last position allows it.
-    fn place_is_right(&mut self, seen: &ObservedTick) -> Verdict {
-        let touches = seen.output.state == ContactState::Touching;
-        let is_open = self.courses.is_empty();
-        let mut is_rubbed = is_open;
-        let mut wrong = None;
-        let mut courses = std::mem::take(&mut self.courses);
-        courses.retain(|course| {
-            let friction = course.friction();
-            is_rubbed |= course.may_rub();
+    fn check_position(&mut self, observed: &ObservedTick) -> Verdict {
+        let touches = observed.output.state == ContactState::Touching;
+        let is_open = self.candidates.is_empty();
+        let mut has_friction = is_open;
+        let mut last_violation = None;
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.retain(|candidate| {
+            let friction = candidate.friction();
+            has_friction |= candidate.may_have_friction();
             let verdict = match friction.is_none() {
                 true => Ok(()),
                 false => self
-                    .place
-                    .is_held_by(course.frictions(), seen)
-                    .and_then(|()| self.slides(course, seen)),
+                    .position_oracle
+                    .check_friction(candidate.friction_bounds(), observed)
+                    .and_then(|()| self.check_slides(candidate, observed)),
             };
-            verdict.map_err(|violation| wrong = Some(violation)).is_ok()
+            verdict
+                .map_err(|violation| last_violation = Some(violation))
+                .is_ok()
         });
-        self.judged.rubbed += u64::from(touches && is_rubbed && !is_open);
-        if let (true, Some(violation)) = (courses.is_empty(), wrong) {
+        self.counts.with_friction += u64::from(touches && has_friction && !is_open);
+        if let (true, Some(violation)) = (candidates.is_empty(), last_violation) {
             return Err(violation);
         }
-        self.courses = courses;
-        self.place.look_at_place(seen, is_rubbed)
+        self.candidates = candidates;
+        self.position_oracle.check_position(observed, has_friction)
     }
 
     /// Checks that the force is that of a possible material.
-    fn force_is_right(&mut self, replied: &Replied, seen: &ObservedTick) -> Verdict {
+    fn check_force(&mut self, replied: &Replied, observed: &ObservedTick) -> Verdict {
         let TickRecord { state, proxy, .. } = replied.sample;
         let touches = state == ContactState::Touching;
         // A point keeps its class, whichever of two equally near classes it has.
@@ -161,25 +163,25 @@ impl<'g> MaterialOracle<'g> {
         let touched = self.is_touched_before();
         let nearest = self.nearest(replied.proxy);
         let mut next: Vec<ActiveMaterial> = Vec::new();
-        let courses = std::mem::take(&mut self.courses);
-        let was_open = courses.is_empty();
-        for course in courses {
-            let own = [course.wanted()];
+        let candidates = std::mem::take(&mut self.candidates);
+        let was_open = candidates.is_empty();
+        for candidate in candidates {
+            let own = [candidate.class()];
             let is_own = stays && touched && nearest.contains(&own[0]);
             let nearest = if is_own { &own[..] } else { &nearest };
-            for after in course.after(self.materials, state, nearest, &proxy) {
+            for after in candidate.successors(self.materials, state, nearest, &proxy) {
                 if !next.iter().any(|one| one.is_same(&after)) {
                     next.push(after);
                 }
             }
         }
         if touches {
-            self.keep_rendered(&mut next, was_open, replied, seen)?;
+            self.retain_rendered(&mut next, was_open, replied, observed)?;
         }
-        if next.len() > FOLLOWED {
+        if next.len() > MAX_CANDIDATES {
             next.clear();
         }
-        self.courses = next;
+        self.candidates = next;
         Ok(())
     }
 
@@ -189,75 +191,83 @@ impl<'g> MaterialOracle<'g> {
     }
 
     /// Drops the alternatives with another force.
-    fn keep_rendered(
+    fn retain_rendered(
         &mut self,
-        courses: &mut Vec<ActiveMaterial>,
+        candidates: &mut Vec<ActiveMaterial>,
         was_open: bool,
         replied: &Replied,
-        seen: &ObservedTick,
+        observed: &ObservedTick,
     ) -> Verdict {
-        self.judged.open += u64::from(was_open);
+        self.counts.open += u64::from(was_open);
         if was_open {
             return Ok(());
         }
-        let output = self.output(replied, seen);
+        let output = self.output(replied, observed);
         let force = replied.sample.force_n.as_dvec3();
         let fades = replied.sample.limits.contains(Limits::EDGE_FADING);
         let is_whole = !fades && self.shading == Shading::None;
         let mut reported = String::new();
-        let changing = courses.iter().any(|course| !course.is_settled());
-        courses.retain(|course| {
-            let (is_rendered, wanted) = match is_whole {
+        let changing = candidates.iter().any(|candidate| !candidate.is_settled());
+        candidates.retain(|candidate| {
+            let (is_rendered, expected) = match is_whole {
                 true => {
-                    let wanted = output.force(course);
-                    let is_rendered = (force - wanted.force_n).length() <= wanted.allowed_n;
-                    (is_rendered, format!("{wanted:?}"))
+                    let expected = output.force(candidate);
+                    let is_rendered = (force - expected.force_n).length() <= expected.allowed_n;
+                    (is_rendered, format!("{expected:?}"))
                 }
                 false => {
-                    let [least, most] = output.sizes(course, fades);
-                    let is_rendered = (least..=most).contains(&force.length());
-                    (is_rendered, format!("{least} to {most} N"))
+                    let [min, max] = output.sizes(candidate, fades);
+                    let is_rendered = (min..=max).contains(&force.length());
+                    (is_rendered, format!("{min} to {max} N"))
                 }
             };
             if !is_rendered {
-                reported = format!("{force} N of {}, {wanted} by {course:?}", force.length());
+                reported = format!(
+                    "{force} N of {}, {expected} by {candidate:?}",
+                    force.length()
+                );
             }
             is_rendered
         });
-        if courses.is_empty() {
+        if candidates.is_empty() {
             return self.fail(Invariant::Material, format!("{reported}: {replied:?}"));
         }
-        self.never_pulls(&output, force, replied)?;
-        self.judged.changing += u64::from(changing);
-        self.judged.in_whole += u64::from(is_whole);
-        self.judged.by_size += u64::from(!is_whole);
+        self.check_no_pull(&output, force, replied)?;
+        self.counts.changing += u64::from(changing);
+        self.counts.compared_as_vectors += u64::from(is_whole);
+        self.counts.compared_by_size += u64::from(!is_whole);
         Ok(())
     }
 
     /// Checks that no force acts against the spring, and that shading turns it by 60° at most.
-    fn never_pulls(&self, output: &TickConditions<'_>, force: DVec3, replied: &Replied) -> Verdict {
-        let (depth, size) = (output.way.length(), force.length());
+    fn check_no_pull(
+        &self,
+        output: &TickConditions<'_>,
+        force: DVec3,
+        replied: &Replied,
+    ) -> Verdict {
+        let (depth, size) = (output.displacement.length(), force.length());
         let is_even = self.materials.table.iter().all(|one| one.texture.is_none());
-        let least = match self.shading {
+        let min = match self.shading {
             Shading::None => 0.0,
             Shading::Smooth if is_even => 0.5,
             Shading::Smooth => return Ok(()),
         };
         let off = (output.allowed / depth).min(1.0) + 1e-4;
-        if depth > 0.0 && force.dot(output.way) < (least - 2.0 * off) * depth * size {
-            let detail = format!("{force} N pulls along {}: {replied:?}", output.way);
+        if depth > 0.0 && force.dot(output.displacement) < (min - 2.0 * off) * depth * size {
+            let detail = format!("{force} N pulls along {}: {replied:?}", output.displacement);
             return self.fail(Invariant::Material, detail);
         }
         Ok(())
     }
 
-    fn output<'p>(&self, replied: &'p Replied, seen: &ObservedTick) -> TickConditions<'p> {
+    fn output<'p>(&self, replied: &'p Replied, observed: &ObservedTick) -> TickConditions<'p> {
         let cell_mm = f64::from(self.materials.cell_mm);
         let [hip, proxy] = [replied.hip, replied.proxy].map(DVec3::from_array);
         let from = self.before.map_or(replied.hip, |before| before.hip);
         TickConditions {
-            way: proxy - hip,
-            allowed: seen.allowed_in_space(self.place.terrain),
+            displacement: proxy - hip,
+            allowed: observed.allowed_in_space(self.position_oracle.terrain),
             proxy: &replied.sample.proxy,
             velocity_mm_s: (hip - DVec3::from_array(from)) * (cell_mm * RATE_HZ),
             max_n: f64::from(self.materials.params.max_force_n),
@@ -268,7 +278,7 @@ impl<'g> MaterialOracle<'g> {
     /// Returns the classes of the samples nearest to a point, each once.
     fn nearest(&self, [x, y, _]: [f64; 3]) -> Vec<u8> {
         let along = |at: f64| {
-            let [low, high] = [-HALF_WAY, HALF_WAY].map(|off| (at + off + 0.5).floor() as i32);
+            let [low, high] = [-TIE, TIE].map(|off| (at + off + 0.5).floor() as i32);
             low..=high
         };
         let mut classes: Vec<u8> = along(x)
@@ -291,16 +301,16 @@ impl<'g> MaterialOracle<'g> {
 
 /// Returns the contact of a point in the form of the other checks. If the whole spring is rendered,
 /// the displacement is the vector to the proxy.
-fn seen(replied: &Replied, shift: [i32; 3]) -> ObservedTick {
+fn observed(replied: &Replied, shift: [i32; 3]) -> ObservedTick {
     let TickRecord {
         state, proxy, work, ..
     } = replied.sample;
-    let way = DVec3::from_array(replied.proxy) - DVec3::from_array(replied.hip);
+    let displacement = DVec3::from_array(replied.proxy) - DVec3::from_array(replied.hip);
     let output = ContactOutput {
         state,
         proxy,
         displacement: match state {
-            ContactState::Touching => way.as_vec3(),
+            ContactState::Touching => displacement.as_vec3(),
             _ => Vec3::ZERO,
         },
         converged: true,

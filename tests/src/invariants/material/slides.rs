@@ -22,54 +22,66 @@ const SLACK: f64 = 0.031;
 
 impl MaterialOracle<'_> {
     /// Checks that a proxy that slides on a plane, not too fast, ends where friction holds it.
-    pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &ObservedTick) -> Verdict {
-        let (friction, [_, most]) = (course.friction(), course.frictions());
+    pub(super) fn check_slides(
+        &mut self,
+        candidate: &ActiveMaterial,
+        observed: &ObservedTick,
+    ) -> Verdict {
+        let (friction, [_, max]) = (candidate.friction(), candidate.friction_bounds());
         let Some(before) = self.before else {
             return Ok(());
         };
         let touches = |state| state == ContactState::Touching;
-        let moved = distance(before.proxy, seen.proxy);
+        let moved = distance(before.proxy, observed.proxy);
         let inside = |p: [f64; 3]| {
-            let size = self.place.terrain.size.map(f64::from);
+            let size = self.position_oracle.terrain.size.map(f64::from);
             (0..2).all(|axis| (1.0..size[axis] - 1.0).contains(&p[axis]))
         };
         let is_plane = matches!(self.kind, Kind::Flat | Kind::Slope);
         let is_whole = |sample: &TickRecord| !sample.limits.contains(Limits::EDGE_FADING);
         let is_reported = is_plane
             && touches(before.sample.state)
-            && touches(seen.output.state)
+            && touches(observed.output.state)
             && is_whole(&before.sample)
-            && [before.proxy, seen.proxy, seen.hip].into_iter().all(inside)
+            && [before.proxy, observed.proxy, observed.hip]
+                .into_iter()
+                .all(inside)
             && SLIDES.contains(&moved)
-            && PRESSES.contains(&distance(seen.proxy, seen.hip));
+            && PRESSES.contains(&distance(observed.proxy, observed.hip));
         if !is_reported {
             return Ok(());
         }
-        let [x, y, _] = seen.proxy;
-        let Some(patch) = Patch::at(self.place.terrain, [x.floor() as i32, y.floor() as i32])
-        else {
+        let [x, y, _] = observed.proxy;
+        let Some(patch) = Patch::at(
+            self.position_oracle.terrain,
+            [x.floor() as i32, y.floor() as i32],
+        ) else {
             return Ok(());
         };
         let [east, north] = patch.slopes(x, y);
         let normal = DVec3::new(-east, -north, 1.0).normalize();
-        let way = DVec3::from_array(seen.hip) - DVec3::from_array(seen.proxy);
-        let presses = -way.dot(normal);
+        let displacement = DVec3::from_array(observed.hip) - DVec3::from_array(observed.proxy);
+        let presses = -displacement.dot(normal);
         // A HIP in the surface does not press, so friction does not act.
         if presses < PRESSES.start {
             return Ok(());
         }
-        let pulls = (way - normal * way.dot(normal)).length();
+        let pulls = (displacement - normal * displacement.dot(normal)).length();
         let trails = f64::from(friction.viscous_s) * RATE_HZ * moved;
         let held = f64::from(friction.dynamic_mu) * presses + trails;
-        self.judged.sliding += 1;
+        self.counts.sliding += 1;
         // Heights of a slope and positions are rounded.
         let times = 1.0 + f64::from(friction.dynamic_mu + friction.viscous_s * RATE_HZ as f32);
-        let place = seen.allowed_in_space(self.place.terrain) * (1.0 + east.hypot(north));
-        let left = f64::from(most.viscous_s - friction.viscous_s) * RATE_HZ * moved;
-        let allowed =
-            left + 1e-3 * held + SLACK * trails + 3e-4 * way.length() + 8.0 * times * place;
+        let place =
+            observed.allowed_in_space(self.position_oracle.terrain) * (1.0 + east.hypot(north));
+        let uncertainty = f64::from(max.viscous_s - friction.viscous_s) * RATE_HZ * moved;
+        let allowed = uncertainty
+            + 1e-3 * held
+            + SLACK * trails
+            + 3e-4 * displacement.length()
+            + 8.0 * times * place;
         if (pulls - held).abs() > allowed {
-            let detail = format!("pulled by {pulls}, {held} is held by {friction:?}: {seen:?}");
+            let detail = format!("pulled by {pulls}, {held} is held by {friction:?}: {observed:?}");
             return self.fail(Invariant::Slides, detail);
         }
         Ok(())

@@ -72,7 +72,7 @@ fn the_second_signal_ends_it_at_once_with_the_same_word() {
     let child = start(&served, folder.path(), &[]);
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    served.wait_for_unheard_bye();
+    served.wait_for_ignored_bye();
     signal(&child, "INT");
     let output = end_of(child);
     let text = output_text(&output);
@@ -158,7 +158,7 @@ fn a_signal_before_it_has_begun_is_heeded() {
         .spawn();
     let child = child.expect("it runs");
     // The device does not answer the open. When the open arrives, the session is closed.
-    served.wait_for_unheard_hello();
+    served.wait_for_ignored_hello();
     signal(&child, "INT");
     pass(Duration::from_millis(500));
     served.deaf.store(false, Ordering::Relaxed);

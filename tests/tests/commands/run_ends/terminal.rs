@@ -111,7 +111,7 @@ fn unread_output_does_not_stop_the_first_and_second_signal() {
     pass(A_LINE);
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
-    served.wait_for_unheard_bye();
+    served.wait_for_ignored_bye();
     signal(&child, "INT");
     let output = end_of(child);
     // Not after its own time-out, as when the board does not confirm in time.
@@ -175,7 +175,7 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
             "interrupts" => {
                 served.deaf.store(true, Ordering::Relaxed);
                 window.write_all(&[3]).expect("typed");
-                served.wait_for_unheard_bye();
+                served.wait_for_ignored_bye();
                 window.write_all(&[3]).expect("typed");
                 let output = end_of(child);
                 assert_eq!(output.status.code(), Some(130));

@@ -80,10 +80,12 @@ impl Service for Microsoft {
         let own = format!("/{}/", account.name);
         let within = path.strip_prefix(&own);
         let path = within.map_or(path.to_owned(), |rest| format!("/{rest}"));
-        let stated = request.headers.get(AUTHORIZATION);
-        match stated.map(|stated| stated.to_str().unwrap_or_default()) {
-            Some(stated) if stated.starts_with("Bearer ") => principal::check(stated)?,
-            Some(stated) => shared_key::check(account, request, stated)?,
+        let authorization = request.headers.get(AUTHORIZATION);
+        match authorization.map(|authorization| authorization.to_str().unwrap_or_default()) {
+            Some(authorization) if authorization.starts_with("Bearer ") => {
+                principal::check(authorization)?
+            }
+            Some(authorization) => shared_key::check(account, request, authorization)?,
             None if sas::is_in(request) => sas::check(account, request, bucket(&path))?,
             None => check_public(account, bucket(&path))?,
         }

@@ -19,16 +19,16 @@ pub(super) const PATH: &str = "/hills-tenant/oauth2/v2.0/token";
 /// # Errors
 /// If name or secret are wrong.
 pub(super) fn token_for(body: &str) -> Result<Answer, Refusal> {
-    let stated = |name: &str| {
+    let parameter = |name: &str| {
         let mut pairs = body.split('&').filter_map(|pair| pair.split_once('='));
         let pair = pairs.find(|(other, _)| *other == name);
         decoded(&pair.map_or("", |(_, value)| value).replace('+', " "))
     };
     let [_, name, secret] = PRINCIPAL;
-    let is_known = stated("client_id") == name
-        && stated("client_secret") == secret
-        && stated("grant_type") == "client_credentials"
-        && stated("scope") == "https://storage.azure.com/.default";
+    let is_known = parameter("client_id") == name
+        && parameter("client_secret") == secret
+        && parameter("grant_type") == "client_credentials"
+        && parameter("scope") == "https://storage.azure.com/.default";
     let why = "AADSTS7000215: Invalid client secret provided.";
     match is_known {
         true => Ok(token(TOKEN)),
@@ -38,9 +38,9 @@ pub(super) fn token_for(body: &str) -> Result<Answer, Refusal> {
 
 /// # Errors
 /// If it is not the token of the registered program.
-pub(super) fn check(stated: &str) -> Result<(), Refusal> {
+pub(super) fn check(authorization: &str) -> Result<(), Refusal> {
     let why = "Server failed to authenticate the request.";
-    match stated.strip_prefix("Bearer ") == Some(TOKEN) {
+    match authorization.strip_prefix("Bearer ") == Some(TOKEN) {
         true => Ok(()),
         false => Err(refusal(
             StatusCode::UNAUTHORIZED,

@@ -36,15 +36,15 @@ pub(super) fn is_in(request: &Parts) -> bool {
 /// If a request's signature was not made with the account's key, or has expired.
 pub(super) fn check(account: &Account, request: &Parts, container: &str) -> Result<(), Refusal> {
     let query = request.uri.query().unwrap_or_default();
-    let stated = |name: &str| {
+    let parameter = |name: &str| {
         let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
         let pair = pairs.find(|(other, _)| *other == name);
         decoded(pair.map_or("", |(_, value)| value))
     };
-    let parts = ["sp", "st", "se", "spr", "sv", "sr"].map(stated);
+    let parts = ["sp", "st", "se", "spr", "sv", "sr"].map(parameter);
     let parts = parts.each_ref().map(String::as_str);
     let text = string_to_sign(account, container, parts);
-    if stated("sig") != account.signature(&text) {
+    if parameter("sig") != account.signature(&text) {
         return Err(failed("Signature did not match."));
     }
     let [may, _, until, ..] = parts;

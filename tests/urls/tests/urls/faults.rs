@@ -73,12 +73,12 @@ fn permanent_server_error_names_file_and_reason() {
 }
 
 #[test]
-fn long_page_of_an_error_is_not_read_to_its_end() {
+fn long_error_page_is_not_read_to_its_end() {
     let (_folder, server) = hills();
     server.fail(Fault::LongError, usize::MAX);
     let reported = open(&server, "hills.tif").expect_err("none");
     assert!(reported.contains("there is no such file"), "{reported}");
-    let (requests, bytes) = server.seen();
+    let (requests, bytes) = server.log();
     // Besides the data in the system's buffers.
     assert!(bytes <= requests.len() * (16 << 20), "{bytes} bytes came");
 }
@@ -101,13 +101,13 @@ fn responses_of_wrong_range_or_length_are_rejected() {
         let (height, status) = raster.read_height(1200, 700, Wait::UntilRead);
         assert!(height.is_nan() && !status.is_complete(), "{fault:?}");
         server.fail(Fault::None, 0);
-        let known = comes(&raster, 1200, 700);
+        let known = wait_for_height(&raster, 1200, 700);
         assert_eq!(known, expected(1200, 700), "{fault:?}");
     }
 }
 
 /// Returns a height as soon as it has arrived.
-fn comes(raster: &Raster, column: u32, row: u32) -> f64 {
+fn wait_for_height(raster: &Raster, column: u32, row: u32) -> f64 {
     wait_for("the height", || {
         let height = raster.height(column, row);
         (!height.is_nan()).then_some(height)
@@ -126,7 +126,7 @@ fn unreadable_mask_is_an_error_unless_forbidden() {
 }
 
 #[test]
-fn notes_beside_a_url_are_read_as_beside_a_file() {
+fn notes_beside_a_url_are_read_like_those_of_a_file() {
     let (folder, server) = hills();
     let lowest = height(0, 0);
     let notes = format!(
@@ -136,21 +136,21 @@ fn notes_beside_a_url_are_read_as_beside_a_file() {
     let beside = folder.path().join("hills.tif.aux.xml");
     std::fs::write(beside, notes).expect("written");
     let here = Raster::open(folder.path().join("hills.tif"), &OpenOptions::default());
-    let (here, there) = (
+    let (here, remote) = (
         here.expect("opens"),
         open(&server, "hills.tif").expect("opens"),
     );
-    for raster in [&here, &there] {
+    for raster in [&here, &remote] {
         assert_eq!(raster.no_data(), Some(f64::from(lowest)));
         assert_eq!(raster.scale_and_offset(), (0.5, 0.0));
         assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));
     }
     let [column, row] = [1200, 700];
-    assert_eq!(there.height(column, row), 0.5 * expected(column, row));
-    assert!(there.height(0, SIZE[1] - 1).is_nan() && here.height(0, SIZE[1] - 1).is_nan());
-    let (requests, _) = server.seen();
-    let asked = requests.iter().filter(|line| line.ends_with(".aux.xml"));
-    assert_eq!(asked.count(), 1, "{requests:?}");
+    assert_eq!(remote.height(column, row), 0.5 * expected(column, row));
+    assert!(remote.height(0, SIZE[1] - 1).is_nan() && here.height(0, SIZE[1] - 1).is_nan());
+    let (requests, _) = server.log();
+    let sidecar_requests = requests.iter().filter(|line| line.ends_with(".aux.xml"));
+    assert_eq!(sidecar_requests.count(), 1, "{requests:?}");
     server.fail_at(".aux.xml", Fault::Error500, usize::MAX);
     let reported = open(&server, "hills.tif").expect_err("who knows what is no data");
     assert!(reported.contains("500"), "{reported}");
@@ -186,7 +186,7 @@ fn placement_reports_server_error_instead_of_no_data() {
 }
 
 #[test]
-fn a_page_for_every_name_is_no_neighbour() {
+fn page_for_every_name_is_no_neighbour() {
     let (_folder, server) = hills();
     let here = open(&server, "hills.tif").expect("opens");
     for neighbour in [".msk", ".ovr"] {
@@ -204,14 +204,14 @@ fn check_complete_reports_failed_reads_once() {
     let raster = open(&server, "hills.tif").expect("opens");
     assert!(raster.check_complete().is_ok());
     server.fail(Fault::Error500, usize::MAX);
-    let (requests, _) = server.seen();
+    let (requests, _) = server.log();
     for column in (0..SIZE[0]).step_by(100) {
         assert!(raster.height(column, 700).is_nan());
     }
-    let asked = server.seen().0.len() - requests.len();
+    let later_requests = server.log().0.len() - requests.len();
     assert!(
-        asked < 40,
-        "{asked} requests to a server that does not answer"
+        later_requests < 40,
+        "{later_requests} requests to a server that does not answer"
     );
     let reported = raster.check_complete().expect_err("it did not come");
     assert!(
@@ -248,7 +248,7 @@ fn missing_vrt_source_is_no_data_and_other_sources_are_read() {
     let refused = Raster::open(&url, &OpenOptions::default()).expect_err("small");
     assert!(refused.to_string().contains("valleys.tif"), "{refused}");
     let in_blocks = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     let raster = Raster::open(&url, &in_blocks).expect("one of two");
@@ -303,7 +303,7 @@ fn truncated_file_is_an_error_from_disk_and_from_url() {
     };
     let here = fault(&folder.path().join("cut.tif").to_string_lossy());
     assert!(here.is_err(), "{here:?}");
-    let there = fault(&server.url("cut.tif"));
-    assert!(there.is_err(), "{there:?}");
+    let remote = fault(&server.url("cut.tif"));
+    assert!(remote.is_err(), "{remote:?}");
     assert!(fault(&server.url("empty.tif")).is_err());
 }

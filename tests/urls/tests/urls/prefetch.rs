@@ -16,8 +16,8 @@ use heightfield::{OpenOptions, Raster};
 
 /// Requests for two adjacent tiles, and for the surroundings of a HIP: runs of pages, by the layout
 /// of the file.
-const OF_TWO_TILES: usize = 1;
-const OF_A_VIEW: usize = 1;
+const TWO_TILES_REQUESTS: usize = 1;
+const VIEW_REQUESTS: usize = 1;
 
 fn height(column: u32, row: u32) -> f32 {
     (column % 100) as f32 + 0.5 * (row % 64) as f32
@@ -33,7 +33,7 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
 }
 
 /// Returns true if all of a tile has arrived.
-fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
+fn is_loaded(terrain: &Terrain<'_>, key: TileKey) -> bool {
     let mut buffer = TileBuffer::default();
     let (_, status) = terrain.tile(key, &mut buffer).expect("there is one");
     status.is_complete()
@@ -47,7 +47,7 @@ fn terrain(raster: &Raster) -> Terrain<'_> {
 
 /// Returns the number of requests up to now.
 fn requests(server: &Server) -> usize {
-    server.seen().0.len()
+    server.log().0.len()
 }
 
 /// Returns the number of requests up to now, after time for unwanted ones.
@@ -65,11 +65,11 @@ fn tiles_read_ahead_need_no_request() {
     // It must not wait: the server holds its answers back forever.
     server.hold(true);
     terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
-    let ahead = opened + OF_TWO_TILES;
+    let ahead = opened + TWO_TILES_REQUESTS;
     wait_until("requests ahead", || requests(&server) >= ahead);
     server.hold(false);
     for key in keys {
-        wait_until("a tile", || is_here(&terrain, key));
+        wait_until("a tile", || is_loaded(&terrain, key));
     }
     assert_eq!(requests(&server), ahead, "the tiles asked for nothing more");
     // The whole field, or an area outside it, is not prefetched.
@@ -82,7 +82,7 @@ fn tiles_read_ahead_need_no_request() {
 
 /// While the clutch is open, blocks of the next placement are fetched before any tile request.
 #[test]
-fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
+fn next_placement_is_prefetched_around_the_hip() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let at = |east| GridPoint::new([east, 640, 100], Vec3::ZERO);
@@ -97,11 +97,11 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
         keeps_tiles: true,
     };
     client.put_view(Duration::ZERO, view, terrain.clone(), &mut vec![]);
-    let after = before + OF_A_VIEW;
+    let after = before + VIEW_REQUESTS;
     wait_until("requests around the HIP", || requests(&server) >= after);
     server.hold(false);
     wait_until("the tile at the HIP", || {
-        is_here(&terrain, TileKey::new(0, 3500 / 32, 20))
+        is_loaded(&terrain, TileKey::new(0, 3500 / 32, 20))
     });
     assert_eq!(
         requests_later(&server),
@@ -121,21 +121,21 @@ fn benchmark_counts_missing_tiles_at_100_ms_latency() {
             let (_folder, raster, server) = hills();
             let terrain = terrain(&raster);
             server.set_latency(Duration::from_millis(100));
-            let looks = 3000 * 100 / speed;
-            let cells = |look: i32| 40 + look * speed / 100;
-            let missing = (0..looks).filter(|look| {
+            let reads = 3000 * 100 / speed;
+            let cells = |read_all: i32| 40 + read_all * speed / 100;
+            let missing = (0..reads).filter(|read_all| {
                 pass(Duration::from_millis(10));
-                let (at, ahead) = (cells(*look), cells(*look + 50));
+                let (at, ahead) = (cells(*read_all), cells(*read_all + 50));
                 if reads_ahead {
                     let edge = |cell: i32| cell / 32 * 32;
                     let to = [edge(ahead) + 32, 672];
                     terrain.grid().prefetch(0, [edge(at), 640], to);
                 }
-                !is_here(&terrain, TileKey::new(0, at / 32, 20))
+                !is_loaded(&terrain, TileKey::new(0, at / 32, 20))
             });
-            (missing.count(), looks)
+            (missing.count(), reads)
         });
-        let [(without, looks), (ahead, _)] = counts;
-        println!("{speed:7}  {without:7}  {ahead:5}  {looks:8}");
+        let [(without, reads), (ahead, _)] = counts;
+        println!("{speed:7}  {without:7}  {ahead:5}  {reads:8}");
     }
 }

@@ -24,7 +24,7 @@ fn open(path: impl AsRef<Path>) -> Raster {
 
 fn in_blocks(path: &Path) -> Raster {
     let options = OpenOptions {
-        most_in_memory_bytes: 0,
+        max_in_memory_bytes: 0,
         ..OpenOptions::default()
     };
     Raster::open(path, &options).expect("opens")
@@ -56,29 +56,29 @@ fn same_tiles(one: &Raster, other: &Raster, level: u8) {
 fn remote_cog_matches_local_file_and_opens_with_few_bytes() {
     let bytes = cog(3000, 2000, 3, height);
     let (_folder, path, server) = served("hills.tif", &bytes);
-    let (here, there) = (in_blocks(&path), open(server.url("hills.tif")));
-    let (requests, fetched) = server.seen();
+    let (here, remote) = (in_blocks(&path), open(server.url("hills.tif")));
+    let (requests, fetched) = server.log();
     assert!(requests.len() <= 8, "{requests:?}");
     assert!(fetched < bytes.len() / 8, "{fetched} of {}", bytes.len());
-    assert_eq!(here.format(), there.format());
-    assert_eq!(here.reference_system(), there.reference_system());
+    assert_eq!(here.format(), remote.format());
+    assert_eq!(here.reference_system(), remote.reference_system());
     for level in 0..4 {
-        same_tiles(&here, &there, level);
+        same_tiles(&here, &remote, level);
     }
     for (column, row) in [(0, 0), (2999, 1999), (1500, 3), (255, 256), (256, 255)] {
-        assert_eq!(there.height(column, row), here.height(column, row));
+        assert_eq!(remote.height(column, row), here.height(column, row));
         assert_eq!(
-            there.height(column, row),
+            remote.height(column, row),
             f64::from(height(column, 1999 - row))
         );
     }
-    let (again, _) = server.seen();
-    assert_eq!(there.height(1500, 3), here.height(1500, 3));
-    assert_eq!(server.seen().0, again, "what is here is not fetched again");
+    let (before, _) = server.log();
+    assert_eq!(remote.height(1500, 3), here.height(1500, 3));
+    assert_eq!(server.log().0, before, "what is here is not fetched again");
 }
 
 #[test]
-fn neighbours_of_a_file_are_found_beside_it_at_its_server() {
+fn neighbours_of_a_remote_file_are_found() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
     let heights: Vec<u8> = (0..600 * 500_u32)
@@ -92,12 +92,12 @@ fn neighbours_of_a_file_are_found_beside_it_at_its_server() {
     let server = Server::of(folder.path());
     let here = open(folder.path().join("hills.flt"));
     // A key after the path is sent with all of them.
-    let there = open(server.url("hills.flt?key=a/b.c"));
-    assert_eq!(there.format(), here.format());
-    assert!(there.reference_system().is_some());
-    assert_eq!(there.reference_system(), here.reference_system());
-    assert_eq!(there.height(599, 0), f64::from(height(599, 499)));
-    let (requests, _) = server.seen();
+    let remote = open(server.url("hills.flt?key=a/b.c"));
+    assert_eq!(remote.format(), here.format());
+    assert!(remote.reference_system().is_some());
+    assert_eq!(remote.reference_system(), here.reference_system());
+    assert_eq!(remote.height(599, 0), f64::from(height(599, 499)));
+    let (requests, _) = server.log();
     assert!(
         requests.iter().all(|line| line.ends_with("?key=a/b.c")),
         "{requests:?}"
@@ -116,23 +116,23 @@ fn plain_samples_are_fetched_only_around_reads() {
     write("hills.flt", &heights).expect("written");
     write("hills.hdr", header.as_bytes()).expect("written");
     let server = Server::of(folder.path());
-    let (here, there) = (
+    let (here, remote) = (
         in_blocks(&folder.path().join("hills.flt")),
         open(server.url("hills.flt")),
     );
     for (column, row) in [(0, 0), (4999, 2999), (2500, 777)] {
         let expected = f64::from(height(column, SIZE[1] - 1 - row));
         assert_eq!(here.height(column, row), expected);
-        assert_eq!(there.height(column, row), expected);
+        assert_eq!(remote.height(column, row), expected);
     }
-    let (_, fetched) = server.seen();
+    let (_, fetched) = server.log();
     assert!(
         fetched < heights.len() / 4,
         "{fetched} of {}",
         heights.len()
     );
     for level in [0, 3] {
-        same_tiles(&here, &there, level);
+        same_tiles(&here, &remote, level);
     }
 }
 
@@ -146,21 +146,21 @@ fn single_strip_is_fetched_only_around_rows_read() {
     image.extend(placed([500_000.0, 4_000_000.0], 30.0, 32611));
     let bytes = tiff(&heights, &[image]);
     let (_folder, path, server) = served("strip.tif", &bytes);
-    let (here, there) = (in_blocks(&path), open(server.url("strip.tif")));
+    let (here, remote) = (in_blocks(&path), open(server.url("strip.tif")));
     for (column, row) in [(0, 0), (4999, 2999), (2500, 777)] {
         let expected = f64::from(height(column, SIZE[1] - 1 - row));
         assert_eq!(here.height(column, row), expected);
-        assert_eq!(there.height(column, row), expected);
+        assert_eq!(remote.height(column, row), expected);
     }
-    let (_, fetched) = server.seen();
+    let (_, fetched) = server.log();
     assert!(fetched < bytes.len() / 4, "{fetched} of {}", bytes.len());
     for level in [0, 3] {
-        same_tiles(&here, &there, level);
+        same_tiles(&here, &remote, level);
     }
 }
 
 #[test]
-fn a_vrt_and_its_files_may_be_elsewhere() {
+fn vrt_and_its_files_may_be_remote() {
     if !has_gdal() {
         return;
     }
@@ -207,12 +207,12 @@ fn a_vrt_and_its_files_may_be_elsewhere() {
 }
 
 #[test]
-fn a_server_without_ranges_hands_over_all_of_a_file() {
+fn server_without_ranges_sends_the_whole_file() {
     let bytes = cog(700, 500, 1, height);
     let (_folder, path, server) = served("hills.tif", &bytes);
     server.fail(Fault::NoRanges, usize::MAX);
-    let (here, there) = (in_blocks(&path), open(server.url("hills.tif")));
-    same_tiles(&here, &there, 0);
+    let (here, remote) = (in_blocks(&path), open(server.url("hills.tif")));
+    same_tiles(&here, &remote, 0);
 }
 
 /// All formats, also packed or with a sidecar.
@@ -255,7 +255,7 @@ fn archives_are_the_same_from_a_server() {
 }
 
 #[test]
-fn files_at_a_url_lead_to_no_file_of_this_computer() {
+fn remote_files_reference_no_local_file() {
     if !has_gdal() {
         return;
     }
@@ -317,7 +317,7 @@ fn tar(name: &str, bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_stac_at_a_url_is_refused_with_the_files_to_make_a_vrt_of() {
+fn remote_stac_is_refused_with_its_list_of_files() {
     if !has_gdal() {
         return;
     }
@@ -329,7 +329,7 @@ fn a_stac_at_a_url_is_refused_with_the_files_to_make_a_vrt_of() {
     let (_folder, _, server) = served("items.json", stac.as_bytes());
     let refused = Raster::open(server.url("items.json?key=a"), &OpenOptions::default());
     let error = refused.expect_err("a STAC");
-    let RasterError::ToBuild { files, .. } = error.fault() else {
+    let RasterError::NeedsVrt { files, .. } = error.fault() else {
         panic!("{error}");
     };
     let west = format!("/vsicurl/{}", server.url("west.tif"));
@@ -348,25 +348,25 @@ fn same_from_a_server(folder: &Path) -> u32 {
         }
         let name = entry.file_name().to_string_lossy().replace(' ', "%20");
         let here = Raster::open(entry.path(), &OpenOptions::default());
-        let there = Raster::open(server.url(&name), &OpenOptions::default());
-        let (here, there) = match (here, there) {
-            (Ok(here), Ok(there)) => (here, there),
-            (Err(here), Err(there)) => {
-                let [here, there] = [here, there].map(|error| error.fault().to_string());
-                assert_eq!(here, there, "{name}");
+        let remote = Raster::open(server.url(&name), &OpenOptions::default());
+        let (here, remote) = match (here, remote) {
+            (Ok(here), Ok(remote)) => (here, remote),
+            (Err(here), Err(remote)) => {
+                let [here, remote] = [here, remote].map(|error| error.fault().to_string());
+                assert_eq!(here, remote, "{name}");
                 continue;
             }
-            (here, there) => panic!("{name}: {:?}, and there {:?}", here.err(), there.err()),
+            (here, remote) => panic!("{name}: {:?}, and there {:?}", here.err(), remote.err()),
         };
-        assert_eq!(here.format(), there.format(), "{name}");
-        assert_eq!(here.cell(), there.cell(), "{name}");
-        assert_eq!(here.reference_system(), there.reference_system(), "{name}");
+        assert_eq!(here.format(), remote.format(), "{name}");
+        assert_eq!(here.cell(), remote.cell(), "{name}");
+        assert_eq!(here.reference_system(), remote.reference_system(), "{name}");
         let (columns, rows) = (here.columns(), here.rows());
-        assert_eq!((columns, rows), (there.columns(), there.rows()), "{name}");
+        assert_eq!((columns, rows), (remote.columns(), remote.rows()), "{name}");
         for step in 0..200 {
             let (column, row) = (step * 7919 % columns, step * 104_729 % rows);
-            let [here, there] = [&here, &there].map(|raster| raster.height(column, row));
-            assert_eq!(here.to_bits(), there.to_bits(), "{name} {column} {row}");
+            let [here, remote] = [&here, &remote].map(|raster| raster.height(column, row));
+            assert_eq!(here.to_bits(), remote.to_bits(), "{name} {column} {row}");
         }
         compared += 1;
     }

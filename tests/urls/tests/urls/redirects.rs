@@ -20,7 +20,7 @@ fn open(url: &str) -> Result<Raster, String> {
 }
 
 #[test]
-fn redirect_without_key_is_followed_and_names_no_referer() {
+fn redirect_without_key_is_followed_without_referer() {
     let (_folder, [first, second]) = servers("hills.tif");
     let raster = open(&first.url("moved.tif")).expect("redirected");
     assert_eq!(raster.height(7, 199), 7.0);
@@ -35,7 +35,7 @@ fn redirect_with_key_to_another_host_is_refused() {
     let why = open(&first.url("moved.tif?sig=SECRET")).expect_err("refused");
     assert!(why.contains("redirects to 127.0.0.1"), "{why}");
     assert!(!why.contains("SECRET"), "{why}");
-    assert_eq!(second.seen().0.len(), 0, "{:?}", second.seen().0);
+    assert_eq!(second.log().0.len(), 0, "{:?}", second.log().0);
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn redirect_with_key_within_the_host_is_followed() {
     first.redirect("/loop.tif?sig=SECRET");
     let why = open(&first.url("moved.tif?sig=SECRET")).expect_err("a loop");
     assert!(why.contains("again and again"), "{why}");
-    assert_eq!(first.seen().0.len(), 11);
+    assert_eq!(first.log().0.len(), 11);
 }
 
 #[test]

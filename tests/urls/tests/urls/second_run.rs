@@ -8,7 +8,7 @@ use hapterra_url_tests::http::Server;
 use heightfield::disk_cache::DiskCache;
 use heightfield::{OpenOptions, Raster, Wait};
 
-/// Pages that [`Bed::look`] needs.
+/// Pages that [`Bed::read_all`] needs.
 const PAGES: usize = 50;
 
 fn height(column: u32, row: u32) -> f32 {
@@ -21,7 +21,7 @@ fn other(column: u32, row: u32) -> f32 {
 
 struct Bed {
     folder: tempfile::TempDir,
-    kept: tempfile::TempDir,
+    cache_folder: tempfile::TempDir,
     server: Server,
 }
 
@@ -31,20 +31,20 @@ fn bed() -> Bed {
     std::fs::write(path, cog(2200, 1800, 2, height)).expect("written");
     Bed {
         server: Server::of(folder.path()),
-        kept: tempfile::tempdir().expect("a folder"),
+        cache_folder: tempfile::tempdir().expect("a folder"),
         folder,
     }
 }
 
 impl Bed {
     /// Reads heights at fine and coarse levels. Returns them, and the number of requests.
-    fn look(&self, name: &str) -> (Vec<f64>, usize) {
+    fn read_all(&self, name: &str) -> (Vec<f64>, usize) {
         // Like another program: only the folder on disk is the same.
         let options = OpenOptions {
-            disk_cache: DiskCache::at(self.kept.path(), 256 << 20),
+            disk_cache: DiskCache::at(self.cache_folder.path(), 256 << 20),
             ..OpenOptions::default()
         };
-        let before = self.server.seen().0.len();
+        let before = self.server.log().0.len();
         let raster = Raster::open(self.server.url(name), &options).expect("opens");
         let mut heights = vec![0.0; 500];
         for (number, heights) in heights.chunks_exact_mut(50).enumerate() {
@@ -61,17 +61,17 @@ impl Bed {
                     .is_complete()
             );
         }
-        (heights, self.server.seen().0.len() - before)
+        (heights, self.server.log().0.len() - before)
     }
 
     /// Waits until the pages of the first run are written, each to a file.
-    fn settle(&self) {
+    fn wait_for_pages(&self) {
         let is_whole = |path: &PathBuf| {
             let name = path.file_name().expect("a name").to_string_lossy();
             !name.starts_with('.')
         };
         wait_until("all pages on disk", || {
-            let files = files(self.kept.path());
+            let files = files(self.cache_folder.path());
             files.iter().filter(|path| is_whole(path)).count() >= PAGES
         });
     }
@@ -90,36 +90,39 @@ fn files(folder: &Path) -> Vec<std::path::PathBuf> {
 #[test]
 fn second_run_requests_only_file_start_and_sidecars() {
     let bed = bed();
-    let (first, requests) = bed.look("hills.tif");
+    let (first, requests) = bed.read_all("hills.tif");
     assert!(requests > 10, "{requests}");
-    bed.settle();
+    bed.wait_for_pages();
     // The file's beginning, and the four possible sidecars.
-    let (second, again) = bed.look("hills.tif");
+    let (second, second_requests) = bed.read_all("hills.tif");
     assert_eq!(second, first);
-    assert!(again <= 5, "{again} after {requests}");
+    assert!(second_requests <= 5, "{second_requests} after {requests}");
     // Damaged pages are fetched again.
-    for file in files(bed.kept.path()) {
+    for file in files(bed.cache_folder.path()) {
         let mut bytes = std::fs::read(&file).expect("there");
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
         std::fs::write(file, bytes).expect("written");
     }
-    let (third, after_damage) = bed.look("hills.tif");
+    let (third, after_damage) = bed.read_all("hills.tif");
     assert_eq!(third, first);
-    assert!(after_damage > again);
+    assert!(after_damage > second_requests);
 }
 
 #[test]
-fn pages_of_a_file_that_was_changed_at_its_server_are_not_used() {
+fn pages_of_a_file_changed_on_its_server_are_not_used() {
     let bed = bed();
-    let (first, requests) = bed.look("hills.tif");
-    bed.settle();
+    let (first, requests) = bed.read_all("hills.tif");
+    bed.wait_for_pages();
     // The same size, another tag.
     let path = bed.folder.path().join("hills.tif");
     std::fs::write(path, cog(2200, 1800, 2, other)).expect("written");
     bed.server.change();
-    let (second, again) = bed.look("hills.tif");
-    assert!(again + 5 >= requests, "{again} {requests}");
+    let (second, second_requests) = bed.read_all("hills.tif");
+    assert!(
+        second_requests + 5 >= requests,
+        "{second_requests} {requests}"
+    );
     for (one, other) in first.iter().zip(&second) {
         assert!((other - one - 5000.0).abs() < 0.01, "{one} {other}");
     }
@@ -128,9 +131,9 @@ fn pages_of_a_file_that_was_changed_at_its_server_are_not_used() {
 #[test]
 fn cache_folder_contains_no_part_of_the_url() {
     let bed = bed();
-    bed.look("hills.tif?sig=VerySecretKey");
-    bed.settle();
-    let all = files(bed.kept.path());
+    bed.read_all("hills.tif?sig=VerySecretKey");
+    bed.wait_for_pages();
+    let all = files(bed.cache_folder.path());
     assert!(!all.is_empty());
     let holds = |bytes: &[u8], word: &[u8]| bytes.windows(word.len()).any(|some| some == word);
     for file in all {
@@ -141,6 +144,6 @@ fn cache_folder_contains_no_part_of_the_url() {
         }
     }
     // With another key it may be another file.
-    let (_, requests) = bed.look("hills.tif?sig=Other");
+    let (_, requests) = bed.read_all("hills.tif?sig=Other");
     assert!(requests > 10, "{requests}");
 }

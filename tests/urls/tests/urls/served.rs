@@ -46,7 +46,7 @@ fn tile(terrain: &Terrain<'_>) -> Option<String> {
     status.is_complete().then(|| format!("{heights:?}"))
 }
 
-fn comes(terrain: &Terrain<'_>) -> String {
+fn wait_for_height(terrain: &Terrain<'_>) -> String {
     wait_for("the tile", || tile(terrain))
 }
 
@@ -60,7 +60,7 @@ fn unloaded_tile_is_fetched_without_blocking() {
         assert_eq!(tile(&terrain), None);
     }
     server.hold(false);
-    let from_server = comes(&terrain);
+    let from_server = wait_for_height(&terrain);
     let at = |column: u32, row: u32| f64::from(height(column, 1799 - row));
     assert_eq!(raster.height(640, 640), at(640, 640));
     assert_eq!(tile(&terrain), Some(from_server));
@@ -76,7 +76,7 @@ fn server_outage_is_retried_and_is_not_no_data() {
         pass(Duration::from_millis(10));
     }
     server.fail(Fault::None, 0);
-    comes(&terrain);
+    wait_for_height(&terrain);
 }
 
 /// A block of many chunks in several places of the file.
@@ -89,10 +89,10 @@ fn all_chunks_of_a_block_are_requested_at_once() {
     let raster = Raster::open(server.url("hills.tif"), &OpenOptions::default());
     let raster = raster.expect("opens");
     server.hold(true);
-    let before = server.seen().0.len();
+    let before = server.log().0.len();
     assert!(raster.read_height(1500, 500, Wait::Never).0.is_nan());
     wait_until("requests for four rows of chunks", || {
-        server.seen().0.len() >= before + 4
+        server.log().0.len() >= before + 4
     });
 }
 
@@ -130,11 +130,11 @@ fn world_file_names_are_requested_in_parallel() {
     let url = server.url("plain.tif");
     std::thread::scope(|scope| {
         let open = scope.spawn(|| Raster::open(url, &OpenOptions::default()));
-        wait_until("six requests at once", || server.most_at_once() >= 6);
+        wait_until("six requests at once", || server.max_concurrent() >= 6);
         server.hold(false);
         open.join().expect("no panic").expect("opens");
     });
-    let (requests, _) = server.seen();
+    let (requests, _) = server.log();
     assert!(requests.iter().any(|line| line.contains("plain.tfw")));
 }
 
@@ -223,7 +223,7 @@ fn device_receives_tiles_only_after_they_are_loaded() {
         Session::open(&terrain, scene, None, Box::new(line), Timeouts::REAL_TIME)
             .expect("it does not wait for the server, either");
     let mut sent = 0;
-    let mut look = |session: &mut Session<'_>| {
+    let mut read_all = |session: &mut Session<'_>| {
         let mut on = |event: Event<'_>| sent += usize::from(matches!(event, Event::TileSent(_)));
         session
             .poll(Duration::from_millis(5), &mut on)
@@ -231,13 +231,13 @@ fn device_receives_tiles_only_after_they_are_loaded() {
         sent
     };
     for _ in 0..100 {
-        assert_eq!(look(&mut session), 0, "what has not come is not sent");
+        assert_eq!(read_all(&mut session), 0, "what has not come is not sent");
     }
     // Requested tiles are sent without another request.
     is_mute.set(true);
     server.hold(false);
-    wait_until("a tile that has come", || look(&mut session) > 0);
+    wait_until("a tile that has come", || read_all(&mut session) > 0);
     is_mute.set(false);
-    wait_until("more tiles", || look(&mut session) > 3);
+    wait_until("more tiles", || read_all(&mut session) > 3);
     session.say_goodbye(&mut |_| {}).expect("confirmed");
 }

@@ -72,13 +72,13 @@ struct PackBits<R> {
 
 /// Rest of a run.
 enum Run {
-    Of(usize),
-    Equal(usize, u8),
+    Literal(usize),
+    Repeat(usize, u8),
 }
 
 impl<R: BufRead> PackBits<R> {
     const fn new(packed: R) -> Self {
-        let run = Run::Of(0);
+        let run = Run::Literal(0);
         Self { packed, run }
     }
 
@@ -95,10 +95,10 @@ impl<R: BufRead> PackBits<R> {
             match head {
                 // This code has no effect.
                 128 => {}
-                0..=127 => return Ok(Some(Run::Of(usize::from(head) + 1))),
+                0..=127 => return Ok(Some(Run::Literal(usize::from(head) + 1))),
                 _ => {
                     let byte = self.byte()?.ok_or_else(cut)?;
-                    return Ok(Some(Run::Equal(257 - usize::from(head), byte)));
+                    return Ok(Some(Run::Repeat(257 - usize::from(head), byte)));
                 }
             }
         }
@@ -108,20 +108,20 @@ impl<R: BufRead> PackBits<R> {
 
 impl<R: BufRead> Read for PackBits<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        if matches!(self.run, Run::Of(0) | Run::Equal(0, _)) {
+        if matches!(self.run, Run::Literal(0) | Run::Repeat(0, _)) {
             match self.next()? {
                 Some(run) => self.run = run,
                 None => return Ok(0),
             }
         }
         match &mut self.run {
-            Run::Of(left) => {
+            Run::Literal(left) => {
                 let count = into.len().min(*left);
                 let count = self.packed.read(&mut into[..count])?;
                 *left -= count;
                 Ok(count)
             }
-            Run::Equal(left, byte) => {
+            Run::Repeat(left, byte) => {
                 let count = into.len().min(*left);
                 into[..count].fill(*byte);
                 *left -= count;

@@ -49,8 +49,8 @@ pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()>
     }
     let bands = layout.bands_read().count() as u64;
     let all = layout.chunks_of_band().saturating_mul(bands).max(1);
-    let least = all.min(2 * u64::from(layout.chunks_across()) * bands);
-    let file = Unpacked::new(layout.chunk_size(), least..=all, disk)?;
+    let min = all.min(2 * u64::from(layout.chunks_across()) * bands);
+    let file = Unpacked::new(layout.chunk_size(), min..=all, disk)?;
     layout.unpacked = Some(Arc::new(file));
     Ok(())
 }
@@ -135,7 +135,7 @@ fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> R
 }
 
 /// Returns true if a whole band is best read by rows: its strips are large.
-pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
+pub(super) fn suits_whole_band(layout: &Layout, part: &Part) -> bool {
     let is_whole = *part == Part::whole(layout.columns, layout.rows);
     is_whole && layout.has_strips() && layout.chunk_size() > MAX_DECODED && suits(layout)
 }
@@ -145,10 +145,10 @@ pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
 pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, RasterError> {
     let all = Part::whole(layout.columns, layout.rows);
     let stored = layout.sample();
-    let apart = layout.texel_bytes() as usize;
+    let stride = layout.texel_bytes() as usize;
     let first = layout.bytes_before(band);
     let count = u64::from(layout.columns) * u64::from(layout.rows);
-    let mut samples = stored.room(count)?;
+    let mut samples = stored.reserve(count)?;
     for chunk in layout.chunks_of(band, &all) {
         let covers = chunk.covers;
         if chunk.bytes == 0 {
@@ -160,7 +160,7 @@ pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, Raster
         }
         let mut rows = Rows::of(layout, &chunk)?;
         for _ in 0..covers.rows {
-            stored.append(&mut samples, &rows.next()?[first..], apart, ENDIAN);
+            stored.append(&mut samples, &rows.next()?[first..], stride, ENDIAN);
         }
     }
     match samples.len() as u64 == count {

@@ -6,7 +6,7 @@ use tiff_reader::TiffError;
 use tiff_reader::source::TiffSource;
 
 /// Size of a read, bytes.
-const PIECE: u64 = 256 << 10;
+const READ_BYTES: u64 = 256 << 10;
 
 /// The stored bytes of a strip or tile, up to the end of the file.
 pub(super) struct StoredBytes<'f> {
@@ -15,8 +15,8 @@ pub(super) struct StoredBytes<'f> {
     end: u64,
     /// True if the bits of each byte are reversed.
     is_reversed: bool,
-    piece: Vec<u8>,
-    taken: usize,
+    buffer: Vec<u8>,
+    consumed: usize,
 }
 
 impl<'f> StoredBytes<'f> {
@@ -32,42 +32,42 @@ impl<'f> StoredBytes<'f> {
             next: place,
             end: place.saturating_add(bytes).min(source.len()),
             is_reversed,
-            piece: vec![],
-            taken: 0,
+            buffer: vec![],
+            consumed: 0,
         }
     }
 }
 
 impl BufRead for StoredBytes<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.taken == self.piece.len() && self.next < self.end {
-            let count = PIECE.min(self.end - self.next);
-            let piece = self.source.read_exact_at(self.next, count as usize);
-            self.piece = piece.map_err(|error| match error {
+        if self.consumed == self.buffer.len() && self.next < self.end {
+            let count = READ_BYTES.min(self.end - self.next);
+            let buffer = self.source.read_exact_at(self.next, count as usize);
+            self.buffer = buffer.map_err(|error| match error {
                 TiffError::Io(error, _) => error,
                 error => io::Error::other(error),
             })?;
-            self.taken = 0;
+            self.consumed = 0;
             self.next += count;
             if self.is_reversed {
-                for byte in &mut self.piece {
+                for byte in &mut self.buffer {
                     *byte = byte.reverse_bits();
                 }
             }
         }
-        Ok(&self.piece[self.taken..])
+        Ok(&self.buffer[self.consumed..])
     }
 
     fn consume(&mut self, count: usize) {
-        self.taken += count;
+        self.consumed += count;
     }
 }
 
 impl Read for StoredBytes<'_> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let there = self.fill_buf()?;
-        let count = there.len().min(into.len());
-        into[..count].copy_from_slice(&there[..count]);
+        let available = self.fill_buf()?;
+        let count = available.len().min(into.len());
+        into[..count].copy_from_slice(&available[..count]);
         self.consume(count);
         Ok(count)
     }

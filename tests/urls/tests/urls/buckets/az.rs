@@ -1,7 +1,7 @@
 //! `az://`
 
 use hapterra_url_tests::azure::{Account, EMULATOR, PRINCIPAL, SURVEYORS, TOKEN, served};
-use hapterra_url_tests::bucket::{PUBLIC, Seen, Server};
+use hapterra_url_tests::bucket::{PUBLIC, RequestLog, Server};
 
 use crate::buckets::opened::{
     Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
@@ -11,7 +11,7 @@ use crate::buckets::opened::{
 const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
 /// Times before which a signature is valid.
 const ONE_DAY: &str = "2100-01-31T00:00:00Z";
-const LONG_AGO: &str = "2020-01-31T00:00:00Z";
+const EXPIRED: &str = "2020-01-31T00:00:00Z";
 
 /// A server of the containers of an account.
 struct Microsoft {
@@ -41,12 +41,12 @@ impl Microsoft {
         output_of(name, &[&server, environment].concat())
     }
 
-    fn stated_with_key(&self, name: &str, key: &str) -> String {
+    fn output_with_key(&self, name: &str, key: &str) -> String {
         self.output_of(name, &[("AZURE_STORAGE_ACCOUNT_KEY", key)])
     }
 
     /// Opens a file as from an emulator on this computer, usually `Azurite`.
-    fn said_by_emulator(&self, name: &str, environment: &[(&str, &str)]) -> String {
+    fn output_of_emulator(&self, name: &str, environment: &[(&str, &str)]) -> String {
         let server = [
             ("AZURE_STORAGE_USE_EMULATOR", "true"),
             ("AZURITE_BLOB_STORAGE_URL", self.server.endpoint()),
@@ -62,14 +62,14 @@ fn url() -> String {
 #[test]
 fn file_opens_with_account_key_and_is_fetched_in_parts() {
     let microsoft = Microsoft::start(SURVEYORS);
-    let output = microsoft.stated_with_key(&url(), SURVEYORS.key);
+    let output = microsoft.output_with_key(&url(), SURVEYORS.key);
     assert!(output.contains("read GeoTIFF"), "{output}");
-    assert_fetched_in_parts(&microsoft.server.take_seen(), microsoft.hills.bytes);
+    assert_fetched_in_parts(&microsoft.server.take_log(), microsoft.hills.bytes);
 }
 
 /// The variables of Microsoft's own command.
 #[test]
-fn a_file_opens_with_what_is_set_for_microsofts_command() {
+fn file_opens_with_the_settings_of_microsofts_command() {
     let microsoft = Microsoft::start(SURVEYORS);
     let environment = [
         ("AZURE_STORAGE_ENDPOINT", microsoft.server.endpoint()),
@@ -82,7 +82,7 @@ fn a_file_opens_with_what_is_set_for_microsofts_command() {
 }
 
 #[test]
-fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
+fn file_opens_with_a_valid_shared_access_signature() {
     let microsoft = Microsoft::start(SURVEYORS);
     let with = |sas: &str| microsoft.output_of(&url(), &[("AZURE_STORAGE_SAS_TOKEN", sas)]);
     for mark in ["", "?"] {
@@ -90,7 +90,7 @@ fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
         assert!(output.contains("read GeoTIFF"), "{output}");
     }
     for other in [
-        SURVEYORS.sas("hills", LONG_AGO),
+        SURVEYORS.sas("hills", EXPIRED),
         SURVEYORS.sas(PUBLIC, ONE_DAY),
         EMULATOR.sas("hills", ONE_DAY),
     ] {
@@ -101,7 +101,7 @@ fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
 }
 
 #[test]
-fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
+fn file_opens_with_a_token_or_a_principals_secret() {
     let microsoft = Microsoft::start(SURVEYORS);
     let with_token = |token: &str| microsoft.output_of(&url(), &[("AZURE_STORAGE_TOKEN", token)]);
     assert!(with_token(TOKEN).contains("read GeoTIFF"));
@@ -116,11 +116,11 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
         ];
         microsoft.output_of(&url(), &environment)
     };
-    let _ = microsoft.server.take_seen();
+    let _ = microsoft.server.take_log();
     let output = with_secret(secret);
     assert!(output.contains("read GeoTIFF"), "{output}");
     // The file and its possible sidecars share a token.
-    let Seen { requests, .. } = microsoft.server.take_seen();
+    let RequestLog { requests, .. } = microsoft.server.take_log();
     let changes = requests.iter().filter(|line| line.starts_with("POST"));
     assert_eq!(changes.count(), 1, "{requests:?}");
     let reported = with_secret("in the hut");
@@ -137,10 +137,10 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
 #[test]
 fn emulator_file_opens_only_with_the_well_known_key() {
     let microsoft = Microsoft::start(EMULATOR);
-    let output = microsoft.said_by_emulator(&url(), &[]);
+    let output = microsoft.output_of_emulator(&url(), &[]);
     assert!(output.contains("read GeoTIFF"), "{output}");
     let other = [("AZURE_STORAGE_ACCOUNT_KEY", SURVEYORS.key)];
-    let reported = microsoft.said_by_emulator(&url(), &other);
+    let reported = microsoft.output_of_emulator(&url(), &other);
     assert_refused(&reported, "AuthenticationFailed", HINT);
 }
 
@@ -161,7 +161,7 @@ fn only_public_container_opens_without_a_key() {
 #[test]
 fn missing_file_is_reported() {
     let microsoft = Microsoft::start(SURVEYORS);
-    let missing = microsoft.stated_with_key("az://hills/south.tif", SURVEYORS.key);
+    let missing = microsoft.output_with_key("az://hills/south.tif", SURVEYORS.key);
     assert!(
         missing.contains("there is no such file (az://hills/south.tif)"),
         "{missing}"
@@ -171,10 +171,10 @@ fn missing_file_is_reported() {
 #[test]
 fn wrong_key_is_refused_and_no_data_is_sent() {
     let microsoft = Microsoft::start(SURVEYORS);
-    let reported = microsoft.stated_with_key(&url(), EMULATOR.key);
+    let reported = microsoft.output_with_key(&url(), EMULATOR.key);
     assert_refused(&reported, "AuthenticationFailed", HINT);
-    let seen = microsoft.server.take_seen();
-    assert_eq!(seen.bytes, 0, "{seen:?}");
+    let log = microsoft.server.take_log();
+    assert_eq!(log.bytes, 0, "{log:?}");
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn environment_error_names_variable_and_sends_no_request() {
             "the environment holds no key, and this computer has none of its own (az://hills",
         ),
         (
-            microsoft.stated_with_key(&url(), "not base 64"),
+            microsoft.output_with_key(&url(), "not base 64"),
             "error: cannot read what is there: Invalid Access Key",
         ),
         (output_of(&url(), &over_http), "URL scheme is not allowed"),
@@ -203,7 +203,7 @@ fn environment_error_names_variable_and_sends_no_request() {
         assert!(reported.contains(why), "{reported}");
         assert!(reported.contains(HINT), "{reported}");
     }
-    assert!(microsoft.server.take_seen().requests.is_empty());
+    assert!(microsoft.server.take_log().requests.is_empty());
 }
 
 #[test]
@@ -226,14 +226,14 @@ fn refused_connection_error_names_cause_and_hint() {
 
 /// A file on disk never leads to a server.
 #[test]
-fn a_mosaic_here_that_names_a_container_is_refused() {
+fn local_mosaic_that_names_a_container_is_refused() {
     let microsoft = Microsoft::start(SURVEYORS);
     let files = [
         "/vsiaz/hills/north ridge/hills-1.tif",
         "/vsiaz/open/50% #2.tif",
     ];
     let mosaic = mosaic(microsoft.hills.folder.path(), files);
-    let reported = microsoft.stated_with_key(&mosaic, SURVEYORS.key);
+    let reported = microsoft.output_with_key(&mosaic, SURVEYORS.key);
     assert!(
         reported.contains("it names /vsiaz/hills/north ridge/hills-1.tif"),
         "{reported}"

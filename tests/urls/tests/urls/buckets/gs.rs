@@ -1,7 +1,7 @@
 //! `gs://`
 
 use hapterra_url_tests::bucket::{PUBLIC, Server};
-use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
+use hapterra_url_tests::gcs::{SURVEYOR, TOKEN, UNPRIVILEGED, served};
 
 use crate::buckets::opened::{
     Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, output_of,
@@ -31,7 +31,7 @@ impl Google {
         output_of(name, &[&server, environment].concat())
     }
 
-    fn stated_with_key(&self, name: &str, key: &str) -> String {
+    fn output_with_key(&self, name: &str, key: &str) -> String {
         std::fs::write(&self.key, key).expect("written");
         self.output_of(name, &[("GOOGLE_APPLICATION_CREDENTIALS", &self.key)])
     }
@@ -44,14 +44,14 @@ fn url() -> String {
 #[test]
 fn service_account_key_opens_a_file_fetched_in_parts() {
     let google = Google::start();
-    let output = google.stated_with_key(&url(), &SURVEYOR.file());
+    let output = google.output_with_key(&url(), &SURVEYOR.file());
     assert!(output.contains("read GeoTIFF"), "{output}");
-    assert_fetched_in_parts(&google.server.take_seen(), google.hills.bytes);
+    assert_fetched_in_parts(&google.server.take_log(), google.hills.bytes);
 }
 
 /// A token from `gcloud auth print-access-token`, or from the metadata server of Google's cloud.
 #[test]
-fn a_file_opens_with_a_token() {
+fn file_opens_with_a_token() {
     let google = Google::start();
     let address = google.server.endpoint().trim_start_matches("http://");
     for given in [
@@ -77,7 +77,7 @@ fn unsigned_access_opens_only_public_buckets() {
 #[test]
 fn missing_file_error_names_its_url() {
     let google = Google::start();
-    let missing = google.stated_with_key("gs://hills/south.tif", &SURVEYOR.file());
+    let missing = google.output_with_key("gs://hills/south.tif", &SURVEYOR.file());
     assert!(
         missing.contains("there is no such file (gs://hills/south.tif)"),
         "{missing}"
@@ -87,13 +87,13 @@ fn missing_file_error_names_its_url() {
 #[test]
 fn rejected_key_error_names_the_server_code() {
     let google = Google::start();
-    let stranger = google.stated_with_key(&url(), &STRANGER.file());
+    let stranger = google.output_with_key(&url(), &UNPRIVILEGED.file());
     assert_refused(&stranger, "AccessDenied", HINT);
-    let forged = SURVEYOR.file_with_key_of(&STRANGER);
-    let forged = google.stated_with_key(&url(), &forged);
+    let forged = SURVEYOR.file_with_key_of(&UNPRIVILEGED);
+    let forged = google.output_with_key(&url(), &forged);
     assert_refused(&forged, "AuthenticationRequired", HINT);
-    let seen = google.server.take_seen();
-    assert_eq!(seen.bytes, 0, "{seen:?}");
+    let log = google.server.take_log();
+    assert_eq!(log.bytes, 0, "{log:?}");
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn credential_environment_errors_include_a_hint() {
         &url(),
         &[("GOOGLE_APPLICATION_CREDENTIALS", "/nowhere/key.json")],
     );
-    let no_key = google.stated_with_key(&url(), r#"{"type":"service_account"}"#);
+    let no_key = google.output_with_key(&url(), r#"{"type":"service_account"}"#);
     for (reported, why) in [
         (
             none,
@@ -119,7 +119,7 @@ fn credential_environment_errors_include_a_hint() {
         assert!(reported.contains(why), "{reported}");
         assert!(reported.contains(HINT), "{reported}");
     }
-    assert!(google.server.take_seen().requests.is_empty());
+    assert!(google.server.take_log().requests.is_empty());
 }
 
 #[test]
@@ -138,12 +138,12 @@ fn unreachable_server_error_names_cause_and_hint() {
 
 /// A file on disk never leads to a server.
 #[test]
-fn a_mosaic_here_that_names_a_bucket_is_refused() {
+fn local_mosaic_that_names_a_bucket_is_refused() {
     let google = Google::start();
     let public = format!("/vsigs/{PUBLIC}/50% #2.tif");
     let files = ["/vsigs/hills/north ridge/hills-1.tif", &public];
     let mosaic = mosaic(google.hills.folder.path(), files);
-    let reported = google.stated_with_key(&mosaic, &SURVEYOR.file());
+    let reported = google.output_with_key(&mosaic, &SURVEYOR.file());
     assert!(
         reported.contains("it names /vsigs/hills/north ridge/hills-1.tif"),
         "{reported}"

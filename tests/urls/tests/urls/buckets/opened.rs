@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hapterra::cli::failure::Failure;
-use hapterra_url_tests::bucket::Seen;
+use hapterra_url_tests::bucket::RequestLog;
 use hapterra_url_tests::cog::cog;
 use heightfield::{OpenOptions, Raster};
 
@@ -104,8 +104,8 @@ pub(crate) fn output_of(name: &str, environment: &[(&str, &str)]) -> String {
 }
 
 /// Checks that only parts of the file were sent, and nothing of the sidecars that it does not have.
-pub(crate) fn assert_fetched_in_parts(seen: &Seen, of: usize) {
-    let Seen { requests, bytes } = seen;
+pub(crate) fn assert_fetched_in_parts(log: &RequestLog, of: usize) {
+    let RequestLog { requests, bytes } = log;
     assert!(*bytes < of / 4, "{bytes} of {of}");
     let parts = requests.iter().filter(|line| line.contains(" 206 "));
     assert!(parts.count() > 3, "{requests:?}");

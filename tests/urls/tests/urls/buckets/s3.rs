@@ -4,7 +4,7 @@ use hapterra_url_tests::s3::{KEY, Server};
 
 use crate::buckets::opened::{NAME, hills, output_of};
 
-fn said_with(server: &Server, url: &str, key: [&str; 2]) -> String {
+fn output_with(server: &Server, url: &str, key: [&str; 2]) -> String {
     let environment = [
         ("AWS_ENDPOINT_URL", server.endpoint()),
         ("AWS_ALLOW_HTTP", "true"),
@@ -15,14 +15,14 @@ fn said_with(server: &Server, url: &str, key: [&str; 2]) -> String {
 }
 
 #[test]
-fn a_file_in_a_bucket_opens_with_its_key_and_with_no_other() {
+fn bucket_file_opens_only_with_its_key() {
     let hills = hills(&["hills"]);
     let server = Server::of(hills.folder.path());
     let url = format!("s3://hills/{NAME}");
-    let output = said_with(&server, &url, KEY);
+    let output = output_with(&server, &url, KEY);
     assert!(output.contains("read GeoTIFF"), "{output}");
-    let missing = said_with(&server, "s3://hills/south.tif", KEY);
+    let missing = output_with(&server, "s3://hills/south.tif", KEY);
     assert!(missing.contains("there is no such file"), "{missing}");
-    let forbidden = said_with(&server, &url, [KEY[0], "sand"]);
+    let forbidden = output_with(&server, &url, [KEY[0], "sand"]);
     assert!(forbidden.contains("without a key"), "{forbidden}");
 }
