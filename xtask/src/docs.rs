@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::run::{TEST_VARIABLES, cargo, on_path, report, root, run, timed};
+use crate::run::{TEST_ARGUMENTS, cargo, on_path, report, root, run, timed};
 
 /// Programs that test the pages.
 const TESTS: [&str; 4] = ["--test", "reference_pages", "--test", "docs"];
@@ -18,7 +18,7 @@ pub(crate) fn docs(write: bool) -> Result<()> {
     let mut tests = cargo();
     tests
         .arg("test")
-        .args(TEST_VARIABLES)
+        .args(TEST_ARGUMENTS)
         .args(TESTS)
         .env("HAPTERRA_DOCS", if write { "write" } else { "check" });
     timed("checking the pages", || run(&mut tests))?;

@@ -54,7 +54,7 @@ pub(crate) fn without_own_variables(command: &mut Command) {
 
 /// The packages and features of all tests: with others, cargo would rebuild dependencies. The image
 /// tests need probe-rs anyway, and the command is also tested with it.
-pub(crate) const TEST_VARIABLES: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
+pub(crate) const TEST_ARGUMENTS: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
 
 /// Builds `hapterra` for a user, and returns its path.
 pub(crate) fn hapterra(features: &[&str]) -> Result<PathBuf> {
@@ -78,7 +78,7 @@ pub(crate) fn hapterra(features: &[&str]) -> Result<PathBuf> {
 pub(crate) fn tested_programs() -> Result<[PathBuf; 2]> {
     let names = ["hapterra", "hapterra-lab"];
     let mut build = cargo();
-    build.arg("build").args(TEST_VARIABLES);
+    build.arg("build").args(TEST_ARGUMENTS);
     build.args(names.map(|name| ["--bin", name]).as_flattened());
     // If the targets include a test, cargo uses the dependencies' features for tests.
     build.args(["--test", "page"]);

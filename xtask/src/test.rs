@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
 use crate::deny::Advisories;
-use crate::run::{TEST_VARIABLES, cargo, command_line, report, run, timed};
+use crate::run::{TEST_ARGUMENTS, cargo, command_line, report, run, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, page, panics, python, size};
 
@@ -73,7 +73,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
             .args(if request.quick {
                 &QUICK[..]
             } else {
-                &TEST_VARIABLES
+                &TEST_ARGUMENTS
             })
             .env("HAPTERRA_QEMU", &qemu)
             .env(image::COUNTS_VARIABLE, &counts);

@@ -11,7 +11,7 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::run::{
-    TEST_VARIABLES, cargo, hapterra, on_path, report, root, run, run_quietly, target_dir,
+    TEST_ARGUMENTS, cargo, hapterra, on_path, report, root, run, run_quietly, target_dir,
     tested_programs, timed,
 };
 use crate::setup::{packages, toolchain};
@@ -78,7 +78,7 @@ pub(crate) fn test() -> Result<()> {
     let mut tests = cargo();
     tests
         .arg("test")
-        .args(TEST_VARIABLES)
+        .args(TEST_ARGUMENTS)
         .args(["--test", "page"])
         .env("HAPTERRA", hapterra)
         .env("HAPTERRA_LAB", lab)
