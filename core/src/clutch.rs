@@ -206,11 +206,11 @@ impl Clutch {
                 }
             }
             State::Open { hip: there, tip_mm } => {
-                if let Some(landed) = contact.land(window) {
+                if let Some(landed) = contact.place_on_surface(window) {
                     *there = landed;
                 }
                 hip = *there;
-                if !is_held && !contact.is_onset() {
+                if !is_held && !contact.is_onset_pending() {
                     self.owed_mm += from_home_mm(scene) - *tip_mm;
                     self.owed_mm = match self.carries {
                         true => Vec3::ZERO,

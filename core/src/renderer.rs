@@ -243,7 +243,7 @@ impl Renderer {
         });
         let (lacked, last) = (point.lacked, point.tile);
         // The HIP is the point's, not the one that the landing returns.
-        let _ = self.state.contact.land(window);
+        let _ = self.state.contact.place_on_surface(window);
         let output = *self.state.contact.step(window, &hip);
         let may_lack = lacked < TILES_PER_SLOT * (D * D) as u32;
         let missing = output.missing_tile.filter(|_| may_lack);

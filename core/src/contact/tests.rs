@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use super::budget::Budget;
-use super::sweep::{Path, Swept};
+use super::sweep::{Path, SweepEnd};
 use super::test_random::Random;
 use super::*;
 use crate::cases::cases;
@@ -207,13 +207,13 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
         let mut path = Path::through_air(a, b);
         let swept = loop {
             match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
-                Swept::Suspended => {}
+                SweepEnd::Suspended => {}
                 ended => break ended,
             }
         };
         let at = std::format!("{name} {from:?} to {to:?}: {swept:?}");
         match (swept, dense_crossing(&truth, position(&a), position(&b))) {
-            (Swept::Hit(point), Some([before, after])) => {
+            (SweepEnd::Hit(point), Some([before, after])) => {
                 seen[0] += 1;
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
@@ -231,14 +231,14 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
                     z - line
                 );
             }
-            (Swept::Hit(point), None) => {
+            (SweepEnd::Hit(point), None) => {
                 // A graze between two points of the dense search, or a touch.
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
                 assert!(truth.at(x, y).is_some(), "{at}");
             }
-            (Swept::Clear, None) => seen[1] += 1,
-            (Swept::Clear, Some([_, after])) => {
+            (SweepEnd::Clear, None) => seen[1] += 1,
+            (SweepEnd::Clear, Some([_, after])) => {
                 let z = truth.at(after[0], after[1]).unwrap_or(f64::NAN);
                 assert!(
                     z - after[2] < 4e-6 * (1.0 + slope),
@@ -471,11 +471,14 @@ fn steep_ways_in_over_the_border_cross_nothing() {
         let mut path = Path::through_air(from, to);
         let ended = loop {
             match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
-                Swept::Suspended => {}
+                SweepEnd::Suspended => {}
                 ended => break ended,
             }
         };
-        assert!(matches!(ended, Swept::Under), "{way}, {from:?}: {ended:?}");
+        assert!(
+            matches!(ended, SweepEnd::Under),
+            "{way}, {from:?}: {ended:?}"
+        );
     }
 }
 
@@ -605,7 +608,7 @@ fn bits(output: &ContactOutput) -> (ContactState, GridPoint, [u32; 3]) {
 }
 
 #[test]
-fn the_shortcuts_change_no_bit() {
+fn fast_paths_change_no_bit() {
     let without = ContactSettings {
         fast_paths: false,
         ..ContactSettings::AT_1_KHZ
@@ -626,7 +629,7 @@ fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
         ..ContactSettings::AT_1_KHZ
     };
     let mut cut = 0;
-    for work_per_tick in [ContactSettings::LEAST_WORK, WORK_PER_TICK] {
+    for work_per_tick in [ContactSettings::MIN_WORK, WORK_PER_TICK] {
         let short = ContactSettings {
             work_per_tick,
             ..ContactSettings::AT_1_KHZ

@@ -80,7 +80,7 @@ impl Shader {
         if output.state == ContactState::Touching
             && let Some(slopes) = SlopesAt::point(window, &output.proxy)
         {
-            let normal = output.displacement - contact.held_back();
+            let normal = output.displacement - contact.friction_displacement();
             self.turn = Turn::between(met_by(&slopes, normal), slopes.smoothed);
             self.missing = slopes.missing;
         }

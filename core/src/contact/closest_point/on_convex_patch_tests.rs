@@ -17,12 +17,12 @@ fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, 
 /// The closest point by the search by rulings: over v, or over u if that ends at a border.
 fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
     let search = |patch: &Patch, hip, start| {
-        let (looked, most) = (0, u32::MAX);
+        let (evaluated, max_evaluations) = (0, u32::MAX);
         Rulings {
             patch,
             hip,
-            looked,
-            most,
+            evaluated,
+            max_evaluations,
         }
         .closest_to(start)
     };
@@ -30,8 +30,8 @@ fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) 
     if !found.at_end {
         return (found.u, found.v);
     }
-    let turned = search(&patch.transposed(), (hip.1, hip.0), u);
-    (turned.v, turned.u)
+    let transposed = search(&patch.transposed(), (hip.1, hip.0), u);
+    (transposed.v, transposed.u)
 }
 
 const CASES: u32 = cases(20_000, 200);
@@ -40,7 +40,7 @@ const CASES: u32 = cases(20_000, 200);
 /// answer. Returns how many queries fell back to rulings and how many did not.
 fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
     let mut random = Random(41);
-    let mut seen = [0; 2];
+    let mut counts = [0; 2];
     for _ in 0..CASES {
         let depth = random.between(depths[0], depths[1]);
         let heights = core::array::from_fn(|_| (depth + random.between(0.0, slope)) as f32);
@@ -51,13 +51,13 @@ fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
         let moved = |x: f32, random: &mut Random| x + random.between(-0.05, 0.05) as f32;
         let hip = (moved(first.0, &mut random), moved(first.1, &mut random));
         let found = convex(heights, hip, start);
-        seen[usize::from(found.is_some())] += 1;
+        counts[usize::from(found.is_some())] += 1;
         let Some((u, v)) = found else { continue };
         let other = by_rulings(&patch, hip, start);
         let off = (u - other.0).abs().max((v - other.1).abs());
         assert!(off <= bound, "{patch:?} {hip:?} ({u}, {v}) {other:?}");
     }
-    seen
+    counts
 }
 
 #[test]

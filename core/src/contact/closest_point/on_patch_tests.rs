@@ -165,8 +165,8 @@ fn warm_started_it_takes_two_evaluations() {
 /// twist cancellation hides it as well.
 #[test]
 fn search_ends_at_minimum_despite_rounding_of_distances() {
-    type Place = (f32, f32);
-    let cases: [([f32; 4], Place, Place); 3] = [
+    type PatchPoint = (f32, f32);
+    let cases: [([f32; 4], PatchPoint, PatchPoint); 3] = [
         (
             [-14_186.715, 15_225.447, 11_851.875, -12_628.072],
             (0.482_250_2, 0.070_614_815),
