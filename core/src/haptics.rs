@@ -175,7 +175,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     pub fn on_board(tiles: [[&'t mut Tile; D]; D], board: &Board) -> Self {
         let mut guard = Guard::new(board.rate, board.fault);
         if let Some(motors) = board.motors {
-            guard.begin_at(motors);
+            guard.set_temperatures(motors);
         }
         Self {
             renderer: Renderer::new(board.rate, board.latency_s),
@@ -226,7 +226,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             }
             Command::Disarm => self.guard.disarm(),
             Command::Zero(counts) => self.take_zero(counts),
-            Command::ClearFault(seen) => self.guard.clear_seen(seen),
+            Command::ClearFault(fault) => self.guard.clear_if_acknowledged(fault),
             Command::Trip(fault) => self.guard.trip(fault),
             Command::HoldOutputs(shares) => self.guard.hold(shares),
         }

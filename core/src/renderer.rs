@@ -10,7 +10,7 @@
 use glam::Vec3;
 
 use crate::contact::{Contact, ContactSettings};
-use crate::force::{EffectContext, Effects, MaterialTable, Moment, Shares};
+use crate::force::{EffectContext, Effects, MaterialTable, PassivityInputs, Shares};
 use crate::grid::GridPoint;
 use crate::guard::Guard;
 use crate::phantom::{Kinematics, Pose, to_terrain_frame};
@@ -49,13 +49,18 @@ impl Mover<'_> {
 
     /// Returns the inputs of damping and passivity controller; `None` while no force follows the
     /// spring: with the amplifiers off, while the last force ramps down, or with an open clutch.
-    fn moment(&self, displacement_mm: Vec3, moved_mm: Vec3, rate: TickRate) -> Option<Moment> {
+    fn passivity_inputs(
+        &self,
+        displacement_mm: Vec3,
+        moved_mm: Vec3,
+        rate: TickRate,
+    ) -> Option<PassivityInputs> {
         Some(match *self {
-            Self::Points => Moment {
+            Self::Points => PassivityInputs {
                 displacement_mm,
                 moved_mm,
                 velocity_mm_s: moved_mm * rate.hz() as f32,
-                asked_n: Vec3::ZERO,
+                commanded_n: Vec3::ZERO,
                 max_n: 0.0,
                 shares: Shares::ALL,
             },
@@ -66,12 +71,12 @@ impl Mover<'_> {
                 clutch,
             } => {
                 let [ramp, speed] = guard.shares().filter(|_| clutch > 0.0)?;
-                Moment {
+                PassivityInputs {
                     displacement_mm,
                     moved_mm,
                     velocity_mm_s: to_terrain_frame(guard.tip_velocity_mm_s(mechanism, pose)),
-                    asked_n: guard.force_n(),
-                    max_n: guard.most_force_n(),
+                    commanded_n: guard.force_n(),
+                    max_n: guard.max_force_n(),
                     shares: Shares {
                         clutch,
                         ramp,
@@ -315,14 +320,14 @@ impl Renderer {
             return spring_n;
         };
         let moved = before.map_or(Vec3::ZERO, |before| before.to(&hip));
-        match mover.moment(displacement_mm, moved * scene.cell_mm, self.rate) {
-            Some(moment) => {
+        match mover.passivity_inputs(displacement_mm, moved * scene.cell_mm, self.rate) {
+            Some(passivity_inputs) => {
                 *before = Some(hip);
-                damper.observe(&moment);
-                damper.force_n(spring_n, moment.velocity_mm_s)
+                damper.observe(&passivity_inputs);
+                damper.force_n(spring_n, passivity_inputs.velocity_mm_s)
             }
             None => {
-                damper.rest();
+                damper.reset();
                 *before = None;
                 spring_n
             }

@@ -92,14 +92,14 @@ impl<const D: usize> Haptics<'_, D> {
         let Some(pose) = pose else {
             return self.tick_without_arm(outcome);
         };
-        let wanted_n = self.wanted_n(pose, &mut outcome.sample);
-        let force_n = self.guard.limit_force(wanted_n);
+        let target_n = self.target_n(pose, &mut outcome.sample);
+        let force_n = self.guard.limit_force(target_n);
         self.drive(pose, force_n, &mut outcome.drive);
         self.write_state(force_n, &mut outcome.sample);
     }
 
     /// Returns the requested force at the HIP, N, terrain frame.
-    fn wanted_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
+    fn target_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
         let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) else {
             write_nothing(sample);
             return Vec3::ZERO;
@@ -116,12 +116,12 @@ impl<const D: usize> Haptics<'_, D> {
             pose,
             clutch: self.clutch.share(),
         };
-        let wanted_n = self.renderer.step(&self.window, scene, hip, &arm);
+        let target_n = self.renderer.step(&self.window, scene, hip, &arm);
         write_output(hip, &self.renderer, sample);
         if self.renderer.has_effects() && self.renderer.created_mj() > 0.0 {
-            self.guard.says(Limits::ENERGY_DISSIPATED);
+            self.guard.add_limits(Limits::ENERGY_DISSIPATED);
         }
-        wanted_n
+        target_n
     }
 
     /// Sets the currents, A, for a force and for the arm's weight.
@@ -129,17 +129,17 @@ impl<const D: usize> Haptics<'_, D> {
     fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
         *drive = match &self.mechanism {
             Some(mechanism) if self.guard.mode().drives() => {
-                let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
+                let target_a = self.guard.jog_currents_a().unwrap_or_else(|| {
                     let weight = mechanism.gravity_nm(pose) * self.guard.gain();
                     let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
                     mechanism.currents_a(torques)
                 });
-                self.guard.limit_currents(wanted_a)
+                self.guard.limit_currents(target_a)
             }
             _ => GuardOutputs::default(),
         };
         if !drive.enabled {
-            drive.held = self.guard.held();
+            drive.held = self.guard.held_shares();
         }
     }
 
@@ -150,7 +150,7 @@ impl<const D: usize> Haptics<'_, D> {
         let sample = &mut outcome.sample;
         write_nothing(sample);
         outcome.drive = GuardOutputs {
-            held: self.guard.held(),
+            held: self.guard.held_shares(),
             ..GuardOutputs::default()
         };
         self.write_state(Vec3::ZERO, sample);

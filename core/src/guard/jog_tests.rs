@@ -25,11 +25,11 @@ impl<'t> Bench<'t> {
             rate,
             drives: Vec::new(),
         };
-        bench.say(Command::Zero([0; 3]));
+        bench.send(Command::Zero([0; 3]));
         bench
     }
 
-    fn say(&mut self, command: Command<'t>) {
+    fn send(&mut self, command: Command<'t>) {
         assert!(matches!(self.haptics.accept(command), Ok(None)));
     }
 
@@ -51,7 +51,7 @@ impl<'t> Bench<'t> {
 
     /// Requests a jog, presses the switch a moment later, and runs for `ms`.
     fn jog(&mut self, jog: Jog, ms: u32, moves: impl Fn(Vec3) -> [i32; 3]) {
-        self.say(Command::Jog(jog));
+        self.send(Command::Jog(jog));
         for tick in 0..self.rate.ticks(ms) {
             self.sense.dead_man = tick > self.rate.ticks(20);
             self.tick(&moves);
@@ -90,22 +90,22 @@ fn jog_drives_only_its_motor_at_its_current_and_duration() {
             (a - b).abs()
         });
         // No step is larger than the fade-out's, 0.3 A in 100 ms.
-        let most = steps.fold(0.0, f32::max);
-        assert!(most <= 0.3 / (100 * ms) as f32 + 1e-5, "{most}");
+        let max = steps.fold(0.0, f32::max);
+        assert!(max <= 0.3 / (100 * ms) as f32 + 1e-5, "{max}");
     }
 }
 
 #[test]
-fn it_takes_a_press_and_is_over_when_it_is_over() {
+fn jog_needs_a_press_and_is_not_repeated() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     // Without a jog and without a scene, the arm cannot be armed.
-    bench.say(Command::Arm);
+    bench.send(Command::Arm);
     (0..100).for_each(|_| _ = bench.tick(held));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     // A switch that was held from the start does not count.
     bench.sense.dead_man = true;
-    bench.say(Command::Jog(JOG));
+    bench.send(Command::Jog(JOG));
     for _ in 0..1_000 {
         assert!(!bench.tick(held).enabled);
     }
@@ -115,7 +115,7 @@ fn it_takes_a_press_and_is_over_when_it_is_over() {
     // Another arm command does not repeat the jog.
     bench.drives.clear();
     bench.sense.dead_man = false;
-    bench.say(Command::Arm);
+    bench.send(Command::Arm);
     (0..100).for_each(|_| _ = bench.tick(held));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
@@ -123,31 +123,31 @@ fn it_takes_a_press_and_is_over_when_it_is_over() {
 
 /// Also without a tick in between, and in the tick after the fade-out.
 #[test]
-fn a_plain_arm_does_not_arm_for_a_jog_of_before() {
+fn plain_arm_command_does_not_arm_for_an_earlier_jog() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     for between in [Some(Command::Disarm), None] {
-        bench.say(Command::Jog(JOG));
-        between.into_iter().for_each(|command| bench.say(command));
-        bench.say(Command::Arm);
+        bench.send(Command::Jog(JOG));
+        between.into_iter().for_each(|command| bench.send(command));
+        bench.send(Command::Arm);
         (0..100).for_each(|_| _ = bench.tick(held));
         let refused = bench.report().decision.refused;
         assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
     }
     bench.jog(JOG, 1_500, held);
     assert!(bench.report().mode.drives());
-    bench.say(Command::Disarm);
+    bench.send(Command::Disarm);
     while bench.report().mode.drives() {
         bench.tick(held);
     }
-    bench.say(Command::Arm);
+    bench.send(Command::Arm);
     bench.sense.dead_man = false;
     (0..100).for_each(|_| _ = bench.tick(held));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
 }
 
 #[test]
-fn whatever_blocks_arming_blocks_a_jog() {
+fn blockers_of_arming_also_block_a_jog() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.sense.emergency_stop = true;
@@ -155,7 +155,7 @@ fn whatever_blocks_arming_blocks_a_jog() {
     let refused = bench.report().decision.refused;
     assert!(refused.contains(Blockers::EMERGENCY_STOP), "{refused:?}");
     bench.sense.emergency_stop = false;
-    bench.say(Command::Trip(Fault::Hardware));
+    bench.send(Command::Trip(Fault::Hardware));
     bench.jog(JOG, 1_000, held);
     let refused = bench.report().decision.refused;
     assert!(refused.contains(Blockers::FAULT_LATCHED), "{refused:?}");
@@ -174,7 +174,7 @@ fn dead_man_release_ends_a_jog_within_the_tick() {
 }
 
 #[test]
-fn a_joint_that_runs_away_is_a_fault_whichever_it_is() {
+fn runaway_of_any_joint_is_a_fault() {
     for axis in 0..3 {
         for speed in [9, -9, 30, 2] {
             let mut storage = TileArena::<1>::new();
@@ -188,14 +188,17 @@ fn a_joint_that_runs_away_is_a_fault_whichever_it_is() {
             let fault = bench.report().fault;
             assert_eq!(fault, Some(Fault::JogRanAway), "{axis} {speed}");
             let counts = bench.sense.counts[axis].unsigned_abs() as f32;
-            let way = counts / RECORD.counts_per_radian()[axis];
-            assert!(way < FAR_RAD * 1.1, "{axis} {speed}: {way} rad");
+            let rotation = counts / RECORD.counts_per_radian()[axis];
+            assert!(
+                rotation < MAX_JOG_ROTATION_RAD * 1.1,
+                "{axis} {speed}: {rotation} rad"
+            );
         }
     }
 }
 
 #[test]
-fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
+fn stationary_encoder_is_detected_at_half_the_current() {
     for moves in [
         |_| [0; 3],
         |current: Vec3| {
@@ -207,8 +210,8 @@ fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
         bench.jog(JOG, 4_000, moves);
         assert_eq!(bench.report().fault, Some(Fault::NoMotion));
-        let most = bench.drives.iter().map(|drive| -drive.currents_a.y);
-        assert!(most.fold(0.0, f32::max) < 0.152);
+        let max = bench.drives.iter().map(|drive| -drive.currents_a.y);
+        assert!(max.fold(0.0, f32::max) < 0.152);
     }
 }
 
@@ -231,11 +234,11 @@ fn out_of_range_jog_is_invalid_and_stays_bounded() {
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
         bench.jog(jog, 10_000, |current| held(-current));
-        let most = bench
+        let max = bench
             .drives
             .iter()
             .map(|d| d.currents_a.abs().max_element());
-        assert!(most.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
+        assert!(max.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
         let on = bench.drives.iter().filter(|drive| drive.enabled).count();
         assert!(on <= 2_100 + usize::from(JOG_MAX_MS) + 10, "{on}");
         let one = |drive: &GuardOutputs| drive.currents_a * Vec3::Y == drive.currents_a;
@@ -245,11 +248,11 @@ fn out_of_range_jog_is_invalid_and_stays_bounded() {
 }
 
 #[test]
-fn a_scene_or_new_settings_end_a_jog() {
+fn scene_zero_disarm_or_new_settings_end_a_jog() {
     let ends: [fn(&mut Bench<'_>); 4] = [
-        |bench| bench.say(Command::Disarm),
-        |bench| bench.say(Command::DropScene),
-        |bench| bench.say(Command::Zero([0; 3])),
+        |bench| bench.send(Command::Disarm),
+        |bench| bench.send(Command::DropScene),
+        |bench| bench.send(Command::Zero([0; 3])),
         |bench| {
             bench
                 .haptics

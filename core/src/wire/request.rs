@@ -47,7 +47,7 @@ pub enum Request {
     Jog(Jog),
     /// Holds the outputs at these shares of full scale, -1 to 1, with the amplifiers off, or ends
     /// the hold. Only while disarmed and without a fault; it ends automatically
-    /// ([`HOLD_S`](crate::guard::HOLD_S)).
+    /// ([`MAX_HOLD_S`](crate::guard::MAX_HOLD_S)).
     HoldOutputs(Option<[f32; 3]>),
     /// Holds or releases the clutch: while it is held there is no force, and the placement may
     /// change. It is released when the session ends.
