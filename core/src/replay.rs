@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::guard::GuardOutputs;
 use crate::haptics::Haptics;
-use crate::tick::{Outcome, write_nothing, write_output};
+use crate::tick::{Outcome, write_empty, write_output};
 
 impl<const D: usize> Haptics<'_, D> {
     /// Runs one tick. It is repeated until the point is rendered with all of its terrain; only then
@@ -22,7 +22,7 @@ impl<const D: usize> Haptics<'_, D> {
                 self.point = None;
             }
         } else {
-            write_nothing(sample);
+            write_empty(sample);
         }
         self.write_state(force_n, sample);
     }

@@ -15,10 +15,10 @@ use crate::grid::GridPoint;
 use crate::guard::{GuardInputs, GuardOutputs, Limits, Report, SceneKind, Surroundings};
 pub use crate::haptics::{Board, Command, Haptics, HipSource, LATENCY_S, RefusedScene};
 use crate::phantom::{Kinematics, Pose, to_device_frame, to_terrain_frame};
-use crate::renderer::{Mover, Renderer};
+use crate::renderer::{MotionSource, Renderer};
 use crate::scalar::smaller;
 use crate::scene::{Scene, Source, TickRecord};
-use crate::terrain::SETTLING_MM_S;
+use crate::terrain::BLEND_MM_S;
 
 /// One tick's result.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,7 +85,7 @@ impl<const D: usize> Haptics<'_, D> {
         if let Some(scene) = &self.scene
             && scene.fallback.is_some()
         {
-            self.settle(scene.cell_mm);
+            self.blend_tiles(scene.cell_mm);
         }
         outcome.answers = None;
         // Tested once here: otherwise the compiler tests the option where each number is used.
@@ -94,14 +94,14 @@ impl<const D: usize> Haptics<'_, D> {
         };
         let target_n = self.target_n(pose, &mut outcome.sample);
         let force_n = self.guard.limit_force(target_n);
-        self.drive(pose, force_n, &mut outcome.drive);
+        self.command_motors(pose, force_n, &mut outcome.drive);
         self.write_state(force_n, &mut outcome.sample);
     }
 
     /// Returns the requested force at the HIP, N, terrain frame.
     fn target_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
         let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) else {
-            write_nothing(sample);
+            write_empty(sample);
             return Vec3::ZERO;
         };
         let mut hip = place(mechanism, scene, pose);
@@ -110,7 +110,7 @@ impl<const D: usize> Haptics<'_, D> {
             let drives = self.guard.mode().drives();
             hip = self.clutch.tick(hip, scene, in_contact, drives);
         }
-        let arm = Mover::Arm {
+        let arm = MotionSource::Arm {
             guard: &self.guard,
             mechanism,
             pose,
@@ -126,7 +126,7 @@ impl<const D: usize> Haptics<'_, D> {
 
     /// Sets the currents, A, for a force and for the arm's weight.
     #[inline]
-    fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
+    fn command_motors(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
         *drive = match &self.mechanism {
             Some(mechanism) if self.guard.mode().drives() => {
                 let target_a = self.guard.jog_currents_a().unwrap_or_else(|| {
@@ -148,7 +148,7 @@ impl<const D: usize> Haptics<'_, D> {
     #[inline(never)]
     fn tick_without_arm(&mut self, outcome: &mut Outcome) {
         let sample = &mut outcome.sample;
-        write_nothing(sample);
+        write_empty(sample);
         outcome.drive = GuardOutputs {
             held: self.guard.held_shares(),
             ..GuardOutputs::default()
@@ -160,10 +160,10 @@ impl<const D: usize> Haptics<'_, D> {
     // Not inlined: the tick of a scene without fallback does not need it.
     #[cold]
     #[inline(never)]
-    fn settle(&mut self, cell_mm: f32) {
+    fn blend_tiles(&mut self, cell_mm: f32) {
         // An infinite step would erase the record of the tiles that blend in.
-        let step = smaller(SETTLING_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
-        if self.window.settle(step) {
+        let step = smaller(BLEND_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
+        if self.window.blend_tiles(step) {
             self.renderer.contact_mut().surface_moved(&self.window);
         }
     }
@@ -197,7 +197,7 @@ impl<const D: usize> Haptics<'_, D> {
         let cell = sample.proxy.column();
         let scene = self.scene.as_ref();
         scene.is_some_and(|scene| scene.fallback.is_some() && scene.size.has_cell(cell))
-            && !self.window.is_settled(cell)
+            && !self.window.is_blended(cell)
     }
 }
 
@@ -219,7 +219,7 @@ fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut TickRecord
 /// Writes a record without contact and force.
 #[cold]
 #[inline(never)]
-pub(crate) fn write_nothing(sample: &mut TickRecord) {
+pub(crate) fn write_empty(sample: &mut TickRecord) {
     write_contact(GridPoint::default(), &ContactOutput::default(), sample);
 }
 

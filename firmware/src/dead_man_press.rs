@@ -2,12 +2,12 @@
 //!
 //! A stored record decides what the guard protects from the next start on, for every later user of
 //! the arm. So the user at the arm has to agree: after the request, the switch must be open and
-//! then pressed, within [`PRESS_MS`], while the arm is disarmed.
+//! then pressed, within [`PRESS_TIMEOUT_MS`], while the arm is disarmed.
 
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Health;
 use hapterra_core::wire::request::Refusal;
-use hapterra_core::wire::status::PRESS_MS;
+use hapterra_core::wire::status::PRESS_TIMEOUT_MS;
 
 /// Waits for a press.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ impl PressWait {
     pub(crate) const fn new(now: u32, ticks_per_ms: u32) -> Self {
         Self {
             began: now,
-            timeout: PRESS_MS * ticks_per_ms,
+            timeout: PRESS_TIMEOUT_MS * ticks_per_ms,
             seen_open: false,
         }
     }

@@ -195,7 +195,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             }),
             2 => ToDevice::Request {
                 number: seq as u8 + 2,
-                request: Request::ClearFault { seen: None },
+                request: Request::ClearFault { fault: None },
             },
             _ => ToDevice::Hip(HipCommand { seq, hip }),
         };

@@ -3,7 +3,7 @@
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{
-    CoarseTile, Fallback, FieldSize, RequestHint, SETTLING_MM_S, TILE_CELLS, Tile, TileKey,
+    CoarseTile, Fallback, FieldSize, RequestHint, BLEND_MM_S, TILE_CELLS, Tile, TileKey,
     TileRequester,
 };
 
@@ -18,7 +18,7 @@ use crate::variant::{Answer, Hip};
 const BEFORE: f64 = 1.0;
 /// Motion of the surface in a tick, cells, from the fallback to a tile that arrived: at 1 kHz, with
 /// cells of a millimetre.
-const SETTLED_A_TICK: f32 = SETTLING_MM_S / 1_000.0;
+const SETTLED_A_TICK: f32 = BLEND_MM_S / 1_000.0;
 /// Ticks of the slide eastward.
 const TICKS: u32 = 400;
 
@@ -72,7 +72,7 @@ fn output(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     let size = FieldSize::new(grid.columns as i32, grid.rows as i32);
     let mut requester = TileRequester::<SIDE>::new();
     requester.reset(0, size);
-    window.lay(fallback);
+    window.set_fallback(fallback);
     under = fallback.map(|fallback| coarse(&grid, &fallback));
     if let Some(tile) = &mut under {
         assert!(window.take(tile, [Cell::new(0, 0); 2]).is_none());
@@ -83,7 +83,7 @@ fn output(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     let mut coming: Vec<TileKey> = Vec::new();
     let mut answers = Vec::new();
     for (tick, hip) in (0..).zip(&hips) {
-        if window.settle(SETTLED_A_TICK) {
+        if window.blend_tiles(SETTLED_A_TICK) {
             contact.surface_moved(&window);
         }
         let output = *contact.step(&window, &hip.grid);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::force::{Damping, SurfaceParams, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, Kinematics};
@@ -92,8 +92,8 @@ pub(super) fn run(
     for tick in 0..ticks {
         if let Some([held_s, let_go_s]) = settings.clutch_s {
             let hold = [
-                (held_s, ClutchHold::WithHand),
-                (let_go_s, ClutchHold::LetGo),
+                (held_s, ClutchMode::WithHand),
+                (let_go_s, ClutchMode::Released),
             ];
             for (_, hold) in hold.into_iter().filter(|(s, _)| at(*s) == tick) {
                 let _ = haptics.accept(Command::Clutch(hold));

@@ -100,7 +100,7 @@ impl Budget {
     /// Records that the tile of a cell is missing.
     #[cold]
     pub(super) fn record_missing(&mut self, cell: Cell) {
-        self.missing.get_or_insert(TileIndex::holding(cell));
+        self.missing.get_or_insert(TileIndex::containing(cell));
     }
 
     /// Returns the first tile that the tick needed and that was missing.

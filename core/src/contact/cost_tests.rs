@@ -59,7 +59,7 @@ fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
 /// state.
 fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let above = GridPoint::new([30, 30, 9], Vec3::ZERO);
     let mut step = |hip: &GridPoint| *contact.step(&field.window, hip);

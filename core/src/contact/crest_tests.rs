@@ -25,7 +25,7 @@ impl Single {
     fn proxies(&self, hips: &[[f64; 3]]) -> Option<[[f64; 3]; 2]> {
         let mut tiles = buffers::<1>();
         let corners = self.0;
-        let field = Field::<1>::held(&mut tiles, FieldSize::new(3, 3), move |x, y| {
+        let field = Field::<1>::filled(&mut tiles, FieldSize::new(3, 3), move |x, y| {
             let is_corner = (1..=2).contains(&x) && (1..=2).contains(&y);
             let corner = (x - 1) + 2 * (y - 1);
             if is_corner {

@@ -133,7 +133,7 @@ mod tests {
     use glam::Vec3;
 
     fn hole_at_10_10(tiles: &mut [Tile]) -> Field<'_, 2> {
-        Field::held(tiles, FieldSize::new(40, 40), |x, y| {
+        Field::filled(tiles, FieldSize::new(40, 40), |x, y| {
             if (10..=11).contains(&x) && (10..=11).contains(&y) {
                 f32::NAN
             } else {
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn a_missing_tile_is_named() {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 0.0);
+        let field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 0.0);
         let mut budget = Budget::new(0);
         let there = beside_patches(&field.window, &at(40.5, 5.5), &mut budget);
         let missing = budget.missing();

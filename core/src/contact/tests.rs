@@ -76,7 +76,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Runs a trajectory to the end of every tick and checks each answer.
 fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]]) -> [u32; 4] {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut seen = [0; 4];
@@ -190,7 +190,7 @@ fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f6
 /// Random segments that start above everything.
 fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, high: f64) {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut random = Random(7);
     let mut seen = [0, 0];
@@ -270,7 +270,7 @@ fn two_walls(x: i32, _: i32) -> f32 {
 #[test]
 fn proxy_does_not_tunnel_through_a_wall() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), two_walls);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), two_walls);
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
     let mut swept = Contact::new(ContactSettings::AT_1_KHZ);
     swept.step(&field.window, &above);
@@ -288,7 +288,7 @@ fn shifting_the_scene_changes_no_bit() {
     for shift in [1000, 100_000, 100_000_000] {
         let shift = shift / 32 * 32; // whole tiles, so that one function serves
         let mut near_tiles = buffers::<2>();
-        let near = Field::<2>::held(&mut near_tiles, FieldSize::new(SIZE, SIZE), rough);
+        let near = Field::<2>::filled(&mut near_tiles, FieldSize::new(SIZE, SIZE), rough);
         let mut far_tiles = buffers::<2>();
         let far = Field::<2>::shifted(&mut far_tiles, SIZE, shift, rough);
         let (mut a, mut b) = (
@@ -461,8 +461,8 @@ fn holds_when_the_hip_jumps() {
 #[test]
 fn steep_ways_in_over_the_border_cross_nothing() {
     let mut tiles = buffers::<8>();
-    let mut field = Field::<8>::over(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
-    field.hold_around(Cell::new(36, 36));
+    let mut field = Field::<8>::empty(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
+    field.fill_around(Cell::new(36, 36));
     let mut random = Random(1);
     for way in 0..cases(1000, 10) {
         let beside = [random.between(0.0, 72.0), random.between(-1.0, 0.0), 0.2].map(|x| x as f32);
@@ -495,7 +495,7 @@ fn with_no_data(x: i32, y: i32) -> f32 {
 #[test]
 fn vertical_path_onto_any_valid_sample_touches_surface() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(16, 16), with_no_data);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(16, 16), with_no_data);
     for (x, y) in (0..=16).flat_map(|y| (0..=16).map(move |x| (x, y))) {
         for fast in [0.1, 1.5, 500.0] {
             let at = |z: f32| GridPoint::new([x, y, 0], Vec3::Z * z);
@@ -520,8 +520,8 @@ fn mirrored_path_along_grid_lines_has_mirrored_forces() {
     let [plain, mirrored] = &mut tiles;
     let lopsided = |x: i32, y: i32| with_no_data(x - 2, y + 1) + 0.125 * x as f32;
     let size = FieldSize::new(16, 16);
-    let plain = Field::<2>::held(plain, size, lopsided);
-    let mirrored = Field::<2>::held(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));
+    let plain = Field::<2>::filled(plain, size, lopsided);
+    let mirrored = Field::<2>::filled(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));
     let mut random = Random(5);
     let mut touched = 0;
     for _ in 0..cases(400, 10) {
@@ -575,7 +575,7 @@ fn side_by_side(
 ) {
     for (height, mid, span) in GROUNDS {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
         let mut contacts = [one, other].map(Contact::new);
         // Usually below the surface, after a start above it.
         let above = [[30.0, 30.0, 2e4]].into_iter();
@@ -656,7 +656,7 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
     };
     for mirrored in [[false, false], [true, false], [false, true], [true, true]] {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), move |x, y| {
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), move |x, y| {
             let turned = |c: i32, turned: bool| if turned { SIZE - c } else { c };
             tent(turned(x, mirrored[0]), turned(y, mirrored[1]), 30)
         });
@@ -676,7 +676,7 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
 #[test]
 fn hip_that_leaps_beyond_the_window_begins_anew() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), |_, _| 0.0);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), |_, _| 0.0);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut state = |hip| contact.step(&field.window, &point(hip)).state;
     assert_eq!(state([2.5, 2.5, 1.0]), ContactState::Free);

@@ -126,7 +126,7 @@ fn cliff(x: i32, _: i32) -> f32 {
 #[test]
 fn shading_changes_nothing_on_a_plane() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), plane);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), plane);
     let path = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
     for rendered in forces_along(&field, plane, Friction::NONE, path) {
         let off = (rendered.shaded - rendered.plain).length();
@@ -138,7 +138,7 @@ fn shading_changes_nothing_on_a_plane() {
 #[test]
 fn force_turns_evenly_over_valley_and_ridge() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(8.0, 16.0), (16.0, 24.0)] {
         let path = straight([from, 9.3], [to, 10.1]);
         let rendered = forces_along(&field, folds, Friction::NONE, path);
@@ -157,7 +157,7 @@ fn force_turns_evenly_over_valley_and_ridge() {
 #[test]
 fn shaded_normal_at_each_sample_averages_its_adjacent_edges() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), rough);
     for i in 0..cases(400, 20) as i32 {
         // Including samples on tiles' borders.
         let (x, y) = (
@@ -187,7 +187,7 @@ fn shaded_normal_at_each_sample_averages_its_adjacent_edges() {
 #[test]
 fn shading_cuts_max_force_turn_tenfold_on_rough_terrain() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), rough);
     let (mut plain, mut shaded) = (0.0_f32, 0.0_f32);
     for i in 0..cases(40, 1) {
         let y = 2.0 + f64::from(i);
@@ -205,7 +205,7 @@ fn shading_cuts_max_force_turn_tenfold_on_rough_terrain() {
 #[test]
 fn cliff_is_not_smoothed() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), cliff);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), cliff);
     let rendered = forces_along(
         &field,
         cliff,
@@ -238,8 +238,8 @@ fn border_of_a_tile_is_rendered_as_its_inside() {
         rough(x - 22, y - 22)
     }
     let mut tiles = (buffers::<2>(), buffers::<2>());
-    let inside = Field::<2>::held(&mut tiles.0, FieldSize::new(60, 60), rough);
-    let across = Field::<2>::held(&mut tiles.1, FieldSize::new(60, 60), moved);
+    let inside = Field::<2>::filled(&mut tiles.0, FieldSize::new(60, 60), rough);
+    let across = Field::<2>::filled(&mut tiles.1, FieldSize::new(60, 60), moved);
     let path = || straight([6.3, 7.9], [14.2, 12.1]);
     let shifted = path().map(|[x, y]| [x + 22.0, y + 22.0]);
     let one = forces_along(&inside, rough, Friction::NONE, path());
@@ -254,8 +254,8 @@ fn border_of_a_tile_is_rendered_as_its_inside() {
 #[test]
 fn missing_tile_is_named_and_ends_the_surface() {
     let mut tiles = buffers::<2>();
-    let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), folds);
-    field.install(TileKey::holding(0, Cell::new(5, 5)));
+    let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), folds);
+    field.install(TileKey::containing(0, Cell::new(5, 5)));
     let rendered = forces_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
     let missing: Vec<_> = rendered.iter().map(|record| record.missing).collect();
     assert_eq!(missing, [None, Some(TileIndex::new(1, 0))]);
@@ -271,7 +271,7 @@ fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
         }
     }
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), holed);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), holed);
     // Along the southern border of no-data, half a cell and a tenth of a cell away.
     for y in [8.5, 8.9] {
         let rendered = forces_along(
@@ -291,7 +291,7 @@ fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
         if x > 15 && y < 30 { f32::NAN } else { 3.0 }
     }
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), level);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), level);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut shader = Shader::of(Shading::Smooth).expect("shaded");
     let mut faded = 0;
@@ -311,7 +311,7 @@ fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
 fn slopes_are_independent_of_the_tile_base_height() {
     let size = FieldSize::new(60, 60);
     let mut tiles = (buffers::<2>(), buffers::<2>());
-    let even = Field::<2>::held(&mut tiles.0, size, rough);
+    let even = Field::<2>::filled(&mut tiles.0, size, rough);
     let mut slots = tiles.1.iter_mut();
     let mut next = || slots.next().expect("a buffer for every slot");
     let mut window = Window::new([[next(), next()], [next(), next()]]);
@@ -337,7 +337,7 @@ fn slopes_are_independent_of_the_tile_base_height() {
 #[test]
 fn shading_turns_friction_together_with_normal_force() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(11.0, 13.0), (13.0, 11.0)] {
         // Into the valley and out of it.
         let rendered = forces_along(

@@ -51,7 +51,7 @@ impl SlopesAt {
         let mut beside = |east, north| {
             let there = cell.offset(east, north);
             window.corners(there).unwrap_or_else(|| {
-                missing = Some(TileIndex::holding(there));
+                missing = Some(TileIndex::containing(there));
                 Corners::NONE
             })
         };

@@ -28,10 +28,10 @@ impl Guard {
         if !around.watchdog_live {
             return Some(Fault::TaskStalled);
         }
-        if !self.stops.each_allows(pose.angles()) {
+        if !self.stops.contains_joints(pose.angles()) {
             return Some(Fault::JointLimit);
         }
-        if !self.stops.linkage_allows(pose.angles()) {
+        if !self.stops.contains_linkage(pose.angles()) {
             return Some(Fault::Linkage);
         }
         match self.speed.check(sense.counts, mechanism, pose) {

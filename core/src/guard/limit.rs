@@ -36,25 +36,25 @@ impl Guard {
     }
 
     fn follow_force(&mut self, target_n: Vec3) {
-        let mut target = clamp_length(target_n, self.max_force_n);
-        if target != target_n {
+        let mut limited_n = clamp_length(target_n, self.max_force_n);
+        if limited_n != target_n {
             self.limits |= Limits::FORCE_CLAMPED;
         }
         if self.mode() == Mode::Ramping {
             self.limits |= Limits::RAMPING;
             self.arming.advance_on();
-            target *= self.arming.gain;
+            limited_n *= self.arming.gain;
         }
         let share = self.speed.share;
         if share < 1.0 {
             self.limits |= Limits::SPEED_LIMITED;
-            target *= share;
+            limited_n *= share;
         }
-        let change = target - self.force_n;
+        let change = limited_n - self.force_n;
         let step = clamp_length(change, self.max_slew_n);
         self.force_n = if step == change {
             // Exact to the bit, so that a replay renders the same force.
-            target
+            limited_n
         } else {
             self.limits |= Limits::SLEW_LIMITED;
             self.force_n + step

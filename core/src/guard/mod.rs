@@ -32,10 +32,7 @@ pub use fault::Fault;
 pub use feedback::{CURRENT_ROUGHNESS_A, CURRENT_TOLERANCE_A};
 pub use flags::{Blockers, Limits};
 pub use hold::MAX_HOLD_S;
-pub use jog::{
-    JOG_MAX_MS, JOG_SHARE, Jog, MAX_JOG_ROTATION_RAD as JOG_FAR_RAD,
-    MAX_JOG_SPEED_RAD_S as JOG_FAST_RAD_S,
-};
+pub use jog::{JOG_MAX_MS, JOG_SHARE, Jog, MAX_JOG_ROTATION_RAD, MAX_JOG_SPEED_RAD_S};
 pub use mode::Mode;
 pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
@@ -200,7 +197,7 @@ impl Guard {
         Self {
             max_counts: MAX_COUNTS_PER_S.div_ceil(rate.hz()),
             max_slew_n: MAX_SLEW_N_PER_S / rate.hz() as f32,
-            stops: JointLimits::NOWHERE,
+            stops: JointLimits::EMPTY,
             arming: Arming::new(rate),
             fault: found_at_boot,
             blockers: Blockers::empty(),

@@ -85,7 +85,7 @@ impl SpeedMonitor {
             return SpeedCheck::NotYet;
         }
         self.ticks = 0;
-        self.readings.take(counts);
+        self.readings.push(counts);
         let moved = self.readings.moved();
         let speed_of =
             |counts: Vec3| pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count());

@@ -99,7 +99,7 @@ impl TileKey {
     pub const fn holding(level: u8, cell: Cell) -> Self {
         Self {
             level,
-            index: TileIndex::holding(cell),
+            index: TileIndex::containing(cell),
         }
     }
 }

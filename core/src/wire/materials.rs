@@ -171,7 +171,7 @@ mod tests {
         let noise = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 61 % 16) as u8;
         let mut room = [0xAA; MAX_TILE_BYTES];
         let border = |col: usize, row: usize| u8::from(col + row / 3 > 20) * 9;
-        for (all, most) in [
+        for (all, max) in [
             (materials(|_, _| 15), 1),
             (materials(|_, row| u8::from(row > 16)), 12),
             (materials(border), 2 * 2 * TILE_SAMPLES),
@@ -182,7 +182,7 @@ mod tests {
                 TileMaterials::One(_) => 1,
                 TileMaterials::Runs(bytes) | TileMaterials::Each(bytes) => bytes.len(),
             };
-            assert!(length <= most, "{length} of {most}");
+            assert!(length <= max, "{length} of {max}");
             let mut tile = filled();
             assert_eq!(packed.fill(&mut tile, 16), Ok(()));
             assert_eq!(read(&tile), all);
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_table_fits_and_a_scene_has_its_own() {
+    fn largest_table_fits_and_must_match_its_scene() {
         let mut material = Material::of(&SurfaceParams::PREMIUM);
         material.texture.seed = u32::MAX;
         let table = MaterialTable::new(&[material; MaterialTable::MAX]).expect("fits");

@@ -19,7 +19,7 @@
 //!   order. In a scene fed by points, each point is one [`Contact::step`] in real time, and another
 //!   scene may follow. With materials, each point is one [`Haptics::tick`], and a point without an
 //!   answer is repeated.
-//! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one [`Haptics::tick`],
+//! - `counts.frames`, for a scene fed by encoders: [`PlantState`] frames, each one [`Haptics::tick`],
 //!   from count to current, after the arm was armed at the first of them. In `replay.frames` of
 //!   such a scene a point is a mark: the tiles after it are stored before the tick with its number.
 //!
@@ -52,7 +52,7 @@ use hapterra_core::terrain::{Tile, Window};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::materials::MaterialTile;
 use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::plant::Sensed;
+use hapterra_core::wire::plant::PlantState;
 use hapterra_firmware::link::fill_tile;
 use static_cell::ConstStaticCell;
 
@@ -173,7 +173,7 @@ fn take_scene(
     scene: &Scene,
     table: &MaterialTable,
 ) -> usize {
-    haptics.take_materials(table);
+    haptics.set_materials(table);
     let _ = haptics.accept(Command::Scene(*scene));
     table.materials().len()
 }
@@ -224,7 +224,7 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
     let stopwatch = Stopwatch::start();
     let mut armed = false;
     let mut outcome = Outcome::default();
-    while let Some(Sensed { sense, tick: at }) = sensed.next() {
+    while let Some(PlantState { sense, tick: at }) = sensed.next() {
         if !armed {
             arm(&mut haptics, sense, &mut outcome);
             armed = true;

@@ -13,7 +13,7 @@ use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use hapterra_core::guard::GuardOutputs;
 use hapterra_core::wire::frame::{FrameReader, decode, encode};
-use hapterra_core::wire::plant::{Currents, Sensed};
+use hapterra_core::wire::plant::{Currents, PlantState};
 use hapterra_firmware::board::{Encoders, GuardInputs, TickClock};
 use heapless::spsc::{Consumer, Producer, Queue};
 use static_cell::ConstStaticCell;
@@ -24,7 +24,7 @@ use crate::time::{self, Reason};
 /// Maximum length of a frame on this line.
 const FRAME: usize = 64;
 
-static COUNTS: ConstStaticCell<Queue<Sensed, 4>> = ConstStaticCell::new(Queue::new());
+static COUNTS: ConstStaticCell<Queue<PlantState, 4>> = ConstStaticCell::new(Queue::new());
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
 /// True if counts wait for a tick.
 static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
@@ -59,7 +59,7 @@ pub(crate) fn expect(counts: bool) {
 
 /// The virtual Phantom's encoders, as the tick reads them.
 pub(crate) struct PlantEncoders {
-    counts: Consumer<'static, Sensed>,
+    counts: Consumer<'static, PlantState>,
     currents: Producer<'static, Currents>,
     latest: GuardInputs,
     /// The number of the tick whose counts were read but not answered yet.
@@ -70,7 +70,7 @@ impl Encoders for PlantEncoders {
     fn sense(&mut self) -> GuardInputs {
         // Read in place: taking it out of the queue would copy it byte by byte, twice (150
         // instructions a tick).
-        if let Some(Sensed { tick, sense }) = self.counts.peek() {
+        if let Some(PlantState { tick, sense }) = self.counts.peek() {
             self.latest = *sense;
             self.unanswered = Some(*tick);
             self.counts.dequeue();
@@ -102,7 +102,7 @@ impl PlantEncoders {
 
 /// The task's side of the line.
 pub(crate) struct PlantPort {
-    counts: Producer<'static, Sensed>,
+    counts: Producer<'static, PlantState>,
     currents: Consumer<'static, Currents>,
 }
 

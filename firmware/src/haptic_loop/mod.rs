@@ -155,7 +155,7 @@ where
             };
             match &command {
                 Command::Scene(scene) => {
-                    take_materials(&mut self.haptics, &mut self.ends, scene);
+                    set_materials(&mut self.haptics, &mut self.ends, scene);
                 }
                 Command::Mark(number) => self.mark.begin(*number),
                 _ => {}
@@ -288,7 +288,7 @@ fn take_materials<const D: usize>(
     if let (Some(sum), Some(table)) = (scene.materials, ends.materials.peek())
         && table.check_sum() == sum
     {
-        haptics.take_materials(table);
+        haptics.set_materials(table);
         // The table stays in the queue until it is copied.
         drop(ends.materials.dequeue());
     }

@@ -93,7 +93,7 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     let at = wave(&mut haptic_loop, at, 50);
     // While its answer has no room in the queue.
     let tile = Box::leak(Box::new(Tile::VACANT));
-    let key = TileKey::holding(0, Cell::new(100, 100));
+    let key = TileKey::containing(0, Cell::new(100, 100));
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     let at = wave(&mut haptic_loop, at, 50);
@@ -124,7 +124,7 @@ fn an_answer_that_finds_no_room_is_kept_until_it_does() {
         haptic_loop.tick();
     }
     let tile = Box::leak(Box::new(Tile::VACANT));
-    let key = TileKey::holding(0, Cell::new(100, 100));
+    let key = TileKey::containing(0, Cell::new(100, 100));
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     for _ in 0..5 {

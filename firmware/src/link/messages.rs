@@ -6,7 +6,7 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameError, decode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::session::{InSession, ONLY_LOOKS, SessionEnd, SessionNumber};
+use hapterra_core::wire::session::{InSession, READ_ONLY_SILENCE_S, SessionEnd, SessionNumber};
 use hapterra_core::wire::status::{StackFigures, Status, TickFigures};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -34,7 +34,7 @@ impl<const D: usize> Link<'_, D> {
 
     /// Answers a host of another protocol. A host of this protocol also sends a hello.
     fn on_version_check(&mut self, check: VersionCheck) {
-        if let VersionCheck::Asked { protocol } = check
+        if let VersionCheck::Query { protocol } = check
             && protocol != PROTOCOL
         {
             self.refuse(protocol);
@@ -93,7 +93,7 @@ impl<const D: usize> Link<'_, D> {
         if hello.protocol != PROTOCOL {
             return self.refuse(hello.protocol);
         }
-        if hello.silence_s == ONLY_LOOKS && !self.session.is_of(session) {
+        if hello.silence_s == READ_ONLY_SILENCE_S && !self.session.is_of(session) {
             self.looker = Some(session);
             let hello = self.device.hello(hello.number, self.scene, &self.session);
             return self.say_in(session, &ToHost::Hello(hello));
@@ -221,7 +221,7 @@ impl<const D: usize> Link<'_, D> {
     pub(super) fn forget_scene(&mut self) {
         self.scene = None;
         self.forget_positions();
-        self.requester.forget_asked();
+        self.requester.clear_pending();
     }
 
     /// Discards the state that depends on positions in one scene.
@@ -244,7 +244,7 @@ impl<const D: usize> Link<'_, D> {
         self.tx.clear();
         self.drop_samples();
         self.points.clear();
-        self.requester.forget_asked();
+        self.requester.clear_pending();
     }
 
     /// Drops the samples that are not packed yet, and counts them.
@@ -269,7 +269,7 @@ impl<const D: usize> Link<'_, D> {
         if accepted && self.scene != Some(scene) {
             self.drop_scene_samples();
             self.requester.reset(scene.level, scene.size);
-            self.requester.lay(scene.fallback);
+            self.requester.set_fallback(scene.fallback);
             self.forget_positions();
             self.scene = Some(scene);
             self.command(room, Command::Scene(scene));

@@ -146,10 +146,10 @@ impl<const D: usize> Link<'_, D> {
                 self.command(room, Command::Mark(number));
                 return Progress::Marking(number);
             }
-            Request::ClearFault { seen } => self
+            Request::ClearFault { fault } => self
                 .device
-                .may_clear(seen)
-                .and_then(|()| self.obey(room, Command::ClearFault(seen))),
+                .may_clear(fault)
+                .and_then(|()| self.obey(room, Command::ClearFault(fault))),
             Request::Zero { counts } => self
                 .device
                 .may_change_settings()

@@ -37,7 +37,7 @@ impl<'t, const D: usize> Link<'t, D> {
         room: CommandRoom,
     ) {
         let ours = self.scene.is_some_and(|s| s.epoch == message.epoch);
-        if !ours || !self.requester.awaits(message.key) {
+        if !ours || !self.requester.is_pending(message.key) {
             return;
         }
         self.reclaim_buffers();

@@ -3,7 +3,7 @@
 //! The loop applies commands in order. So every tile behind a placement in the queue belongs to it,
 //! and a tile of the previous placement is refused by its epoch.
 
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::{Scene, SceneChange, Source};
 use hapterra_core::terrain::RequestHint;
@@ -31,10 +31,10 @@ pub(super) enum ClutchOfHost {
 
 impl<const D: usize> Link<'_, D> {
     /// Sets the host's hold of the clutch.
-    pub(super) fn set_clutch(&mut self, hold: ClutchHold, room: CommandRoom) {
+    pub(super) fn set_clutch(&mut self, hold: ClutchMode, room: CommandRoom) {
         self.clutch = match hold {
-            ClutchHold::LetGo => ClutchOfHost::LetGo,
-            ClutchHold::WithHand | ClutchHold::InPlace => ClutchOfHost::Held,
+            ClutchMode::Released => ClutchOfHost::LetGo,
+            ClutchMode::WithHand | ClutchMode::InPlace => ClutchOfHost::Held,
         };
         self.command(room, Command::Clutch(hold));
     }
@@ -51,7 +51,7 @@ impl<const D: usize> Link<'_, D> {
         if self.clutch == ClutchOfHost::Forsaken
             && let Some(room) = self.room_for_command()
         {
-            self.set_clutch(ClutchHold::LetGo, room);
+            self.set_clutch(ClutchMode::Released, room);
         }
     }
 
@@ -93,9 +93,9 @@ impl<const D: usize> Link<'_, D> {
         }
         let fallback = self.scene.and_then(|before| before.fallback);
         if !view.keeps_tiles || fallback != scene.fallback {
-            self.requester.lay(scene.fallback);
+            self.requester.set_fallback(scene.fallback);
         }
-        self.requester.forget_asked();
+        self.requester.clear_pending();
         self.request_hint = Some(RequestHint {
             proxy: at,
             hip: at,

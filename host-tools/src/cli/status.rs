@@ -53,8 +53,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let status = control.fresh_status()?;
         show(text(&status));
         if args.clear {
-            let seen = status.health.report.fault;
-            let answer = control.request(&Request::ClearFault { seen })?;
+            let fault = status.health.report.fault;
+            let answer = control.request(&Request::ClearFault { fault })?;
             answer.map_err(Failure::new)?;
             let cleared = match control.fresh_status()?.health.report.fault {
                 None => "no fault is latched any more".to_owned(),
@@ -120,7 +120,7 @@ fn boot(boot: &BootReport) -> String {
         ResetCause::BrownOut => "after its supply was too low for a moment: check it",
     };
     let crash = boot.crash.as_ref().map_or(String::new(), crashed);
-    let brown_out = if boot.lacks_brown_out_reset() {
+    let brown_out = if boot.is_brown_out_level_low() {
         format!(
             "supply guard   the chip runs down to {} mV: set its brown-out level (docs/reference/hardware.md, The supply)\n",
             boot.resets_below_mv

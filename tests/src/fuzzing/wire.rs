@@ -100,7 +100,7 @@ impl Wire {
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
         for (fault, number) in Fault::ALL.into_iter().zip(0..) {
             let number = first.wrapping_add(number);
-            let request = Request::ClearFault { seen: Some(fault) };
+            let request = Request::ClearFault { fault: Some(fault) };
             self.hear(&message(&ToDevice::Request { number, request }));
         }
         let _ = self.device.tick(GuardInputs::default());

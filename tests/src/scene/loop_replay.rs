@@ -126,7 +126,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
         let mut haptics = Haptics::new(slots, TickRate::DEFAULT, None);
         let message = message(scene, materials, replay.shift);
-        haptics.take_materials(&materials.reported());
+        haptics.set_materials(&materials.reported());
         assert!(matches!(haptics.accept(Command::Scene(message)), Ok(None)));
         let mut requester = TileRequester::new();
         requester.reset(0, message.size);

@@ -23,7 +23,7 @@ fn step(
     path: impl IntoIterator<Item = [f32; 3]>,
 ) -> Vec<([f32; 3], ContactOutput)> {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), height);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(friction));
     path.into_iter()
         .map(|hip| (hip, *contact.step(&field.window, &at(hip))))
@@ -163,7 +163,7 @@ fn a_steady_hand_breaks_away_once_at_every_cell_size() {
             let rate = TickRate::new(hz).expect("in range");
             let settings = ContactSettings::AT_1_KHZ.at_rate(rate).on_cells_of(cell_mm);
             let mut tiles = buffers::<2>();
-            let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), |_, _| 0.0);
+            let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), |_, _| 0.0);
             let mut contact = Contact::new(settings.with_friction(friction));
             let (mut trailed_mm, mut breaks) = (0.0_f32, 0);
             for tick in 0..hz * 4 {
@@ -259,7 +259,7 @@ fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
     let mut height = || random.between(-0.2, 0.2) as f32;
     let heights: Vec<f32> = (0..61 * 61).map(|_| height()).collect();
     let ground = move |x: i32, y: i32| heights[(y.clamp(0, 60) * 61 + x.clamp(0, 60)) as usize];
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), ground);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), ground);
     let friction = Friction {
         viscous_s: 0.001,
         ..Friction::coulomb(0.3)

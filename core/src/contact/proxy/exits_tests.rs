@@ -27,7 +27,7 @@ fn each_phase_takes_exactly_its_listed_exits() {
     let mut taken = BTreeSet::new();
     for _ in 0..cases(60, 60) {
         let mut tiles = buffers::<4>();
-        let field = Field::<4>::held(&mut tiles, FieldSize::new(SIZE, SIZE), holes);
+        let field = Field::<4>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), holes);
         let settings = ContactSettings {
             work_per_tick: ContactSettings::MIN_WORK,
             ..ContactSettings::AT_1_KHZ

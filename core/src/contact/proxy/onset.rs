@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn it_lands_as_deep_as_before_and_stays_on_its_side_of_a_wall() {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), wall);
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), wall);
         // Three cells deep in the wall from the west, relative to the proxy.
         let displacement = Vec3::new(-3.0, 0.1, 0.0);
         let mut contact =
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn onset_without_terrain_names_missing_tile_and_has_no_force() {
         let mut tiles = buffers::<2>();
-        let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
+        let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let displacement = Vec3::new(40.0, 0.0, 1.0);
         let mut contact =
             Contact::onset(ContactSettings::AT_1_KHZ, column(60.5, 5.5), displacement);
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn onset_over_no_data_ends_without_contact() {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), |x, _| {
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), |x, _| {
             if x > 20 { f32::NAN } else { 0.0 }
         });
         let displacement = Vec3::new(0.0, 0.0, 1.0);

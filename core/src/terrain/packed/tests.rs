@@ -15,7 +15,7 @@ const KEY: TileKey = TileKey::new(0, 2, 5);
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
 /// The bits of all samples of a tile.
-fn held(tile: &Tile) -> Vec<u32> {
+fn sample_bits(tile: &Tile) -> Vec<u32> {
     let sample = |i: usize| {
         let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
         // The samples of the last row and column are corners of the patches before them.
@@ -30,7 +30,7 @@ fn loaded(heights: &[f32; SAMPLES]) -> Vec<u32> {
     for (at, height) in heights.iter().enumerate() {
         tile.set(at % TILE_SAMPLES, at / TILE_SAMPLES, *height);
     }
-    held(&tile)
+    sample_bits(&tile)
 }
 
 /// Packs heights, and checks the tile unpacked from them; `None` if packing saves nothing.
@@ -38,12 +38,15 @@ fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>
     let mut buffer = [0xAA; MAX_PACKED];
     let bytes = pack(heights, base, steps, &mut buffer)?.to_vec();
     let mut tile = Box::new(Tile::VACANT);
-    let wanted = loaded(heights);
+    let expected = loaded(heights);
     if tile.unpack(KEY, base, &bytes) != Err(TileError::Step) {
         assert_eq!((tile.key(), tile.base()), (Some(KEY), base));
     }
-    assert!(held(&tile) == wanted, "{} bytes", bytes.len());
-    assert!(reference_decoder::heights(&bytes) == wanted, "by the book");
+    assert!(sample_bits(&tile) == expected, "{} bytes", bytes.len());
+    assert!(
+        reference_decoder::heights(&bytes) == expected,
+        "by the book"
+    );
     Some(bytes)
 }
 
@@ -77,7 +80,7 @@ fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
 }
 
 #[test]
-fn whole_metres_take_half_a_byte_a_sample() {
+fn whole_metres_take_half_a_byte_per_sample() {
     for metres in [1.0, 10.0, 29.97, 91.3] {
         let base = (1450.0 / metres) as i32;
         let steps = [Step::Cells(1.0 / metres)];
@@ -107,7 +110,7 @@ fn centimetres_in_single_precision_are_two_lines() {
 }
 
 #[test]
-fn a_height_of_zero_above_base_zero_is_zero() {
+fn zero_height_over_base_zero_is_packed_exactly() {
     let heights = by_sample(|col, row| (col.min(row) as f64 / 29.99) as f32);
     for steps in [
         &[Step::Cells(1.0 / 29.99)],
@@ -118,7 +121,7 @@ fn a_height_of_zero_above_base_zero_is_zero() {
 }
 
 #[test]
-fn a_zero_below_zero_stays_below_zero() {
+fn negative_zero_is_preserved() {
     let mut heights = by_sample(|col, row| col.min(row) as f32);
     heights[40] = -0.0;
     packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
@@ -127,7 +130,7 @@ fn a_zero_below_zero_stays_below_zero() {
 }
 
 #[test]
-fn floats_without_a_step_are_whole_too() {
+fn floats_without_a_step_are_packed_losslessly() {
     let heights = by_sample(|col, row| ((col as f32 / 9.0).sin() + row as f32 / 7.0) * 3.7);
     for steps in [&[][..], &[Step::Cells(0.1)], &[Step::Cells(f64::NAN)]] {
         let bytes = packed(&heights, 0, steps).unwrap();
@@ -163,7 +166,7 @@ fn packing_keeps_no_data_samples_in_place() {
 }
 
 #[test]
-fn odd_numbers_are_whole_too() {
+fn unusual_floats_are_packed_losslessly() {
     let odd = [
         0.0,
         -0.0,
@@ -208,7 +211,7 @@ fn odd_numbers_are_whole_too() {
 }
 
 #[test]
-fn random_bits_do_not_pay_or_are_whole() {
+fn random_bits_are_packed_losslessly_or_not_at_all() {
     let mut random = Random(7);
     let mut packs = 0;
     for bits in 1..=32 {
@@ -223,7 +226,7 @@ fn random_bits_do_not_pay_or_are_whole() {
 }
 
 /// Examples of packed tiles of every kind.
-fn some() -> Vec<Vec<u8>> {
+fn examples() -> Vec<Vec<u8>> {
     let mut hollow = hills(30.0, 50);
     for i in (0..SAMPLES).filter(|i| i % 37 < 9) {
         hollow[i] = f32::NAN;
@@ -251,8 +254,8 @@ fn some() -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
-    for whole in some() {
+fn truncated_or_overlong_bytes_are_refused() {
+    for whole in examples() {
         let mut tile = Box::new(Tile::VACANT);
         for length in 0..whole.len() {
             tile.fill(KEY, 0, |_, _| 0.0).unwrap();
@@ -273,8 +276,8 @@ fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
 
 #[test]
 fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
-    let (mut taken, mut refused) = (0, 0);
-    for whole in some() {
+    let (mut accepted, mut refused) = (0, 0);
+    for whole in examples() {
         let mut tile = Box::new(Tile::VACANT);
         for place in 0..whole.len() {
             for change in [1, 0x10, 0x80, 0xFF] {
@@ -282,8 +285,11 @@ fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
                 bytes[place] ^= change;
                 match tile.unpack(KEY, 0, &bytes) {
                     Ok(()) => {
-                        taken += 1;
-                        assert!(held(&tile) == reference_decoder::heights(&bytes), "{place}");
+                        accepted += 1;
+                        assert!(
+                            sample_bits(&tile) == reference_decoder::heights(&bytes),
+                            "{place}"
+                        );
                     }
                     Err(error) => {
                         refused += 1;
@@ -297,7 +303,7 @@ fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
             }
         }
     }
-    assert!(taken > 1000 && refused > 1000, "{taken} {refused}");
+    assert!(accepted > 1000 && refused > 1000, "{accepted} {refused}");
 }
 
 #[test]
@@ -317,7 +323,7 @@ fn random_bytes_are_unpacked_or_refused() {
         if let Some(kind) = bytes.first_mut() {
             *kind = *kind & 0x7C | random.below(3) as u8;
         }
-        let taken = tile.unpack(KEY, 0, &bytes).is_ok();
-        assert_eq!(tile.key().is_some(), taken);
+        let accepted = tile.unpack(KEY, 0, &bytes).is_ok();
+        assert_eq!(tile.key().is_some(), accepted);
     }
 }

@@ -77,13 +77,13 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
     // Another fault, or none, was seen: this one stays.
-    for seen in [None, Some(Fault::Hardware)] {
-        rig.ask(Request::ClearFault { seen });
+    for acknowledged in [None, Some(Fault::Hardware)] {
+        rig.ask(Request::ClearFault { fault: acknowledged });
         rig.run(30);
         assert_eq!(fault(&rig), Some(Fault::EncoderJump));
     }
-    let seen = Some(Fault::EncoderJump);
-    rig.ask(Request::ClearFault { seen });
+    let acknowledged = Some(Fault::EncoderJump);
+    rig.ask(Request::ClearFault { fault: acknowledged });
     rig.run(30);
     assert_eq!(fault(&rig), None);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));

@@ -10,7 +10,7 @@ use hapterra_core::terrain::RETRY_TICKS;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
-use hapterra_core::wire::session::{ONLY_LOOKS, SessionEnd, SessionNumber};
+use hapterra_core::wire::session::{READ_ONLY_SILENCE_S, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
@@ -196,7 +196,7 @@ fn duplicate_request_is_executed_once() {
 fn numbers_of_requests_wrap_around() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     for _ in 0..600 {
-        rig.ask(Request::ClearFault { seen: None });
+        rig.ask(Request::ClearFault { fault: None });
         rig.run(1);
     }
     let answers = |m: &&ToHost| matches!(m, ToHost::Answer(_));
@@ -246,7 +246,7 @@ fn read_only_host_opens_no_session_and_keeps_none_armed() {
     let looker = SessionNumber::new(99 << 8);
     (rig.looker, rig.answers_tiles) = (Some(looker), false);
     let looks = HostHello {
-        silence_s: ONLY_LOOKS,
+        silence_s: READ_ONLY_SILENCE_S,
         ..HELLO
     };
     for second in 0..6 {

@@ -76,7 +76,7 @@ pub(super) fn frame(message: &ToDevice<'_>) -> Vec<u8> {
 
 /// Returns a host's query for the device's protocol.
 pub(super) fn asked(protocol: u16) -> Vec<u8> {
-    let asked = VersionCheck::Asked { protocol };
+    let asked = VersionCheck::Query { protocol };
     encode(&asked, &mut [0; 16]).unwrap().to_vec()
 }
 

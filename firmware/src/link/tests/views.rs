@@ -2,7 +2,7 @@
 
 use std::vec::Vec;
 
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::{Scene, SceneChange, Source, TickRecord};
@@ -47,7 +47,7 @@ fn taken(rig: &Rig) -> Vec<(u32, bool)> {
 fn with_an_open_clutch() -> Rig {
     let mut rig = Rig::armed();
     rig.ask(Request::Clutch {
-        hold: ClutchHold::WithHand,
+        hold: ClutchMode::WithHand,
     });
     rig.run(150);
     assert_eq!(rig.answers(TO_CLUTCH), [Ok(())]);
@@ -71,7 +71,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     rig.run(10);
     assert_eq!(taken(&rig), [(1_001, true); 2]);
     rig.ask(Request::Clutch {
-        hold: ClutchHold::LetGo,
+        hold: ClutchMode::Released,
     });
     rig.run(600);
     let sample = latest(&rig);
@@ -102,7 +102,7 @@ fn placement_during_contact_is_refused() {
     // The clutch was held and then released: this is no better.
     let mut rig = with_an_open_clutch();
     rig.ask(Request::Clutch {
-        hold: ClutchHold::LetGo,
+        hold: ClutchMode::Released,
     });
     rig.say(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
@@ -111,7 +111,7 @@ fn placement_during_contact_is_refused() {
     // It is held, and has not opened yet.
     let mut rig = Rig::armed();
     rig.ask(Request::Clutch {
-        hold: ClutchHold::InPlace,
+        hold: ClutchMode::InPlace,
     });
     rig.run(20);
     rig.say(&ToDevice::SceneChange(view(1, before.hip)));

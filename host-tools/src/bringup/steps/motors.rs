@@ -115,7 +115,7 @@ fn jog(
         Some(fault) => return Err(Finding::Fault(fault).into()),
     };
     if fault.is_some() {
-        board.ask(&Request::ClearFault { seen: fault })?;
+        board.ask(&Request::ClearFault { fault })?;
     }
     Ok((angles(&at) - from, fault))
 }

@@ -11,7 +11,7 @@ use clap::ValueHint;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hapterra_core::phantom::{Calibration, Model};
 use hapterra_core::wire::request::Request;
-use hapterra_core::wire::status::PRESS_MS;
+use hapterra_core::wire::status::PRESS_TIMEOUT_MS;
 
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
@@ -220,7 +220,7 @@ fn hand_over(
         false => {
             say(format!(
                 "to store it    press the dead-man switch within {} s",
-                PRESS_MS / 1_000
+                PRESS_TIMEOUT_MS / 1_000
             ));
             (control.store(calibration)?, "and stored there")
         }

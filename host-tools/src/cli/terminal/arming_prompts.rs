@@ -281,7 +281,7 @@ impl ArmingPrompts {
         }
         if fault.is_some() {
             self.say
-                .push(HostRequest::Request(Request::ClearFault { seen: fault }));
+                .push(HostRequest::Request(Request::ClearFault { fault }));
         }
         self.zeroing = question.zeroes;
         self.say.push(match question.zeroes {
@@ -396,8 +396,8 @@ mod tests {
         assert_eq!(prompts.messages(), []);
         assert!(prompts.lines().join("\n").contains("EncoderJump"));
         press.send(()).expect("listening");
-        let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
+        let fault = report.fault;
+        let wanted = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 
@@ -516,8 +516,8 @@ mod tests {
         prompts.on_event(&Event::Guard(&report));
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
-        let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
+        let fault = report.fault;
+        let wanted = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 }
