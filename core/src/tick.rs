@@ -55,7 +55,7 @@ impl<const D: usize> Haptics<'_, D> {
     ///
     /// A board calls it in every tick of a replay in which no point is in progress, and
     /// [`Haptics::tick_into`] in the others.
-    pub fn follow(&mut self, sense: &GuardInputs, watchdog_live: bool) {
+    pub fn monitor(&mut self, sense: &GuardInputs, watchdog_live: bool) {
         self.watch(sense, watchdog_live);
     }
 

@@ -448,7 +448,7 @@ fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
                 dead_man: true,
                 ..GuardInputs::default()
             };
-            device.haptics.follow(&sense, true);
+            device.haptics.monitor(&sense, true);
         }
     }
     counts
@@ -479,7 +479,7 @@ fn encoder_jump_during_a_replay_is_detected() {
         if with_a_point {
             let _ = device.tick(counts);
         } else {
-            device.haptics.follow(
+            device.haptics.monitor(
                 &GuardInputs {
                     counts,
                     ..GuardInputs::default()

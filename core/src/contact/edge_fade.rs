@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn full_over_a_patch_and_none_far_from_one() {
+    fn fade_is_full_over_a_patch_and_zero_far_away() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         assert_eq!(beside(&field, at(8.99, 10.5)).fade, 1.0);
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_tile_is_named() {
+    fn missing_tile_is_reported() {
         let mut tiles = buffers::<2>();
         let field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 0.0);
         let mut budget = Budget::new(0);
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn continuous_across_every_border() {
+    fn edge_fade_is_continuous_across_every_border() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         let mut last = beside(&field, at(7.0, 9.2)).fade;
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn as_long_at_ten_kilohertz_as_at_one() {
+    fn edge_fade_time_is_independent_of_the_tick_rate() {
         for khz in [1, 2, 5, 10] {
             let (ms, max_change) = faded_after(khz);
             assert!((30.9..=32.1).contains(&ms), "{khz} kHz: {ms} ms");

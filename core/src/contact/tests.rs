@@ -253,7 +253,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
 }
 
 #[test]
-fn the_first_crossing_is_found_exactly() {
+fn sweep_finds_the_first_crossing_exactly() {
     sweeps_agree("flat", flat, 0.0, 1.0, 3.0);
     sweeps_agree("hills", hills, 1.5, -3.0, 3.2);
     sweeps_agree("rough", rough, 2.0, 0.0, 2.2);
@@ -340,7 +340,7 @@ fn denormal(x: i32, y: i32) -> f32 {
 }
 
 #[test]
-fn holds_on_flat_and_smooth_terrain() {
+fn contact_invariants_hold_on_flat_and_smooth_terrain() {
     for seed in SEEDS {
         let seen = check(
             "flat",
@@ -372,7 +372,7 @@ fn holds_on_flat_and_smooth_terrain() {
 }
 
 #[test]
-fn holds_on_rough_terrain() {
+fn contact_invariants_hold_on_rough_terrain() {
     for seed in SEEDS {
         check(
             "rough",
@@ -420,7 +420,7 @@ fn contact_invariants_hold_on_spikes_and_no_data() {
 }
 
 #[test]
-fn holds_when_the_hip_jumps() {
+fn contact_invariants_hold_when_the_hip_jumps() {
     for seed in SEEDS {
         check("flat", flat, 0.0, &teleport(seed, cases(300, 15), 2.0, 2.0));
         check(
@@ -459,7 +459,7 @@ fn holds_when_the_hip_jumps() {
 /// On a path that hardly moves sideways, the sweep resolves poorly where the field begins; a
 /// continuation from beyond would start outside of the terrain.
 #[test]
-fn steep_ways_in_over_the_border_cross_nothing() {
+fn steep_paths_over_the_border_cross_nothing() {
     let mut tiles = buffers::<8>();
     let mut field = Field::<8>::empty(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
     field.fill_around(Cell::new(36, 36));
@@ -623,7 +623,7 @@ fn fast_paths_change_no_bit() {
 }
 
 #[test]
-fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
+fn suspended_tick_ends_on_the_same_bits() {
     let whole = ContactSettings {
         work_per_tick: u32::MAX / 2,
         ..ContactSettings::AT_1_KHZ
@@ -674,7 +674,7 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
 /// No arm moves by a window in a tick: such a HIP is a new one, without force until it has been
 /// above the surface.
 #[test]
-fn hip_that_leaps_beyond_the_window_begins_anew() {
+fn hip_leap_beyond_the_window_resets_the_contact() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), |_, _| 0.0);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);

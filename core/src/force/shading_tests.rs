@@ -252,7 +252,7 @@ fn border_of_a_tile_is_rendered_as_its_inside() {
 }
 
 #[test]
-fn missing_tile_is_named_and_ends_the_surface() {
+fn missing_tile_is_reported_and_ends_the_surface() {
     let mut tiles = buffers::<2>();
     let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), folds);
     field.install(TileKey::containing(0, Cell::new(5, 5)));

@@ -138,7 +138,7 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
 fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
-    let mut count = take_scene(&mut haptics, scene, table);
+    let mut count = set_scene(&mut haptics, scene, table);
     let mut spare = Some(SPARE.take());
     let mut outcome = Outcome::default();
     let stopwatch = Stopwatch::start();
@@ -146,7 +146,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
         match message {
             ToDevice::MaterialScene(both) => {
                 let table = both.table().expect("the host made it well");
-                count = take_scene(&mut haptics, &both.scene, &table);
+                count = set_scene(&mut haptics, &both.scene, &table);
             }
             ToDevice::MaterialTile(tile) => {
                 let buffer = spare.take().expect("every tile gives a buffer back");
@@ -168,7 +168,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
 }
 
 /// Begins a scene with its table and returns the number of its materials.
-fn take_scene(
+fn set_scene(
     haptics: &mut Haptics<'static, WINDOW>,
     scene: &Scene,
     table: &MaterialTable,
@@ -212,14 +212,14 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
     haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let count = match table {
-        Some(table) => take_scene(&mut haptics, scene, table),
+        Some(table) => set_scene(&mut haptics, scene, table),
         None => {
             let _ = haptics.accept(Command::Scene(*scene));
             0
         }
     };
     let mut spares = SPARES.take().each_mut().map(Some);
-    let mut next = take_tiles(&mut haptics, &mut spares, frames, count);
+    let mut next = store_tiles(&mut haptics, &mut spares, frames, count);
     let mut sensed = Frames::open(c"counts.frames");
     let stopwatch = Stopwatch::start();
     let mut armed = false;
@@ -230,7 +230,7 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
             armed = true;
         }
         if next == Some(at) {
-            next = take_tiles(&mut haptics, &mut spares, frames, count);
+            next = store_tiles(&mut haptics, &mut spares, frames, count);
         }
         let sense = black_box(GuardInputs {
             dead_man: true,
@@ -253,7 +253,7 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
 
 /// Stores the tiles up to the next point. Returns the number of the tick before which the tiles
 /// after that point are stored.
-fn take_tiles(
+fn store_tiles(
     haptics: &mut Haptics<'static, WINDOW>,
     spares: &mut [Option<&'static mut Tile>],
     frames: &mut Frames,

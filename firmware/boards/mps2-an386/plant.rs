@@ -27,7 +27,7 @@ const FRAME: usize = 64;
 static COUNTS: ConstStaticCell<Queue<PlantState, 4>> = ConstStaticCell::new(Queue::new());
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
 /// True if counts wait for a tick.
-static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
+static COUNTS_PENDING: AtomicBool = AtomicBool::new(false);
 /// Raised when a tick has stored its currents.
 pub(crate) static ANSWERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
@@ -50,7 +50,7 @@ pub(crate) fn open() -> (PlantEncoders, PlantPort) {
 
 /// Sets whether the scene is rendered through the encoders, so that ticks wait for counts.
 pub(crate) fn expect(counts: bool) {
-    if counts && !COUNTS_WAIT.load(Ordering::Acquire) {
+    if counts && !COUNTS_PENDING.load(Ordering::Acquire) {
         time::hold(Reason::Plant);
     } else {
         time::release(Reason::Plant);
@@ -75,7 +75,7 @@ impl Encoders for PlantEncoders {
             self.unanswered = Some(*tick);
             self.counts.dequeue();
         }
-        COUNTS_WAIT.store(self.counts.ready(), Ordering::Release);
+        COUNTS_PENDING.store(self.counts.ready(), Ordering::Release);
         self.latest
     }
 }
@@ -122,14 +122,14 @@ impl PlantPort {
 
     fn take(&mut self, reader: &mut FrameReader<FRAME>, mut bytes: &[u8]) {
         while !bytes.is_empty() {
-            let (taken, frame) = reader.push(bytes);
+            let (consumed, frame) = reader.push(bytes);
             if let Some(Ok(counts)) = frame.map(|frame| frame.and_then(decode)) {
                 // A plant that does not wait for its answers loses counts.
                 let _ = self.counts.enqueue(counts);
-                COUNTS_WAIT.store(true, Ordering::Release);
+                COUNTS_PENDING.store(true, Ordering::Release);
                 time::release(Reason::Plant);
             }
-            bytes = bytes.get(taken..).unwrap_or(&[]);
+            bytes = bytes.get(consumed..).unwrap_or(&[]);
         }
     }
 

@@ -46,7 +46,7 @@ pub struct Nearest {
 /// `hip` is the haptic interface point in patch coordinates (u, v); it may lie
 /// outside the unit square. The heights of `patch` count from it. Finite input
 /// gives a finite answer. Up to slope 1 it is within 2·10⁻⁶ cell of the exact point;
-/// above, 4 in 4,000 are not (`within_two_millionths_of_a_cell_on_any_slope`).
+/// above, 4 in 4,000 are not (`search_error_is_below_2e_6_cell_on_any_slope`).
 ///
 /// ```
 /// use hapterra_core::contact::closest_point::nearest_downhill;

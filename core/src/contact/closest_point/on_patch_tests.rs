@@ -116,7 +116,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
 }
 
 #[test]
-fn within_two_millionths_of_a_cell_on_any_slope() {
+fn search_error_is_below_2e_6_cell_on_any_slope() {
     let slopes = [0.0, 0.1, 1.0, 10.0, 100.0, 1e3, 3e3];
     for slope in slopes.into_iter().step_by(cases(1, 3) as usize) {
         for depth in [1e-4, 0.01, 0.1, 1.0] {
@@ -140,7 +140,7 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
 }
 
 #[test]
-fn a_saddle_is_no_answer() {
+fn search_does_not_end_at_a_saddle() {
     // The HIP is under the middle of a strongly twisted patch: (½, ½) is stationary.
     let patch = Patch::new([4.0, -2.0, -2.0, 4.0].map(|h| h + 1.0));
     let found = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
@@ -154,7 +154,7 @@ fn a_saddle_is_no_answer() {
 }
 
 #[test]
-fn warm_started_it_takes_two_evaluations() {
+fn warm_start_takes_at_most_three_evaluations() {
     let patch = Patch::new([0.3, 0.1, 0.45, 0.35]);
     let first = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
     let next = nearest_downhill(&patch, (0.51, 0.5), (first.u, first.v));

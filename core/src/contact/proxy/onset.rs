@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn it_lands_as_deep_as_before_and_stays_on_its_side_of_a_wall() {
+    fn onset_keeps_depth_and_stays_on_its_side_of_a_wall() {
         let mut tiles = buffers::<2>();
         let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), wall);
         // Three cells deep in the wall from the west, relative to the proxy.
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn onset_without_terrain_names_missing_tile_and_has_no_force() {
+    fn onset_without_terrain_reports_missing_tile_without_force() {
         let mut tiles = buffers::<2>();
         let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let displacement = Vec3::new(40.0, 0.0, 1.0);
