@@ -13,7 +13,7 @@ use hapterra_core::tick::{Command, Haptics, Outcome, RefusedScene};
 use self_cell::{MutBorrow, self_cell};
 
 use crate::terrain::Terrain;
-use crate::tile_cutter::NoTile;
+use crate::tile_cutter::CutError;
 
 /// Tiles along the side of the window: the same number as in the `hapterra` command.
 const WINDOW: usize = 16;
@@ -34,7 +34,7 @@ struct Running<'t> {
     spare: Option<&'t mut Tile>,
     outcome: Outcome,
     /// Buffer for the samples of a tile.
-    room: Vec<f64>,
+    buffer: Vec<f64>,
     seq: u32,
     view: u8,
 }
@@ -54,7 +54,7 @@ impl TickLoop {
     }
 
     /// Begins a scene, with the table of its materials.
-    pub(crate) fn begin(
+    pub(crate) fn set_scene(
         &mut self,
         scene: Scene,
         materials: Option<&MaterialTable>,
@@ -68,7 +68,7 @@ impl TickLoop {
     }
 
     /// Changes the surface, with the HIP at its last position.
-    pub(crate) fn change(
+    pub(crate) fn change_surface(
         &mut self,
         scene: Scene,
         materials: Option<&MaterialTable>,
@@ -96,7 +96,7 @@ impl TickLoop {
         hip: GridPoint,
         terrain: &Terrain,
         materials: usize,
-    ) -> Result<Option<TickRecord>, NoTile> {
+    ) -> Result<Option<TickRecord>, CutError> {
         self.0
             .with_dependent_mut(|_, running| running.step(hip, terrain, materials))
     }
@@ -112,7 +112,7 @@ impl<'t> Running<'t> {
             haptics: Haptics::new(slots, rate, None),
             spare,
             outcome: Outcome::default(),
-            room: Vec::new(),
+            buffer: Vec::new(),
             seq: 0,
             view: 0,
         }
@@ -130,7 +130,7 @@ impl<'t> Running<'t> {
         hip: GridPoint,
         terrain: &Terrain,
         materials: usize,
-    ) -> Result<Option<TickRecord>, NoTile> {
+    ) -> Result<Option<TickRecord>, CutError> {
         self.seq = self.seq.wrapping_add(1);
         let seq = self.seq;
         // A point is never refused, and returns no tile.
@@ -142,17 +142,22 @@ impl<'t> Running<'t> {
                 return Ok(Some(self.outcome.sample));
             }
             if let Some(index) = self.outcome.sample.missing_tile {
-                self.bring(TileKey { level: 0, index }, terrain, materials)?;
+                self.load_tile(TileKey { level: 0, index }, terrain, materials)?;
             }
         }
         Ok(None)
     }
 
-    fn bring(&mut self, key: TileKey, terrain: &Terrain, materials: usize) -> Result<(), NoTile> {
+    fn load_tile(
+        &mut self,
+        key: TileKey,
+        terrain: &Terrain,
+        materials: usize,
+    ) -> Result<(), CutError> {
         let Some(tile) = self.spare.take() else {
             return Ok(());
         };
-        if let Err(error) = terrain.cut(key, materials, &mut self.room, tile) {
+        if let Err(error) = terrain.cut(key, materials, &mut self.buffer, tile) {
             self.spare = Some(tile);
             return Err(error);
         }

@@ -57,7 +57,7 @@ fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
 
 /// Median and 99th percentile of the patches and of the evaluations, over the ticks that end in a
 /// state.
-fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
+fn search_cost(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
@@ -99,45 +99,45 @@ fn patches_and_evaluations_per_tick_are_bounded() {
     let states = [
         (
             "unmoved",
-            looked_at(rests, ContactState::Touching),
+            search_cost(rests, ContactState::Touching),
             [[0, 0], [0, 0]],
         ),
         (
             "free high",
-            looked_at(places(0.5).map(high), ContactState::Free),
+            search_cost(places(0.5).map(high), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
             "free low",
-            looked_at(flies(1.0), ContactState::Free),
+            search_cost(flies(1.0), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
             "first contact",
-            looked_at(taps, ContactState::Touching),
+            search_cost(taps, ContactState::Touching),
             [[1, 2], [2, 5]],
         ),
         (
             "slides 0.01",
-            looked_at(slides(0.01), ContactState::Touching),
+            search_cost(slides(0.01), ContactState::Touching),
             [[1, 2], [1, 2]],
         ),
         (
             "slides 0.5",
-            looked_at(slides(0.5), ContactState::Touching),
+            search_cost(slides(0.5), ContactState::Touching),
             [[2, 4], [2, 8]],
         ),
         (
             "trembles",
-            looked_at(trembles, ContactState::Touching),
+            search_cost(trembles, ContactState::Touching),
             [[1, 1], [1, 1]],
         ),
     ];
-    for (state, [patches, evaluations], most) in states {
+    for (state, [patches, evaluations], max) in states {
         std::println!("{state}: patches {patches:?}, evaluations {evaluations:?}");
-        let within = |is: [u32; 2], most: [u32; 2]| is[0] <= most[0] && is[1] <= most[1];
+        let within = |is: [u32; 2], max: [u32; 2]| is[0] <= max[0] && is[1] <= max[1];
         assert!(
-            within(patches, most[0]) && within(evaluations, most[1]),
+            within(patches, max[0]) && within(evaluations, max[1]),
             "{state}"
         );
     }

@@ -79,18 +79,18 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
     let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
-    let mut seen = [0; 4];
+    let mut counts = [0; 4];
     for (tick, p) in path.iter().enumerate() {
         let hip = point(*p);
         let mut output = contact.step(&field.window, &hip);
-        let mut turns = 0;
+        let mut ticks = 0;
         while !output.converged {
             output = contact.step(&field.window, &hip);
-            turns += 1;
-            assert!(turns < 5000, "{name} {tick}: never settles {output:?}");
+            ticks += 1;
+            assert!(ticks < 5000, "{name} {tick}: never settles {output:?}");
         }
         let (x, proxy) = (position(&hip), position(&output.proxy));
-        seen[output.state as usize] += 1;
+        counts[output.state as usize] += 1;
         let at = std::format!("{name} tick {tick} hip {x:?} {output:?}");
         assert!(output.displacement.is_finite(), "{at}");
         match output.state {
@@ -111,7 +111,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
             assert!(x[2] > z - bound, "free below the surface: {at} {z}");
         }
     }
-    seen
+    counts
 }
 
 /// No point of the surface on a ring around the proxy is nearer to the HIP.
@@ -193,9 +193,9 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
     let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut random = Random(7);
-    let mut seen = [0, 0];
-    const WAYS: u32 = cases(4000, 6);
-    for _ in 0..WAYS {
+    let mut counts = [0, 0];
+    const PATHS: u32 = cases(4000, 6);
+    for _ in 0..PATHS {
         let from = [random.between(0.5, 59.5), random.between(0.5, 59.5), high];
         let reach = if random.unit() < 0.5 { 2.0 } else { 60.0 };
         let to = [
@@ -205,26 +205,31 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
         ];
         let (a, b) = (point(from), point(to));
         let mut path = Path::through_air(a, b);
-        let swept = loop {
+        let end = loop {
             match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
                 SweepEnd::Suspended => {}
-                ended => break ended,
+                end => break end,
             }
         };
-        let at = std::format!("{name} {from:?} to {to:?}: {swept:?}");
-        match (swept, dense_crossing(&truth, position(&a), position(&b))) {
+        let at = std::format!("{name} {from:?} to {to:?}: {end:?}");
+        match (end, dense_crossing(&truth, position(&a), position(&b))) {
             (SweepEnd::Hit(point), Some([before, after])) => {
-                seen[0] += 1;
+                counts[0] += 1;
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
                 // On the path, and not after the crossing of the dense search.
-                let way = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
-                let gone = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
-                let seen_at = ((after[0] - from[0]).powi(2) + (after[1] - from[1]).powi(2)).sqrt();
-                assert!(gone < seen_at + 4e-6, "late by {} {at}", gone - seen_at);
+                let length = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
+                let travelled = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
+                let dense_travelled =
+                    ((after[0] - from[0]).powi(2) + (after[1] - from[1]).powi(2)).sqrt();
+                assert!(
+                    travelled < dense_travelled + 4e-6,
+                    "late by {} {at}",
+                    travelled - dense_travelled
+                );
                 let z = truth.at(x, y).unwrap_or(f64::NAN);
-                let line = from[2] + (to[2] - from[2]) * gone / way;
-                let steep = slope + ((to[2] - from[2]) / way).abs();
+                let line = from[2] + (to[2] - from[2]) * travelled / length;
+                let steep = slope + ((to[2] - from[2]) / length).abs();
                 assert!(
                     (z - line).abs() < 4e-6 * (1.0 + steep),
                     "{} {before:?} {at}",
@@ -237,7 +242,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
                 let y = f64::from(point.cell.y) + f64::from(point.v);
                 assert!(truth.at(x, y).is_some(), "{at}");
             }
-            (SweepEnd::Clear, None) => seen[1] += 1,
+            (SweepEnd::Clear, None) => counts[1] += 1,
             (SweepEnd::Clear, Some([_, after])) => {
                 let z = truth.at(after[0], after[1]).unwrap_or(f64::NAN);
                 assert!(
@@ -248,8 +253,8 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
             (other, dense) => panic!("{other:?} {dense:?} {at}"),
         }
     }
-    let enough = seen[0] > WAYS / 8 && seen[1] > WAYS / 40;
-    assert!(enough, "both occur: {seen:?}");
+    let both_occur = counts[0] > PATHS / 8 && counts[1] > PATHS / 40;
+    assert!(both_occur, "both occur: {counts:?}");
 }
 
 #[test]
@@ -342,14 +347,14 @@ fn denormal(x: i32, y: i32) -> f32 {
 #[test]
 fn contact_invariants_hold_on_flat_and_smooth_terrain() {
     for seed in SEEDS {
-        let seen = check(
+        let counts = check(
             "flat",
             flat,
             0.0,
             &wander(seed, cases(2000, 150), 0.05, 2.0, 0.6),
         );
         let some = cases(50, 10);
-        assert!(seen[1] > some && seen[2] > some, "{seen:?}");
+        assert!(counts[1] > some && counts[2] > some, "{counts:?}");
         check(
             "hills",
             hills,
@@ -464,21 +469,18 @@ fn steep_paths_over_the_border_cross_nothing() {
     let mut field = Field::<8>::empty(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
     field.fill_around(Cell::new(36, 36));
     let mut random = Random(1);
-    for way in 0..cases(1000, 10) {
+    for index in 0..cases(1000, 10) {
         let beside = [random.between(0.0, 72.0), random.between(-1.0, 0.0), 0.2].map(|x| x as f32);
         let from = GridPoint::new([0; 3], Vec3::from(beside));
         let to = GridPoint::new([3, 3, -100_000_000], Vec3::ZERO);
         let mut path = Path::through_air(from, to);
-        let ended = loop {
+        let end = loop {
             match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
                 SweepEnd::Suspended => {}
-                ended => break ended,
+                end => break end,
             }
         };
-        assert!(
-            matches!(ended, SweepEnd::Under),
-            "{way}, {from:?}: {ended:?}"
-        );
+        assert!(matches!(end, SweepEnd::Under), "{index}, {from:?}: {end:?}");
     }
 }
 
@@ -529,14 +531,14 @@ fn mirrored_path_along_grid_lines_has_mirrored_forces() {
         let mut at = [8.0, 8.0, 4.0_f32];
         for tick in 0..60 {
             let axis = (random.between(0.0, 3.0) as usize).min(2);
-            let way = 0.25 * random.between(-8.0, 9.0).floor() as f32;
-            let most = if axis == 2 { 4.0 } else { 17.0 };
-            at[axis] = (at[axis] + way).clamp(-1.0, most);
+            let step = 0.25 * random.between(-8.0, 9.0).floor() as f32;
+            let max = if axis == 2 { 4.0 } else { 17.0 };
+            at[axis] = (at[axis] + step).clamp(-1.0, max);
             let [x, y, z] = at;
-            let ways = [[x, y, z], [16.0 - x, 16.0 - y, z]];
+            let positions = [[x, y, z], [16.0 - x, 16.0 - y, z]];
             let mut output = [ContactOutput::default(); 2];
             for (index, field) in [&plain, &mirrored].into_iter().enumerate() {
-                let hip = GridPoint::new([0; 3], Vec3::from(ways[index]));
+                let hip = GridPoint::new([0; 3], Vec3::from(positions[index]));
                 output[index] = *contacts[index].step(&field.window, &hip);
             }
             let [one, other] = output;
@@ -571,7 +573,7 @@ const GROUNDS: [TestGround; 7] = [
 fn side_by_side(
     one: ContactSettings,
     other: ContactSettings,
-    mut look: impl FnMut(&ContactOutput, &ContactOutput, [u32; 2]),
+    mut compare: impl FnMut(&ContactOutput, &ContactOutput, [u32; 2]),
 ) {
     for (height, mid, span) in GROUNDS {
         let mut tiles = buffers::<2>();
@@ -583,20 +585,20 @@ fn side_by_side(
             let below = wander(5, cases(1500, 20), step, mid - 0.6 * span, 0.6 * span);
             for p in above.clone().chain(below) {
                 let hip = point(p);
-                let mut turns = [0; 2];
+                let mut ticks = [0; 2];
                 let answers = [0, 1].map(|i| {
                     let before = *contacts[i].output();
                     loop {
-                        turns[i] += 1;
+                        ticks[i] += 1;
                         let output = *contacts[i].step(&field.window, &hip);
                         if output.converged {
                             return output;
                         }
-                        assert!(turns[i] < 10_000, "{hip:?} never converges");
+                        assert!(ticks[i] < 10_000, "{hip:?} never converges");
                         contacts[i].resume(&before);
                     }
                 });
-                look(&answers[0], &answers[1], turns);
+                compare(&answers[0], &answers[1], ticks);
             }
         }
     }
@@ -624,7 +626,7 @@ fn fast_paths_change_no_bit() {
 
 #[test]
 fn suspended_tick_ends_on_the_same_bits() {
-    let whole = ContactSettings {
+    let unlimited = ContactSettings {
         work_per_tick: u32::MAX / 2,
         ..ContactSettings::AT_1_KHZ
     };
@@ -634,11 +636,11 @@ fn suspended_tick_ends_on_the_same_bits() {
             work_per_tick,
             ..ContactSettings::AT_1_KHZ
         };
-        side_by_side(whole, short, |whole, short, turns| {
-            assert_eq!(bits(whole), bits(short));
-            assert_eq!(turns[0], 1);
+        side_by_side(unlimited, short, |unlimited, short, ticks| {
+            assert_eq!(bits(unlimited), bits(short));
+            assert_eq!(ticks[0], 1);
             assert!(short.work <= work_per_tick);
-            cut += u32::from(turns[1] > 1);
+            cut += u32::from(ticks[1] > 1);
         });
     }
     assert!(cut > cases(500, 5), "{cut} ticks were cut short");
@@ -664,7 +666,7 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
         contact.step(&field.window, &point([30.0, 30.0, 1.0]));
         let output = *contact.step(&field.window, &point([30.0, 30.0, -0.2]));
         assert_eq!(output.state, ContactState::Touching);
-        let toward = |way: f32, mirrored: bool| if mirrored { -way } else { way };
+        let toward = |component: f32, mirrored: bool| if mirrored { -component } else { component };
         let [east, north, _] = output.displacement.to_array();
         assert!(toward(east, mirrored[0]) > 0.0, "{mirrored:?} {output:?}");
         assert!(toward(north, mirrored[1]) > 0.0, "{mirrored:?} {output:?}");

@@ -19,7 +19,7 @@ pub(crate) struct ActiveMaterial {
     index: u8,
     /// Material when the change began, and the completed share of the change.
     from: Material,
-    done: f32,
+    progress: f32,
     /// Share of a change in one tick.
     step: f32,
     /// Factor on the stiffness.
@@ -47,7 +47,7 @@ impl ActiveMaterial {
         let mut material = Self {
             index: 0,
             from: default,
-            done: 1.0,
+            progress: 1.0,
             step: rate.tick_s() / MATERIAL_CHANGE_S,
             scale,
             params: *params,
@@ -106,7 +106,7 @@ impl ActiveMaterial {
         if let Some(index) = there
             && index != self.index
         {
-            (self.from, self.done, self.index) = (Material::of(&self.params), 0.0, index);
+            (self.from, self.progress, self.index) = (Material::of(&self.params), 0.0, index);
         }
         let Some(target) = table.at(self.index) else {
             return false;
@@ -115,7 +115,7 @@ impl ActiveMaterial {
         if core::mem::replace(&mut self.was_rendered, true) {
             self.blend_toward(target)
         } else {
-            self.done = 1.0;
+            self.progress = 1.0;
             self.set_material(target);
             self.texture_share = 1.0;
             self.set_texture(&target.texture)
@@ -123,12 +123,12 @@ impl ActiveMaterial {
     }
 
     fn blend_toward(&mut self, target: &Material) -> bool {
-        if self.done < 1.0 {
-            self.done += self.step;
-            if self.done < 1.0 {
+        if self.progress < 1.0 {
+            self.progress += self.step;
+            if self.progress < 1.0 {
                 self.set_material(&self.blended_with(target));
             } else {
-                self.done = 1.0;
+                self.progress = 1.0;
                 self.set_material(target);
             }
         }
@@ -150,7 +150,7 @@ impl ActiveMaterial {
 
     /// Returns the material between the start of the change and the target.
     fn blended_with(&self, target: &Material) -> Material {
-        let mix = |from: f32, to: f32| from + (to - from) * self.done;
+        let mix = |from: f32, to: f32| from + (to - from) * self.progress;
         let (from, to) = (&self.from, target);
         let dynamic_mu = mix(from.friction.dynamic_mu, to.friction.dynamic_mu);
         let static_mu = mix(from.friction.static_mu, to.friction.static_mu);

@@ -113,8 +113,11 @@ fn ramp_and_clutch_record_only_energy_of_the_motion() {
         let [at_rest, leaving] = created_mj_with(|tick| ramps(share(tick)));
         assert_eq!(at_rest, 0.0);
         // 2 N acted over 0.5 mm, and 0.51 of the spring gave 0.51 · ½ (2² − 1.5²).
-        let given = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
-        assert!((leaving - given).abs() < 1e-5, "{leaving} mJ, not {given}");
+        let released_mj = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
+        assert!(
+            (leaving - released_mj).abs() < 1e-5,
+            "{leaving} mJ, not {released_mj}"
+        );
     }
     // The speed limit also lets a force return, without an action of the user.
     let [at_rest, _] = created_mj_with(|tick| Shares {
@@ -201,7 +204,7 @@ impl Taps {
         let slew_n = 1000.0 * tick_s as f32;
         let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * self.tap_hz * t_s);
         let mut forces_n: Vec<f64> = Vec::new();
-        let (mut given, mut taps) = (0.0, Vec::new());
+        let (mut released_mj, mut taps) = (0.0, Vec::new());
         for tick in 0..(5.0 / self.tap_hz / tick_s) as usize {
             let now_s = tick as f64 * tick_s;
             let tip_mm = Vec3::Z * height_mm(now_s) as f32;
@@ -229,12 +232,12 @@ impl Taps {
                 let ago = (self.latency_s / tick_s - from - 1e-9).ceil().max(0.0) as usize;
                 let acts_n = forces_n.get(tick.wrapping_sub(ago)).copied();
                 let moves_mm = height_mm(now_s + to * tick_s) - height_mm(now_s + from * tick_s);
-                given += acts_n.unwrap_or(0.0) * moves_mm;
+                released_mj += acts_n.unwrap_or(0.0) * moves_mm;
             }
             // Well above the surface: the tap has ended.
-            if height_mm(now_s) > 0.9 * DEEP_MM && given != 0.0 {
-                taps.push(given);
-                given = 0.0;
+            if height_mm(now_s) > 0.9 * DEEP_MM && released_mj != 0.0 {
+                taps.push(released_mj);
+                released_mj = 0.0;
             }
         }
         taps
@@ -391,8 +394,11 @@ fn net_dissipation_stays_below_the_created_energy() {
             let taps = Taps::new(hz, latency_s);
             let without = taps.released_mj(&params(1.0, 0.0, Controller::Off));
             let with = taps.released_mj(&params(1.0, 0.0, Controller::On));
-            for (given, taken) in without.iter().zip(&with) {
-                assert!(-taken < *given, "{hz} Hz: {taken} mJ, {given} without");
+            for (released_mj, taken) in without.iter().zip(&with) {
+                assert!(
+                    -taken < *released_mj,
+                    "{hz} Hz: {taken} mJ, {released_mj} without"
+                );
             }
         }
     }

@@ -66,7 +66,7 @@ const JOG: Jog = Jog {
 };
 
 /// A held joint: it moves by some counts when the current has overcome its friction.
-fn held(current: Vec3) -> [i32; 3] {
+fn held_joint(current: Vec3) -> [i32; 3] {
     [0, i32::from((0.05..0.052).contains(&-current.y)), 0]
 }
 
@@ -75,7 +75,7 @@ fn jog_drives_only_its_motor_at_its_current_and_duration() {
     for rate in [1_000, 10_000].map(|hz| TickRate::new(hz).expect("in range")) {
         let (mut storage, ms) = (TileArena::<1>::new(), rate.ticks(1) as usize);
         let mut bench = Bench::new(&mut storage, rate);
-        bench.jog(JOG, 4_000, held);
+        bench.jog(JOG, 4_000, held_joint);
         assert_eq!(bench.report().fault, None);
         assert_eq!(bench.report().mode, Mode::Disarmed);
         let on = || bench.drives.iter().filter(|drive| drive.enabled);
@@ -101,22 +101,22 @@ fn jog_needs_a_press_and_is_not_repeated() {
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     // Without a jog and without a scene, the arm cannot be armed.
     bench.send(Command::Arm);
-    (0..100).for_each(|_| _ = bench.tick(held));
+    (0..100).for_each(|_| _ = bench.tick(held_joint));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     // A switch that was held from the start does not count.
     bench.sense.dead_man = true;
     bench.send(Command::Jog(JOG));
     for _ in 0..1_000 {
-        assert!(!bench.tick(held).enabled);
+        assert!(!bench.tick(held_joint).enabled);
     }
-    bench.jog(JOG, 4_000, held);
+    bench.jog(JOG, 4_000, held_joint);
     assert_eq!(bench.report().mode, Mode::Disarmed);
     assert!(bench.drives.iter().any(|drive| drive.enabled));
     // Another arm command does not repeat the jog.
     bench.drives.clear();
     bench.sense.dead_man = false;
     bench.send(Command::Arm);
-    (0..100).for_each(|_| _ = bench.tick(held));
+    (0..100).for_each(|_| _ = bench.tick(held_joint));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
 }
@@ -130,19 +130,19 @@ fn plain_arm_command_does_not_arm_for_an_earlier_jog() {
         bench.send(Command::Jog(JOG));
         between.into_iter().for_each(|command| bench.send(command));
         bench.send(Command::Arm);
-        (0..100).for_each(|_| _ = bench.tick(held));
+        (0..100).for_each(|_| _ = bench.tick(held_joint));
         let refused = bench.report().decision.refused;
         assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
     }
-    bench.jog(JOG, 1_500, held);
+    bench.jog(JOG, 1_500, held_joint);
     assert!(bench.report().mode.drives());
     bench.send(Command::Disarm);
     while bench.report().mode.drives() {
-        bench.tick(held);
+        bench.tick(held_joint);
     }
     bench.send(Command::Arm);
     bench.sense.dead_man = false;
-    (0..100).for_each(|_| _ = bench.tick(held));
+    (0..100).for_each(|_| _ = bench.tick(held_joint));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
 }
 
@@ -151,12 +151,12 @@ fn blockers_of_arming_also_block_a_jog() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.sense.emergency_stop = true;
-    bench.jog(JOG, 1_000, held);
+    bench.jog(JOG, 1_000, held_joint);
     let refused = bench.report().decision.refused;
     assert!(refused.contains(Blockers::EMERGENCY_STOP), "{refused:?}");
     bench.sense.emergency_stop = false;
     bench.send(Command::Trip(Fault::Hardware));
-    bench.jog(JOG, 1_000, held);
+    bench.jog(JOG, 1_000, held_joint);
     let refused = bench.report().decision.refused;
     assert!(refused.contains(Blockers::FAULT_LATCHED), "{refused:?}");
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
@@ -166,10 +166,10 @@ fn blockers_of_arming_also_block_a_jog() {
 fn dead_man_release_ends_a_jog_within_the_tick() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-    bench.jog(JOG, 1_500, held);
+    bench.jog(JOG, 1_500, held_joint);
     assert!(bench.report().mode.drives());
     bench.sense.dead_man = false;
-    assert_eq!(bench.tick(held), GuardOutputs::default());
+    assert_eq!(bench.tick(held_joint), GuardOutputs::default());
     assert_eq!(bench.report().fault, Some(Fault::DeadManReleased));
 }
 
@@ -181,7 +181,7 @@ fn runaway_of_any_joint_is_a_fault() {
             let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
             // For two of the three, a joint that is not the motor's own.
             bench.jog(JOG, 4_000, |current| {
-                let mut moved = held(current);
+                let mut moved = held_joint(current);
                 moved[axis] += if current.y < -0.1 { speed } else { 0 };
                 moved
             });
@@ -233,7 +233,7 @@ fn out_of_range_jog_is_invalid_and_stays_bounded() {
         assert!(!jog.is_valid(&RECORD), "{jog:?}");
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-        bench.jog(jog, 10_000, |current| held(-current));
+        bench.jog(jog, 10_000, |current| held_joint(-current));
         let max = bench
             .drives
             .iter()
@@ -262,15 +262,15 @@ fn scene_zero_disarm_or_new_settings_end_a_jog() {
     for end in ends {
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-        bench.jog(JOG, 1_500, held);
+        bench.jog(JOG, 1_500, held_joint);
         assert!(bench.report().mode.drives());
         end(&mut bench);
         bench.drives.clear();
-        (0..200).for_each(|_| _ = bench.tick(held));
+        (0..200).for_each(|_| _ = bench.tick(held_joint));
         assert_eq!(bench.report().mode, Mode::Disarmed);
         assert!(bench.drives[101..].iter().all(|drive| !drive.enabled));
         assert!(matches!(bench.haptics.accept(Command::Arm), Ok(None)));
-        (0..100).for_each(|_| _ = bench.tick(held));
+        (0..100).for_each(|_| _ = bench.tick(held_joint));
         assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     }
 }

@@ -75,10 +75,10 @@ impl Temperatures {
         let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MAX_K).all();
         let is_possible = possible(self.winding_k) && possible(self.housing_k);
         // Not above the end of derating: repeated resets alone must not trip the guard.
-        let room = Vec3::splat(CONTINUOUS_C - AIR_C) - self.winding_k - self.housing_k;
-        let unseen = room.clamp(Vec3::ZERO, Vec3::splat(RESET_MARGIN_K));
+        let headroom = Vec3::splat(CONTINUOUS_C - AIR_C) - self.winding_k - self.housing_k;
+        let margin = headroom.clamp(Vec3::ZERO, Vec3::splat(RESET_MARGIN_K));
         is_possible.then_some(Self {
-            winding_k: self.winding_k + unseen,
+            winding_k: self.winding_k + margin,
             ..self
         })
     }
@@ -271,12 +271,12 @@ mod tests {
         let hottest_c = (hot.winding_k + hot.housing_k).x + AIR_C;
         // A constant press on axis 1, in bursts on the others.
         for ms in 0..4_000_000_u32 {
-            let wanted = Vec3::new(
+            let requested = Vec3::new(
                 5.5,
                 if ms % 9_000 < 4_000 { 5.5 } else { 0.0 },
                 if ms % 100_000 < 60_000 { 5.5 } else { 0.5 },
             );
-            motors.heat(wanted.min(motors.allowed_a));
+            motors.heat(requested.min(motors.allowed_a));
             if ms % 10 == 0 {
                 let housing = motors.at.housing_k.max_element();
                 assert!(housing < hot.housing_k.x + 0.1, "{housing} K");
@@ -292,11 +292,11 @@ mod tests {
             winding_k: Vec3::new(0.0, 10.0, 20.0),
             housing_k: Vec3::new(0.0, 60.0, 60.0),
         };
-        let begun = stored.after_reset().expect("possible");
-        let sum = begun.winding_k + begun.housing_k;
+        let start = stored.after_reset().expect("possible");
+        let sum = start.winding_k + start.housing_k;
         // Never beyond the end of derating, and never colder either.
         assert!((sum - Vec3::new(5.0, 75.0, 80.0)).abs().max_element() < 1e-4);
-        assert_eq!(begun.housing_k, stored.housing_k);
+        assert_eq!(start.housing_k, stored.housing_k);
     }
 
     #[test]
@@ -343,22 +343,22 @@ mod tests {
 
     #[test]
     fn cool_motor_may_have_its_peak_current() {
-        let (motors, given) = after(khz(1), 1, 5.5);
-        assert_eq!(given.x, 5.5);
+        let (motors, allowed) = after(khz(1), 1, 5.5);
+        assert_eq!(allowed.x, 5.5);
         assert!(motors.winding_c().x < DERATE_C);
     }
 
     #[test]
     fn permanent_peak_request_derates_and_never_trips() {
-        let (motors, given) = after(khz(1), 3000, 5.5);
+        let (motors, allowed) = after(khz(1), 3000, 5.5);
         assert!(!motors.too_hot, "{:?}", motors.winding_c());
-        assert!(given.x < 1.4 && given.x >= 1.24, "{given}");
+        assert!(allowed.x < 1.4 && allowed.x >= 1.24, "{allowed}");
     }
 
     #[test]
     fn continuous_current_is_permitted_without_limit() {
-        let (motors, given) = after(khz(1), 4000, 1.24);
-        assert_eq!(given.x, 1.24);
+        let (motors, allowed) = after(khz(1), 4000, 1.24);
+        assert_eq!(allowed.x, 1.24);
         assert!(motors.winding_c().x < CONTINUOUS_C);
         // 1.24² A² · 2.82 Ω · 17.1 K/W above the air.
         assert!(

@@ -260,8 +260,8 @@ fn material_tile_and_table_bytes() {
         std::vec![0xAC, 0x02],
     ]
     .concat();
-    let mut room = [0; MAX_TABLE_BYTES];
-    assert_eq!(table_bytes(&table, &mut room), expected);
+    let mut buffer = [0; MAX_TABLE_BYTES];
+    assert_eq!(table_bytes(&table, &mut buffer), expected);
 }
 
 #[test]

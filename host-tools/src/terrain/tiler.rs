@@ -116,7 +116,7 @@ impl TileBuffer {
     pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
         let base = tile_heights::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
-            *single = tile_heights::above(base, *height);
+            *single = tile_heights::height_above(base, *height);
         }
         self.packed(base, steps)
     }
@@ -370,9 +370,9 @@ impl<'r> Terrain<'r> {
             return self.ground_mm(self.level, [east_mm, north_mm], reads);
         };
         let cell_mm = self.scale.cell_mm();
-        let (column, u) = tile_heights::place(east_mm / cell_mm, self.size[0])?;
-        let (row, v) = tile_heights::place(north_mm / cell_mm, self.size[1])?;
-        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH, reads);
+        let (column, u) = tile_heights::patch_at(east_mm / cell_mm, self.size[0])?;
+        let (row, v) = tile_heights::patch_at(north_mm / cell_mm, self.size[1])?;
+        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH_NODES, reads);
         let height = ball.between(&samples, nodes, [u, v])?;
         Some(height * cell_mm)
     }
@@ -411,8 +411,8 @@ impl<'r> Terrain<'r> {
         let size = self
             .size
             .map(|patches| (patches / self.parts as i32) >> coarser.min(31));
-        let (column, u) = tile_heights::place(east_mm / cell_mm, size[0])?;
-        let (row, v) = tile_heights::place(north_mm / cell_mm, size[1])?;
+        let (column, u) = tile_heights::patch_at(east_mm / cell_mm, size[0])?;
+        let (row, v) = tile_heights::patch_at(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
             let height = reads.record(self.grid.read_height(level, column + dx, row + dy));
             height * self.scale.height_mm_per_unit()
@@ -466,7 +466,7 @@ impl<'r> Terrain<'r> {
         };
         if low == high && known == self.samples_in(key) {
             let base = tile_heights::base(low, high);
-            let height = tile_heights::above(base, low);
+            let height = tile_heights::height_above(base, low);
             return Some(Heights::Flat { base, height });
         }
         let steps = match self.step() {

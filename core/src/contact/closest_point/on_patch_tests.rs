@@ -29,19 +29,19 @@ fn height64(patch: &Patch, at: &Nearest) -> f64 {
 /// The local minimum of F that lies downhill of `from`, in f64.
 fn minimum64(patch: &Patch, hip: (f64, f64), from: f64) -> (f64, f64) {
     let slope = |v: f64| ruling64(patch, hip, v).1;
-    let way = if slope(from) < 0.0 { 1.0 } else { -1.0 };
+    let direction = if slope(from) < 0.0 { 1.0 } else { -1.0 };
     let (mut low, mut step) = (from, 1e-10);
     let mut high = loop {
-        let next = (low + way * step).clamp(0.0, 1.0);
-        if slope(next) * way >= 0.0 || next == 0.0 || next == 1.0 {
+        let next = (low + direction * step).clamp(0.0, 1.0);
+        if slope(next) * direction >= 0.0 || next == 0.0 || next == 1.0 {
             break next;
         }
         (low, step) = (next, 2.0 * step);
     };
-    if slope(high) * way > 0.0 {
+    if slope(high) * direction > 0.0 {
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
-            if slope(middle) * way < 0.0 {
+            if slope(middle) * direction < 0.0 {
                 low = middle;
             } else {
                 high = middle;
@@ -67,14 +67,14 @@ struct Errors {
     off: u32,
     worst: f64,
     mean_evaluations: f64,
-    most_evaluations: u32,
+    max_evaluations: u32,
 }
 
 /// Random patches of a slope, HIPs at a depth below them, random starts.
 fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
     const QUERIES: u32 = cases(4000, 1);
     let mut random = Random(0x5EED);
-    let (mut wrong, mut worst, mut total, mut most) = (0, 0.0_f64, 0_u64, 0);
+    let (mut wrong, mut worst, mut total, mut max_evaluations) = (0, 0.0_f64, 0_u64, 0);
     for _ in 0..QUERIES {
         let flat = [0, 1, 2].map(|_| slope * random.between(-1.0, 1.0));
         let last = flat[1] + flat[2] - flat[0] + twist * random.between(-1.0, 1.0);
@@ -88,7 +88,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let start = (random.unit() as f32, random.unit() as f32);
         let found = nearest_downhill(&patch, hip, start);
         total += u64::from(found.evaluations);
-        most = most.max(found.evaluations);
+        max_evaluations = max_evaluations.max(found.evaluations);
         let hip = (f64::from(hip.0), f64::from(hip.1));
         let truth = minimum64(&patch, hip, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
@@ -98,7 +98,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let largest = patch
             .corners
             .iter()
-            .fold(0.0_f32, |most, h| most.max(h.abs()));
+            .fold(0.0_f32, |max, h| max.max(h.abs()));
         let rounding = 4.0 * f64::from(f32::EPSILON * largest);
         assert!(
             off < 1e-6 * steepness.hypot(1.0) + rounding,
@@ -111,7 +111,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         off: wrong,
         worst,
         mean_evaluations: total as f64 / f64::from(QUERIES),
-        most_evaluations: most,
+        max_evaluations,
     }
 }
 
@@ -133,7 +133,7 @@ fn search_error_is_below_2e_6_cell_on_any_slope() {
                     "{}: {at}",
                     errors.mean_evaluations
                 );
-                assert!(errors.most_evaluations <= MAX_EVALUATIONS, "{at}");
+                assert!(errors.max_evaluations <= MAX_EVALUATIONS, "{at}");
             }
         }
     }

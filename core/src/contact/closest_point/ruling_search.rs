@@ -155,8 +155,8 @@ impl Rulings<'_> {
 ///
 /// A Newton step that is not less than half the last step but one is replaced by bisection.
 fn next(near: &Ruling, far: &FarSide, before: f32) -> Option<f32> {
-    let room = far.v() - near.v;
-    if room.abs() < RESOLUTION {
+    let remaining = far.v() - near.v;
+    if remaining.abs() < RESOLUTION {
         return None;
     }
     let newton = |ruling: &Ruling| match ruling.curvature > 0.0 {
@@ -164,14 +164,14 @@ fn next(near: &Ruling, far: &FarSide, before: f32) -> Option<f32> {
         false => f32::INFINITY,
     };
     let step = newton(near);
-    if step.abs() < smaller(room.abs(), 0.5 * before) {
+    if step.abs() < smaller(remaining.abs(), 0.5 * before) {
         return Some(near.v + step);
     }
     let far = match far {
         FarSide::End(end) => return Some(*end),
         FarSide::Ruling(far) => far,
     };
-    let middle = near.v + 0.5 * room;
+    let middle = near.v + 0.5 * remaining;
     let back = newton(far);
     let v = far.v + back;
     let is_between = (v - near.v) * (far.v - v) > 0.0 && back.abs() < 0.5 * before;

@@ -129,8 +129,8 @@ fn static_friction_breaks_away_and_returns_after_a_rest() {
     let lag = |tick: usize| -output[tick].1.displacement.x;
     assert!((lag(178) - 0.78).abs() < 1e-4, "{}", lag(178));
     assert!((lag(190) - 0.3).abs() < 1e-4, "it broke away: {}", lag(190));
-    let most = (355..450).map(lag).fold(0.0, f32::max);
-    assert!((0.75..=0.8).contains(&most), "it holds again: {most}");
+    let max = (355..450).map(lag).fold(0.0, f32::max);
+    assert!((0.75..=0.8).contains(&max), "it holds again: {max}");
 }
 
 #[test]
@@ -213,9 +213,9 @@ fn friction_never_drags_a_lifted_hip() {
     );
     for (hip, output) in &output[200..] {
         let depth = (-hip[2]).max(0.0);
-        let most = 0.5 * depth + 1e-5;
+        let max = 0.5 * depth + 1e-5;
         assert!(
-            output.displacement.truncate().length() <= most,
+            output.displacement.truncate().length() <= max,
             "{hip:?}: {output:?}"
         );
         assert!(output.displacement.z >= 0.0);

@@ -117,7 +117,7 @@ fn winding_temperature_follows_measured_not_commanded_current() {
     // Armed, and with the amplifiers off.
     for mut bench in [Bench::armed(), Bench::new()] {
         let winding = |bench: &Bench| bench.guard.motors().winding_c();
-        let begun = winding(&bench);
+        let start = winding(&bench);
         let swing = oscillating(1.5, 333.0);
         let mut commands = [Vec3::ZERO; 2];
         bench.ticks(2);
@@ -127,7 +127,7 @@ fn winding_temperature_follows_measured_not_commanded_current() {
             commands = [commands[1], bench.tick().currents_a];
             assert_eq!(bench.guard.report().fault, None);
         }
-        let warmer = winding(&bench) - begun;
+        let warmer = winding(&bench) - start;
         // 1.13 A² · 2.82 Ω · (3.1 K/W · 0.81 + 14 K/W · 0.03).
         assert!((8.0..11.0).contains(&warmer.y), "{warmer}");
         assert!(warmer.x < 1.0 && warmer.z < 1.0, "{warmer}");
@@ -140,8 +140,8 @@ fn implausible_monitor_currents_keep_motor_temperatures_valid() {
     bench.sense.measured_ma = Some([i16::MIN; 3]);
     bench.ticks(200_000);
     assert_eq!(bench.guard.report().fault, Some(Fault::CurrentMismatch));
-    let kept = bench.guard.motors().temperatures();
-    assert!(kept.after_reset().is_some(), "{kept:?}");
+    let before = bench.guard.motors().temperatures();
+    assert!(before.after_reset().is_some(), "{before:?}");
 }
 
 #[test]

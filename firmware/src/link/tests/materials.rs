@@ -34,8 +34,8 @@ fn scene_of(table: &MaterialTable, epoch: u32) -> Scene {
 
 /// Sends a scene with its table and returns true if it was accepted.
 fn send_scene(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
-    let mut room = [0; MAX_TABLE_BYTES];
-    let table = table_bytes(table, &mut room);
+    let mut buffer = [0; MAX_TABLE_BYTES];
+    let table = table_bytes(table, &mut buffer);
     rig.send_message(&ToDevice::MaterialScene(MaterialScene { scene, table }));
     rig.run(1);
     is_accepted(rig, scene.epoch)
@@ -175,7 +175,7 @@ fn scene_with_missing_or_invalid_material_table_is_refused() {
 fn consecutive_scenes_use_their_own_material_tables() {
     let mut rig = greeted();
     let (soft, hard) = (table(&[0.5]), table(&[1.0]));
-    let mut room = [0; MAX_TABLE_BYTES];
+    let mut buffer = [0; MAX_TABLE_BYTES];
     for (epoch, table) in [(1, &soft), (2, &hard), (3, &soft), (4, &soft), (5, &hard)] {
         let scene = Scene {
             params: SurfaceParams {
@@ -184,7 +184,7 @@ fn consecutive_scenes_use_their_own_material_tables() {
             },
             ..scene_of(table, epoch)
         };
-        let table = table_bytes(table, &mut room);
+        let table = table_bytes(table, &mut buffer);
         rig.send_message(&ToDevice::MaterialScene(MaterialScene { scene, table }));
         rig.send_message(&ToDevice::Scene(scene));
     }
