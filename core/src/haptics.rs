@@ -126,7 +126,7 @@ pub struct Board {
 ///     let hip = GridPoint::new([10, 10, 0], Vec3::new(0.5, 0.5, height));
 ///     haptics.accept(Command::Hip(HipCommand { seq, hip }))?;
 ///     let outcome = haptics.tick(&GuardInputs::default(), true);
-///     assert_eq!(outcome.answers, Some(seq));
+///     assert_eq!(outcome.answered_seq, Some(seq));
 ///     sample = outcome.sample;
 /// }
 /// // One millimetre deep: half a newton up.

@@ -28,7 +28,7 @@ pub struct Outcome {
     /// Record for telemetry.
     pub sample: TickRecord,
     /// Number of the point that this tick answers.
-    pub answers: Option<u32>,
+    pub answered_seq: Option<u32>,
 }
 
 impl<const D: usize> Haptics<'_, D> {
@@ -87,7 +87,7 @@ impl<const D: usize> Haptics<'_, D> {
         {
             self.blend_tiles(scene.cell_mm);
         }
-        outcome.answers = None;
+        outcome.answered_seq = None;
         // Tested once here: otherwise the compiler tests the option where each number is used.
         let Some(pose) = pose else {
             return self.tick_without_arm(outcome);
@@ -107,7 +107,7 @@ impl<const D: usize> Haptics<'_, D> {
         let mut hip = place(mechanism, scene, pose);
         if !self.clutch.is_closed() {
             let in_contact = (self.renderer.contact_mut(), &self.window);
-            let drives = self.guard.mode().drives();
+            let drives = self.guard.mode().is_driving();
             hip = self.clutch.tick(hip, scene, in_contact, drives);
         }
         let arm = MotionSource::Arm {
@@ -128,7 +128,7 @@ impl<const D: usize> Haptics<'_, D> {
     #[inline]
     fn command_motors(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
         *drive = match &self.mechanism {
-            Some(mechanism) if self.guard.mode().drives() => {
+            Some(mechanism) if self.guard.mode().is_driving() => {
                 let target_a = self.guard.jog_currents_a().unwrap_or_else(|| {
                     let weight = mechanism.gravity_nm(pose) * self.guard.gain();
                     let torques = pose.torques_nm(to_device_frame(force_n)) + weight;

@@ -174,7 +174,7 @@ impl<'t, const D: usize> Device<'t, D> {
                 GuardOutputs::default(),
                 "replay drives no motor"
             );
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 return outcome.sample;
             }
         }

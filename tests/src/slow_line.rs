@@ -118,7 +118,7 @@ impl Stepped for InMemory {
 
     fn tick(&mut self, _: SessionNumber, frames: &[u8]) -> Vec<u8> {
         let drive = self.device.tick(self.arm.sense());
-        if self.device.link.drives_arm() {
+        if self.device.link.is_arm_in_use() {
             let currents_a = drive.currents_a.to_array().map(f64::from);
             self.arm.step(currents_a, 1e-3);
         }

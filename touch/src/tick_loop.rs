@@ -61,7 +61,7 @@ impl TickLoop {
     ) -> Result<(), RefusedScene> {
         self.0.with_dependent_mut(|_, running| {
             if let Some(table) = materials {
-                running.haptics.take_materials(table);
+                running.haptics.set_materials(table);
             }
             running.accept(Command::Scene(scene))
         })
@@ -76,7 +76,7 @@ impl TickLoop {
     ) -> Result<(), RefusedScene> {
         self.0.with_dependent_mut(|_, running| {
             if let Some(table) = materials {
-                running.haptics.take_materials(table);
+                running.haptics.set_materials(table);
             }
             running.view = running.view.wrapping_add(1);
             // Tiles with materials differ from those without.
@@ -138,7 +138,7 @@ impl<'t> Running<'t> {
         let sense = GuardInputs::default();
         for _ in 0..MAX_TICKS {
             self.haptics.tick_into(&sense, true, &mut self.outcome);
-            if self.outcome.answers == Some(seq) {
+            if self.outcome.answered_seq == Some(seq) {
                 return Ok(Some(self.outcome.sample));
             }
             if let Some(index) = self.outcome.sample.missing_tile {

@@ -65,7 +65,7 @@ pub(super) const INTERSECTION: u32 = 8;
 pub(super) const BORDER_ENTRY: u32 = PATCH_ENTRY + 4 * SLOPE;
 /// Units of the largest piece of work. A tick that postponed work has spent more than its budget
 /// minus this.
-pub const MAX_PIECE: u32 = BORDER_ENTRY;
+pub const MAX_ATOMIC_WORK: u32 = BORDER_ENTRY;
 
 /// Work of a tick, its limit, and the first missing tile.
 #[derive(Debug)]

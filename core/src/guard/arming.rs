@@ -193,7 +193,7 @@ impl Arming {
             Mode::Disarmed => Blockers::HOST_DISARMED,
             _ => Blockers::empty(),
         };
-        let hand = match (self.mode.drives(), dead_man) {
+        let hand = match (self.mode.is_driving(), dead_man) {
             (false, false) => Blockers::DEAD_MAN_RELEASED,
             (false, true) if self.mode != Mode::Confirming && !self.was_switch_open => {
                 Blockers::DEAD_MAN_STILL_HELD

@@ -15,7 +15,7 @@ impl Guard {
         if !around.zeroed || jumped {
             self.counts = None;
         }
-        let is_on = self.mode().drives();
+        let is_on = self.mode().is_driving();
         if let Some(fault) = self.feedback.check(sense, self.currents_a, is_on) {
             self.trip(fault);
         }
@@ -26,10 +26,10 @@ impl Guard {
         if self.motors.too_hot {
             self.trip(Fault::MotorTooHot);
         }
-        if self.mode().drives() {
+        if self.mode().is_driving() {
             self.watch_driven(sense, around);
         }
-        if !self.mode().drives() {
+        if !self.mode().is_driving() {
             self.watch_undriven(sense, around);
         }
         jumped

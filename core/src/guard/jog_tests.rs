@@ -135,9 +135,9 @@ fn plain_arm_command_does_not_arm_for_an_earlier_jog() {
         assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
     }
     bench.jog(JOG, 1_500, held_joint);
-    assert!(bench.report().mode.drives());
+    assert!(bench.report().mode.is_driving());
     bench.send(Command::Disarm);
-    while bench.report().mode.drives() {
+    while bench.report().mode.is_driving() {
         bench.tick(held_joint);
     }
     bench.send(Command::Arm);
@@ -167,7 +167,7 @@ fn dead_man_release_ends_a_jog_within_the_tick() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.jog(JOG, 1_500, held_joint);
-    assert!(bench.report().mode.drives());
+    assert!(bench.report().mode.is_driving());
     bench.sense.dead_man = false;
     assert_eq!(bench.tick(held_joint), GuardOutputs::default());
     assert_eq!(bench.report().fault, Some(Fault::DeadManReleased));
@@ -263,7 +263,7 @@ fn scene_zero_disarm_or_new_settings_end_a_jog() {
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
         bench.jog(JOG, 1_500, held_joint);
-        assert!(bench.report().mode.drives());
+        assert!(bench.report().mode.is_driving());
         end(&mut bench);
         bench.drives.clear();
         (0..200).for_each(|_| _ = bench.tick(held_joint));

@@ -81,7 +81,7 @@ impl Guard {
         if !is_finite(target_a) {
             self.trip(Fault::NotANumber);
         }
-        if !self.mode().drives() {
+        if !self.mode().is_driving() {
             return GuardOutputs::default();
         }
         let allowed_a = self.motors.allowed_a;

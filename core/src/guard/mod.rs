@@ -316,7 +316,7 @@ impl Guard {
     /// continues.
     pub fn arm(&mut self) {
         self.hold.end();
-        if !self.mode().drives() {
+        if !self.mode().is_driving() {
             self.jog = None;
         }
         self.arming.request();
@@ -333,7 +333,7 @@ impl Guard {
     pub fn disarm(&mut self) {
         self.hold.end();
         let gain = self.arming.gain;
-        if self.mode().drives() && self.mode() != Mode::Fading {
+        if self.mode().is_driving() && self.mode() != Mode::Fading {
             // Divided by the gain, so that the fade starts at the present force.
             self.fade_from_n = if gain > 0.0 {
                 self.force_n / gain

@@ -64,7 +64,7 @@ impl Bench {
             .limit_currents(self.mechanism.currents_a(torques));
         self.note();
         self.zeroed &= !lost;
-        assert_eq!(drive.enabled, self.guard.mode().drives());
+        assert_eq!(drive.enabled, self.guard.mode().is_driving());
         assert!(drive.enabled || drive == GuardOutputs::default());
         drive
     }

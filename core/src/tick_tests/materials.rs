@@ -94,7 +94,7 @@ impl<'t> Ground<'t> {
         for _ in 0..200 {
             self.ticks += 1;
             let outcome = self.haptics.tick(&GuardInputs::default(), true);
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 return outcome.sample;
             }
             if let Some(TileIndex { col, .. }) = outcome.sample.missing_tile {

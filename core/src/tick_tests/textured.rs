@@ -52,7 +52,7 @@ fn rendered(late: u32) -> (Vec<Vec3>, u32) {
         loop {
             ticks += 1;
             let outcome = haptics.tick(&GuardInputs::default(), true);
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 forces.push(outcome.sample.force_n);
                 break;
             }

@@ -463,7 +463,7 @@ fn held_clutch_does_not_allow_arming_inside_the_ground() {
     device.dead_man = true;
     for _ in 0..500 {
         let sample = device.tick([0, -60, 0]).sample;
-        assert!(!sample.mode.drives());
+        assert!(!sample.mode.is_driving());
     }
     let blockers = device.haptics.report().blockers;
     assert!(blockers.contains(Blockers::FORCE_TOO_LARGE));

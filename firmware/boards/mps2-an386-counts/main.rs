@@ -157,7 +157,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
                 let _ = haptics.accept(Command::Hip(black_box(point)));
                 let sense = black_box(GuardInputs::default());
                 let (cost, ()) = stopwatch.counted(|| tick(&mut haptics, &sense, &mut outcome));
-                let is_answered = u32::from(outcome.answers.is_some());
+                let is_answered = u32::from(outcome.answered_seq.is_some());
                 let sample = &outcome.sample;
                 let first = [cost, sample.state as u32, is_answered, sample.work];
                 records.add(first, sample.force_n, &sample.proxy);

@@ -214,8 +214,8 @@ where
         let sense = self.encoders.sense();
         self.run_tick(&sense, watchdog_live);
         self.report(&sense, &drive);
-        let record = self.record(self.outcome.answers);
-        if record.answers.is_some() {
+        let record = self.record(self.outcome.answered_seq);
+        if record.answered_seq.is_some() {
             self.answer(record);
         } else {
             // It only reports which tile the point lacks; the next record repeats that.
@@ -234,11 +234,11 @@ where
         drive
     }
 
-    fn record(&mut self, answers: Option<u32>) -> QueuedTick {
+    fn record(&mut self, answered_seq: Option<u32>) -> QueuedTick {
         self.timing.fill(&mut self.outcome.sample);
         QueuedTick {
             sample: self.outcome.sample,
-            answers,
+            answered_seq,
         }
     }
 

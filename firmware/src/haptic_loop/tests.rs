@@ -131,13 +131,13 @@ fn unsent_answer_is_sent_once_there_is_room() {
         haptic_loop.tick();
     }
     let early = drain(&mut link_ends);
-    assert!(early.iter().all(|record| record.answers.is_none()));
+    assert!(early.iter().all(|record| record.answered_seq.is_none()));
     for _ in 0..5 {
         haptic_loop.tick();
     }
     let late: Vec<_> = drain(&mut link_ends)
         .into_iter()
-        .filter_map(|record| record.answers)
+        .filter_map(|record| record.answered_seq)
         .collect();
     assert_eq!(late, [9], "once, and only once");
 }

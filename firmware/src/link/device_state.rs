@@ -129,14 +129,14 @@ impl DeviceState {
     }
 
     /// Returns true if the amplifiers are on.
-    pub(super) const fn drives(&self) -> bool {
-        self.health.report.mode.drives()
+    pub(super) const fn is_driving(&self) -> bool {
+        self.health.report.mode.is_driving()
     }
 
     /// Returns true if nothing is driven, no arm command waits for the loop and no calibration for
     /// a press.
     pub(super) fn is_idle(&self) -> bool {
-        !self.drives() && self.arming.is_none() && !self.is_awaiting_press()
+        !self.is_driving() && self.arming.is_none() && !self.is_awaiting_press()
     }
 
     /// Returns true if a dead-man press will store a calibration.
@@ -195,7 +195,7 @@ impl DeviceState {
 
     /// Returns true if an arm command is pending and the amplifiers are still off.
     pub(super) fn is_being_armed(&self) -> bool {
-        self.may_drive && !self.drives()
+        self.may_drive && !self.is_driving()
     }
 
     /// Checks that the arm is disarmed, as every change of settings requires.

@@ -286,7 +286,7 @@ impl<const D: usize> Link<'_, D> {
             return;
         }
         let is = |seq: u32| seq == point.seq;
-        if let Some(last) = self.replay.last.filter(|r| r.answers.is_some_and(is)) {
+        if let Some(last) = self.replay.last.filter(|r| r.answered_seq.is_some_and(is)) {
             return self.answer_point(last);
         }
         if self.replay.current.is_some_and(is) || self.points.iter().any(|p| is(p.seq)) {

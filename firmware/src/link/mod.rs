@@ -234,7 +234,7 @@ impl<'t, const D: usize> Link<'t, D> {
     /// force still ramps down.
     #[must_use]
     pub fn is_arm_in_use(&self) -> bool {
-        self.is_arm_scene() || self.device.drives()
+        self.is_arm_scene() || self.device.is_driving()
     }
 
     /// Returns the pattern of the board's status LED.
@@ -285,7 +285,7 @@ impl<'t, const D: usize> Link<'t, D> {
     /// Answers a point with the loop's record of it.
     fn answer_point(&mut self, record: QueuedTick) {
         let is_open = self.session.is_open();
-        if let Some(seq) = record.answers.filter(|_| is_open) {
+        if let Some(seq) = record.answered_seq.filter(|_| is_open) {
             let sample = record.sample;
             self.send(&ToHost::PointAnswer { seq, sample });
         }

@@ -43,7 +43,7 @@ impl<const D: usize> Link<'_, D> {
                 ));
             }
             self.last_record = record;
-            if record.answers.is_some() {
+            if record.answered_seq.is_some() {
                 self.replay.current = None;
                 self.replay.last = Some(record);
                 self.answer_point(record);

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
-use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::packed::{HeightStep, MAX_PACKED, pack};
 use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, TILE_CELLS, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
@@ -113,7 +113,7 @@ impl Default for TileBuffer {
 impl TileBuffer {
     /// Returns the heights in their shortest form for the link; `low` and `high` are the lowest and
     /// the highest of them.
-    pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
+    pub(super) fn above(&mut self, low: f64, high: f64, steps: &[HeightStep]) -> Heights<'_> {
         let base = tile_heights::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
             *single = tile_heights::height_above(base, *height);
@@ -122,7 +122,7 @@ impl TileBuffer {
     }
 
     /// Returns the tile in its shortest form for the link.
-    fn packed(&mut self, base: i32, steps: &[Step]) -> Heights<'_> {
+    fn packed(&mut self, base: i32, steps: &[HeightStep]) -> Heights<'_> {
         let room = &mut self.bytes[..MAX_PACKED];
         if let Some(length) = pack(&self.singles, base, steps, room).map(<[u8]>::len) {
             let bytes = &self.bytes[..length];
@@ -470,7 +470,7 @@ impl<'r> Terrain<'r> {
             return Some(Heights::Flat { base, height });
         }
         let steps = match self.step() {
-            Some(step) => vec![Step::Cells(step)],
+            Some(step) => vec![HeightStep::Cells(step)],
             None => steps(unit, self.scale.height_cells(1.0)).collect(),
         };
         Some(buffer.above(low, high, &steps))

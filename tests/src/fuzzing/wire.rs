@@ -75,7 +75,10 @@ impl Wire {
             };
             let drive = self.device.tick(sense);
             assert!(drive.currents_a.is_finite(), "{drive:?}");
-            assert!(self.device.link.drives_arm() || !drive.enabled, "{drive:?}");
+            assert!(
+                self.device.link.is_arm_in_use() || !drive.enabled,
+                "{drive:?}"
+            );
             self.listen();
         }
     }

@@ -199,7 +199,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             work = outcome.sample.work.max(work);
             self.now += 1;
             self.supply(&outcome.sample);
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 return Some(TickRecord {
                     work,
                     ..outcome.sample
@@ -222,7 +222,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             instructions: 0,
             cycles: Cycles::default(),
             state: state as u32,
-            converged: outcome.answers.is_some(),
+            converged: outcome.answered_seq.is_some(),
             work,
             vector: force_n,
             proxy,

@@ -19,7 +19,7 @@ pub const MAX_PACKED: usize = 4 * SAMPLES - 1;
 
 /// Unit of heights that are whole multiples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
+pub enum HeightStep {
     /// A height is a multiple of this many cells.
     Cells(f64),
     /// A height is a multiple of `unit`, rounded to single precision, times `cells`: for example a
@@ -41,7 +41,7 @@ pub enum Step {
 pub fn pack<'b>(
     heights: &[f32; SAMPLES],
     base: i32,
-    steps: &[Step],
+    steps: &[HeightStep],
     buffer: &'b mut [u8],
 ) -> Option<&'b [u8]> {
     let first = heights.iter().position(|height| !is_no_data(*height))?;
@@ -89,15 +89,15 @@ struct Lines {
 
 impl Lines {
     /// Creates the lines of a step; `height` is the one nearest to the base.
-    fn of(step: &Step, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
+    fn of(step: &HeightStep, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
         let known = || heights.iter().filter(|height| !is_no_data(**height));
         let above = |height: f32| f64::from(height) + base;
         let span = known().fold(0.0, |span: f64, other| {
             span.max((f64::from(*other) - f64::from(height)).abs())
         });
         let (step_cells, unit) = match *step {
-            Step::Cells(cells) => (cells, cells),
-            Step::Single { unit, cells } => (unit * cells, unit),
+            HeightStep::Cells(cells) => (cells, cells),
+            HeightStep::Single { unit, cells } => (unit * cells, unit),
         };
         let from = libm::rint(above(height) / step_cells);
         // A height this near to the base is exact only as it is: the product would be rounded.
@@ -106,11 +106,11 @@ impl Lines {
             _ => libm::fma(number, cells, -base),
         };
         let lines = match *step {
-            Step::Cells(cells) => {
+            HeightStep::Cells(cells) => {
                 let line = Line::through(0, there(from, cells), cells, span / cells)?;
                 [line, Line::NONE]
             }
-            Step::Single { cells, .. } => {
+            HeightStep::Single { cells, .. } => {
                 let in_file = |height: f32| (above(height) / cells).abs();
                 let min_height = known()
                     .map(|height| in_file(*height))
@@ -133,8 +133,8 @@ impl Lines {
         Some(Self {
             lines,
             count: match step {
-                Step::Cells(_) => 1,
-                Step::Single { .. } => 2,
+                HeightStep::Cells(_) => 1,
+                HeightStep::Single { .. } => 2,
             },
             up: base,
             per_cell: 1.0 / step_cells,

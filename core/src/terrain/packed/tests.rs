@@ -34,7 +34,7 @@ fn loaded(heights: &[f32; SAMPLES]) -> Vec<u32> {
 }
 
 /// Packs heights, and checks the tile unpacked from them; `None` if packing saves nothing.
-fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>> {
+fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[HeightStep]) -> Option<Vec<u8>> {
     let mut buffer = [0xAA; MAX_PACKED];
     let bytes = pack(heights, base, steps, &mut buffer)?.to_vec();
     let mut tile = Box::new(Tile::VACANT);
@@ -83,7 +83,7 @@ fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
 fn whole_metres_take_half_a_byte_per_sample() {
     for metres in [1.0, 10.0, 29.97, 91.3] {
         let base = (1450.0 / metres) as i32;
-        let steps = [Step::Cells(1.0 / metres)];
+        let steps = [HeightStep::Cells(1.0 / metres)];
         let bytes = packed(&hills(metres, base), base, &steps).unwrap();
         assert_eq!(bytes[0] & 7, 1, "one line, no holes");
         assert!(bytes.len() < 600, "{}", bytes.len());
@@ -98,8 +98,8 @@ fn centimetres_in_single_precision_are_two_lines() {
             (f64::from(file) * cells - f64::from(base)) as f32
         });
         let steps = [
-            Step::Cells(0.01 * cells),
-            Step::Single { unit: 0.01, cells },
+            HeightStep::Cells(0.01 * cells),
+            HeightStep::Single { unit: 0.01, cells },
         ];
         let bytes = packed(&heights, base, &steps).unwrap();
         // The file's single precision is then the tile's, so one line is enough.
@@ -113,8 +113,8 @@ fn centimetres_in_single_precision_are_two_lines() {
 fn zero_height_over_base_zero_is_packed_exactly() {
     let heights = by_sample(|col, row| (col.min(row) as f64 / 29.99) as f32);
     for steps in [
-        &[Step::Cells(1.0 / 29.99)],
-        &[Step::Cells(1.0 / (8.0 * 29.99))],
+        &[HeightStep::Cells(1.0 / 29.99)],
+        &[HeightStep::Cells(1.0 / (8.0 * 29.99))],
     ] {
         assert_eq!(packed(&heights, 0, steps).unwrap()[0] & 3, 1);
     }
@@ -124,15 +124,19 @@ fn zero_height_over_base_zero_is_packed_exactly() {
 fn negative_zero_is_preserved() {
     let mut heights = by_sample(|col, row| col.min(row) as f32);
     heights[40] = -0.0;
-    packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
+    packed(&heights, 0, &[HeightStep::Cells(1.0)]).unwrap();
     heights[40] = 0.0;
-    packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
+    packed(&heights, 0, &[HeightStep::Cells(1.0)]).unwrap();
 }
 
 #[test]
 fn floats_without_a_step_are_packed_losslessly() {
     let heights = by_sample(|col, row| ((col as f32 / 9.0).sin() + row as f32 / 7.0) * 3.7);
-    for steps in [&[][..], &[Step::Cells(0.1)], &[Step::Cells(f64::NAN)]] {
+    for steps in [
+        &[][..],
+        &[HeightStep::Cells(0.1)],
+        &[HeightStep::Cells(f64::NAN)],
+    ] {
         let bytes = packed(&heights, 0, steps).unwrap();
         assert_eq!(bytes[0] & 7, 0);
     }
@@ -143,7 +147,7 @@ fn packing_keeps_no_data_samples_in_place() {
     let base = 50;
     let hills = hills(30.0, base);
     let mut random = Random(3);
-    let steps = [Step::Cells(1.0 / 30.0)];
+    let steps = [HeightStep::Cells(1.0 / 30.0)];
     let holes: [&mut dyn FnMut(usize, usize) -> bool; 6] = [
         &mut |col, row| (col, row) != (17, 4),
         &mut |col, row| (col, row) == (0, 0),
@@ -184,18 +188,18 @@ fn unusual_floats_are_packed_losslessly() {
     ];
     let mut random = Random(5);
     let steps = [
-        Step::Cells(1e-45),
-        Step::Cells(0.0),
-        Step::Cells(-2.0),
-        Step::Single {
+        HeightStep::Cells(1e-45),
+        HeightStep::Cells(0.0),
+        HeightStep::Cells(-2.0),
+        HeightStep::Single {
             unit: 0.1,
             cells: 1e30,
         },
-        Step::Single {
+        HeightStep::Single {
             unit: 1e-300,
             cells: 1e300,
         },
-        Step::Cells(1.0),
+        HeightStep::Cells(1.0),
     ];
     let mut packs = 0;
     for round in 0..300 {
@@ -231,10 +235,10 @@ fn examples() -> Vec<Vec<u8>> {
     for i in (0..SAMPLES).filter(|i| i % 37 < 9) {
         hollow[i] = f32::NAN;
     }
-    let step = [Step::Cells(1.0 / 30.0)];
+    let step = [HeightStep::Cells(1.0 / 30.0)];
     let rough = by_sample(|col, row| (col * row % 11) as f32 * 0.37);
     let single = by_sample(|col, row| (6000 + col * 3 + row) as f32 / 100.0);
-    let steps = [Step::Single {
+    let steps = [HeightStep::Single {
         unit: 0.01,
         cells: 1.0,
     }];
@@ -245,7 +249,7 @@ fn examples() -> Vec<Vec<u8>> {
         _ => 0.0,
     });
     std::vec![
-        packed(&last, 0, &[Step::Cells(1.0)]).unwrap(),
+        packed(&last, 0, &[HeightStep::Cells(1.0)]).unwrap(),
         packed(&hills(30.0, 50), 50, &step).unwrap(),
         packed(&hollow, 50, &step).unwrap(),
         packed(&rough, 0, &[]).unwrap(),

@@ -319,7 +319,7 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
     while !answered(&rig) {
         rig.run(1);
         ticks += 1;
-        on += u32::from(rig.report().is_some_and(|r| r.mode.drives()));
+        on += u32::from(rig.report().is_some_and(|r| r.mode.is_driving()));
         assert!(ticks < 400, "for ever");
     }
     assert!((90..=102).contains(&on), "{on}");

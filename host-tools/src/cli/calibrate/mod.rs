@@ -149,7 +149,7 @@ fn calibrate(
             "measure them, too; or accept guesses: --measure zero,gravity,guessed-ratios",
         );
     }
-    if control.status()?.health.report.mode.drives() {
+    if control.status()?.health.report.mode.is_driving() {
         return Err("the amplifiers are on").or_hint("disarm first: hapterra status --disarm");
     }
     let (mut record, mut zero) = (begin, None);

@@ -179,7 +179,7 @@ impl ArmingPrompts {
     /// Reports the state of the guard if it changed.
     fn on_guard_report(&mut self, report: &Report) {
         let before = self.report.replace(*report);
-        let is_settled = report.mode == Mode::Disarmed || report.mode.drives();
+        let is_settled = report.mode == Mode::Disarmed || report.mode.is_driving();
         if self.is_back && is_settled {
             self.is_back = false;
             if report.mode == Mode::Disarmed && report.fault.is_none() {
@@ -195,7 +195,7 @@ impl ArmingPrompts {
         if let Some(fault) = report.fault.filter(|_| was != report.fault) {
             let (number, meaning) = (fault.number(), fault.meaning());
             self.tell(format!("FAULT {number} {fault:?}: {meaning}"));
-            self.tell(format!("  {}", fault.what_to_do()));
+            self.tell(format!("  {}", fault.remedy()));
             return self.ask_for_enter(report.blockers);
         }
         match report.mode {
@@ -211,7 +211,7 @@ impl ArmingPrompts {
             }
             Mode::Ramping => self.tell("amplifiers on; force comes in"),
             Mode::Armed => self.tell("armed"),
-            Mode::Disarmed if before.is_some_and(|before| before.mode.drives()) => {
+            Mode::Disarmed if before.is_some_and(|before| before.mode.is_driving()) => {
                 self.tell("disarmed; amplifiers off");
             }
             _ => {}
