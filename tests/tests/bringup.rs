@@ -10,7 +10,7 @@ use hapterra::bringup::{
 };
 use hapterra::link::{ControlSession, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
-use hapterra_core::guard::{Blockers, MAX_JOG_SPEED_RAD_S, Jog};
+use hapterra_core::guard::{Blockers, Jog, MAX_JOG_SPEED_RAD_S};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_firmware::native::StoppedClock;

@@ -106,8 +106,8 @@ impl Terrain {
         Ok(())
     }
 
-    /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `buffer` is
-    /// a buffer for its samples.
+    /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `buffer`
+    /// is memory for its samples.
     pub(crate) fn cut(
         &self,
         key: TileKey,

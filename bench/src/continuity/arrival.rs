@@ -3,7 +3,7 @@
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{
-    CoarseTile, Fallback, FieldSize, RequestHint, BLEND_MM_S, TILE_CELLS, Tile, TileKey,
+    BLEND_MM_S, CoarseTile, Fallback, FieldSize, RequestHint, TILE_CELLS, Tile, TileKey,
     TileRequester,
 };
 

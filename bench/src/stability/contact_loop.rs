@@ -103,13 +103,13 @@ pub(super) fn run(
         let read_up_mm = read_up_mm(&arm, sense.counts);
         let outcome = haptics.tick(&sense, true);
         let sample = outcome.sample;
-        let demand = RequestHint {
+        let hint = RequestHint {
             missing_tile: sample.missing_tile,
             proxy: sample.proxy.column(),
             hip: sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = requester.next_request(sample.tick, &demand) {
+        while let Some(key) = requester.next_request(sample.tick, &hint) {
             let Some(tile) = spare.pop() else { break };
             fill(tile, key, scene.size);
             requester.received(key);

@@ -34,7 +34,8 @@ fn is_far(proxy: Cell, hip: Cell) -> bool {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Target {
     /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous in the HIP
-    /// within [`FULL_FORCE_DISTANCE`] of the proxy's cell, and 1 beyond. Missing tiles count as no-data.
+    /// within [`FULL_FORCE_DISTANCE`] of the proxy's cell, and 1 beyond. Missing tiles count as
+    /// no-data.
     pub(super) fade: f32,
     /// True if the HIP is over a patch, so that nothing fades while it stays over its cell.
     pub(super) over_patch: bool,

@@ -45,7 +45,8 @@ enum Phase {
 
 impl Phase {
     /// Returns the phase's name, and the phases in which a tick that starts in it may end. Between
-    /// ticks only [`Contact::place_on_surface`] changes the phase: a waiting proxy is then on the surface.
+    /// ticks only [`Contact::place_on_surface`] changes the phase: a waiting proxy is then on the
+    /// surface.
     #[cfg(test)]
     const fn exits(&self) -> (&'static str, &'static [&'static str]) {
         match self {
@@ -309,8 +310,8 @@ impl Contact {
         }
     }
 
-    /// Runs a tick without the fast path. `closest` is the closest point of the proxy's patch, if the
-    /// fast path has computed it.
+    /// Runs a tick without the fast path. `closest` is the closest point of the proxy's patch, if
+    /// the fast path has computed it.
     #[inline(never)]
     fn step_in_full<const D: usize>(
         &mut self,

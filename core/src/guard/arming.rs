@@ -155,8 +155,8 @@ impl Arming {
         }
     }
 
-    /// Returns the gain of this tick before [`Arming::advance_on`] sets it; `None` while the force does
-    /// not follow the wanted force.
+    /// Returns the gain of this tick before [`Arming::advance_on`] sets it; `None` while the force
+    /// does not follow the target force.
     pub(super) fn next_gain(&self) -> Option<f32> {
         match self.mode {
             Mode::Ramping => Some(smaller(

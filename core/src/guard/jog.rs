@@ -7,8 +7,8 @@
 //! weight: the hand holds only the arm and this one motor.
 //!
 //! All other checks of the guard stay active, with three more: no joint may move faster than
-//! [`MAX_JOG_SPEED_RAD_S`] or farther than [`MAX_JOG_ROTATION_RAD`], whichever motor really turns it
-//! ([`Fault::JogRanAway`]), and at half the current the joint's encoder must have moved
+//! [`MAX_JOG_SPEED_RAD_S`] or farther than [`MAX_JOG_ROTATION_RAD`], whichever motor really turns
+//! it ([`Fault::JogRanAway`]), and at half the current the joint's encoder must have moved
 //! ([`Fault::NoMotion`]).
 
 use glam::Vec3;

@@ -34,7 +34,7 @@ pub use flags::{Blockers, Limits};
 pub use hold::MAX_HOLD_S;
 pub use jog::{JOG_MAX_MS, JOG_SHARE, Jog, MAX_JOG_ROTATION_RAD, MAX_JOG_SPEED_RAD_S};
 pub use mode::Mode;
-pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
+pub use stall::MAX_OTHERS_TRAVEL;
 
 use crate::phantom::{JointLimits, Kinematics, Pose};
 pub use crate::rate::MAX_SLEW_N_PER_S;

@@ -68,8 +68,9 @@ impl Temperatures {
 
     /// Returns the initial temperatures from those kept over a reset.
     ///
-    /// The kept ones are up to [`RESET_MARGIN_K`] too low, because the motors had current after they were
-    /// kept. Returns `None` if a number is outside of the model's range: the memory may be corrupt.
+    /// The kept ones are up to [`RESET_MARGIN_K`] too low, because the motors had current after
+    /// they were kept. Returns `None` if a number is outside of the model's range: the memory may
+    /// be corrupt.
     #[must_use]
     pub fn after_reset(self) -> Option<Self> {
         let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MAX_K).all();

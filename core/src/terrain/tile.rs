@@ -58,8 +58,8 @@ pub struct Tile {
     lowest: f32,
     /// True if the tile has materials.
     has_materials: bool,
-    /// For each sample, in the order of `samples`, its index in the scene's table of materials; valid
-    /// only if `has_materials`.
+    /// For each sample, in the order of `samples`, its index in the scene's table of materials;
+    /// valid only if `has_materials`.
     materials: [[u8; TILE_SAMPLES]; TILE_SAMPLES],
 }
 

@@ -57,10 +57,10 @@ impl RequestHint {
 /// requester.reset(0, FieldSize::new(10_000, 10_000));
 /// // HIP and proxy are in the middle of a tile and move east, 0.1 cell a tick.
 /// let cell = Cell::new(80, 48);
-/// let demand = RequestHint { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..RequestHint::default() };
-/// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 2, 1)));
-/// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 3, 1)));
-/// assert_eq!(requester.next_request(0, &demand), None);
+/// let hint = RequestHint { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..RequestHint::default() };
+/// assert_eq!(requester.next_request(0, &hint), Some(TileKey::new(0, 2, 1)));
+/// assert_eq!(requester.next_request(0, &hint), Some(TileKey::new(0, 3, 1)));
+/// assert_eq!(requester.next_request(0, &hint), None);
 /// requester.received(TileKey::new(0, 2, 1));
 /// assert_eq!(requester.in_flight(), 1);
 /// ```

@@ -120,8 +120,8 @@ impl<'t, const D: usize> Window<'t, D> {
         window
     }
 
-    /// Discards every tile and sets a new field without fallback ([`Self::set_fallback`]): its level, its
-    /// size, and an upper bound of its samples in whole cells.
+    /// Discards every tile and sets a new field without fallback ([`Self::set_fallback`]): its
+    /// level, its size, and an upper bound of its samples in whole cells.
     // Not inlined: the loop over the tiles would be unrolled in each caller.
     #[inline(never)]
     pub fn reset(&mut self, level: u8, size: FieldSize, top: i32) {

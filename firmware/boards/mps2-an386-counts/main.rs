@@ -19,9 +19,10 @@
 //!   order. In a scene fed by points, each point is one [`Contact::step`] in real time, and another
 //!   scene may follow. With materials, each point is one [`Haptics::tick`], and a point without an
 //!   answer is repeated.
-//! - `counts.frames`, for a scene fed by encoders: [`PlantState`] frames, each one [`Haptics::tick`],
-//!   from count to current, after the arm was armed at the first of them. In `replay.frames` of
-//!   such a scene a point is a mark: the tiles after it are stored before the tick with its number.
+//! - `counts.frames`, for a scene fed by encoders: [`PlantState`] frames, each one
+//!   [`Haptics::tick`], from count to current, after the arm was armed at the first of them. In
+//!   `replay.frames` of such a scene a point is a mark: the tiles after it are stored before the
+//!   tick with its number.
 //!
 //! and writes `ticks.bin`: [`RECORD`] little-endian words a tick. For a scene fed by points it also
 //! writes `tiles.bin`: as many words for each tile, which count the filling of a buffer.

@@ -81,7 +81,11 @@ pub fn run(data: &[u8]) {
                 spare.extend(haptics.accept(Command::ClutchInput(held)).ok().flatten());
             }
             _ if kind >= 248 => {
-                let holds = [ClutchMode::Released, ClutchMode::WithHand, ClutchMode::InPlace];
+                let holds = [
+                    ClutchMode::Released,
+                    ClutchMode::WithHand,
+                    ClutchMode::InPlace,
+                ];
                 let hold = holds[usize::from(kind - 248)];
                 spare.extend(haptics.accept(Command::Clutch(hold)).ok().flatten());
             }

@@ -234,13 +234,13 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let Supply::Pulled { latency } = self.replay.supply else {
             return;
         };
-        let demand = RequestHint {
+        let hint = RequestHint {
             missing_tile: sample.missing_tile,
             proxy: sample.proxy.column(),
             hip: sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = self.requester.next_request(self.now, &demand) {
+        while let Some(key) = self.requester.next_request(self.now, &hint) {
             self.coming.push((self.now + latency, key));
         }
         let is_here = |(due, _): &(u32, TileKey)| *due <= self.now;

@@ -99,8 +99,8 @@ impl NeighbourSearch {
         self.best = None;
     }
 
-    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best candidate
-    /// found in this call.
+    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best
+    /// candidate found in this call.
     #[inline]
     pub(super) fn advance<const D: usize>(
         &mut self,

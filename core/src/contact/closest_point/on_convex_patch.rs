@@ -165,7 +165,8 @@ impl Convexity {
         (place, is_exact)
     }
 
-    /// Runs Newton's method (eq. 8-11) from a place; returns `None` if [`MAX_NEWTON_STEPS`] are not enough.
+    /// Runs Newton's method (eq. 8-11) from a place; returns `None` if [`MAX_NEWTON_STEPS`] are not
+    /// enough.
     fn by_newton(&self, patch: &Patch, (p, q): (f32, f32), from: PatchPoint) -> Option<PatchPoint> {
         let (mut u, mut v) = (from.u, from.v);
         for _ in 0..MAX_NEWTON_STEPS {

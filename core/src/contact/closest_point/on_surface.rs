@@ -18,8 +18,8 @@ const MAX_IDLE_PATCHES: u32 = 16;
 /// End of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum DescentEnd {
-    /// No direction on the surface leads closer to the HIP, which is below; or [`MAX_IDLE_PATCHES`] patches in
-    /// a row brought the proxy no nearer; or the proxy must not leave.
+    /// No direction on the surface leads closer to the HIP, which is below; or [`MAX_IDLE_PATCHES`]
+    /// patches in a row brought the proxy no nearer; or the proxy must not leave.
     AtRest,
     /// From here the straight path to the HIP leads off the surface.
     Departure,

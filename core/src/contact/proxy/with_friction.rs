@@ -42,8 +42,8 @@ enum Motion {
 enum WalkStage {
     /// The proxy has not moved in this tick: the cone at rest decides.
     AtStart,
-    /// The proxy has moved along `paths` straight segments, the last `paths_inside` of them within one
-    /// patch.
+    /// The proxy has moved along `paths` straight segments, the last `paths_inside` of them within
+    /// one patch.
     Walking { paths: u32, paths_inside: u32 },
     /// Descent without friction: the proxy moves to the closest point.
     Frictionless,

@@ -167,7 +167,7 @@ impl Rig {
 
     /// Opens a session in this scene.
     pub(super) fn in_scene(scene: Scene) -> Self {
-        let mut rig = Self::asking(scene);
+        let mut rig = Self::with_unanswered_tiles(scene);
         rig.answers_tiles = true;
         for key in rig.tile_requests() {
             rig.send(&tile(scene.epoch, key));
