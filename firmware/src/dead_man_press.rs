@@ -81,8 +81,8 @@ mod tests {
     #[test]
     fn switch_held_from_the_start_is_no_press() {
         assert_eq!(decided(|_| true), Some((11_100, Err(Refusal::NotPressed))));
-        let let_go_and_pressed = |now| !(3_000..3_500).contains(&now);
-        assert_eq!(decided(let_go_and_pressed), Some((3_500, Ok(()))));
+        let released_and_pressed = |now| !(3_000..3_500).contains(&now);
+        assert_eq!(decided(released_and_pressed), Some((3_500, Ok(()))));
     }
 
     #[test]

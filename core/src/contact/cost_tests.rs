@@ -88,18 +88,18 @@ fn search_cost(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[
 #[test]
 fn patches_and_evaluations_per_tick_are_bounded() {
     let high = |[x, y]: [f64; 2]| GridPoint::new([x as i32, y as i32, 9], Vec3::ZERO);
-    let flies = |above: f64| places(0.5).map(move |at| hip(at, above));
-    let slides = |step: f64| places(step).map(|at| hip(at, -0.1));
+    let above_ground = |above: f64| places(0.5).map(move |at| hip(at, above));
+    let sliding = |step: f64| places(step).map(|at| hip(at, -0.1));
     let taps = places(0.03).flat_map(|at| [hip(at, 0.2), hip(at, -0.1)]);
     // One encoder count, 0.03 cell, in either direction.
     let mut random = Random(72);
     let mut count = || 0.03 * random.between(-1.5, 1.5).round();
-    let trembles = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));
-    let rests = (0..TICKS).map(|_| hip([30.4, 30.5], -0.1));
+    let trembling = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));
+    let unmoved = (0..TICKS).map(|_| hip([30.4, 30.5], -0.1));
     let states = [
         (
             "unmoved",
-            search_cost(rests, ContactState::Touching),
+            search_cost(unmoved, ContactState::Touching),
             [[0, 0], [0, 0]],
         ),
         (
@@ -109,7 +109,7 @@ fn patches_and_evaluations_per_tick_are_bounded() {
         ),
         (
             "free low",
-            search_cost(flies(1.0), ContactState::Free),
+            search_cost(above_ground(1.0), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
@@ -119,17 +119,17 @@ fn patches_and_evaluations_per_tick_are_bounded() {
         ),
         (
             "slides 0.01",
-            search_cost(slides(0.01), ContactState::Touching),
+            search_cost(sliding(0.01), ContactState::Touching),
             [[1, 2], [1, 2]],
         ),
         (
             "slides 0.5",
-            search_cost(slides(0.5), ContactState::Touching),
+            search_cost(sliding(0.5), ContactState::Touching),
             [[2, 4], [2, 8]],
         ),
         (
             "trembles",
-            search_cost(trembles, ContactState::Touching),
+            search_cost(trembling, ContactState::Touching),
             [[1, 1], [1, 1]],
         ),
     ];

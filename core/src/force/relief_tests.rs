@@ -128,8 +128,11 @@ fn height_and_slope_are_continuous_over_cells_and_grains() {
                     let mean = 0.5 * (slope(&before) + slope(&rise));
                     let off = (rise.height - before.height - mean * STEP).abs();
                     assert!(off < 1e-6, "{pattern:?} {i}: {off:e}");
-                    let bent = (slope(&rise) - slope(&before)).abs();
-                    assert!(bent < 48.0 * waves * waves * STEP + 1e-5, "{i}: {bent:e}");
+                    let slope_change = (slope(&rise) - slope(&before)).abs();
+                    assert!(
+                        slope_change < 48.0 * waves * waves * STEP + 1e-5,
+                        "{i}: {slope_change:e}"
+                    );
                 }
                 before = Some(rise);
             }

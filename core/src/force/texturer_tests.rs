@@ -136,14 +136,14 @@ fn texture_fades_before_it_would_alias() {
 fn texture_at_rest_is_independent_of_the_previous_position() {
     for texture in [GRATING, GRAIN] {
         let there = place(0.7, -0.4);
-        let rested = |from: GridPoint| {
+        let at_rest = |from: GridPoint| {
             let mut texturer = texturer(&texture);
             texturer.add(Vec3::Z, &from);
             (0..200).map(|_| texturer.add(Vec3::Z, &there)).last()
         };
-        let first = rested(there);
+        let first = at_rest(there);
         for (x, y) in [(0.1, 0.2), (-50.0, 3.0), (1e6, -1e6), (0.7, -0.4)] {
-            assert_eq!(rested(place(x, y)), first, "{x} {y}");
+            assert_eq!(at_rest(place(x, y)), first, "{x} {y}");
         }
     }
 }

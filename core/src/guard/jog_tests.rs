@@ -37,12 +37,12 @@ impl<'t> Bench<'t> {
         self.haptics.report()
     }
 
-    /// Runs a tick; once a millisecond the encoders move as `moves` computes from the currents.
-    fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
+    /// Runs a tick; once a millisecond the encoders move as `motion` computes from the currents.
+    fn tick(&mut self, motion: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
         let drive = self.haptics.tick(&self.sense, true).drive;
         self.drives.push(drive);
         let is_ms = (self.drives.len() as u32).is_multiple_of(self.rate.ticks(1));
-        let moved = moves(drive.currents_a).map(|counts| if is_ms { counts } else { 0 });
+        let moved = motion(drive.currents_a).map(|counts| if is_ms { counts } else { 0 });
         for (count, moved) in self.sense.counts.iter_mut().zip(moved) {
             *count += moved;
         }
@@ -50,11 +50,11 @@ impl<'t> Bench<'t> {
     }
 
     /// Requests a jog, presses the switch a moment later, and runs for `ms`.
-    fn jog(&mut self, jog: Jog, ms: u32, moves: impl Fn(Vec3) -> [i32; 3]) {
+    fn jog(&mut self, jog: Jog, ms: u32, motion: impl Fn(Vec3) -> [i32; 3]) {
         self.send(Command::Jog(jog));
         for tick in 0..self.rate.ticks(ms) {
             self.sense.dead_man = tick > self.rate.ticks(20);
-            self.tick(&moves);
+            self.tick(&motion);
         }
     }
 }
@@ -199,7 +199,7 @@ fn runaway_of_any_joint_is_a_fault() {
 
 #[test]
 fn stationary_encoder_is_detected_at_half_the_current() {
-    for moves in [
+    for motion in [
         |_| [0; 3],
         |current: Vec3| {
             // One dead channel: a count up and down. Then another joint moves.
@@ -208,7 +208,7 @@ fn stationary_encoder_is_detected_at_half_the_current() {
     ] {
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-        bench.jog(JOG, 4_000, moves);
+        bench.jog(JOG, 4_000, motion);
         assert_eq!(bench.report().fault, Some(Fault::NoMotion));
         let max = bench.drives.iter().map(|drive| -drive.currents_a.y);
         assert!(max.fold(0.0, f32::max) < 0.152);

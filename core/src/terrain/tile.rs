@@ -315,8 +315,8 @@ impl Tile {
         [v, v + 1, v1 + 1].into_iter().all(|row| {
             let row = &self.samples[row];
             // False for NaN.
-            let reaches = |sample: f32| sample >= low;
-            !(reaches(row[u]) || reaches(row[u + 1]) || reaches(row[u1 + 1]))
+            let is_reached = |sample: f32| sample >= low;
+            !(is_reached(row[u]) || is_reached(row[u + 1]) || is_reached(row[u1 + 1]))
         })
     }
 

@@ -219,11 +219,11 @@ fn debounced_clutch_input_opens_the_clutch() {
         |ticks, reads| limits_after(&mut haptic_loop, &mut ends, ticks, reads) & of_clutch;
     assert_eq!(limits(4, true), Limits::empty());
     assert_eq!(limits(10, false), Limits::empty());
-    let moves = Limits::CLUTCH_INPUT | Limits::CLUTCH_MOVES;
-    assert_eq!(limits(6, true), moves);
+    let opening = Limits::CLUTCH_INPUT | Limits::CLUTCH_MOVES;
+    assert_eq!(limits(6, true), opening);
     let open = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN;
     for _ in 0..3 {
-        assert_eq!(limits(30, true), moves, "it takes 0.1 s");
+        assert_eq!(limits(30, true), opening, "it takes 0.1 s");
     }
     assert_eq!(limits(30, true), open);
     assert_eq!(limits(19, false), open);

@@ -9,8 +9,8 @@ impl<const D: usize> Link<'_, D> {
     /// dead-man press ends as soon as the host is absent.
     pub(super) fn check_host_timeout(&mut self) {
         let now = self.ends.monitor.ticks();
-        let waits = self.device.is_being_armed() || self.device.is_awaiting_press();
-        if waits
+        let is_waiting = self.device.is_being_armed() || self.device.is_awaiting_press();
+        if is_waiting
             && let Some(room) = self.room_for_command()
             && self.session.is_absent(now, self.device.ticks_per_ms())
         {

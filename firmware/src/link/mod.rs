@@ -209,7 +209,7 @@ impl<'t, const D: usize> Link<'t, D> {
     /// the device in lock-step runs no tick; a real board keeps ticking.
     #[must_use]
     pub fn may_stop_clock(&self) -> bool {
-        let waits = match &self.scene {
+        let is_waiting = match &self.scene {
             None => true,
             Some(scene) if scene.source == Source::Points => self.replay.current.is_none(),
             Some(scene) if scene.hold_clock && self.requester.in_flight() > 0 => return true,
@@ -217,9 +217,9 @@ impl<'t, const D: usize> Link<'t, D> {
         };
         // Commands have to reach the loop, the force has to ramp down, and a host that closes has
         // to receive its answer.
-        let leaves = self.session.is_closing();
-        waits
-            && !(leaves && self.device.may_drive)
+        let is_closing = self.session.is_closing();
+        is_waiting
+            && !(is_closing && self.device.may_drive)
             && self.ends.commands.is_empty()
             && self.ends.settings.is_empty()
             && self.device.is_idle()

@@ -90,9 +90,9 @@ impl<const D: usize> Link<'_, D> {
 
     /// Sends the close when nothing is driven and everything else was sent.
     fn send_goodbye(&mut self) {
-        let leaves = self.session.is_closing();
+        let is_closing = self.session.is_closing();
         let is_flushed = self.samples.is_empty() && self.tx.is_telemetry_sent();
-        if leaves && is_flushed && !self.device.may_drive && self.tx.has_room() {
+        if is_closing && is_flushed && !self.device.may_drive && self.tx.has_room() {
             self.send(&ToHost::Goodbye(self.sample_count()));
             self.session.answer_goodbye();
             log::ended();
@@ -112,9 +112,9 @@ impl<const D: usize> Link<'_, D> {
 
     /// Packs the next telemetry message when the last one was sent.
     fn pack_telemetry(&mut self) {
-        let leaves = self.session.is_closing();
-        let enough = self.samples.len() >= BATCH || leaves;
-        if !enough || self.samples.is_empty() || !self.tx.is_telemetry_sent() {
+        let is_closing = self.session.is_closing();
+        let is_batch_due = self.samples.len() >= BATCH || is_closing;
+        if !is_batch_due || self.samples.is_empty() || !self.tx.is_telemetry_sent() {
             return;
         }
         let mut samples = Vec::new();

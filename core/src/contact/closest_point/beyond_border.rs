@@ -274,7 +274,7 @@ fn steepness_into(
     // edge the slope is valid, although the last place of its coordinate is worth much height.
     let is_on_edge = beside == [0.0, 0.0];
     let from_here = is_on_edge || (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
-    let falls = |direction: i32, off: f32, slope: f32| {
+    let steepness_squared = |direction: i32, off: f32, slope: f32| {
         let gradient = direction as f32 * (off + z * slope);
         let noise = SLOPE_NOISE * (off.abs() + rounding * slope.abs());
         let surely = from_here && gradient < -noise;
@@ -284,7 +284,10 @@ fn steepness_into(
             0.0
         })
     };
-    match (falls(side.east, u - p, zu), falls(side.north, v - q, zv)) {
+    match (
+        steepness_squared(side.east, u - p, zu),
+        steepness_squared(side.north, v - q, zv),
+    ) {
         (Some(east), Some(north)) => Some(east + north),
         (east, north) => east.or(north),
     }
@@ -395,11 +398,11 @@ fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint, border: Si
     let east = (at.u - p) + z * patch.slope_u(at.v);
     let north = (at.v - q) + z * patch.slope_v(at.u);
     // On a border only the direction back into the patch counts.
-    let falls = |border: i32, slope: f32| {
+    let steepness_squared = |border: i32, slope: f32| {
         let outward = border as f32 * slope < 0.0;
         if outward { 0.0 } else { slope * slope }
     };
-    falls(border.east, east) + falls(border.north, north)
+    steepness_squared(border.east, east) + steepness_squared(border.north, north)
 }
 
 #[cfg(test)]
@@ -428,15 +431,15 @@ mod tests {
             z: 0.003_328_164_8,
             evaluations: 1,
         };
-        let falls = |v: f32| steepness_into(&patch, &view, &entry, side, &here(v));
+        let steepness_squared = |v: f32| steepness_into(&patch, &view, &entry, side, &here(v));
         // Slope of half the squared distance: height over the HIP times slope northward.
         let slope = 0.003_328_f32 * 0.0479 * (1.0 - entry.u);
-        let steepness = falls(1.0).expect("it falls");
+        let steepness = steepness_squared(1.0).expect("it falls");
         assert!(
             (steepness / (slope * slope) - 1.0).abs() < 0.02,
             "{steepness:e}"
         );
         // Beside the edge its slope is not valid.
-        assert_eq!(falls(1.0 - 2e-7), Some(0.0));
+        assert_eq!(steepness_squared(1.0 - 2e-7), Some(0.0));
     }
 }

@@ -249,9 +249,9 @@ fn closest_on_line(hip: f32, slope: f32, [start, end]: [f32; 2]) -> (f32, f32, i
 /// Returns true if the distance surely falls out of the patch at a place of its border.
 #[inline(always)]
 fn falls_outward(patch: &Patch, (p, q): (f32, f32), place: &PatchPoint, side: Side) -> bool {
-    let falls = |toward: i32, slope: f32| toward == 0 || toward as f32 * slope < -LEVEL;
-    falls(side.east, (place.u - p) + place.z * patch.slope_u(place.v))
-        && falls(side.north, (place.v - q) + place.z * patch.slope_v(place.u))
+    let is_downhill = |toward: i32, slope: f32| toward == 0 || toward as f32 * slope < -LEVEL;
+    is_downhill(side.east, (place.u - p) + place.z * patch.slope_u(place.v))
+        && is_downhill(side.north, (place.v - q) + place.z * patch.slope_v(place.u))
 }
 
 #[cfg(test)]
