@@ -36,8 +36,8 @@ fn main() {
         return;
     };
     if let Some(counts_a_second) = counts_a_second {
-        let stated = env::var("HAPTERRA_TICK_HZ").ok();
-        match tick_rate::tick_hz(stated.as_deref(), board, *counts_a_second) {
+        let requested = env::var("HAPTERRA_TICK_HZ").ok();
+        match tick_rate::tick_hz(requested.as_deref(), board, *counts_a_second) {
             Ok(hz) => println!("cargo::rustc-env=HAPTERRA_TICK_HZ={hz}"),
             Err(why) => println!("cargo::error={why}"),
         }

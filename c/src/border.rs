@@ -7,7 +7,7 @@ use std::slice;
 use crate::status::{Failure, HapterraStatus};
 
 /// Checks that a pointer can be that of an array.
-fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
+fn check_pointer<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     let bytes = count.checked_mul(size_of::<T>());
     match pointer {
         pointer if pointer.is_null() => Err(HapterraStatus::NullPointer),
@@ -25,7 +25,7 @@ pub(crate) unsafe fn array<'a, T>(
     pointer: *const T,
     count: usize,
 ) -> Result<&'a [T], HapterraStatus> {
-    check(pointer, count)?;
+    check_pointer(pointer, count)?;
     // SAFETY: not null, aligned, no larger than memory; the contract of the header, which every
     // caller of this function repeats, guarantees the values.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
@@ -35,16 +35,16 @@ pub(crate) unsafe fn array<'a, T>(
 ///
 /// # Safety
 /// At `pointer` is room for `count` values that no other thread uses during the call.
-pub(crate) unsafe fn room<'a, T>(
+pub(crate) unsafe fn output_array<'a, T>(
     pointer: *mut T,
     count: usize,
 ) -> Result<&'a mut [MaybeUninit<T>], HapterraStatus> {
-    check(pointer, count)?;
+    check_pointer(pointer, count)?;
     // SAFETY: as above, and the type allows any content, also uninitialised.
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
 /// Runs a call and returns a panic as a failure.
-pub(crate) fn caught<R>(call: impl FnOnce() -> Result<R, Failure>) -> Result<R, Failure> {
+pub(crate) fn catch_panic<R>(call: impl FnOnce() -> Result<R, Failure>) -> Result<R, Failure> {
     catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|_| Err(HapterraStatus::Internal.into()))
 }

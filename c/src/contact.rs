@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 
 use hapterra_touch::{Contact, State, Step};
 
-use crate::border::{array, caught, room};
+use crate::border::{array, catch_panic, output_array};
 use crate::status::{Failure, HapterraStatus, Message};
 use crate::surface_params::{HapterraSurface, surface};
 use crate::terrain::HapterraTerrain;
@@ -76,13 +76,13 @@ impl HapterraContact {
         &mut self,
         call: impl FnOnce(&mut Option<Contact>) -> Result<(), Failure>,
     ) -> HapterraStatus {
-        let Err(failure) = caught(|| call(&mut self.contact)) else {
+        let Err(failure) = catch_panic(|| call(&mut self.contact)) else {
             return HapterraStatus::Ok;
         };
         if failure.status == HapterraStatus::Internal {
             self.contact = None;
         }
-        self.message.keep(failure)
+        self.message.set(failure)
     }
 }
 
@@ -174,23 +174,23 @@ pub unsafe extern "C" fn hapterra_contact_run(
     steps: *mut HapterraStep,
     done: Option<&mut MaybeUninit<usize>>,
 ) -> HapterraStatus {
-    let mut happened = 0;
+    let mut done_steps = 0;
     let status = contact.map_or(HapterraStatus::NullPointer, |contact| {
         contact.call(|contact| {
             let contact = contact.as_mut().ok_or(HapterraStatus::NotBegun)?;
             // SAFETY: by this function's contract.
             let hips_mm = unsafe { array(hips_mm.cast::<[f64; 3]>(), count) }?;
             // SAFETY: by this function's contract.
-            let steps = unsafe { room(steps, count) }?;
+            let steps = unsafe { output_array(steps, count) }?;
             for (hip_mm, step) in hips_mm.iter().zip(steps) {
                 step.write(contact.step(*hip_mm)?.into());
-                happened += 1;
+                done_steps += 1;
             }
             Ok(())
         })
     });
     if let Some(done) = done {
-        done.write(happened);
+        done.write(done_steps);
     }
     status
 }

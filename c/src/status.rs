@@ -131,7 +131,7 @@ impl From<StepError> for Failure {
 pub(crate) struct Message(CString);
 
 impl Message {
-    pub(crate) fn keep(&mut self, failure: Failure) -> HapterraStatus {
+    pub(crate) fn set(&mut self, failure: Failure) -> HapterraStatus {
         // No message contains a zero.
         self.0 = CString::new(failure.message).unwrap_or_default();
         failure.status

@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 
 use hapterra_touch::{Block, Height, Heights, RowOrder, Terrain, TerrainError, Unread};
 
-use crate::border::{array, caught};
+use crate::border::{array, catch_panic};
 use crate::status::{Failure, HapterraStatus, Message};
 
 /// The order of the rows of an array.
@@ -60,8 +60,8 @@ impl Heights for Reader {
             columns,
             rows,
         } = block;
-        let room = heights.as_mut_ptr();
-        match (self.read)(self.user, column, row, columns, rows, room) {
+        let buffer = heights.as_mut_ptr();
+        match (self.read)(self.user, column, row, columns, rows, buffer) {
             0 => Ok(()),
             error => Err(Unread(error)),
         }
@@ -70,16 +70,16 @@ impl Heights for Reader {
 
 impl HapterraTerrain {
     /// Replaces the heights; keeps the previous ones after an error.
-    fn put(
+    fn set_terrain(
         &mut self,
-        made: impl FnOnce(Option<&Terrain>) -> Result<Terrain, Failure>,
+        create: impl FnOnce(Option<&Terrain>) -> Result<Terrain, Failure>,
     ) -> HapterraStatus {
-        match caught(|| made(self.terrain.as_ref())) {
+        match catch_panic(|| create(self.terrain.as_ref())) {
             Ok(terrain) => {
                 self.terrain = Some(terrain);
                 HapterraStatus::Ok
             }
-            Err(failure) => self.message.keep(failure),
+            Err(failure) => self.message.set(failure),
         }
     }
 
@@ -92,7 +92,7 @@ impl HapterraTerrain {
         cell_mm: f64,
         order: u32,
     ) -> HapterraStatus {
-        self.put(|_| {
+        self.set_terrain(|_| {
             let order = row_order(order)?;
             let count = (columns as usize).checked_mul(rows as usize);
             let count = count.ok_or(TerrainError::Memory { columns, rows })?;
@@ -179,7 +179,7 @@ pub extern "C" fn hapterra_terrain_set_reader(
     cell_mm: f64,
 ) -> HapterraStatus {
     terrain.map_or(HapterraStatus::NullPointer, |terrain| {
-        terrain.put(|_| {
+        terrain.set_terrain(|_| {
             let read = read.ok_or(HapterraStatus::NullPointer)?;
             let reader = Reader { read, user };
             Ok(Terrain::from_tiles(columns, rows, cell_mm, reader)?)
@@ -195,7 +195,7 @@ pub extern "C" fn hapterra_terrain_set_height_scale(
     mm_per_unit: f64,
 ) -> HapterraStatus {
     terrain.map_or(HapterraStatus::NullPointer, |terrain| {
-        terrain.put(|terrain| {
+        terrain.set_terrain(|terrain| {
             let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
             Ok(terrain.with_height_scale(mm_per_unit)?)
         })
@@ -212,7 +212,7 @@ pub extern "C" fn hapterra_terrain_set_tip(
     tip_mm: f64,
 ) -> HapterraStatus {
     terrain.map_or(HapterraStatus::NullPointer, |terrain| {
-        terrain.put(|terrain| {
+        terrain.set_terrain(|terrain| {
             let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
             Ok(terrain.with_tip(tip_mm)?)
         })
@@ -233,7 +233,7 @@ pub unsafe extern "C" fn hapterra_terrain_set_materials(
     order: u32,
 ) -> HapterraStatus {
     terrain.map_or(HapterraStatus::NullPointer, |terrain| {
-        terrain.put(|terrain| {
+        terrain.set_terrain(|terrain| {
             let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
             // SAFETY: by this function's contract.
             let materials = unsafe { array(materials, count) }?;
@@ -251,7 +251,7 @@ pub extern "C" fn hapterra_terrain_height_mm(
     north_mm: f64,
 ) -> f64 {
     let terrain = terrain.and_then(|terrain| terrain.terrain.as_ref());
-    let height = caught(|| Ok(terrain.and_then(|it| it.height_mm(east_mm, north_mm))));
+    let height = catch_panic(|| Ok(terrain.and_then(|it| it.height_mm(east_mm, north_mm))));
     height.ok().flatten().unwrap_or(f64::NAN)
 }
 

@@ -31,7 +31,7 @@ fn rough() -> HapterraSurface {
 }
 
 #[test]
-fn surface_keeps_every_number() {
+fn surface_round_trips_every_field() {
     let params = rough().params().expect("known numbers");
     assert_eq!(HapterraSurface::of(&params), rough());
     let mut default = MaybeUninit::uninit();
@@ -47,7 +47,7 @@ fn surface_keeps_every_number() {
 }
 
 #[test]
-fn steps_are_those_of_the_library() {
+fn steps_equal_those_of_the_touch_crate() {
     let heights: Vec<f64> = (0..60 * 50)
         .map(|at| 4.0 * (f64::from(at) * 0.37).sin())
         .collect();

@@ -107,7 +107,7 @@ fn programs_run_with_the_static_and_the_shared_library() {
 
 #[cfg(unix)]
 #[test]
-fn valgrind_finds_no_wrong_access_and_no_leak() {
+fn valgrind_finds_no_invalid_access_and_no_leak() {
     if !has("valgrind") {
         return;
     }

@@ -48,9 +48,9 @@ impl Arm {
 
     /// Advances by a tick, with these motor currents and a hand whose target is a height over the
     /// tip's home, mm.
-    fn go_on(&mut self, drive: &GuardOutputs, wanted_mm: f32) {
+    fn advance(&mut self, drive: &GuardOutputs, target_mm: f32) {
         let pose = self.mechanism.pose(self.counts(), [0; 3]);
-        let wanted = self.mechanism.home_mm() + Vec3::Z * wanted_mm;
+        let wanted = self.mechanism.home_mm() + Vec3::Z * target_mm;
         let hand = pose.torques_nm((wanted - pose.tip_mm()) * Self::GRIP_N_PER_MM);
         let nm_per_ampere = self.mechanism.currents_a(Vec3::ONE).recip();
         let motors = drive.currents_a * nm_per_ampere;
@@ -104,19 +104,19 @@ pub(crate) fn main() -> Result<(), CalibrationError> {
     for tick in 0..6_000_u16 {
         let time_s = f32::from(tick) * TICK_S;
         // Armed after the switch is pressed and the force has ramped up; then down.
-        let wanted_mm = (-8.0 * (time_s - 2.5)).clamp(-20.0, 0.0);
+        let target_mm = (-8.0 * (time_s - 2.5)).clamp(-20.0, 0.0);
         let sense = GuardInputs {
             counts: arm.counts(),
             dead_man: tick > 10,
             ..GuardInputs::default()
         };
         let outcome = haptics.tick(&sense, true);
-        arm.go_on(&outcome.drive, wanted_mm);
+        arm.advance(&outcome.drive, target_mm);
         let sample = outcome.sample;
         last = sample.force_n.z;
         if tick % 250 == 0 {
             println!(
-                "{time_s:4.2} s {wanted_mm:9.2} mm {:6.2} mm {last:9.3} N   {:10} {:?}",
+                "{time_s:4.2} s {target_mm:9.2} mm {:6.2} mm {last:9.3} N   {:10} {:?}",
                 arm.height_mm(),
                 format!("{:?}", sample.mode),
                 sample.state

@@ -105,13 +105,13 @@ pub(crate) fn main() -> Result<(), FrameError> {
         let output = *contact.step(&window, &hip);
         touching += u32::from(output.state == ContactState::Touching);
         waiting += u32::from(output.missing_tile.is_some());
-        let demand = RequestHint {
+        let hint = RequestHint {
             missing_tile: output.missing_tile,
             proxy: output.proxy.column(),
             hip: hip.column(),
             velocity: [0.1, 0.0],
         };
-        while let Some(key) = requester.next_request(tick, &demand) {
+        while let Some(key) = requester.next_request(tick, &hint) {
             let message = ToHost::TileRequest { epoch: EPOCH, key };
             let session = SESSION;
             let mut buffer = [0; 32];

@@ -18,12 +18,12 @@ const HEIGHT: f32 = 20.0;
 const DEGREE: f32 = 1.1;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("{}", drawn()?);
+    println!("{}", picture()?);
     Ok(())
 }
 
 /// Returns the picture.
-pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
+pub(crate) fn picture() -> Result<String, Box<dyn std::error::Error>> {
     let size = FieldSize::new(SECTION.len() as i32 - 1, 4);
     let mut field = TileArena::<1>::from_fn(size, |x, _| SECTION[x as usize])?;
     let window = field.window();

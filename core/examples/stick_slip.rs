@@ -38,7 +38,7 @@ const ICE: f32 = 160.0;
 const START: f32 = 460.0;
 
 /// Record of a tick: s, newtons along the surface, and mm from the start.
-struct Seen {
+struct TickState {
     time: f32,
     force: f32,
     hand: f32,
@@ -47,16 +47,16 @@ struct Seen {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("{}", drawn()?);
+    println!("{}", picture()?);
     Ok(())
 }
 
 /// Returns the picture.
-pub(crate) fn drawn() -> Result<String, Box<dyn Error>> {
-    let seen = dragged()?;
-    let line = |color: &str, height: fn(&Seen) -> f32| {
+pub(crate) fn picture() -> Result<String, Box<dyn Error>> {
+    let states = simulate()?;
+    let line = |color: &str, height: fn(&TickState) -> f32| {
         // Every fourth tick is less than a pixel.
-        let points = seen.iter().step_by(4);
+        let points = states.iter().step_by(4);
         let points = points.map(|at| format!("{:.1},{:.1} ", at.time * SECOND, height(at)));
         let points: String = points.collect();
         format!(
@@ -84,7 +84,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn Error>> {
 }
 
 /// Runs a hand that moves east, and the tip that it drags.
-fn dragged() -> Result<Vec<Seen>, Box<dyn Error>> {
+fn simulate() -> Result<Vec<TickState>, Box<dyn Error>> {
     let size = FieldSize::new(64, 4);
     let mut field = TileArena::<2>::from_fn(size, |_, _| 0.0)?;
     let window = field.window();
@@ -95,13 +95,13 @@ fn dragged() -> Result<Vec<Seen>, Box<dyn Error>> {
     let tick_s = TickRate::DEFAULT.tick_s();
     let step_s = tick_s / f32::from(STEPS);
     let (mut hip, mut speed) = (0.0_f32, 0.0_f32);
-    let mut seen = Vec::new();
+    let mut states = Vec::new();
     for tick in 0..TICKS {
         let time = f32::from(tick) * tick_s;
         let hand = SPEED * time;
         let output = *contact.step(&window, &at(hip, -DEPTH));
         let pull = output.displacement.x;
-        seen.push(Seen {
+        states.push(TickState {
             time,
             force: -pull * STIFFNESS,
             hand,
@@ -114,5 +114,5 @@ fn dragged() -> Result<Vec<Seen>, Box<dyn Error>> {
             hip += speed * step_s;
         }
     }
-    Ok(seen)
+    Ok(states)
 }

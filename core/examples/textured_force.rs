@@ -10,7 +10,7 @@ use hapterra_core::rate::TickRate;
 const STIFFNESS: f32 = 0.5;
 const DEPTH: f32 = 1.0;
 /// Path over the plane, mm, and distance between HIPs, mm.
-const WAY: f32 = 10.0;
+const PATH_MM: f32 = 10.0;
 const STEP: f32 = 0.02;
 /// Pixels of a millimetre, and of a newton.
 const MM: f32 = 70.0;
@@ -25,19 +25,19 @@ const TEXTURE: Texture = Texture {
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("{}", drawn()?);
+    println!("{}", picture()?);
     Ok(())
 }
 
 /// Returns the picture.
-pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
+pub(crate) fn picture() -> Result<String, Box<dyn std::error::Error>> {
     let grain = Texture {
         pattern: Pattern::Grain,
         ..TEXTURE
     };
     let mut lines = String::new();
     for (texture, middle) in [(TEXTURE, 90.0), (grain, 230.0)] {
-        let forces = rendered(&texture, STEP, (WAY / STEP) as usize)?;
+        let forces = rendered(&texture, STEP, (PATH_MM / STEP) as usize)?;
         for (color, part) in [("#1f5f9e", Vec3::Z), ("#b5482c", Vec3::X)] {
             let points = forces.iter().enumerate().map(|(i, force)| {
                 let off = part.dot(*force - Vec3::Z * STIFFNESS * DEPTH);
@@ -51,8 +51,8 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
         let speed = 0.0025 * i as f32;
         // Not in step with the ticks.
         let forces = rendered(&TEXTURE, (speed + 1.3e-5) * TEXTURE.wavelength_mm, 20_000);
-        let most = forces.map(|forces| forces.iter().fold(0.0, |most, f| f32::max(most, f.z)));
-        let share = (most.unwrap_or_default() / STIFFNESS - DEPTH) / TEXTURE.amplitude_mm;
+        let max = forces.map(|forces| forces.iter().fold(0.0, |max, f| f32::max(max, f.z)));
+        let share = (max.unwrap_or_default() / STIFFNESS - DEPTH) / TEXTURE.amplitude_mm;
         format!("{:.1},{:.1} ", i as f32 * 5.6, 440.0 - 90.0 * share)
     });
     lines += &polyline("#333", &faded.skip(4).collect::<String>());

@@ -21,7 +21,7 @@
 //!
 //! A pressing hand yields when the force fades out: it moves on towards its target. If the terrain
 //! follows it, the ground sinks by that distance. So a clutch that is held only for a new placement
-//! ([`ClutchHold::InPlace`]) keeps the terrain in its place relative to the arm: the point that was
+//! ([`ClutchMode::InPlace`]) keeps the terrain in its place relative to the arm: the point that was
 //! under the tip when the clutch opened is there when it closes, and the press returns.
 
 use glam::Vec3;
@@ -35,18 +35,18 @@ use crate::scene::Scene;
 use crate::terrain::Window;
 
 /// Duration of the ramp-up to full force, ms.
-const IN_MS: u32 = 500;
+const RAMP_UP_MS: u32 = 500;
 /// Maximum motion of the hand, mm, for which the terrain stays in its place; for any motion beyond
 /// that the terrain follows the hand. A hand that yields under 1.2 N moves some 5 mm.
-const GIVE_MM: f32 = 10.0;
+const MAX_OFFSET_MM: f32 = 10.0;
 
 /// The host's use of the clutch. While it is held, the HIP stays at its place over the terrain, and
 /// no force is rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ClutchHold {
+pub enum ClutchMode {
     /// Not held.
     #[default]
-    LetGo,
+    Released,
     /// The terrain follows the hand: it is rendered again at the new position of the hand.
     WithHand,
     /// For a new placement: the terrain is rendered again in its place relative to the arm, after
@@ -73,13 +73,13 @@ enum State {
 pub(crate) struct Clutch {
     state: State,
     /// The host's use of the clutch.
-    host: ClutchHold,
+    host: ClutchMode,
     /// True if the board's clutch input is held: the terrain follows the hand.
     input: bool,
     /// True if the terrain had to follow the hand at some time since the clutch was held.
-    carries: bool,
+    follows_hand: bool,
     /// Remaining shift of the terrain, relative to the tip, mm.
-    owed_mm: Vec3,
+    pending_shift_mm: Vec3,
     /// Share of the force for a driven arm.
     ramp: f32,
     /// Share of the force in the last tick.
@@ -87,8 +87,8 @@ pub(crate) struct Clutch {
     /// The clutch's limits of the last tick.
     limits: Limits,
     /// Decrease of the share in a tick: the same as for disarming.
-    out: f32,
-    back: f32,
+    fade_step: f32,
+    ramp_step: f32,
 }
 
 impl Clutch {
@@ -96,15 +96,15 @@ impl Clutch {
     pub(crate) fn new(rate: TickRate) -> Self {
         Self {
             state: State::Closed,
-            host: ClutchHold::LetGo,
+            host: ClutchMode::Released,
             input: false,
-            carries: false,
-            owed_mm: Vec3::ZERO,
+            follows_hand: false,
+            pending_shift_mm: Vec3::ZERO,
             ramp: 1.0,
             share: 1.0,
             limits: Limits::empty(),
-            out: 1.0 / rate.ticks(FADE_MS) as f32,
-            back: 1.0 / rate.ticks(IN_MS) as f32,
+            fade_step: 1.0 / rate.ticks(FADE_MS) as f32,
+            ramp_step: 1.0 / rate.ticks(RAMP_UP_MS) as f32,
         }
     }
 
@@ -121,7 +121,7 @@ impl Clutch {
 
     /// Restarts, closed, for a new scene. A held input opens the clutch of an arm; a replay has no
     /// hand.
-    pub(crate) fn begin(&mut self, rate: TickRate, of_arm: bool) {
+    pub(crate) fn restart(&mut self, rate: TickRate, of_arm: bool) {
         let input = self.input;
         *self = Self::new(rate);
         self.input = input;
@@ -131,20 +131,20 @@ impl Clutch {
     }
 
     /// Sets the host's use of the clutch.
-    pub(crate) fn hold(&mut self, host: ClutchHold) {
+    pub(crate) fn set_mode(&mut self, host: ClutchMode) {
         self.host = host;
         self.open_if_held();
     }
 
     /// Sets the state of the board's clutch input.
-    pub(crate) fn press(&mut self, held: bool) {
+    pub(crate) fn set_input(&mut self, held: bool) {
         self.input = held;
         self.open_if_held();
     }
 
     /// Returns true if the host or the input holds the clutch.
     const fn is_held(&self) -> bool {
-        self.input || !matches!(self.host, ClutchHold::LetGo)
+        self.input || !matches!(self.host, ClutchMode::Released)
     }
 
     fn open_if_held(&mut self) {
@@ -153,13 +153,13 @@ impl Clutch {
         }
         if let State::Closed | State::Closing = self.state {
             self.state = State::Opening;
-            self.carries = false;
+            self.follows_hand = false;
         }
-        self.carries |= self.input || self.host == ClutchHold::WithHand;
+        self.follows_hand |= self.input || self.host == ClutchMode::WithHand;
     }
 
     /// Moves the HIP of an open clutch.
-    pub(crate) fn put(&mut self, there: GridPoint) {
+    pub(crate) fn set_hip(&mut self, there: GridPoint) {
         if let State::Open { hip, .. } = &mut self.state {
             *hip = there;
         }
@@ -198,7 +198,7 @@ impl Clutch {
         match &mut self.state {
             State::Closed => {}
             State::Opening => {
-                self.ramp -= self.out;
+                self.ramp -= self.fade_step;
                 if self.ramp <= 0.0 {
                     self.ramp = 0.0;
                     let tip_mm = from_home_mm(scene);
@@ -206,15 +206,15 @@ impl Clutch {
                 }
             }
             State::Open { hip: there, tip_mm } => {
-                if let Some(landed) = contact.land(window) {
-                    *there = landed;
+                if let Some(start) = contact.place_on_surface(window) {
+                    *there = start;
                 }
                 hip = *there;
-                if !is_held && !contact.is_onset() {
-                    self.owed_mm += from_home_mm(scene) - *tip_mm;
-                    self.owed_mm = match self.carries {
+                if !is_held && !contact.is_onset_pending() {
+                    self.pending_shift_mm += from_home_mm(scene) - *tip_mm;
+                    self.pending_shift_mm = match self.follows_hand {
                         true => Vec3::ZERO,
-                        false => self.owed_mm.clamp_length_max(GIVE_MM),
+                        false => self.pending_shift_mm.clamp_length_max(MAX_OFFSET_MM),
                     };
                     move_home(scene, tip.to(&hip));
                     self.state = State::Closing;
@@ -223,11 +223,11 @@ impl Clutch {
             State::Closing => {
                 // Together with the force, and no faster than a hand: after a jump the proxy would
                 // lag.
-                let share = (self.back / (1.0 - self.ramp)).min(1.0);
-                let step_mm = self.owed_mm * share;
+                let share = (self.ramp_step / (1.0 - self.ramp)).min(1.0);
+                let step_mm = self.pending_shift_mm * share;
                 move_home(scene, step_mm / scene.cell_mm);
-                self.owed_mm -= step_mm;
-                self.ramp += self.back;
+                self.pending_shift_mm -= step_mm;
+                self.ramp += self.ramp_step;
                 if self.ramp >= 1.0 {
                     self.ramp = 1.0;
                     self.state = State::Closed;
@@ -235,11 +235,11 @@ impl Clutch {
             }
         }
         self.share = if drives { self.ramp } else { 1.0 };
-        self.limits = self.limits_now();
+        self.limits = self.current_limits();
         hip
     }
 
-    const fn limits_now(&self) -> Limits {
+    const fn current_limits(&self) -> Limits {
         let by = match self.input {
             true => Limits::CLUTCH_INPUT,
             false => Limits::empty(),

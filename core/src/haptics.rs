@@ -1,6 +1,6 @@
 //! The state of the loop, and its changes between ticks: commands and scenes.
 
-use crate::clutch::{Clutch, ClutchHold};
+use crate::clutch::{Clutch, ClutchMode};
 use crate::contact::Contact;
 use crate::force::MaterialTable;
 use crate::guard::thermal::Temperatures;
@@ -24,7 +24,7 @@ pub enum Command<'t> {
     /// this acts as another scene.
     SceneChange(SceneChange),
     /// Hold or release the clutch.
-    Clutch(ClutchHold),
+    Clutch(ClutchMode),
     /// Set the state of the board's clutch input: true while it is held.
     ClutchInput(bool),
     /// Mark the next tick with this number. It only makes the loop around the tick raise the
@@ -126,7 +126,7 @@ pub struct Board {
 ///     let hip = GridPoint::new([10, 10, 0], Vec3::new(0.5, 0.5, height));
 ///     haptics.accept(Command::Hip(HipCommand { seq, hip }))?;
 ///     let outcome = haptics.tick(&GuardInputs::default(), true);
-///     assert_eq!(outcome.answers, Some(seq));
+///     assert_eq!(outcome.answered_seq, Some(seq));
 ///     sample = outcome.sample;
 /// }
 /// // One millimetre deep: half a newton up.
@@ -175,7 +175,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     pub fn on_board(tiles: [[&'t mut Tile; D]; D], board: &Board) -> Self {
         let mut guard = Guard::new(board.rate, board.fault);
         if let Some(motors) = board.motors {
-            guard.begin_at(motors);
+            guard.set_temperatures(motors);
         }
         Self {
             renderer: Renderer::new(board.rate, board.latency_s),
@@ -207,13 +207,13 @@ impl<'t, const D: usize> Haptics<'t, D> {
     pub fn accept(&mut self, command: Command<'t>) -> Result<Option<&'t mut Tile>, RefusedScene> {
         let mut back = None;
         match command {
-            Command::Scene(scene) => self.take_scene(Some(scene))?,
-            Command::DropScene => self.take_scene(None)?,
-            Command::SceneChange(view) => self.take_view(&view)?,
-            Command::Clutch(hold) => self.clutch.hold(hold),
-            Command::ClutchInput(held) => self.clutch.press(held),
+            Command::Scene(scene) => self.set_scene(Some(scene))?,
+            Command::DropScene => self.set_scene(None)?,
+            Command::SceneChange(view) => self.set_placement(&view)?,
+            Command::Clutch(hold) => self.clutch.set_mode(hold),
+            Command::ClutchInput(held) => self.clutch.set_input(held),
             Command::Mark(_) => {}
-            Command::Tile(tile) => back = self.take_tile(tile),
+            Command::Tile(tile) => back = self.store_tile(tile),
             Command::Hip(HipCommand { seq, hip }) => {
                 // The link can deliver any bits.
                 let hip = hip.normalised();
@@ -221,12 +221,12 @@ impl<'t, const D: usize> Haptics<'t, D> {
             }
             Command::Arm => self.guard.arm(),
             Command::Jog(jog) => {
-                self.take_scene(None)?;
+                self.set_scene(None)?;
                 self.guard.jog(jog);
             }
             Command::Disarm => self.guard.disarm(),
-            Command::Zero(counts) => self.take_zero(counts),
-            Command::ClearFault(seen) => self.guard.clear_seen(seen),
+            Command::Zero(counts) => self.set_zero(counts),
+            Command::ClearFault(fault) => self.guard.clear_if_acknowledged(fault),
             Command::Trip(fault) => self.guard.trip(fault),
             Command::HoldOutputs(shares) => self.guard.hold(shares),
         }
@@ -244,8 +244,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// Sets the table of materials for the scene that follows through [`Haptics::accept`] before
     /// the next tick. A scene with an invalid table is refused.
-    pub fn take_materials(&mut self, table: &MaterialTable) {
-        self.renderer.take_materials(table);
+    pub fn set_materials(&mut self, table: &MaterialTable) {
+        self.renderer.set_materials(table);
     }
 
     /// Returns the source of the next tick's HIP in the current scene.
@@ -262,25 +262,25 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// Sets a scene, or drops the current one; the force ramps down. A refused scene also drops the
     /// current one, because its sender assumes it to be set.
-    fn take_scene(&mut self, scene: Option<Scene>) -> Result<(), RefusedScene> {
-        let asked = scene.is_some();
-        let scene = scene.filter(|scene| self.renderer.can_take(scene));
+    fn set_scene(&mut self, scene: Option<Scene>) -> Result<(), RefusedScene> {
+        let is_requested = scene.is_some();
+        let scene = scene.filter(|scene| self.renderer.can_render(scene));
         match &scene {
             Some(scene) if scene.source == Source::Points => self.guard.stop(),
             _ => self.guard.disarm(),
         }
         if let Some(scene) = &scene {
             self.window.reset(scene.level, scene.size, scene.top);
-            self.window.lay(scene.fallback);
+            self.window.set_fallback(scene.fallback);
             self.tick = 0;
         }
-        self.renderer.take(scene.as_ref(), None);
+        self.renderer.set_scene(scene.as_ref(), None);
         self.scene = scene;
         self.point = None;
         let of_arm = scene.is_some_and(|scene| scene.source == Source::Encoders);
-        self.clutch.begin(self.rate, of_arm);
+        self.clutch.restart(self.rate, of_arm);
         self.view = 0;
-        match asked && scene.is_none() {
+        match is_requested && scene.is_none() {
             true => Err(RefusedScene),
             false => Ok(()),
         }
@@ -289,7 +289,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// Sets another placement without a step in force: the clutch of an arm is open, and a replay
     /// drives no arm. A proxy in contact starts on the surface at its position relative to the
     /// hand, as deep as before.
-    fn take_view(&mut self, view: &SceneChange) -> Result<(), RefusedScene> {
+    fn set_placement(&mut self, view: &SceneChange) -> Result<(), RefusedScene> {
         let &SceneChange { scene, hip, .. } = view;
         let before = self.scene.as_ref();
         let may_change = before.is_some_and(|before| {
@@ -299,23 +299,23 @@ impl<'t, const D: usize> Haptics<'t, D> {
         let displacement = before
             .zip(self.renderer.contact().displacement())
             .map(|(before, displacement)| displacement * (before.cell_mm / scene.cell_mm));
-        if !may_change || !self.renderer.can_take(&scene) {
-            return self.take_scene(Some(scene));
+        if !may_change || !self.renderer.can_render(&scene) {
+            return self.set_scene(Some(scene));
         }
         if !view.keeps_tiles {
             self.window.reset(scene.level, scene.size, scene.top);
         }
         let has_other_fallback = before.is_none_or(|before| before.fallback != scene.fallback);
         if has_other_fallback || !view.keeps_tiles {
-            self.window.lay(scene.fallback);
+            self.window.set_fallback(scene.fallback);
         }
         // The link can deliver any bits.
         let hip = hip.normalised();
-        self.renderer.take(
+        self.renderer.set_scene(
             Some(&scene),
             displacement.map(|displacement| (hip, displacement)),
         );
-        self.clutch.put(hip);
+        self.clutch.set_hip(hip);
         self.scene = Some(scene);
         self.point = None;
         self.view = view.number;
@@ -323,7 +323,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     }
 
     /// Sets the zero counts. The tip's position then jumps, so the outputs are switched off.
-    fn take_zero(&mut self, counts: [i32; 3]) {
+    fn set_zero(&mut self, counts: [i32; 3]) {
         self.guard.stop();
         self.guard.restart_counts();
         self.renderer.restart(self.scene.as_ref());
@@ -332,14 +332,14 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// Stores a tile. In a scene of an arm it is refused if its slot holds the tile under the
     /// proxy, or a tile next to it: it was requested for a place that the proxy has left.
-    fn take_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
+    fn store_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
         let level = self.window.level();
         let of_arm = self
             .scene
             .as_ref()
             .is_some_and(|it| it.source == Source::Encoders);
         let under_proxy = self.renderer.contact().patch().filter(|_| of_arm);
-        let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
+        let under_proxy = under_proxy.map(|cell| TileKey::containing(level, cell));
         if let (Some(under_proxy), Some(key)) = (under_proxy, tile.key())
             && key != under_proxy
             && self.window.expects(key)

@@ -10,7 +10,7 @@
 use glam::Vec3;
 
 use crate::contact::{Contact, ContactSettings};
-use crate::force::{EffectContext, Effects, MaterialTable, Moment, Shares};
+use crate::force::{EffectContext, Effects, MaterialTable, PassivityInputs, Shares};
 use crate::grid::GridPoint;
 use crate::guard::Guard;
 use crate::phantom::{Kinematics, Pose, to_terrain_frame};
@@ -23,7 +23,7 @@ const TILES_PER_SLOT: u32 = 4;
 
 /// Source of the HIP's motion.
 #[derive(Clone, Copy)]
-pub(crate) enum Mover<'a> {
+pub(crate) enum MotionSource<'a> {
     /// The host's points, each rendered with all of the terrain that it needs.
     Points,
     /// An arm.
@@ -39,7 +39,7 @@ pub(crate) enum Mover<'a> {
     },
 }
 
-impl Mover<'_> {
+impl MotionSource<'_> {
     const fn clutch(&self) -> f32 {
         match self {
             Self::Points => 1.0,
@@ -49,13 +49,18 @@ impl Mover<'_> {
 
     /// Returns the inputs of damping and passivity controller; `None` while no force follows the
     /// spring: with the amplifiers off, while the last force ramps down, or with an open clutch.
-    fn moment(&self, displacement_mm: Vec3, moved_mm: Vec3, rate: TickRate) -> Option<Moment> {
+    fn passivity_inputs(
+        &self,
+        displacement_mm: Vec3,
+        moved_mm: Vec3,
+        rate: TickRate,
+    ) -> Option<PassivityInputs> {
         Some(match *self {
-            Self::Points => Moment {
+            Self::Points => PassivityInputs {
                 displacement_mm,
                 moved_mm,
                 velocity_mm_s: moved_mm * rate.hz() as f32,
-                asked_n: Vec3::ZERO,
+                commanded_n: Vec3::ZERO,
                 max_n: 0.0,
                 shares: Shares::ALL,
             },
@@ -66,12 +71,12 @@ impl Mover<'_> {
                 clutch,
             } => {
                 let [ramp, speed] = guard.shares().filter(|_| clutch > 0.0)?;
-                Moment {
+                PassivityInputs {
                     displacement_mm,
                     moved_mm,
                     velocity_mm_s: to_terrain_frame(guard.tip_velocity_mm_s(mechanism, pose)),
-                    asked_n: guard.force_n(),
-                    max_n: guard.most_force_n(),
+                    commanded_n: guard.force_n(),
+                    max_n: guard.max_force_n(),
                     shares: Shares {
                         clutch,
                         ramp,
@@ -94,11 +99,11 @@ struct RenderState {
 }
 
 /// A point of a replay in progress.
-struct BegunPoint {
+struct PointInProgress {
     /// The state before it.
     before: RenderState,
     /// Number of times that another tile was missing.
-    lacked: u32,
+    missing_count: u32,
     /// The last missing tile.
     tile: Option<TileIndex>,
 }
@@ -109,16 +114,16 @@ pub(crate) enum Progress {
     /// The point was rendered; without this tile, if it needs more tiles than the window stores.
     Done(Option<TileIndex>),
     /// Work is left for the next tick.
-    GoesOn,
+    Continue,
     /// A tile is missing: the point will be rendered again, from the state before it.
-    Lacks(TileIndex),
+    MissingTile(TileIndex),
 }
 
 /// Contact and effects of the current scene.
 pub(crate) struct Renderer {
     state: RenderState,
     /// A point of a replay in progress.
-    point: Option<BegunPoint>,
+    point: Option<PointInProgress>,
     progress: Progress,
     rate: TickRate,
     /// Time from the start of a tick until its force acts, s.
@@ -147,31 +152,31 @@ impl Renderer {
     }
 
     /// Stores the table of materials for the next scene.
-    pub(crate) fn take_materials(&mut self, table: &MaterialTable) {
+    pub(crate) fn set_materials(&mut self, table: &MaterialTable) {
         self.materials_sum = table.check_sum();
         self.materials.clone_from(table);
     }
 
     /// Returns true if a scene's numbers are valid and its materials are stored.
-    pub(crate) fn can_take(&self, scene: &Scene) -> bool {
+    pub(crate) fn can_render(&self, scene: &Scene) -> bool {
         let is_here = |sum: u32| sum == self.materials_sum && self.materials.is_valid();
         scene.is_valid() && scene.materials.is_none_or(is_here)
     }
 
-    /// Sets a scene that [`Self::can_take`] accepts, or none. All effects are created here.
+    /// Sets a scene that [`Self::can_render`] accepts, or none. All effects are created here.
     /// `onset` is the HIP after a change of placement, and the displacement with which the proxy
     /// starts on the surface, cells.
-    pub(crate) fn take(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
+    pub(crate) fn set_scene(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
         self.state.effects = scene.and_then(|scene| self.effects_of(scene));
-        self.begin(scene, onset);
+        self.restart_contact(scene, onset);
     }
 
     /// Restarts the contact in the same scene, because the HIP has jumped.
     pub(crate) fn restart(&mut self, scene: Option<&Scene>) {
-        self.begin(scene, None);
+        self.restart_contact(scene, None);
     }
 
-    fn begin(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
+    fn restart_contact(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
         let settings = ContactSettings::AT_1_KHZ
             .at_rate(self.rate)
             .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm));
@@ -219,10 +224,10 @@ impl Renderer {
         window: &Window<'_, D>,
         scene: &Scene,
         hip: GridPoint,
-        mover: &Mover<'_>,
+        motion: &MotionSource<'_>,
     ) -> Vec3 {
         self.state.contact.step(window, &hip);
-        self.force_n(window, scene, hip, mover)
+        self.force_n(window, scene, hip, motion)
     }
 
     /// Runs one tick for a point of a replay, as a transaction: if a tile is missing, it is
@@ -236,37 +241,37 @@ impl Renderer {
         hip: GridPoint,
     ) -> Vec3 {
         let state = &self.state;
-        let point = self.point.get_or_insert_with(|| BegunPoint {
+        let point = self.point.get_or_insert_with(|| PointInProgress {
             before: state.clone(),
-            lacked: 0,
+            missing_count: 0,
             tile: None,
         });
-        let (lacked, last) = (point.lacked, point.tile);
+        let (missing_count, last) = (point.missing_count, point.tile);
         // The HIP is the point's, not the one that the landing returns.
-        let _ = self.state.contact.land(window);
+        let _ = self.state.contact.place_on_surface(window);
         let output = *self.state.contact.step(window, &hip);
-        let may_lack = lacked < TILES_PER_SLOT * (D * D) as u32;
-        let missing = output.missing_tile.filter(|_| may_lack);
+        let may_request = missing_count < TILES_PER_SLOT * (D * D) as u32;
+        let missing = output.missing_tile.filter(|_| may_request);
         if missing.is_none() && !output.converged {
             self.state.contact.resume(point.before.contact.output());
-            self.progress = Progress::GoesOn;
+            self.progress = Progress::Continue;
             return Vec3::ZERO;
         }
         let force_n = match missing {
             Some(_) => Vec3::ZERO,
-            None => self.force_n(window, scene, hip, &Mover::Points),
+            None => self.force_n(window, scene, hip, &MotionSource::Points),
         };
-        let Some(tile) = missing.or_else(|| self.missing().filter(|_| may_lack)) else {
+        let Some(tile) = missing.or_else(|| self.missing().filter(|_| may_request)) else {
             self.point = None;
-            self.progress = Progress::Done(last.filter(|_| !may_lack));
+            self.progress = Progress::Done(last.filter(|_| !may_request));
             return force_n;
         };
         if let Some(point) = &mut self.point {
-            point.lacked += u32::from(self.progress != Progress::Lacks(tile));
+            point.missing_count += u32::from(self.progress != Progress::MissingTile(tile));
             point.tile = Some(tile);
             self.state = point.before.clone();
         }
-        self.progress = Progress::Lacks(tile);
+        self.progress = Progress::MissingTile(tile);
         Vec3::ZERO
     }
 
@@ -275,13 +280,13 @@ impl Renderer {
         window: &Window<'_, D>,
         scene: &Scene,
         hip: GridPoint,
-        mover: &Mover<'_>,
+        motion: &MotionSource<'_>,
     ) -> Vec3 {
         match self.state.effects {
-            Some(_) => self.with_effects(window, scene, hip, mover),
+            Some(_) => self.with_effects(window, scene, hip, motion),
             None => {
                 let displacement_mm = self.contact().output().displacement * scene.cell_mm;
-                scene.params.spring().force_n(displacement_mm) * mover.clutch()
+                scene.params.spring().force_n(displacement_mm) * motion.clutch()
             }
         }
     }
@@ -294,7 +299,7 @@ impl Renderer {
         window: &Window<'_, D>,
         scene: &Scene,
         hip: GridPoint,
-        mover: &Mover<'_>,
+        motion: &MotionSource<'_>,
     ) -> Vec3 {
         let RenderState {
             contact,
@@ -307,7 +312,7 @@ impl Renderer {
         let displacement = effects.displacement(window, contact, &self.materials);
         let displacement_mm = displacement * scene.cell_mm;
         let spring = effects.params(&scene.params).spring();
-        let spring_n = spring.force_n(displacement_mm) * mover.clutch();
+        let spring_n = spring.force_n(displacement_mm) * motion.clutch();
         if let Some(friction) = effects.friction() {
             contact.set_friction(friction);
         }
@@ -315,14 +320,14 @@ impl Renderer {
             return spring_n;
         };
         let moved = before.map_or(Vec3::ZERO, |before| before.to(&hip));
-        match mover.moment(displacement_mm, moved * scene.cell_mm, self.rate) {
-            Some(moment) => {
+        match motion.passivity_inputs(displacement_mm, moved * scene.cell_mm, self.rate) {
+            Some(passivity_inputs) => {
                 *before = Some(hip);
-                damper.observe(&moment);
-                damper.force_n(spring_n, moment.velocity_mm_s)
+                damper.observe(&passivity_inputs);
+                damper.force_n(spring_n, passivity_inputs.velocity_mm_s)
             }
             None => {
-                damper.rest();
+                damper.reset();
                 *before = None;
                 spring_n
             }
@@ -349,11 +354,11 @@ impl Renderer {
         self.state.effects.as_ref().and_then(Effects::missing)
     }
 
-    /// Returns the tile that the last tick lacked, for an arm or a point.
+    /// Returns the tile that was missing in the last tick, for an arm or a point.
     pub(crate) fn missing_tile(&self) -> Option<TileIndex> {
         match self.progress {
-            Progress::Lacks(tile) | Progress::Done(Some(tile)) => Some(tile),
-            Progress::Done(None) | Progress::GoesOn => {
+            Progress::MissingTile(tile) | Progress::Done(Some(tile)) => Some(tile),
+            Progress::Done(None) | Progress::Continue => {
                 let missing = self.contact().output().missing_tile;
                 missing.or_else(|| self.missing())
             }

@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_limit_that_cannot_be_squared_is_kept_all_the_same() {
+    fn clamp_keeps_limits_whose_square_overflows() {
         let long = Vec3::new(5.1e27, -2e27, 5.1e26);
         let length = |v: Vec3| {
             let squares = v.to_array().map(|c| f64::from(c).powi(2));
@@ -92,11 +92,11 @@ mod tests {
         for limit in [1e-30, 1e-22, 1e19, 1e20, 5e27, 1e38] {
             for scale in [1e-37, 1.0, 1e10] {
                 let v = long * scale;
-                let kept = length(clamp_length(v, limit));
-                let wanted = length(v).min(f64::from(limit));
+                let clamped = length(clamp_length(v, limit));
+                let expected = length(v).min(f64::from(limit));
                 assert!(
-                    kept <= f64::from(limit) && kept >= wanted * (1.0 - 1e-6),
-                    "{v} by {limit}: {kept}"
+                    clamped <= f64::from(limit) && clamped >= expected * (1.0 - 1e-6),
+                    "{v} by {limit}: {clamped}"
                 );
             }
         }
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_root_of_what_is_not_normal_is_the_usual_one() {
+    fn root_of_a_non_normal_number_equals_sqrtf() {
         for x in [0.0, -0.0, 1e-40, f32::INFINITY] {
             assert_eq!(root(x).to_bits(), libm::sqrtf(x).to_bits(), "{x:e}");
         }

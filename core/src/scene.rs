@@ -79,7 +79,7 @@ pub struct SceneChange {
     /// running device computes its position from [`SceneChange::hip`].
     pub scene: Scene,
     /// The haptic interface point (HIP) in the new placement, cells, for the tip's position when
-    /// the clutch opened, or when it closes ([`ClutchHold`](crate::clutch::ClutchHold)). In contact
+    /// the clutch opened, or when it closes ([`ClutchMode`](crate::clutch::ClutchMode)). In contact
     /// the device sets its height: as deep as before.
     pub hip: GridPoint,
     /// True if the tiles on the device stay valid: only place and surface parameters differ.

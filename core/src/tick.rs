@@ -15,10 +15,10 @@ use crate::grid::GridPoint;
 use crate::guard::{GuardInputs, GuardOutputs, Limits, Report, SceneKind, Surroundings};
 pub use crate::haptics::{Board, Command, Haptics, HipSource, LATENCY_S, RefusedScene};
 use crate::phantom::{Kinematics, Pose, to_device_frame, to_terrain_frame};
-use crate::renderer::{Mover, Renderer};
+use crate::renderer::{MotionSource, Renderer};
 use crate::scalar::smaller;
 use crate::scene::{Scene, Source, TickRecord};
-use crate::terrain::SETTLING_MM_S;
+use crate::terrain::BLEND_MM_S;
 
 /// One tick's result.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Outcome {
     /// Record for telemetry.
     pub sample: TickRecord,
     /// Number of the point that this tick answers.
-    pub answers: Option<u32>,
+    pub answered_seq: Option<u32>,
 }
 
 impl<const D: usize> Haptics<'_, D> {
@@ -55,7 +55,7 @@ impl<const D: usize> Haptics<'_, D> {
     ///
     /// A board calls it in every tick of a replay in which no point is in progress, and
     /// [`Haptics::tick_into`] in the others.
-    pub fn follow(&mut self, sense: &GuardInputs, watchdog_live: bool) {
+    pub fn monitor(&mut self, sense: &GuardInputs, watchdog_live: bool) {
         self.watch(sense, watchdog_live);
     }
 
@@ -85,61 +85,61 @@ impl<const D: usize> Haptics<'_, D> {
         if let Some(scene) = &self.scene
             && scene.fallback.is_some()
         {
-            self.settle(scene.cell_mm);
+            self.blend_tiles(scene.cell_mm);
         }
-        outcome.answers = None;
+        outcome.answered_seq = None;
         // Tested once here: otherwise the compiler tests the option where each number is used.
         let Some(pose) = pose else {
             return self.tick_without_arm(outcome);
         };
-        let wanted_n = self.wanted_n(pose, &mut outcome.sample);
-        let force_n = self.guard.limit_force(wanted_n);
-        self.drive(pose, force_n, &mut outcome.drive);
+        let target_n = self.target_n(pose, &mut outcome.sample);
+        let force_n = self.guard.limit_force(target_n);
+        self.command_motors(pose, force_n, &mut outcome.drive);
         self.write_state(force_n, &mut outcome.sample);
     }
 
     /// Returns the requested force at the HIP, N, terrain frame.
-    fn wanted_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
+    fn target_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
         let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) else {
-            write_nothing(sample);
+            write_empty(sample);
             return Vec3::ZERO;
         };
         let mut hip = place(mechanism, scene, pose);
         if !self.clutch.is_closed() {
             let in_contact = (self.renderer.contact_mut(), &self.window);
-            let drives = self.guard.mode().drives();
+            let drives = self.guard.mode().is_driving();
             hip = self.clutch.tick(hip, scene, in_contact, drives);
         }
-        let arm = Mover::Arm {
+        let arm = MotionSource::Arm {
             guard: &self.guard,
             mechanism,
             pose,
             clutch: self.clutch.share(),
         };
-        let wanted_n = self.renderer.step(&self.window, scene, hip, &arm);
+        let target_n = self.renderer.step(&self.window, scene, hip, &arm);
         write_output(hip, &self.renderer, sample);
         if self.renderer.has_effects() && self.renderer.created_mj() > 0.0 {
-            self.guard.says(Limits::ENERGY_DISSIPATED);
+            self.guard.add_limits(Limits::ENERGY_DISSIPATED);
         }
-        wanted_n
+        target_n
     }
 
     /// Sets the currents, A, for a force and for the arm's weight.
     #[inline]
-    fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
+    fn command_motors(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
         *drive = match &self.mechanism {
-            Some(mechanism) if self.guard.mode().drives() => {
-                let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
+            Some(mechanism) if self.guard.mode().is_driving() => {
+                let target_a = self.guard.jog_currents_a().unwrap_or_else(|| {
                     let weight = mechanism.gravity_nm(pose) * self.guard.gain();
                     let torques = pose.torques_nm(to_device_frame(force_n)) + weight;
                     mechanism.currents_a(torques)
                 });
-                self.guard.limit_currents(wanted_a)
+                self.guard.limit_currents(target_a)
             }
             _ => GuardOutputs::default(),
         };
         if !drive.enabled {
-            drive.held = self.guard.held();
+            drive.held = self.guard.held_shares();
         }
     }
 
@@ -148,9 +148,9 @@ impl<const D: usize> Haptics<'_, D> {
     #[inline(never)]
     fn tick_without_arm(&mut self, outcome: &mut Outcome) {
         let sample = &mut outcome.sample;
-        write_nothing(sample);
+        write_empty(sample);
         outcome.drive = GuardOutputs {
-            held: self.guard.held(),
+            held: self.guard.held_shares(),
             ..GuardOutputs::default()
         };
         self.write_state(Vec3::ZERO, sample);
@@ -160,10 +160,10 @@ impl<const D: usize> Haptics<'_, D> {
     // Not inlined: the tick of a scene without fallback does not need it.
     #[cold]
     #[inline(never)]
-    fn settle(&mut self, cell_mm: f32) {
+    fn blend_tiles(&mut self, cell_mm: f32) {
         // An infinite step would erase the record of the tiles that blend in.
-        let step = smaller(SETTLING_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
-        if self.window.settle(step) {
+        let step = smaller(BLEND_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
+        if self.window.blend_tiles(step) {
             self.renderer.contact_mut().surface_moved(&self.window);
         }
     }
@@ -197,7 +197,7 @@ impl<const D: usize> Haptics<'_, D> {
         let cell = sample.proxy.column();
         let scene = self.scene.as_ref();
         scene.is_some_and(|scene| scene.fallback.is_some() && scene.size.has_cell(cell))
-            && !self.window.is_settled(cell)
+            && !self.window.is_blended(cell)
     }
 }
 
@@ -219,7 +219,7 @@ fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut TickRecord
 /// Writes a record without contact and force.
 #[cold]
 #[inline(never)]
-pub(crate) fn write_nothing(sample: &mut TickRecord) {
+pub(crate) fn write_empty(sample: &mut TickRecord) {
     write_contact(GridPoint::default(), &ContactOutput::default(), sample);
 }
 

@@ -60,7 +60,7 @@ struct Device<'t, const D: usize> {
     /// The material of a sample, in a scene with materials; `None` for tiles without.
     material: fn(TileKey, [i32; 2]) -> Option<u8>,
     size: FieldSize,
-    demand: RequestHint,
+    hint: RequestHint,
     served: usize,
     dead_man: bool,
 }
@@ -84,7 +84,7 @@ impl<'t, const D: usize> Device<'t, D> {
             height,
             material: |_, _| None,
             size: scene.size,
-            demand: RequestHint::default(),
+            hint: RequestHint::default(),
             served: 0,
             dead_man: false,
         }
@@ -97,14 +97,14 @@ impl<'t, const D: usize> Device<'t, D> {
         device
     }
 
-    fn say(&mut self, command: Command<'t>) {
+    fn send(&mut self, command: Command<'t>) {
         assert!(matches!(self.haptics.accept(command), Ok(None)));
     }
 
     /// Zeroes the arm in its home pose and arms it there.
     fn arm(&mut self, counts: [i32; 3]) {
-        self.say(Command::Zero([0; 3]));
-        self.say(Command::Arm);
+        self.send(Command::Zero([0; 3]));
+        self.send(Command::Arm);
         self.dead_man = false;
         let _ = self.tick(counts);
         self.dead_man = true;
@@ -122,16 +122,13 @@ impl<'t, const D: usize> Device<'t, D> {
             ..GuardInputs::default()
         };
         let outcome = self.haptics.tick(&sense, true);
-        self.demand = RequestHint {
+        self.hint = RequestHint {
             missing_tile: outcome.sample.missing_tile,
             proxy: outcome.sample.proxy.column(),
             hip: outcome.sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = self
-            .requester
-            .next_request(outcome.sample.tick, &self.demand)
-        {
+        while let Some(key) = self.requester.next_request(outcome.sample.tick, &self.hint) {
             self.serve(key);
         }
         outcome
@@ -157,7 +154,7 @@ impl<'t, const D: usize> Device<'t, D> {
         assert_ne!(
             spent.key(),
             Some(key),
-            "the window refused what it had asked for"
+            "the window refused what it had requested"
         );
         self.spare.push(spent);
         self.served += 1;
@@ -177,7 +174,7 @@ impl<'t, const D: usize> Device<'t, D> {
                 GuardOutputs::default(),
                 "replay drives no motor"
             );
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 return outcome.sample;
             }
         }
@@ -202,7 +199,7 @@ fn dip() -> impl Iterator<Item = [i32; 3]> {
 }
 
 #[test]
-fn pressed_on_a_plane_the_motors_push_back() {
+fn motors_push_back_when_pressed_on_a_plane() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     let outcomes: Vec<_> = dip().map(|c| device.tick(c)).collect();
@@ -281,7 +278,7 @@ fn late_fallback_is_accepted_and_evicts_no_tile_beside_proxy() {
         device.haptics.window.occupant(TileKey::new(0, 0, 0)),
         Some(beside)
     );
-    device.haptics.window.lay(Some(fallback));
+    device.haptics.window.set_fallback(Some(fallback));
     for key in fallback.keys(0).into_iter().flatten() {
         let tile = device.spare.pop().expect("a spare one");
         tile.fill(key, 0, |_, _| 0.0).expect("in range");
@@ -294,7 +291,7 @@ fn late_fallback_is_accepted_and_evicts_no_tile_beside_proxy() {
         device.haptics.window.occupant(TileKey::new(0, 0, 0)),
         Some(beside)
     );
-    assert!(device.haptics.window.is_settled(Cell::new(290, 290)));
+    assert!(device.haptics.window.is_blended(Cell::new(290, 290)));
 }
 
 #[test]
@@ -333,7 +330,7 @@ fn gravity_currents_follow_signs_of_the_calibration() {
 }
 
 #[test]
-fn begun_inside_the_terrain_there_is_no_force() {
+fn start_inside_the_terrain_gives_no_force() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     for _ in 0..50 {
@@ -355,12 +352,12 @@ fn fault_latches_until_cleared_and_encoder_jump_needs_new_zero() {
         assert_eq!(device.tick([5000, 0, 0]).drive, GuardOutputs::default());
     }
     // Clears only the fault that was seen.
-    device.say(Command::ClearFault(Some(Fault::Hardware)));
+    device.send(Command::ClearFault(Some(Fault::Hardware)));
     assert_eq!(
         device.tick([5000, 0, 0]).sample.fault,
         Some(Fault::EncoderJump)
     );
-    device.say(Command::ClearFault(Some(Fault::EncoderJump)));
+    device.send(Command::ClearFault(Some(Fault::EncoderJump)));
     let outcome = device.tick([0; 3]);
     assert_eq!((outcome.sample.fault, outcome.drive.enabled), (None, false));
     let blockers = device.haptics.report().blockers;
@@ -386,7 +383,7 @@ fn force_ramps_down_without_step_on_scene_change_or_disarm() {
         let mut tiles = buffers::<4>();
         let (mut device, mut last) = pressed(&mut tiles);
         assert!(last.z > 0.2);
-        device.say(command);
+        device.send(command);
         let mut ticks = 0;
         loop {
             let outcome = device.tick([0; 3]);
@@ -404,7 +401,7 @@ fn force_ramps_down_without_step_on_scene_change_or_disarm() {
 }
 
 #[test]
-fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
+fn settings_zero_or_replay_switch_off_at_once() {
     let points = Scene {
         epoch: 2,
         ..scene(Source::Points)
@@ -412,7 +409,7 @@ fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
     for command in [Command::Zero([7, 7, 7]), Command::Scene(points)] {
         let mut tiles = buffers::<4>();
         let (mut device, _) = pressed(&mut tiles);
-        device.say(command);
+        device.send(command);
         assert_eq!(device.tick([0; 3]).drive, GuardOutputs::default());
     }
     let mut tiles = buffers::<4>();
@@ -431,7 +428,7 @@ fn replaying(tiles: &mut [Tile]) -> Device<'_, 4> {
         epoch: 2,
         ..scene(Source::Points)
     };
-    device.say(Command::Scene(points));
+    device.send(Command::Scene(points));
     device
 }
 
@@ -443,7 +440,7 @@ fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
         if n % 2 == 0 {
             let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
             let seq = n.unsigned_abs();
-            device.say(Command::Hip(HipCommand { seq, hip }));
+            device.send(Command::Hip(HipCommand { seq, hip }));
             assert_eq!(device.tick(counts).drive, GuardOutputs::default());
         } else {
             let sense = GuardInputs {
@@ -451,18 +448,18 @@ fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
                 dead_man: true,
                 ..GuardInputs::default()
             };
-            device.haptics.follow(&sense, true);
+            device.haptics.monitor(&sense, true);
         }
     }
     counts
 }
 
 #[test]
-fn an_arm_that_is_moved_during_a_replay_keeps_its_zero() {
+fn arm_moved_during_a_replay_keeps_its_zero() {
     let mut tiles = buffers::<4>();
     let mut device = replaying(&mut tiles);
     let counts = wave(&mut device, 60);
-    device.say(Command::Scene(Scene {
+    device.send(Command::Scene(Scene {
         epoch: 3,
         ..scene(Source::Encoders)
     }));
@@ -472,7 +469,7 @@ fn an_arm_that_is_moved_during_a_replay_keeps_its_zero() {
 }
 
 #[test]
-fn a_jump_during_a_replay_is_noticed() {
+fn encoder_jump_during_a_replay_is_detected() {
     let mut tiles = buffers::<4>();
     for with_a_point in [false, true] {
         let mut device = replaying(&mut tiles);
@@ -482,7 +479,7 @@ fn a_jump_during_a_replay_is_noticed() {
         if with_a_point {
             let _ = device.tick(counts);
         } else {
-            device.haptics.follow(
+            device.haptics.monitor(
                 &GuardInputs {
                     counts,
                     ..GuardInputs::default()
@@ -499,12 +496,12 @@ fn a_jump_during_a_replay_is_noticed() {
 fn replay_drives_no_motor_and_refuses_arming_with_its_blocker() {
     let mut tiles = buffers::<4>();
     let mut device = replaying(&mut tiles);
-    device.say(Command::Arm);
+    device.send(Command::Arm);
     device.dead_man = false;
     wave(&mut device, 60);
     device.dead_man = true;
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
-    device.say(Command::Hip(HipCommand { seq: 100, hip }));
+    device.send(Command::Hip(HipCommand { seq: 100, hip }));
     for _ in 0..200 {
         assert_eq!(
             device.tick([5_900, -5_900, 0]).drive,
@@ -524,8 +521,8 @@ fn missing_calibration_prevents_rendering_and_arming() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     device.haptics.mechanism = None;
-    device.say(Command::Zero([0; 3]));
-    device.say(Command::Arm);
+    device.send(Command::Zero([0; 3]));
+    device.send(Command::Arm);
     for tick in 0..3_000 {
         device.dead_man = tick > 10;
         let outcome = device.tick([0; 3]);
@@ -539,7 +536,7 @@ fn missing_calibration_prevents_rendering_and_arming() {
 }
 
 #[test]
-fn a_scene_that_is_not_valid_is_refused() {
+fn invalid_scene_is_refused() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     let good = scene(Source::Encoders);
@@ -639,7 +636,7 @@ fn edge(x: i32, _: i32) -> f32 {
 
 /// The link checks sums, not meanings: a damaged host may send any bits.
 #[test]
-fn point_of_any_bits_is_made_valid_before_the_contact() {
+fn point_of_any_bits_is_normalised_before_the_contact() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Points, plane);
     // Cell (i32::MIN, 100, 9) as zigzag varints, then three fractions.
@@ -660,21 +657,21 @@ fn held_outputs_reach_drive_only_with_amplifiers_off() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     let held = Vec3::new(0.5, -0.5, 0.1);
-    device.say(Command::HoldOutputs(Some(held.to_array())));
+    device.send(Command::HoldOutputs(Some(held.to_array())));
     let expected = GuardOutputs {
         held,
         ..GuardOutputs::default()
     };
     assert_eq!(device.tick([0; 3]).drive, expected);
     device.arm([0; 3]);
-    device.say(Command::HoldOutputs(Some(held.to_array())));
+    device.send(Command::HoldOutputs(Some(held.to_array())));
     let drive = device.tick([0; 3]).drive;
     assert!(drive.enabled);
     assert_eq!(drive.held, Vec3::ZERO);
 }
 
 #[test]
-fn a_refused_scene_lets_the_force_out() {
+fn refused_scene_fades_the_force_out() {
     let mut tiles = buffers::<1>();
     let mut device = Device::<1>::armed(&mut tiles, |_, _| 0.0);
     let refused = Scene {
@@ -689,7 +686,7 @@ fn a_refused_scene_lets_the_force_out() {
         let _ = device.tick([0; 3]);
     }
     assert_eq!(device.haptics.report().mode, Mode::Disarmed);
-    device.say(Command::Arm);
+    device.send(Command::Arm);
     for _ in 0..100 {
         let _ = device.tick([0; 3]);
     }

@@ -13,7 +13,7 @@ fn forces_along_a_path_runs() {
 }
 
 #[test]
-fn the_closed_loop_runs() {
+fn closed_loop_example_runs() {
     closed_loop::main().expect("it runs");
 }
 

@@ -40,7 +40,7 @@ impl Sources {
 
     /// A crate with these modules.
     #[cfg(test)]
-    fn made_up(modules: &[(&str, &str)]) -> Self {
+    fn from_code(modules: &[(&str, &str)]) -> Self {
         let module = |name: &str| {
             let names = name.split("::").filter(|name| !name.is_empty());
             names.map(str::to_owned).collect::<Module>()
@@ -96,8 +96,8 @@ impl Sources {
         let Some(item) = path.get(known).filter(|_| depth < 8) else {
             return module;
         };
-        let passes_on = |path: &&Module| path.last() == Some(item);
-        match self.paths(&module).iter().find(passes_on) {
+        let re_exports = |path: &&Module| path.last() == Some(item);
+        match self.paths(&module).iter().find(re_exports) {
             Some(further) if further.as_slice() != path => self.target(further, depth + 1),
             _ => module,
         }
@@ -123,23 +123,23 @@ impl Sources {
     }
 
     /// Cycles of imports, each as a list of its imports.
-    fn circles(&self) -> Vec<String> {
+    fn cycles(&self) -> Vec<String> {
         let imports = self.imports();
-        let reaches = |folder: &Module, from: &String, to: &String| {
-            let (mut seen, mut next) = (BTreeSet::new(), vec![from.clone()]);
+        let leads_to = |folder: &Module, from: &String, to: &String| {
+            let (mut visited, mut next) = (BTreeSet::new(), vec![from.clone()]);
             while let Some(name) = next.pop() {
                 for (of, a, b) in imports.keys() {
-                    if of == folder && *a == name && seen.insert(b.clone()) {
+                    if of == folder && *a == name && visited.insert(b.clone()) {
                         next.push(b.clone());
                     }
                 }
             }
-            seen.contains(to)
+            visited.contains(to)
         };
-        let in_circle = imports
+        let in_cycle = imports
             .iter()
-            .filter(|((folder, from, to), _)| reaches(folder, to, from));
-        in_circle.map(|(_, shown)| shown.clone()).collect()
+            .filter(|((folder, from, to), _)| leads_to(folder, to, from));
+        in_cycle.map(|(_, shown)| shown.clone()).collect()
     }
 
     /// Imports against an order of the crate's modules: a module may import those before it and
@@ -241,7 +241,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// The order of modules in core's `lib.rs`: the place of each name.
-fn stated_order() -> BTreeMap<String, usize> {
+fn order_of_lib_rs() -> BTreeMap<String, usize> {
     let mut order = BTreeMap::new();
     let mut place = 0;
     for line in include_str!("../src/lib.rs").lines() {
@@ -269,35 +269,35 @@ fn stated_order() -> BTreeMap<String, usize> {
 }
 
 #[test]
-fn files_and_folders_import_each_other_in_no_circle() {
+fn imports_of_files_and_folders_form_no_cycle() {
     for folder in ["core/src", "firmware/src"] {
         let sources = Sources::of(folder);
         assert!(sources.imports().len() > 30, "{folder}: hardly an import");
-        let circles = sources.circles();
+        let cycles = sources.cycles();
         assert!(
-            circles.is_empty(),
+            cycles.is_empty(),
             "{folder}: a circle of\n{}",
-            circles.join("\n")
+            cycles.join("\n")
         );
     }
 }
 
 #[test]
-fn core_imports_in_the_order_that_lib_rs_states() {
-    let order = stated_order();
+fn core_imports_follow_the_order_of_lib_rs() {
+    let order = order_of_lib_rs();
     assert!(order.len() >= 10 && order["phantom"] == 1, "{order:?}");
     let wrong = Sources::of("core/src").against(&order);
     assert!(wrong.is_empty(), "against the order:\n{}", wrong.join("\n"));
 }
 
 #[test]
-fn circles_are_found_through_what_folders_pass_on() {
+fn cycles_are_found_through_re_exports() {
     let tiles = "use super::Window;\n";
     let window =
         "use crate::terrain::{Kind, tile::Tile};\n#[cfg(test)]\nmod tests {\nuse crate::a::B;\n}\n";
     let terrain = "mod tile;\nmod window;\npub use tile::{Kind, Tile};\npub use window::Window;\n";
     let sources = |tiles| {
-        Sources::made_up(&[
+        Sources::from_code(&[
             ("", "pub mod terrain;"),
             ("terrain", terrain),
             ("terrain::tile", tiles),
@@ -305,7 +305,7 @@ fn circles_are_found_through_what_folders_pass_on() {
         ])
     };
     assert_eq!(
-        sources(tiles).circles(),
+        sources(tiles).cycles(),
         [
             "terrain::tile imports terrain::Window",
             "terrain::window imports terrain::Kind"
@@ -314,12 +314,12 @@ fn circles_are_found_through_what_folders_pass_on() {
     let none = sources(
         "// use super::Window;\nuse super::super::grid;\npub(in crate::terrain) struct T;\n",
     );
-    assert!(none.circles().is_empty());
+    assert!(none.cycles().is_empty());
 }
 
 #[test]
 fn imports_against_the_order_are_found() {
-    let sources = Sources::made_up(&[
+    let sources = Sources::from_code(&[
         ("force", "fn f() -> crate::guard::Slew { g() }"),
         ("guard", "use crate::{force::Force, rate};"),
         ("rate", "use crate::force;"),

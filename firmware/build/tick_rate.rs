@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_that_divide_the_clock_and_end_in_time_are_taken() {
+    fn rates_that_divide_the_clock_and_meet_timing_are_accepted() {
         for (board, clock, rates) in [
             ("nucleo-g474re", G474, &[1_000, 2_000, 3_000, 4_000][..]),
             (
@@ -72,18 +72,18 @@ mod tests {
                 &[1_000, 2_000, 3_000, 4_000, 5_000, 6_000],
             ),
         ] {
-            let taken: Vec<u32> = (0..=20_000)
+            let accepted: Vec<u32> = (0..=20_000)
                 .filter(|hz| tick_hz(Some(&hz.to_string()), board, clock).is_ok())
                 .collect();
-            assert_eq!(taken, rates, "{board}");
-            assert!(taken.iter().all(|hz| TickRate::new(*hz).is_some()));
+            assert_eq!(accepted, rates, "{board}");
+            assert!(accepted.iter().all(|hz| TickRate::new(*hz).is_some()));
             // The auto-reload register has 16 bits.
-            assert!(taken.iter().all(|hz| clock / hz <= 65_536));
+            assert!(accepted.iter().all(|hz| clock / hz <= 65_536));
         }
     }
 
     #[test]
-    fn anything_else_is_named_with_what_there_is_instead() {
+    fn other_rate_is_refused_with_the_possible_rates() {
         for text in [
             "0", "999", "5000", "9000", "1500", "-1000", "1e3", "fast", "",
         ] {

@@ -11,7 +11,7 @@ use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
 use crate::board::{Amplifiers, Encoders, TickClock};
 use crate::haptic_loop::HapticLoop;
-use crate::link::{Buffers, DeviceState, KnownArm, Link};
+use crate::link::{ArmConfig, Buffers, DeviceState, Link};
 use crate::monitor::Monitor;
 use crate::queues::{Queues, SPARES};
 use crate::store::Stored;
@@ -97,7 +97,10 @@ pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
 
 /// Returns the arm of the stored calibration, if this firmware and this board support it, and its
 /// source for the host.
-fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Kinematics>, CalibrationSource) {
+fn usable_calibration(
+    stored: &Stored,
+    full_scale_a: f32,
+) -> (Option<Kinematics>, CalibrationSource) {
     let bad = match stored {
         Stored::Found(calibration) => {
             let fits = calibration.check_board(full_scale_a);
@@ -131,7 +134,7 @@ where
     let (loop_ends, link_ends) = memory.queues.split();
     let monitor = loop_ends.monitor;
     let (window, spare) = tiles.split();
-    let (mechanism, source) = usable(&hardware.calibration, hardware.full_scale_a);
+    let (mechanism, source) = usable_calibration(&hardware.calibration, hardware.full_scale_a);
     let is_unusable = hardware.calibration != Stored::Missing && mechanism.is_none();
     let found = is_unusable.then_some(Fault::CalibrationCorrupt);
     let board_facts = tick::Board {
@@ -151,7 +154,7 @@ where
         hardware.amplifiers,
         hardware.clock,
     );
-    let arm = KnownArm {
+    let arm = ArmConfig {
         calibration: mechanism.map(|mechanism| *mechanism.calibration()),
         source,
         full_scale_a: hardware.full_scale_a,

@@ -27,7 +27,7 @@ pub trait Amplifiers: Sized {
     /// Runs a tick with the power stages off: sets the outputs to these shares of full scale, each
     /// clamped to -1..=1, and keeps the outputs ready. The enable line stays low. Zero unless the
     /// user measures the outputs ([`Guard::hold`](hapterra_core::guard::Guard::hold)).
-    fn rest(&mut self, held: [f32; 3]);
+    fn set_held_outputs(&mut self, held: [f32; 3]);
 }
 
 /// Amplifiers that are on.

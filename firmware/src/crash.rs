@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longest_record_fits() {
+    fn longest_record_fits() {
         let longest = CrashRecord::new(CrashKind::HardFault, [u32::MAX; 5], &"x".repeat(99));
         let crash = CrashRecord::read(longest.bytes()).expect("a crash");
         assert_eq!((crash.pc, crash.file.len()), (u32::MAX, CRASH_FILE));

@@ -2,44 +2,44 @@
 //!
 //! A stored record decides what the guard protects from the next start on, for every later user of
 //! the arm. So the user at the arm has to agree: after the request, the switch must be open and
-//! then pressed, within [`PRESS_MS`], while the arm is disarmed.
+//! then pressed, within [`PRESS_TIMEOUT_MS`], while the arm is disarmed.
 
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Health;
 use hapterra_core::wire::request::Refusal;
-use hapterra_core::wire::status::PRESS_MS;
+use hapterra_core::wire::status::PRESS_TIMEOUT_MS;
 
 /// Waits for a press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PressWait {
     /// The tick of the request.
-    began: u32,
+    start: u32,
     /// Max ticks of the wait.
     timeout: u32,
-    seen_open: bool,
+    was_open: bool,
 }
 
 impl PressWait {
     /// Begins to wait in tick `now`.
     pub(crate) const fn new(now: u32, ticks_per_ms: u32) -> Self {
         Self {
-            began: now,
-            timeout: PRESS_MS * ticks_per_ms,
-            seen_open: false,
+            start: now,
+            timeout: PRESS_TIMEOUT_MS * ticks_per_ms,
+            was_open: false,
         }
     }
 
     /// Handles a report of the loop, received in tick `now`. Returns the decision, if there is one.
-    pub(crate) fn look(&mut self, health: &Health, now: u32) -> Option<Result<(), Refusal>> {
+    pub(crate) fn check(&mut self, health: &Health, now: u32) -> Option<Result<(), Refusal>> {
         if health.report.mode != Mode::Disarmed {
             // A press while armed has another purpose.
             return Some(Err(Refusal::NotWhileArmed));
         }
-        if now.wrapping_sub(self.began) > self.timeout {
+        if now.wrapping_sub(self.start) > self.timeout {
             return Some(Err(Refusal::NotPressed));
         }
-        let is_pressed = health.sense.dead_man && self.seen_open;
-        self.seen_open |= !health.sense.dead_man;
+        let is_pressed = health.sense.dead_man && self.was_open;
+        self.was_open |= !health.sense.dead_man;
         is_pressed.then_some(Ok(()))
     }
 }
@@ -61,17 +61,17 @@ mod tests {
         let mut wait = PressWait::new(1_000, 1);
         (1_000..20_000).step_by(100).find_map(|now| {
             let health = health(switch(now), Mode::Disarmed);
-            wait.look(&health, now).map(|result| (now, result))
+            wait.check(&health, now).map(|result| (now, result))
         })
     }
 
     #[test]
-    fn open_and_then_pressed_is_consent() {
+    fn release_then_press_is_consent() {
         assert_eq!(decided(|now| now >= 4_000), Some((4_000, Ok(()))));
     }
 
     #[test]
-    fn never_pressed_is_refused_after_ten_seconds() {
+    fn missing_press_times_out_after_ten_seconds() {
         let refused = Some((11_100, Err(Refusal::NotPressed)));
         assert_eq!(decided(|_| false), refused);
         // Too late.
@@ -79,28 +79,28 @@ mod tests {
     }
 
     #[test]
-    fn a_switch_that_is_held_all_along_is_no_press() {
+    fn switch_held_from_the_start_is_no_press() {
         assert_eq!(decided(|_| true), Some((11_100, Err(Refusal::NotPressed))));
-        let let_go_and_pressed = |now| !(3_000..3_500).contains(&now);
-        assert_eq!(decided(let_go_and_pressed), Some((3_500, Ok(()))));
+        let released_and_pressed = |now| !(3_000..3_500).contains(&now);
+        assert_eq!(decided(released_and_pressed), Some((3_500, Ok(()))));
     }
 
     #[test]
-    fn a_press_that_arms_stores_nothing() {
+    fn press_while_arming_is_refused() {
         let modes = [Mode::Requested, Mode::Confirming, Mode::Armed, Mode::Fading];
         for mode in modes {
             let mut wait = PressWait::new(0, 1);
-            assert_eq!(wait.look(&health(false, Mode::Disarmed), 1), None);
-            let refused = wait.look(&health(true, mode), 2);
+            assert_eq!(wait.check(&health(false, Mode::Disarmed), 1), None);
+            let refused = wait.check(&health(true, mode), 2);
             assert_eq!(refused, Some(Err(Refusal::NotWhileArmed)));
         }
     }
 
     #[test]
-    fn ticks_may_wrap_and_be_faster() {
+    fn timeout_handles_tick_wrap_and_higher_rates() {
         let mut wait = PressWait::new(u32::MAX - 50, 10);
-        assert_eq!(wait.look(&health(false, Mode::Disarmed), 99_949), None);
-        let late = wait.look(&health(false, Mode::Disarmed), 99_951);
+        assert_eq!(wait.check(&health(false, Mode::Disarmed), 99_949), None);
+        let late = wait.check(&health(false, Mode::Disarmed), 99_951);
         assert_eq!(late, Some(Err(Refusal::NotPressed)));
     }
 }

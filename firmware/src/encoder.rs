@@ -12,7 +12,7 @@ pub struct EndlessCount {
 
 impl EndlessCount {
     /// Updates with the counter's current reading and returns the total count.
-    pub fn follow(&mut self, reading: u16) -> i32 {
+    pub fn update(&mut self, reading: u16) -> i32 {
         let moved = reading.wrapping_sub(self.last).cast_signed();
         self.last = reading;
         self.total = self.total.wrapping_add(i32::from(moved));
@@ -25,12 +25,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_on_through_the_wrap_in_both_directions() {
+    fn count_continues_through_the_wrap_in_both_directions() {
         let mut count = EndlessCount::default();
         let mut truth = 0;
         for step in [5, -10, 30_000, 30_000, 30_000, -32_768, -32_000, 32_767] {
             truth += step;
-            assert_eq!(count.follow(truth as u16), truth);
+            assert_eq!(count.update(truth as u16), truth);
         }
     }
 }

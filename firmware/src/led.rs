@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_flashes_its_number_and_pauses() {
+    fn fault_flashes_its_number_and_pauses() {
         for fault in Fault::ALL {
             let number = fault.number();
             let signal = LedPattern::Fault(number);
@@ -110,18 +110,18 @@ mod tests {
             LedPattern::Touching,
         ];
         all.extend(Fault::ALL.map(|fault| LedPattern::Fault(fault.number())));
-        let looks: Vec<Vec<bool>> = all
+        let patterns: Vec<Vec<bool>> = all
             .iter()
             .map(|signal| (0..10_000).map(|ms| signal.is_lit(ms)).collect())
             .collect();
-        for (i, look) in looks.iter().enumerate() {
-            assert!(!looks[..i].contains(look), "{:?}", all[i]);
+        for (i, pattern) in patterns.iter().enumerate() {
+            assert!(!patterns[..i].contains(pattern), "{:?}", all[i]);
         }
         assert_eq!(flashes(LedPattern::Disarmed, 10_000), 4);
     }
 
     #[test]
-    fn a_fault_outranks_everything() {
+    fn fault_has_priority_over_all_patterns() {
         let mut report = Report {
             mode: Mode::Armed,
             ..Report::default()

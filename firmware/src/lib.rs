@@ -54,7 +54,7 @@
 //!
 //! The application's time is the number of ticks, and time-outs are counted in ticks. In a scene
 //! that sets [`hold_clock`], no time passes while a requested tile is missing; in a replay, no time
-//! passes between two points. [`link::Link::may_stand_still`] returns true in these cases. The
+//! passes between two points. [`link::Link::may_stop_clock`] returns true in these cases. The
 //! emulated board then stops its two timers, its only clocks; the native device is not ticked; a
 //! real board cannot stop time and continues. So the host's speed does not change the rendering,
 //! and a run is repeatable to the last bit.

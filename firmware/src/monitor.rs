@@ -7,7 +7,7 @@ use hapterra_core::wire::status::UsbClock;
 
 /// A part of the application that has to check in before the watchdog is fed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum WatchedPart {
     /// The haptic tick.
     Tick = 0,
     /// The link's task.
@@ -16,7 +16,7 @@ pub enum Part {
     Usb = 2,
 }
 
-impl Part {
+impl WatchedPart {
     const fn bit(self) -> u32 {
         1 << self as u32
     }
@@ -51,7 +51,7 @@ impl Monitor {
 
     /// Records that a part runs. Each watched part calls this at least every few milliseconds, from
     /// any priority.
-    pub fn check_in(&self, part: Part) {
+    pub fn check_in(&self, part: WatchedPart) {
         self.checked_in.fetch_or(part.bit(), Relaxed);
     }
 
@@ -61,7 +61,7 @@ impl Monitor {
     /// A part in `parts` that does not check in leads to a reset; other parts are not watched. From
     /// the count of feedings the tick knows that the watchdog is being fed.
     #[must_use]
-    pub fn may_feed_watchdog(&self, parts: &[Part]) -> bool {
+    pub fn may_feed_watchdog(&self, parts: &[WatchedPart]) -> bool {
         let all = parts.iter().fold(0, |bits, part| bits | part.bit());
         if self.checked_in.load(Relaxed) & all != all {
             return false;
@@ -128,10 +128,10 @@ impl Monitor {
 mod tests {
     use super::*;
 
-    const PARTS: [Part; 3] = [Part::Tick, Part::Link, Part::Usb];
+    const PARTS: [WatchedPart; 3] = [WatchedPart::Tick, WatchedPart::Link, WatchedPart::Usb];
 
     #[test]
-    fn every_part_but_one_does_not_feed_the_watchdog() {
+    fn watchdog_is_not_fed_if_one_part_is_missing() {
         for hung in PARTS {
             let monitor = Monitor::new();
             for _ in 0..3 {
@@ -153,10 +153,10 @@ mod tests {
     fn unwatched_parts_do_not_block_the_watchdog() {
         let monitor = Monitor::new();
         let watched = &PARTS[..2];
-        monitor.check_in(Part::Tick);
-        monitor.check_in(Part::Usb);
+        monitor.check_in(WatchedPart::Tick);
+        monitor.check_in(WatchedPart::Usb);
         assert!(!monitor.may_feed_watchdog(watched));
-        monitor.check_in(Part::Link);
+        monitor.check_in(WatchedPart::Link);
         assert!(monitor.may_feed_watchdog(watched));
     }
 }

@@ -66,14 +66,14 @@ impl MotorLog {
 /// content, and the RAM's new content, which contains no older copy.
 #[must_use]
 pub fn begin(cause: ResetCause, found: &Copies) -> (Temperatures, Copies) {
-    let kept = match cause {
+    let stored = match cause {
         // After a power-up the RAM's content is random, and the time without power is unknown.
         ResetCause::PowerOn | ResetCause::Unknown => None,
         ResetCause::Pin | ResetCause::Software | ResetCause::Watchdog | ResetCause::BrownOut => {
             newest(found).and_then(Temperatures::after_reset)
         }
     };
-    let temperatures = kept.unwrap_or(Temperatures::HOT);
+    let temperatures = stored.unwrap_or(Temperatures::HOT);
     (temperatures, [encode(0, &temperatures), [0; WORDS]])
 }
 

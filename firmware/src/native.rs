@@ -1,7 +1,7 @@
 //! The application as a value, for a host program: no interrupts, no tasks.
 //!
 //! The caller moves bytes and calls [`Device::tick`]: in lock-step only while
-//! [`Link::may_stand_still`] is false, as the emulated board's clock does; in real time always a
+//! [`Link::may_stop_clock`] is false, as the emulated board's clock does; in real time always a
 //! thousand times a second.
 
 use hapterra_core::guard::GuardOutputs;
@@ -15,7 +15,7 @@ use crate::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, GuardInputs, TickClock};
 use crate::haptic_loop::HapticLoop;
 use crate::link::Link;
-use crate::monitor::{Monitor, Part};
+use crate::monitor::{Monitor, WatchedPart};
 use crate::motor_memory::{self, Copies};
 use crate::store::Stored;
 
@@ -50,7 +50,7 @@ impl Amplifiers for VirtualAmplifiersOff {
         VirtualAmplifiersOn
     }
 
-    fn rest(&mut self, _held: [f32; 3]) {}
+    fn set_held_outputs(&mut self, _held: [f32; 3]) {}
 }
 
 impl EnabledAmplifiers for VirtualAmplifiersOn {
@@ -197,9 +197,9 @@ impl<C: TickClock, const D: usize> Device<C, D> {
 
     /// Passes bytes from the host to the link ([`Link::receive`]) and runs the link's task.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
-        let taken = self.link.receive(bytes);
+        let consumed = self.link.receive(bytes);
         self.poll();
-        taken
+        consumed
     }
 
     fn poll(&mut self) {
@@ -216,7 +216,9 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         let drive = self.tick_alone(sense);
         self.poll();
         // There is no watchdog here, but the tick expects one to be fed.
-        let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
+        let _ = self
+            .monitor
+            .may_feed_watchdog(&[WatchedPart::Tick, WatchedPart::Link]);
         drive
     }
 
@@ -224,7 +226,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
     pub fn tick_alone(&mut self, sense: GuardInputs) -> GuardOutputs {
         self.haptic_loop.encoders_mut().0 = sense;
         let drive = self.haptic_loop.tick();
-        if let Some((copy, words)) = self.haptic_loop.motors_to_keep()
+        if let Some((copy, words)) = self.haptic_loop.due_motor_copy()
             && let Some(place) = self.retained.get_mut(copy)
         {
             *place = words;

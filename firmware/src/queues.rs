@@ -35,7 +35,7 @@ pub(crate) struct QueuedTick {
     /// Record of the tick.
     pub(crate) sample: TickRecord,
     /// The number of the point that this tick answers.
-    pub(crate) answers: Option<u32>,
+    pub(crate) answered_seq: Option<u32>,
 }
 
 /// The loop's state as reported to the link.

@@ -19,7 +19,7 @@ use hapterra_core::wire::materials::{
     MAX_TABLE_BYTES, MAX_TILE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
 };
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
-use hapterra_core::wire::plant::Sensed;
+use hapterra_core::wire::plant::PlantState;
 use serde::Serialize;
 
 use crate::cycles::Cycles;
@@ -223,7 +223,7 @@ impl CountingBoard {
                 counts: *counts,
                 ..GuardInputs::default()
             };
-            frames.add(&Sensed { tick, sense });
+            frames.add(&PlantState { tick, sense });
         }
         frames.close();
         self.run(folder.path())

@@ -7,7 +7,7 @@ use hapterra::phantom::HeldPhantom;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::plant::{Currents, Sensed};
+use hapterra_core::wire::plant::{Currents, PlantState};
 use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
@@ -118,7 +118,7 @@ impl Stepped for InMemory {
 
     fn tick(&mut self, _: SessionNumber, frames: &[u8]) -> Vec<u8> {
         let drive = self.device.tick(self.arm.sense());
-        if self.device.link.drives_arm() {
+        if self.device.link.is_arm_in_use() {
             let currents_a = drive.currents_a.to_array().map(f64::from);
             self.arm.step(currents_a, 1e-3);
         }
@@ -230,7 +230,7 @@ impl Stepped for OnBoard {
     fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8> {
         let (tick, sense) = (self.ticks, self.arm.sense());
         let mut frame = [0; 64];
-        let sensed = encode(&Sensed { tick, sense }, &mut frame).expect("it fits");
+        let sensed = encode(&PlantState { tick, sense }, &mut frame).expect("it fits");
         self.plant.send(sensed).expect("the board is there");
         let currents = self.currents();
         assert_eq!(currents.tick, tick);

@@ -114,7 +114,7 @@ pub(crate) fn check_count(columns: u32, rows: u32, given: usize) -> Result<(), T
 }
 
 /// Allocates memory for the samples.
-pub(crate) fn room_for<T>(columns: u32, rows: u32) -> Result<Vec<T>, TerrainError> {
+pub(crate) fn reserve_samples<T>(columns: u32, rows: u32) -> Result<Vec<T>, TerrainError> {
     check_size(columns, rows)?;
     let mut samples = Vec::new();
     let count = usize::try_from(u64::from(columns) * u64::from(rows)).unwrap_or(usize::MAX);

@@ -15,7 +15,7 @@ use crate::heights::Unread;
 use crate::surface_params::{Surface, SurfaceError};
 use crate::terrain::Terrain;
 use crate::tick_loop::TickLoop;
-use crate::tile_cutter::NoTile;
+use crate::tile_cutter::CutError;
 
 /// Maximum number of ticks in which a force ramps up after a change, at every rate.
 const MAX_SETTLING: u32 = 4_096;
@@ -159,8 +159,8 @@ impl Contact {
         let rate = TickRate::new(rate_hz).ok_or(ContactError::Rate(rate_hz))?;
         let scene = scene(&terrain, &surface)?;
         let mut tick_loop = TickLoop::new(rate);
-        let begun = tick_loop.begin(scene, surface.table());
-        begun.map_err(|_| ContactError::Refused)?;
+        let accepted = tick_loop.set_scene(scene, surface.table());
+        accepted.map_err(|_| ContactError::Refused)?;
         Ok(Self {
             materials: surface.table().map_or(0, |table| table.materials().len()),
             terrain,
@@ -218,8 +218,8 @@ impl Contact {
     pub fn set_surface(&mut self, surface: Surface) -> Result<(), ContactError> {
         let next = scene(&self.terrain, &surface)?;
         let hip = self.last.unwrap_or_default();
-        let put = self.tick_loop.change(next, surface.table(), hip);
-        put.map_err(|_| ContactError::Refused)?;
+        let accepted = self.tick_loop.change_surface(next, surface.table(), hip);
+        accepted.map_err(|_| ContactError::Refused)?;
         self.scene = next;
         self.materials = surface.table().map_or(0, |table| table.materials().len());
         // The loop restarts. Points at the HIP's last position either show that the proxy is in the
@@ -245,8 +245,8 @@ impl Contact {
         match output {
             Ok(Some(sample)) => Ok(sample),
             Ok(None) => Err(StepError::Far { hip_mm }),
-            Err(NoTile::Unread(unread)) => Err(unread.into()),
-            Err(NoTile::Step) => Err(StepError::Steep { east_mm, north_mm }),
+            Err(CutError::Unread(unread)) => Err(unread.into()),
+            Err(CutError::Step) => Err(StepError::Steep { east_mm, north_mm }),
         }
     }
 

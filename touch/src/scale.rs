@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn to_the_grid_and_back() {
+    fn grid_points_convert_back_to_mm() {
         let scale = Scale::new(0.25, 1.0).expect("valid");
         for mm in [[0.1, -0.1, 1e6], [-1e-12, 0.25, -0.25], [1e8, -1e8, 0.0]] {
             let point = scale.to_grid(mm).expect("addressable");
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_and_a_level_keeps_the_size() {
+    fn invalid_scales_are_refused_and_a_level_keeps_the_size() {
         for cell in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-60, 1e60] {
             assert!(Scale::new(cell, 1.0).is_err(), "{cell}");
         }

@@ -35,16 +35,16 @@ pub struct Surface {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// A number is out of its bounds.
-    #[error("{what} is {value}: give {least} to {most}")]
+    #[error("{what} is {value}: give {min} to {max}")]
     Bounds {
         /// Name of the number.
         what: &'static str,
         /// The number.
         value: f32,
         /// The minimum.
-        least: f32,
+        min: f32,
         /// The maximum.
-        most: f32,
+        max: f32,
     },
     /// The static friction is less than the dynamic friction.
     #[error(
@@ -57,7 +57,7 @@ pub enum SurfaceError {
         dynamic_mu: f32,
     },
     /// There are too many materials.
-    #[error("{0} materials besides the surface itself: give at most {most}", most = MaterialTable::MAX - 1)]
+    #[error("{0} materials besides the surface itself: give at most {max}", max = MaterialTable::MAX - 1)]
     Materials(usize),
     /// There are materials, which scale the stiffness, but the stiffness is zero.
     #[error("a surface with materials has a stiffness of 0 N/mm: give more")]
@@ -156,49 +156,53 @@ fn check(params: &SurfaceParams) -> Result<(), SurfaceError> {
         shading: _,
         texture,
     } = params;
-    within("stiffness, N/mm,", *stiffness_n_per_mm, 0.0..=f32::MAX)?;
-    within("max_force, N,", *max_force_n, 0.0..=f32::MAX)?;
-    within("dynamic friction", friction.dynamic_mu, 0.0..=Friction::MAX)?;
-    within("static friction", friction.static_mu, 0.0..=Friction::MAX)?;
-    let most_s = Friction::MAX_VISCOUS_S;
-    within("viscous friction, s,", friction.viscous_s, 0.0..=most_s)?;
+    check_range("stiffness, N/mm,", *stiffness_n_per_mm, 0.0..=f32::MAX)?;
+    check_range("max_force, N,", *max_force_n, 0.0..=f32::MAX)?;
+    check_range("dynamic friction", friction.dynamic_mu, 0.0..=Friction::MAX)?;
+    check_range("static friction", friction.static_mu, 0.0..=Friction::MAX)?;
+    let max_s = Friction::MAX_VISCOUS_S;
+    check_range("viscous friction, s,", friction.viscous_s, 0.0..=max_s)?;
     if friction.static_mu < friction.dynamic_mu {
         return Err(SurfaceError::Friction {
             static_mu: friction.static_mu,
             dynamic_mu: friction.dynamic_mu,
         });
     }
-    let most = Damping::MAX_NS_PER_M;
-    within("damping, N·s/m,", damping.ns_per_m, 0.0..=most)?;
+    let max = Damping::MAX_NS_PER_M;
+    check_range("damping, N·s/m,", damping.ns_per_m, 0.0..=max)?;
     if texture.is_none() {
         return Ok(());
     }
     let (shortest, longest) = Texture::WAVELENGTHS_MM;
-    within(
+    check_range(
         "texture wavelength, mm,",
         texture.wavelength_mm,
         shortest..=longest,
     )?;
     let steepest_mm = texture.wavelength_mm * Texture::STEEPEST;
     let max_mm = steepest_mm.min(Texture::MAX_AMPLITUDE_MM);
-    within("texture amplitude, mm,", texture.amplitude_mm, 0.0..=max_mm)?;
-    within(
+    check_range("texture amplitude, mm,", texture.amplitude_mm, 0.0..=max_mm)?;
+    check_range(
         "texture direction, degrees,",
         texture.direction_deg,
         -360.0..=360.0,
     )
 }
 
-fn within(what: &'static str, value: f32, range: RangeInclusive<f32>) -> Result<(), SurfaceError> {
-    let (least, most) = range.into_inner();
+fn check_range(
+    what: &'static str,
+    value: f32,
+    range: RangeInclusive<f32>,
+) -> Result<(), SurfaceError> {
+    let (min, max) = range.into_inner();
     // NaN is in no range.
-    match (least..=most).contains(&value) {
+    match (min..=max).contains(&value) {
         true => Ok(()),
         false => Err(SurfaceError::Bounds {
             what,
             value,
-            least,
-            most,
+            min,
+            max,
         }),
     }
 }

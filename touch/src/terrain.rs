@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use hapterra_core::grid::MAX_CELL;
 
-use crate::checks::{TerrainError, check_count, check_size, room_for};
+use crate::checks::{TerrainError, check_count, check_size, reserve_samples};
 use crate::heights::{Array, Block, Height, Heights, RowOrder, Steepest, Unread, survey};
 use crate::scale::Scale;
 use crate::tip::Ball;
@@ -62,7 +62,7 @@ impl Terrain {
         cell_mm: f64,
         mut height: impl FnMut(u32, u32) -> T,
     ) -> Result<Self, TerrainError> {
-        let mut samples = room_for(columns, rows)?;
+        let mut samples = reserve_samples(columns, rows)?;
         for row in 0..rows {
             samples.extend((0..columns).map(|column| height(column, row)));
         }
@@ -83,7 +83,7 @@ impl Terrain {
     ) -> Result<Self, TerrainError> {
         // The check comes before the copy.
         check_count(columns, rows, heights.len())?;
-        let mut samples = room_for(columns, rows)?;
+        let mut samples = reserve_samples(columns, rows)?;
         samples.extend_from_slice(heights);
         Self::from_vec(columns, rows, cell_mm, order, samples)
     }
@@ -137,7 +137,7 @@ impl Terrain {
         }
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
         let (columns, north) = (count(first), count(rows.len()));
-        let mut samples = room_for(columns, north)?;
+        let mut samples = reserve_samples(columns, north)?;
         for row in rows {
             samples.extend_from_slice(row.as_ref());
         }

@@ -125,7 +125,7 @@ fn blocks_of_a_callback_are_rendered_as_an_array() {
 }
 
 #[test]
-fn unread_heights_leave_the_contact_as_it_was() {
+fn failed_read_leaves_the_contact_unchanged() {
     use core::sync::atomic::{AtomicBool, Ordering};
     static FAILS: AtomicBool = AtomicBool::new(false);
     let tiles = |_: Block, heights: &mut [f64]| match FAILS.load(Ordering::Relaxed) {
@@ -206,7 +206,7 @@ fn every_parameter_changes_the_force() {
 }
 
 #[test]
-fn parameters_out_of_bounds_are_named() {
+fn out_of_range_parameters_are_reported() {
     let bad = [
         (
             params(|it| it.stiffness_n_per_mm = -1.0),
@@ -253,7 +253,7 @@ fn parameters_out_of_bounds_are_named() {
 }
 
 #[test]
-fn bad_terrains_are_errors() {
+fn invalid_terrains_are_errors() {
     let of = |columns, rows, cell_mm, heights: &[f64]| {
         let terrain = Terrain::from_slice(columns, rows, cell_mm, RowOrder::SouthFirst, heights);
         let made = terrain.map_err(|error| error.to_string());
@@ -283,7 +283,7 @@ fn bad_terrains_are_errors() {
 }
 
 #[test]
-fn places_and_rates_out_of_range_are_errors() {
+fn out_of_range_positions_and_rates_are_errors() {
     let mut contact = Contact::new(flat(0.0), Surface::default()).expect("a contact");
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         assert!(matches!(
@@ -314,7 +314,7 @@ fn rate_sets_the_speed_of_damping() {
 }
 
 #[test]
-fn another_surface_keeps_the_contact() {
+fn surface_change_keeps_the_contact() {
     let mut contact = Contact::new(flat(2.0), Surface::default()).expect("a contact");
     contact.step([5.0, 5.0, 3.0]).expect("a step");
     let stiff = || Surface::new(params(|it| it.stiffness_n_per_mm = 1.0)).expect("a surface");

@@ -13,7 +13,7 @@ use hapterra_core::tick::{Command, Haptics, Outcome, RefusedScene};
 use self_cell::{MutBorrow, self_cell};
 
 use crate::terrain::Terrain;
-use crate::tile_cutter::NoTile;
+use crate::tile_cutter::CutError;
 
 /// Tiles along the side of the window: the same number as in the `hapterra` command.
 const WINDOW: usize = 16;
@@ -34,7 +34,7 @@ struct Running<'t> {
     spare: Option<&'t mut Tile>,
     outcome: Outcome,
     /// Buffer for the samples of a tile.
-    room: Vec<f64>,
+    buffer: Vec<f64>,
     seq: u32,
     view: u8,
 }
@@ -54,21 +54,21 @@ impl TickLoop {
     }
 
     /// Begins a scene, with the table of its materials.
-    pub(crate) fn begin(
+    pub(crate) fn set_scene(
         &mut self,
         scene: Scene,
         materials: Option<&MaterialTable>,
     ) -> Result<(), RefusedScene> {
         self.0.with_dependent_mut(|_, running| {
             if let Some(table) = materials {
-                running.haptics.take_materials(table);
+                running.haptics.set_materials(table);
             }
             running.accept(Command::Scene(scene))
         })
     }
 
     /// Changes the surface, with the HIP at its last position.
-    pub(crate) fn change(
+    pub(crate) fn change_surface(
         &mut self,
         scene: Scene,
         materials: Option<&MaterialTable>,
@@ -76,7 +76,7 @@ impl TickLoop {
     ) -> Result<(), RefusedScene> {
         self.0.with_dependent_mut(|_, running| {
             if let Some(table) = materials {
-                running.haptics.take_materials(table);
+                running.haptics.set_materials(table);
             }
             running.view = running.view.wrapping_add(1);
             // Tiles with materials differ from those without.
@@ -96,7 +96,7 @@ impl TickLoop {
         hip: GridPoint,
         terrain: &Terrain,
         materials: usize,
-    ) -> Result<Option<TickRecord>, NoTile> {
+    ) -> Result<Option<TickRecord>, CutError> {
         self.0
             .with_dependent_mut(|_, running| running.step(hip, terrain, materials))
     }
@@ -112,7 +112,7 @@ impl<'t> Running<'t> {
             haptics: Haptics::new(slots, rate, None),
             spare,
             outcome: Outcome::default(),
-            room: Vec::new(),
+            buffer: Vec::new(),
             seq: 0,
             view: 0,
         }
@@ -130,7 +130,7 @@ impl<'t> Running<'t> {
         hip: GridPoint,
         terrain: &Terrain,
         materials: usize,
-    ) -> Result<Option<TickRecord>, NoTile> {
+    ) -> Result<Option<TickRecord>, CutError> {
         self.seq = self.seq.wrapping_add(1);
         let seq = self.seq;
         // A point is never refused, and returns no tile.
@@ -138,21 +138,26 @@ impl<'t> Running<'t> {
         let sense = GuardInputs::default();
         for _ in 0..MAX_TICKS {
             self.haptics.tick_into(&sense, true, &mut self.outcome);
-            if self.outcome.answers == Some(seq) {
+            if self.outcome.answered_seq == Some(seq) {
                 return Ok(Some(self.outcome.sample));
             }
             if let Some(index) = self.outcome.sample.missing_tile {
-                self.bring(TileKey { level: 0, index }, terrain, materials)?;
+                self.load_tile(TileKey { level: 0, index }, terrain, materials)?;
             }
         }
         Ok(None)
     }
 
-    fn bring(&mut self, key: TileKey, terrain: &Terrain, materials: usize) -> Result<(), NoTile> {
+    fn load_tile(
+        &mut self,
+        key: TileKey,
+        terrain: &Terrain,
+        materials: usize,
+    ) -> Result<(), CutError> {
         let Some(tile) = self.spare.take() else {
             return Ok(());
         };
-        if let Err(error) = terrain.cut(key, materials, &mut self.room, tile) {
+        if let Err(error) = terrain.cut(key, materials, &mut self.buffer, tile) {
             self.spare = Some(tile);
             return Err(error);
         }

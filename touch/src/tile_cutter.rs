@@ -15,7 +15,7 @@ use crate::tip::{self, Ball, Nodes, Samples};
 
 /// Reason why a tile could not be cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NoTile {
+pub(crate) enum CutError {
     Unread(Unread),
     Step,
 }
@@ -27,11 +27,11 @@ impl Terrain {
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
         let (size, cell_mm) = (self.size(), self.haptic_scale().cell_mm());
-        let (column, u) = tile_heights::place(east_mm / cell_mm, size[0])?;
-        let (row, v) = tile_heights::place(north_mm / cell_mm, size[1])?;
+        let (column, u) = tile_heights::patch_at(east_mm / cell_mm, size[0])?;
+        let (row, v) = tile_heights::patch_at(north_mm / cell_mm, size[1])?;
         if let Some(ball) = &self.ball {
-            let mut room = Vec::new();
-            let read = self.samples_around(ball, [column, row], tip::PATCH, &mut room);
+            let mut buffer = Vec::new();
+            let read = self.samples_around(ball, [column, row], tip::PATCH_NODES, &mut buffer);
             let (samples, nodes) = read.ok()?;
             return Some(ball.between(&samples, nodes, [u, v])? * cell_mm);
         }
@@ -106,24 +106,26 @@ impl Terrain {
         Ok(())
     }
 
-    /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `room` is
-    /// a buffer for its samples.
+    /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `buffer`
+    /// is memory for its samples.
     pub(crate) fn cut(
         &self,
         key: TileKey,
         materials: usize,
-        room: &mut Vec<f64>,
+        buffer: &mut Vec<f64>,
         tile: &mut Tile,
-    ) -> Result<(), NoTile> {
+    ) -> Result<(), CutError> {
         let index = [key.index.col, key.index.row];
         let first = index.map(|index| index.max(0) as u32 * TILE_CELLS as u32);
-        let width = self.read_haptic(first, room).map_err(NoTile::Unread)?;
-        let base = base(room);
+        let width = self.read_haptic(first, buffer).map_err(CutError::Unread)?;
+        let base = base(buffer);
         let filled = tile.fill(key, base, |col, row| {
-            let cells = (col < width).then(|| room.get(row * width + col)).flatten();
-            cells.map_or(f32::NAN, |cells| tile_heights::above(base, *cells))
+            let cells = (col < width)
+                .then(|| buffer.get(row * width + col))
+                .flatten();
+            cells.map_or(f32::NAN, |cells| tile_heights::height_above(base, *cells))
         });
-        filled.map_err(|_| NoTile::Step)?;
+        filled.map_err(|_| CutError::Step)?;
         if materials > 0
             && let Some(of) = &self.materials
         {
@@ -138,30 +140,30 @@ impl Terrain {
             });
             // Checked when they were set.
             let set = tile.set_materials(materials, samples);
-            set.map_err(|_| NoTile::Step)?;
+            set.map_err(|_| CutError::Step)?;
         }
         Ok(())
     }
 
     /// Reads the rendered heights of a tile, in haptic cells, row by row: NaN for no-data. Returns
     /// the number of heights in a row.
-    fn read_haptic(&self, first: [u32; 2], room: &mut Vec<f64>) -> Result<usize, Unread> {
+    fn read_haptic(&self, first: [u32; 2], buffer: &mut Vec<f64>) -> Result<usize, Unread> {
         let Some(ball) = &self.ball else {
             let end = [self.columns, self.rows].map(i64::from);
             let from = first.map(i64::from);
             let to = [0, 1].map(|axis| (from[axis] + TILE_SAMPLES as i64).min(end[axis]));
-            let block = self.read_cells(from, to, room)?;
+            let block = self.read_cells(from, to, buffer)?;
             if self.height_step > 0.0 {
-                for height in room.iter_mut() {
+                for height in buffer.iter_mut() {
                     *height = libm::round(*height / self.height_step) * self.height_step;
                 }
             }
             return Ok(block.columns as usize);
         };
-        let (samples, nodes) = self.samples_around(ball, first, TILE_SAMPLES, room)?;
-        *room = ball.centres(&samples, nodes);
-        for height in room.iter_mut() {
-            *height = tip::rounded(within(*height));
+        let (samples, nodes) = self.samples_around(ball, first, TILE_SAMPLES, buffer)?;
+        *buffer = ball.centres(&samples, nodes);
+        for height in buffer.iter_mut() {
+            *height = tip::round_centre(nan_beyond_range(*height));
         }
         Ok(TILE_SAMPLES)
     }
@@ -173,16 +175,16 @@ impl Terrain {
         ball: &Ball,
         first: [u32; 2],
         side: usize,
-        room: &mut Vec<f64>,
+        buffer: &mut Vec<f64>,
     ) -> Result<(Samples, Nodes), Unread> {
-        let (from, along, nodes) = ball.around(first, side);
+        let (from, along, nodes) = ball.samples_for(first, side);
         let end = [self.columns, self.rows].map(i64::from);
         let to = [0, 1].map(|axis| (from[axis] + along as i64).min(end[axis]));
-        let block = self.read_cells(from.map(|first| first.max(0)), to, room)?;
+        let block = self.read_cells(from.map(|first| first.max(0)), to, buffer)?;
         let mut heights = vec![f64::NAN; along * along];
         let beside = from.map(|first| first.min(0).unsigned_abs() as usize);
         let rows = heights.chunks_exact_mut(along).skip(beside[1]);
-        for (row, read) in rows.zip(room.chunks_exact(block.columns.max(1) as usize)) {
+        for (row, read) in rows.zip(buffer.chunks_exact(block.columns.max(1) as usize)) {
             for (height, cells) in row.iter_mut().skip(beside[0]).zip(read) {
                 *height = *cells;
             }
@@ -200,7 +202,7 @@ impl Terrain {
         &self,
         from: [i64; 2],
         to: [i64; 2],
-        room: &mut Vec<f64>,
+        buffer: &mut Vec<f64>,
     ) -> Result<Block, Unread> {
         // Both are within the field.
         let count = |axis: usize| (to[axis] - from[axis]).max(0) as u32;
@@ -210,19 +212,19 @@ impl Terrain {
             columns: count(0),
             rows: count(1),
         };
-        room.clear();
-        room.resize(block.columns as usize * block.rows as usize, f64::NAN);
-        self.heights.read(block, room)?;
+        buffer.clear();
+        buffer.resize(block.columns as usize * block.rows as usize, f64::NAN);
+        self.heights.read(block, buffer)?;
         let scale = self.haptic_scale();
-        for height in room.iter_mut() {
-            *height = within(scale.height_cells(*height));
+        for height in buffer.iter_mut() {
+            *height = nan_beyond_range(scale.height_cells(*height));
         }
         Ok(block)
     }
 }
 
 /// Returns a height in cells; NaN beyond the range of positions.
-fn within(cells: f64) -> f64 {
+fn nan_beyond_range(cells: f64) -> f64 {
     match cells.abs() <= f64::from(MAX_CELL) {
         true => cells,
         false => f64::NAN,

@@ -15,7 +15,7 @@ pub fn base(low: f64, high: f64) -> i32 {
 
 /// Returns a height above a tile's base, cells, rounded once.
 #[must_use]
-pub fn above(base: i32, height: f64) -> f32 {
+pub fn height_above(base: i32, height: f64) -> f32 {
     (height - f64::from(base)) as f32
 }
 
@@ -36,7 +36,7 @@ pub fn top(low: f64, high: f64) -> i32 {
 /// Returns the index of the patch of a coordinate in cells and the fraction in it; `None` outside
 /// the field.
 #[must_use]
-pub fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
+pub fn patch_at(cells: f64, patches: i32) -> Option<(u32, f64)> {
     if !(0.0..=f64::from(patches)).contains(&cells) {
         return None;
     }

@@ -3,7 +3,7 @@
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{
-    CoarseTile, Fallback, FieldSize, RequestHint, SETTLING_MM_S, TILE_CELLS, Tile, TileKey,
+    BLEND_MM_S, CoarseTile, Fallback, FieldSize, RequestHint, TILE_CELLS, Tile, TileKey,
     TileRequester,
 };
 
@@ -18,7 +18,7 @@ use crate::variant::{ContactResult, Hip};
 const START_CELLS: f64 = 1.0;
 /// Motion of the surface in a tick, cells, from the fallback to a tile that arrived: at 1 kHz, with
 /// cells of a millimetre.
-const BLEND_CELLS_PER_TICK: f32 = SETTLING_MM_S / 1_000.0;
+const BLEND_CELLS_PER_TICK: f32 = BLEND_MM_S / 1_000.0;
 /// Ticks of the slide eastward.
 const TICKS: u32 = 400;
 
@@ -86,7 +86,7 @@ fn output(delay_ticks: u32, fallback: Option<Fallback>) -> Vec<ContactResult> {
     let size = FieldSize::new(grid.columns as i32, grid.rows as i32);
     let mut requester = TileRequester::<SIDE>::new();
     requester.reset(0, size);
-    window.lay(fallback);
+    window.set_fallback(fallback);
     fallback_tile = fallback.map(|fallback| coarse(&grid, &fallback));
     if let Some(tile) = &mut fallback_tile {
         assert!(window.take(tile, [Cell::new(0, 0); 2]).is_none());
@@ -97,7 +97,7 @@ fn output(delay_ticks: u32, fallback: Option<Fallback>) -> Vec<ContactResult> {
     let mut requested: Vec<TileKey> = Vec::new();
     let mut results = Vec::new();
     for (tick, hip) in (0..).zip(&hips) {
-        if window.settle(BLEND_CELLS_PER_TICK) {
+        if window.blend_tiles(BLEND_CELLS_PER_TICK) {
             contact.surface_moved(&window);
         }
         let output = *contact.step(&window, &hip.grid);

@@ -74,8 +74,8 @@ pub(super) fn render(grid: &Grid, params: SurfaceParams, hips: &[Hip]) -> Vec<Ef
         let point = HipCommand { seq, hip: hip.grid };
         let _ = haptics.accept(Command::Hip(point));
         let mut ticks = (0..MAX_TICKS).map(|_| haptics.tick(&Default::default(), true));
-        let ended = ticks.find(|outcome| outcome.answers.is_some());
-        ended.map(|outcome| EffectTick::of(&outcome.sample))
+        let answered = ticks.find(|outcome| outcome.answered_seq.is_some());
+        answered.map(|outcome| EffectTick::of(&outcome.sample))
     };
     (0..).zip(hips).map_while(&mut result).collect()
 }

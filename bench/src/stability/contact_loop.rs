@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::force::{Damping, SurfaceParams, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, Kinematics};
@@ -92,8 +92,8 @@ pub(super) fn run(
     for tick in 0..ticks {
         if let Some([held_s, release_s]) = settings.clutch_s {
             let hold = [
-                (held_s, ClutchHold::WithHand),
-                (release_s, ClutchHold::LetGo),
+                (held_s, ClutchMode::WithHand),
+                (release_s, ClutchMode::Released),
             ];
             for (_, hold) in hold.into_iter().filter(|(s, _)| at(*s) == tick) {
                 let _ = haptics.accept(Command::Clutch(hold));
@@ -103,13 +103,13 @@ pub(super) fn run(
         let encoder_height_mm = encoder_height_mm(&arm, inputs.counts);
         let outcome = haptics.tick(&inputs, true);
         let sample = outcome.sample;
-        let demand = RequestHint {
+        let hint = RequestHint {
             missing_tile: sample.missing_tile,
             proxy: sample.proxy.column(),
             hip: sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = requester.next_request(sample.tick, &demand) {
+        while let Some(key) = requester.next_request(sample.tick, &hint) {
             let Some(tile) = spare.pop() else { break };
             fill(tile, key, scene.size);
             requester.received(key);

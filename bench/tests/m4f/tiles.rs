@@ -2,7 +2,7 @@
 //! as possible.
 
 use hapterra_core::terrain::TILE_SAMPLES;
-use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::packed::{HeightStep, MAX_PACKED, pack};
 use hapterra_core::wire::message::Heights;
 use hapterra_lab::path::Random;
 use hapterra_lab::tick_states::terrain;
@@ -18,8 +18,8 @@ const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let mut random = Random(31);
     // 1/30 of a cell a metre; heights to 1/1,024 m.
-    let metres = Step::Cells(1.0 / 30.0);
-    let parts = Step::Cells(1.0 / (1024.0 * 30.0));
+    let metres = HeightStep::Cells(1.0 / 30.0);
+    let parts = HeightStep::Cells(1.0 / (1024.0 * 30.0));
     let whole = packed(&[metres], || {
         (3.0 * random.between(0.0, 1.0)).floor() / 30.0
     });
@@ -28,7 +28,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         (3200.0 * random.between(0.0, 1.0)).floor() / (1024.0 * 30.0)
     });
     let mut random = Random(33);
-    let centimetres = Step::Single {
+    let centimetres = HeightStep::Single {
         unit: 0.01,
         cells: 0.999_85,
     };
@@ -57,7 +57,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
 }
 
 /// Returns hills with an addition, packed with one of the steps.
-fn packed(steps: &[Step], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
+fn packed(steps: &[HeightStep], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
     let mut tile = |_| {
         let heights: [f32; SAMPLES] = std::array::from_fn(|i| {
             let slope = (i % TILE_SAMPLES + i / TILE_SAMPLES) / 4;
@@ -72,9 +72,9 @@ fn packed(steps: &[Step], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
 }
 
 /// Returns the size of a slope's step, cells.
-fn unit(steps: &[Step]) -> f64 {
+fn unit(steps: &[HeightStep]) -> f64 {
     match steps {
-        [Step::Cells(cells)] => *cells,
+        [HeightStep::Cells(cells)] => *cells,
         _ => 0.0,
     }
 }

@@ -17,7 +17,7 @@ use crate::terrain::TileIndex;
 /// cycles of a millisecond; a test of the images checks this.
 pub const WORK_PER_TICK: u32 = 300;
 /// Work units of a tick from 2 kHz on: the number that fits into the costliest tick at 10 kHz.
-const LEAST_WORK_PER_TICK: u32 = 86;
+const MIN_WORK_PER_TICK: u32 = 86;
 
 /// Returns the work units that a tick may spend at a rate.
 ///
@@ -33,27 +33,27 @@ pub const fn work_per_tick(rate: TickRate) -> u32 {
     if rate.hz() < 2_000 {
         WORK_PER_TICK
     } else {
-        LEAST_WORK_PER_TICK
+        MIN_WORK_PER_TICK
     }
 }
 
 /// Units for following the proxy within its patch by the fast path.
 pub(super) const FAST_PATH: u32 = 2;
 /// Units for entering a patch: its corners, and the check whether the path to the HIP leads off.
-pub(super) const ARRIVAL: u32 = 6;
+pub(super) const PATCH_ENTRY: u32 = 6;
 /// Units for the closest point of a convex patch.
 pub(super) const CONVEX: u32 = 4;
-/// Returns the units for the closest points of `looked` rulings.
+/// Returns the units for the closest points of `evaluated` rulings.
 #[inline]
-pub(super) const fn rulings(looked: u32) -> u32 {
-    looked + looked.div_ceil(3)
+pub(super) const fn rulings(evaluated: u32) -> u32 {
+    evaluated + evaluated.div_ceil(3)
 }
 /// Units for the start of a search by rulings.
 pub(super) const RULINGS: u32 = 8;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
 /// Units for one evaluation of the friction cone.
-pub(super) const LOOK: u32 = 3;
+pub(super) const CONE_EVALUATION: u32 = 3;
 /// Units for the direction and the end of a straight path with friction.
 pub(super) const DIRECTION: u32 = 9;
 /// Units for the check that a box is clear.
@@ -62,10 +62,10 @@ pub(super) const BOX: u32 = 4;
 pub(super) const INTERSECTION: u32 = 8;
 
 /// Units for entering a patch on a border, and for the slopes into its four neighbours.
-pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
+pub(super) const BORDER_ENTRY: u32 = PATCH_ENTRY + 4 * SLOPE;
 /// Units of the largest piece of work. A tick that postponed work has spent more than its budget
 /// minus this.
-pub const MAX_PIECE: u32 = ON_BORDER;
+pub const MAX_ATOMIC_WORK: u32 = BORDER_ENTRY;
 
 /// Work of a tick, its limit, and the first missing tile.
 #[derive(Debug)]
@@ -99,8 +99,8 @@ impl Budget {
 
     /// Records that the tile of a cell is missing.
     #[cold]
-    pub(super) fn lacks(&mut self, cell: Cell) {
-        self.missing.get_or_insert(TileIndex::holding(cell));
+    pub(super) fn record_missing(&mut self, cell: Cell) {
+        self.missing.get_or_insert(TileIndex::containing(cell));
     }
 
     /// Returns the first tile that the tick needed and that was missing.
@@ -109,7 +109,7 @@ impl Budget {
     }
 
     /// Returns the number of rulings for which units are left.
-    pub(super) const fn left_for_rulings(&self) -> u32 {
+    pub(super) const fn remaining_rulings(&self) -> u32 {
         self.limit.saturating_sub(self.spent) / 4 * 3
     }
 

@@ -57,9 +57,9 @@ fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
 
 /// Median and 99th percentile of the patches and of the evaluations, over the ticks that end in a
 /// state.
-fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
+fn search_cost(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let above = GridPoint::new([30, 30, 9], Vec3::ZERO);
     let mut step = |hip: &GridPoint| *contact.step(&field.window, hip);
@@ -88,56 +88,56 @@ fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u3
 #[test]
 fn patches_and_evaluations_per_tick_are_bounded() {
     let high = |[x, y]: [f64; 2]| GridPoint::new([x as i32, y as i32, 9], Vec3::ZERO);
-    let flies = |above: f64| places(0.5).map(move |at| hip(at, above));
-    let slides = |step: f64| places(step).map(|at| hip(at, -0.1));
+    let above_ground = |above: f64| places(0.5).map(move |at| hip(at, above));
+    let sliding = |step: f64| places(step).map(|at| hip(at, -0.1));
     let taps = places(0.03).flat_map(|at| [hip(at, 0.2), hip(at, -0.1)]);
     // One encoder count, 0.03 cell, in either direction.
     let mut random = Random(72);
     let mut count = || 0.03 * random.between(-1.5, 1.5).round();
-    let trembles = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));
-    let rests = (0..TICKS).map(|_| hip([30.4, 30.5], -0.1));
+    let trembling = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));
+    let unmoved = (0..TICKS).map(|_| hip([30.4, 30.5], -0.1));
     let states = [
         (
             "unmoved",
-            looked_at(rests, ContactState::Touching),
+            search_cost(unmoved, ContactState::Touching),
             [[0, 0], [0, 0]],
         ),
         (
             "free high",
-            looked_at(places(0.5).map(high), ContactState::Free),
+            search_cost(places(0.5).map(high), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
             "free low",
-            looked_at(flies(1.0), ContactState::Free),
+            search_cost(above_ground(1.0), ContactState::Free),
             [[0, 0], [0, 0]],
         ),
         (
             "first contact",
-            looked_at(taps, ContactState::Touching),
+            search_cost(taps, ContactState::Touching),
             [[1, 2], [2, 5]],
         ),
         (
             "slides 0.01",
-            looked_at(slides(0.01), ContactState::Touching),
+            search_cost(sliding(0.01), ContactState::Touching),
             [[1, 2], [1, 2]],
         ),
         (
             "slides 0.5",
-            looked_at(slides(0.5), ContactState::Touching),
+            search_cost(sliding(0.5), ContactState::Touching),
             [[2, 4], [2, 8]],
         ),
         (
             "trembles",
-            looked_at(trembles, ContactState::Touching),
+            search_cost(trembling, ContactState::Touching),
             [[1, 1], [1, 1]],
         ),
     ];
-    for (state, [patches, evaluations], most) in states {
+    for (state, [patches, evaluations], max) in states {
         std::println!("{state}: patches {patches:?}, evaluations {evaluations:?}");
-        let within = |is: [u32; 2], most: [u32; 2]| is[0] <= most[0] && is[1] <= most[1];
+        let within = |is: [u32; 2], max: [u32; 2]| is[0] <= max[0] && is[1] <= max[1];
         assert!(
-            within(patches, most[0]) && within(evaluations, most[1]),
+            within(patches, max[0]) && within(evaluations, max[1]),
             "{state}"
         );
     }

@@ -25,7 +25,7 @@ impl Single {
     fn proxies(&self, hips: &[[f64; 3]]) -> Option<[[f64; 3]; 2]> {
         let mut tiles = buffers::<1>();
         let corners = self.0;
-        let field = Field::<1>::held(&mut tiles, FieldSize::new(3, 3), move |x, y| {
+        let field = Field::<1>::filled(&mut tiles, FieldSize::new(3, 3), move |x, y| {
             let is_corner = (1..=2).contains(&x) && (1..=2).contains(&y);
             let corner = (x - 1) + 2 * (y - 1);
             if is_corner {
@@ -92,8 +92,8 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[test]
 fn proxy_passes_no_crest_of_a_twisted_patch() {
     let mut random = Random(39);
-    let (mut moves, mut wrong) = (0, 0);
-    while moves < cases(4_000, 40) {
+    let (mut tried, mut wrong) = (0, 0);
+    while tried < cases(4_000, 40) {
         let single = Single([0; 4].map(|_| random.between(-8.0, 8.0) as f32));
         let from = [random.between(0.0, 1.0), random.between(0.0, 1.0)];
         let ground = single.height(from[0], from[1]);
@@ -116,11 +116,11 @@ fn proxy_passes_no_crest_of_a_twisted_patch() {
         let Some(proxies) = single.proxies(&[above, first, hip]) else {
             continue;
         };
-        moves += 1;
+        tried += 1;
         let reach = distance(proxies[0], hip) + 0.01;
         wrong += u32::from(!single.joins(hip, proxies, reach));
     }
-    assert_eq!(wrong, 0, "of {moves}");
+    assert_eq!(wrong, 0, "of {tried}");
 }
 
 /// Corners, the last two HIPs, and the right place of the proxy.

@@ -22,19 +22,20 @@ pub const RATE: f32 = RATE_PER_S / 1_000.0;
 ///
 /// One less than a tile's side: the cells that are read, including a neighbour of the HIP's patch,
 /// never share a slot of the window with the tile under the proxy.
-pub const FAR: u32 = TILE_CELLS as u32 - 1;
+pub const FULL_FORCE_DISTANCE: u32 = TILE_CELLS as u32 - 1;
 
 /// Returns true if the cell under the HIP is too far from the proxy's to matter.
 #[inline]
 fn is_far(proxy: Cell, hip: Cell) -> bool {
-    proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FAR
+    proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FULL_FORCE_DISTANCE
 }
 
 /// Target of the edge fade.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Target {
     /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous in the HIP
-    /// within [`FAR`] of the proxy's cell, and 1 beyond. Missing tiles count as no-data.
+    /// within [`FULL_FORCE_DISTANCE`] of the proxy's cell, and 1 beyond. Missing tiles count as
+    /// no-data.
     pub(super) fade: f32,
     /// True if the HIP is over a patch, so that nothing fades while it stays over its cell.
     pub(super) over_patch: bool,
@@ -76,7 +77,7 @@ fn beside_patches<const D: usize>(
         CellContent::Patch(_) => true,
         CellContent::NoData => false,
         CellContent::Missing => {
-            budget.lacks(cell);
+            budget.record_missing(cell);
             false
         }
     };
@@ -109,16 +110,16 @@ fn gap(place: f32, toward: i32) -> f32 {
     }
 }
 
-/// Returns the edge fade, moved toward its target by at most `most`, which is positive.
-pub(super) fn approach(fade: f32, target: f32, most: f32) -> f32 {
+/// Returns the edge fade, moved toward its target by at most `max_change`, which is positive.
+pub(super) fn approach(fade: f32, target: f32, max_change: f32) -> f32 {
     // Not `f32::min`, which is a call where the processor has no instruction for it.
-    let way = target - fade;
-    if way > most {
-        fade + most
-    } else if way < -most {
-        fade - most
+    let change = target - fade;
+    if change > max_change {
+        fade + max_change
+    } else if change < -max_change {
+        fade - max_change
     } else {
-        fade + way
+        fade + change
     }
 }
 
@@ -133,7 +134,7 @@ mod tests {
     use glam::Vec3;
 
     fn hole_at_10_10(tiles: &mut [Tile]) -> Field<'_, 2> {
-        Field::held(tiles, FieldSize::new(40, 40), |x, y| {
+        Field::filled(tiles, FieldSize::new(40, 40), |x, y| {
             if (10..=11).contains(&x) && (10..=11).contains(&y) {
                 f32::NAN
             } else {
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn full_over_a_patch_and_none_far_from_one() {
+    fn fade_is_full_over_a_patch_and_zero_far_away() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         assert_eq!(beside(&field, at(8.99, 10.5)).fade, 1.0);
@@ -160,9 +161,9 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_tile_is_named() {
+    fn missing_tile_is_reported() {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 0.0);
+        let field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 0.0);
         let mut budget = Budget::new(0);
         let there = beside_patches(&field.window, &at(40.5, 5.5), &mut budget);
         let missing = budget.missing();
@@ -186,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn continuous_across_every_border() {
+    fn edge_fade_is_continuous_across_every_border() {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);
         let mut last = beside(&field, at(7.0, 9.2)).fade;
@@ -214,21 +215,24 @@ mod tests {
         let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));
         assert_eq!(step(above).0, ContactState::Free);
         assert_eq!(step(at(8.5, 10.5)).0, ContactState::Touching);
-        let (mut last, mut most, mut ticks) = (1.0, 0.0f32, 0);
+        let (mut last, mut max_change, mut ticks) = (1.0, 0.0f32, 0);
         while let (ContactState::Touching, fade) = step(at(10.5, 10.5)) {
-            most = most.max(last - fade);
+            max_change = max_change.max(last - fade);
             last = fade;
             ticks += 1;
         }
-        (ticks as f32 / khz as f32, most)
+        (ticks as f32 / khz as f32, max_change)
     }
 
     #[test]
-    fn as_long_at_ten_kilohertz_as_at_one() {
+    fn edge_fade_time_is_independent_of_the_tick_rate() {
         for khz in [1, 2, 5, 10] {
-            let (ms, most) = faded_after(khz);
+            let (ms, max_change) = faded_after(khz);
             assert!((30.9..=32.1).contains(&ms), "{khz} kHz: {ms} ms");
-            assert!(most <= 1.001 * RATE / khz as f32, "{khz} kHz: {most}");
+            assert!(
+                max_change <= 1.001 * RATE / khz as f32,
+                "{khz} kHz: {max_change}"
+            );
         }
     }
 }

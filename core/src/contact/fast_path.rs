@@ -1,13 +1,13 @@
 //! Fast paths for nearly every tick: still free, or still sliding within a gentle patch.
 //!
 //! Each returns the same bits as the full contact (`proxy`), or nothing: a test
-//! (`the_shortcuts_change_no_bit`) and the randomised stress test run scenes with and without them.
+//! (`fast_paths_change_no_bit`) and the randomised stress test run scenes with and without them.
 //! `bench/instructions-m4f.csv` shows what they save: compare a sliding tick on the fast path with
 //! a first contact.
 
 use glam::Vec3;
 
-use super::closest_point::{Convexity, Place, passes_over};
+use super::closest_point::{Convexity, PatchPoint, is_above_tangent_plane};
 use super::surface::patch::Patch;
 use super::surface::{HipView, SurfacePoint};
 use super::sweep::lower;
@@ -29,7 +29,7 @@ pub(super) fn is_free<const D: usize>(
 
 /// A proxy at rest well inside a convex patch, with full force.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Follow {
+pub(super) struct PatchFollower {
     /// Place where it rests.
     pub(super) point: SurfacePoint,
     /// A cell that surely holds a patch: while the HIP is over it, nothing fades.
@@ -40,10 +40,10 @@ pub(super) struct Follow {
     convexity: Convexity,
 }
 
-impl Follow {
+impl PatchFollower {
     /// Creates the fast path of a proxy that came to rest with the HIP over the patch of `over`;
     /// returns `None` if the proxy must use the full contact.
-    pub(super) fn from<const D: usize>(
+    pub(super) fn new<const D: usize>(
         window: &Window<'_, D>,
         point: SurfacePoint,
         over: Cell,
@@ -67,37 +67,39 @@ impl Follow {
 
     /// Moves the proxy to its new place of rest, if that is still well inside its patch.
     #[inline]
-    pub(super) fn to(&mut self, view: &HipView) -> Followed {
+    pub(super) fn follow(&mut self, view: &HipView) -> FollowResult {
         let patch = self.patch.relative_to(view.altitude(), self.base);
         let (p, q) = view.in_patch(self.point.cell);
         let (u, v) = (self.point.u, self.point.v);
-        if passes_over(&patch, &self.point, (p - u, q - v)) {
-            return Followed::Not;
+        if is_above_tangent_plane(&patch, &self.point, (p - u, q - v)) {
+            return FollowResult::NotApplicable;
         }
-        let Some((place, is_exact)) = self.convexity.at_once(&patch, (p, q)) else {
-            return Followed::Not;
+        let Some((place, is_exact)) = self.convexity.closest_if_shallow(&patch, (p, q)) else {
+            return FollowResult::NotApplicable;
         };
-        let stays = is_exact && is_inside(place.u) && is_inside(place.v);
-        if !(stays && self.convexity.is_closest(&place) && self.over == view.column()) {
+        let is_in_patch = is_exact && is_inside(place.u) && is_inside(place.v);
+        if !(is_in_patch && self.convexity.is_closest(&place) && self.over == view.column()) {
             let begin = (place, is_exact);
-            let place = self.convexity.closest_after(&patch, (p, q), (u, v), begin);
-            return place.map_or(Followed::Not, Followed::InPatch);
+            let place = self
+                .convexity
+                .closest_from_start(&patch, (p, q), (u, v), begin);
+            return place.map_or(FollowResult::NotApplicable, FollowResult::InPatch);
         }
         (self.point.u, self.point.v) = (place.u, place.v);
         let displacement = Vec3::new(place.u - p, place.v - q, place.z);
-        Followed::Rests(view.position(&self.point, place.z), displacement)
+        FollowResult::AtRest(view.position(&self.point, place.z), displacement)
     }
 }
 
 /// Outcome of following a proxy within its patch.
-pub(super) enum Followed {
+pub(super) enum FollowResult {
     /// The proxy rests: its position, and the displacement from the HIP to it, cells.
-    Rests(GridPoint, Vec3),
+    AtRest(GridPoint, Vec3),
     /// The full contact is needed, but the proxy does not leave the surface at once, and this is
     /// the patch's closest point.
-    InPatch(Place),
+    InPatch(PatchPoint),
     /// The full contact is needed.
-    Not,
+    NotApplicable,
 }
 
 #[inline]

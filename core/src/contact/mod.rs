@@ -31,7 +31,7 @@ mod test_random;
 #[cfg(test)]
 mod tests;
 
-pub use budget::{MAX_PIECE, WORK_PER_TICK, work_per_tick};
+pub use budget::{MAX_ATOMIC_WORK, WORK_PER_TICK, work_per_tick};
 pub use friction::Friction;
 pub use output::{ContactOutput, ContactState};
 pub use proxy::Contact;

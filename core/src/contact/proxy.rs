@@ -9,8 +9,8 @@ mod with_friction;
 use glam::Vec3;
 
 use super::budget::{Budget, FAST_PATH};
-use super::closest_point::{Descent, Leave, Place};
-use super::fast_path::{self, Follow, Followed};
+use super::closest_point::{DepartureRule, Descent, PatchPoint};
+use super::fast_path::{self, FollowResult, PatchFollower};
 use super::friction::Friction;
 use super::output::{ContactOutput, ContactState};
 use super::settings::ContactSettings;
@@ -20,7 +20,7 @@ use crate::grid::{Cell, GridPoint};
 use crate::terrain::{TILE_CELLS, Window};
 use departures::Departures;
 use onset::Onset;
-use with_friction::Rough;
+use with_friction::FrictionState;
 
 /// Phase of the proxy, with the state of that phase.
 // The path is most of a contact's size, and without a heap it cannot be boxed.
@@ -45,7 +45,8 @@ enum Phase {
 
 impl Phase {
     /// Returns the phase's name, and the phases in which a tick that starts in it may end. Between
-    /// ticks only [`Contact::land`] changes the phase: a waiting proxy is then on the surface.
+    /// ticks only [`Contact::place_on_surface`] changes the phase: a waiting proxy is then on the
+    /// surface.
     #[cfg(test)]
     const fn exits(&self) -> (&'static str, &'static [&'static str]) {
         match self {
@@ -79,13 +80,13 @@ struct Sweeping {
 #[derive(Clone, Debug)]
 struct OnSurface {
     descent: Descent,
-    leave: Leave,
+    departure_rule: DepartureRule,
     /// Share of the force that is rendered: less than 1 at the edge of the surface, and while a
     /// contact fades in after a wait.
     fade: f32,
     departures: Departures,
     /// Data for the fast path of the next tick, if the proxy is at rest.
-    follow: Option<Follow>,
+    follower: Option<PatchFollower>,
 }
 
 /// Outcome of a tick's fast path.
@@ -93,26 +94,26 @@ enum FastPath {
     /// The output is set.
     Taken,
     /// No output, but the closest point of the proxy's patch.
-    Known(Place),
+    ClosestPoint(PatchPoint),
     /// The fast path does not apply.
-    None,
+    NotTaken,
 }
 
 /// Decision to continue a tick, or to end it with an output.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Turn {
-    GoesOn,
-    Ends,
+enum TickProgress {
+    Continue,
+    Done,
 }
 
 impl OnSurface {
     const fn at(point: SurfacePoint, fade: f32) -> Self {
         Self {
             descent: Descent::from(point),
-            leave: Leave::Anywhere,
+            departure_rule: DepartureRule::Anywhere,
             fade,
             departures: None,
-            follow: None,
+            follower: None,
         }
     }
 }
@@ -132,33 +133,33 @@ pub struct Contact {
     settings: ContactSettings,
     phase: Phase,
     /// Position and displacement of the proxy in the last output, if it touched.
-    touched: Option<(GridPoint, Vec3)>,
+    last_touch: Option<(GridPoint, Vec3)>,
     /// Start of the proxy on the surface after a change of placement, until the terrain there
     /// arrives.
     onset: Option<Onset>,
     /// State of friction, if the surface has any.
-    rough: Option<Rough>,
+    friction: Option<FrictionState>,
 }
 
 impl Contact {
     /// Creates a contact that waits until the HIP is above the surface.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
-        let rough = Rough::on(settings.friction);
-        let is_smooth = rough.is_none();
+        let friction = FrictionState::on(settings.friction);
+        let is_frictionless = friction.is_none();
         Self {
             // With friction the proxy does not follow the HIP.
             settings: ContactSettings {
-                fast_paths: settings.fast_paths && is_smooth,
+                fast_paths: settings.fast_paths && is_frictionless,
                 ..settings
             },
             phase: Phase::Unseeded,
             onset: None,
-            rough,
+            friction,
             hip: GridPoint::default(),
             at_rest: false,
             output: ContactOutput::default(),
-            touched: None,
+            last_touch: None,
         }
     }
 
@@ -207,7 +208,7 @@ impl Contact {
     #[inline(never)]
     pub fn surface_moved<const D: usize>(&mut self, window: &Window<'_, D>) {
         self.at_rest = false;
-        if self.rough.is_some() {
+        if self.friction.is_some() {
             return;
         }
         // The work is done in the next step.
@@ -216,17 +217,17 @@ impl Contact {
 
     /// Sets the friction from the next step on. That step tests a held proxy again.
     pub(crate) fn set_friction(&mut self, friction: Friction) {
-        if let Some(rough) = &mut self.rough {
-            self.at_rest &= !rough.takes(friction);
+        if let Some(state) = &mut self.friction {
+            self.at_rest &= !state.set_friction(friction);
         } else if !friction.is_none() {
-            self.rough = Rough::on(friction);
+            self.friction = FrictionState::on(friction);
             // With friction the proxy does not follow the HIP.
             self.settings.fast_paths = false;
             self.at_rest = false;
             if let Phase::OnSurface(on) = &mut self.phase
-                && let Some(follow) = on.follow.take()
+                && let Some(follower) = on.follower.take()
             {
-                on.descent.restart(follow.point);
+                on.descent.restart(follower.point);
             }
         }
     }
@@ -269,8 +270,8 @@ impl Contact {
         }
         match self.take_fast_path(window, hip) {
             FastPath::Taken => self.hip = *hip,
-            FastPath::Known(place) => self.step_in_full(window, *hip, Some(place)),
-            FastPath::None => self.step_in_full(window, *hip, None),
+            FastPath::ClosestPoint(place) => self.step_in_full(window, *hip, Some(place)),
+            FastPath::NotTaken => self.step_in_full(window, *hip, None),
         }
         &self.output
     }
@@ -286,65 +287,65 @@ impl Contact {
             Phase::Free if self.at_rest && self.settings.fast_paths => {
                 let is_free = fast_path::is_free(window, &self.hip, hip);
                 if !is_free {
-                    return FastPath::None;
+                    return FastPath::NotTaken;
                 }
                 self.output.proxy = *hip;
                 self.output.work = 0;
                 FastPath::Taken
             }
             Phase::OnSurface(OnSurface {
-                follow: Some(follow),
+                follower: Some(follower),
                 ..
-            }) => match follow.to(&HipView::new(*hip)) {
-                Followed::Rests(proxy, displacement) => {
+            }) => match follower.follow(&HipView::new(*hip)) {
+                FollowResult::AtRest(proxy, displacement) => {
                     self.output.proxy = proxy;
                     self.output.displacement = displacement;
                     self.output.work = FAST_PATH;
                     FastPath::Taken
                 }
-                Followed::InPatch(place) => FastPath::Known(place),
-                Followed::Not => FastPath::None,
+                FollowResult::InPatch(place) => FastPath::ClosestPoint(place),
+                FollowResult::NotApplicable => FastPath::NotTaken,
             },
-            _ => FastPath::None,
+            _ => FastPath::NotTaken,
         }
     }
 
-    /// Runs a tick without the fast path. `known` is the closest point of the proxy's patch, if the
-    /// fast path has computed it.
+    /// Runs a tick without the fast path. `closest` is the closest point of the proxy's patch, if
+    /// the fast path has computed it.
     #[inline(never)]
     fn step_in_full<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        known: Option<Place>,
+        closest: Option<PatchPoint>,
     ) {
-        if self.rough.is_some() {
-            // `known` is `None`: there is no fast path with friction.
-            return self.step_on_rough_ground(window, hip);
+        if self.friction.is_some() {
+            // `closest` is `None`: there is no fast path with friction.
+            return self.step_with_friction(window, hip);
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remember_contact();
-        self.gives_up_beyond_window::<D>(&hip);
+        self.reset_beyond_window::<D>(&hip);
         if !hip.is_same(&self.hip) {
-            self.redirect(window, hip, known, &mut budget);
+            self.redirect(window, hip, closest, &mut budget);
         }
-        // Bounded by the budget: a series of turns without work never returns to the turn before.
-        while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
+        // Bounded by the budget: a series of turns without work never returns to the one before.
+        while self.advance_phase(window, hip, &mut budget) == TickProgress::Continue {}
         self.hip = hip;
-        self.ends(&budget);
+        self.end_tick(&budget);
     }
 
     /// Resets the contact if the HIP has moved by more than a window, which no arm does in a tick.
-    fn gives_up_beyond_window<const D: usize>(&mut self, hip: &GridPoint) {
+    fn reset_beyond_window<const D: usize>(&mut self, hip: &GridPoint) {
         let (from, to) = (self.hip.column(), hip.column());
-        let way = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y));
-        if way > (D * TILE_CELLS) as u32 {
+        let distance = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y));
+        if distance > (D * TILE_CELLS) as u32 {
             self.phase = Phase::Unseeded;
         }
     }
 
     /// Ends a tick: stores its work, its missing tile and whether the proxy is at rest.
-    fn ends(&mut self, budget: &Budget) {
+    fn end_tick(&mut self, budget: &Budget) {
         self.output.work = budget.spent();
         self.output.missing_tile = budget.missing();
         self.at_rest =
@@ -359,8 +360,8 @@ impl Contact {
             displacement,
             ..
         } = &self.output;
-        let touched = *state == ContactState::Touching;
-        self.touched = touched.then_some((*proxy, *displacement));
+        let is_touching = *state == ContactState::Touching;
+        self.last_touch = is_touching.then_some((*proxy, *displacement));
     }
 
     /// Redirects a path or a descent to the new position of the HIP.
@@ -368,7 +369,7 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        known: Option<Place>,
+        closest: Option<PatchPoint>,
         budget: &mut Budget,
     ) {
         match &mut self.phase {
@@ -378,11 +379,12 @@ impl Contact {
                 sweeping.was_late = true;
             }
             Phase::OnSurface(on) => {
-                match (&on.follow, known) {
-                    (Some(follow), Some(place)) => {
-                        on.descent.restart_knowing(follow.point, place, budget);
+                match (&on.follower, closest) {
+                    (Some(follower), Some(place)) => {
+                        on.descent
+                            .restart_with_closest(follower.point, place, budget);
                     }
-                    (Some(follow), None) => on.descent.restart(follow.point),
+                    (Some(follower), None) => on.descent.restart(follower.point),
                     (None, _) => {
                         let view = HipView::new(self.hip);
                         if let Some((point, _)) = on.descent.nearest(window, &view) {
@@ -390,7 +392,8 @@ impl Contact {
                         }
                     }
                 }
-                (on.leave, on.departures, on.follow) = (Leave::Anywhere, None, None);
+                (on.departure_rule, on.departures, on.follower) =
+                    (DepartureRule::Anywhere, None, None);
             }
             _ => {}
         }
@@ -398,26 +401,26 @@ impl Contact {
 
     /// Runs one step of the current phase. The rare ones are calls: inlined, they would make the
     /// loop set up 70 registers and addresses in every tick.
-    fn turn<const D: usize>(
+    fn advance_phase<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         match &mut self.phase {
-            Phase::Unseeded => self.looks_around(window, hip, budget),
-            Phase::Releasing { .. } => self.fades_out(window, hip, budget),
-            Phase::Free => self.flies(window, hip, budget),
-            Phase::Sweeping(_) => self.sweeps(window, hip, budget),
-            Phase::OnSurface(_) => self.descends(window, hip, budget),
+            Phase::Unseeded => self.try_seed(window, hip, budget),
+            Phase::Releasing { .. } => self.fade_out(window, hip, budget),
+            Phase::Free => self.start_sweep(window, hip, budget),
+            Phase::Sweeping(_) => self.continue_sweep(window, hip, budget),
+            Phase::OnSurface(_) => self.descend(window, hip, budget),
         }
     }
 
     /// Sets the output and ends the tick.
     #[inline]
-    fn answers(&mut self, output: ContactOutput) -> Turn {
+    fn set_output(&mut self, output: ContactOutput) -> TickProgress {
         self.output = output;
-        Turn::Ends
+        TickProgress::Done
     }
 }
 

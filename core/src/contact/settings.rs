@@ -10,11 +10,11 @@ pub struct ContactSettings {
     /// Tick rate: fades have limits per second.
     pub rate: TickRate,
     /// Work units that a tick may spend: [`work_per_tick`] of the rate, or at least
-    /// [`Self::LEAST_WORK`].
+    /// [`Self::MIN_WORK`].
     pub work_per_tick: u32,
     /// Speed, in cells a second, below which a sliding proxy comes to rest:
-    /// [`Self::STICKS_BELOW_MM_S`].
-    pub sticks_below: f32,
+    /// [`Self::STICK_SPEED_MM_S`].
+    pub stick_speed: f32,
     /// Friction of the surface.
     pub friction: Friction,
     /// True if the fast paths are used: still free, and sliding within a patch. Without them every
@@ -24,17 +24,17 @@ pub struct ContactSettings {
 
 impl ContactSettings {
     /// Minimum work units: fewer might not be enough for one short piece of a path.
-    pub const LEAST_WORK: u32 = 86;
+    pub const MIN_WORK: u32 = 86;
 
     /// Speed below which a sliding proxy comes to rest, mm/s: slower than an intended motion of the
     /// hand.
-    pub const STICKS_BELOW_MM_S: f32 = 1.0;
+    pub const STICK_SPEED_MM_S: f32 = 1.0;
 
     /// Settings for 1 kHz and cells of a millimetre.
     pub const AT_1_KHZ: Self = Self {
         rate: TickRate::DEFAULT,
         work_per_tick: WORK_PER_TICK,
-        sticks_below: Self::STICKS_BELOW_MM_S,
+        stick_speed: Self::STICK_SPEED_MM_S,
         friction: Friction::NONE,
         fast_paths: true,
     };
@@ -59,7 +59,7 @@ impl ContactSettings {
     #[must_use]
     pub const fn on_cells_of(self, cell_mm: f32) -> Self {
         Self {
-            sticks_below: Self::STICKS_BELOW_MM_S / cell_mm,
+            stick_speed: Self::STICK_SPEED_MM_S / cell_mm,
             ..self
         }
     }

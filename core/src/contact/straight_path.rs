@@ -16,54 +16,63 @@ use super::surface::patch::Patch;
 use crate::scalar::{larger, smaller};
 
 /// Maximum number of false-position steps. Three or four are usual.
-const STEPS: u32 = 16;
+const MAX_STEPS: u32 = 16;
 /// Fraction of the start's slope below which a path may end.
 const FLAT: f32 = 4e-3;
 
 /// A straight path through one patch.
 #[derive(Debug)]
-pub(super) struct StraightWay {
+pub(super) struct StraightPath {
     from: (f32, f32),
-    way: (f32, f32),
+    direction: (f32, f32),
     /// Coefficients of h, constant first.
     slope: [f32; 4],
 }
 
-impl StraightWay {
+impl StraightPath {
     /// Creates a path from a place of the patch, for a HIP at `hip`, in patch coordinates; at
-    /// `t = 1` it has covered all of `way`.
+    /// `t = 1` it has covered all of `direction`.
     #[inline]
-    pub(super) fn new(patch: &Patch, hip: (f32, f32), from: (f32, f32), way: (f32, f32)) -> Self {
+    pub(super) fn new(
+        patch: &Patch,
+        hip: (f32, f32),
+        from: (f32, f32),
+        direction: (f32, f32),
+    ) -> Self {
         let (off_u, off_v) = (from.0 - hip.0, from.1 - hip.1);
         let z = patch.height(from.0, from.1);
-        let s = patch.slope_u(from.1) * way.0 + patch.slope_v(from.0) * way.1;
-        let w = patch.a * way.0 * way.1;
+        let s = patch.slope_u(from.1) * direction.0 + patch.slope_v(from.0) * direction.1;
+        let w = patch.a * direction.0 * direction.1;
         let slope = [
-            off_u * way.0 + off_v * way.1 + z * s,
-            way.0 * way.0 + way.1 * way.1 + s * s + 2.0 * w * z,
+            off_u * direction.0 + off_v * direction.1 + z * s,
+            direction.0 * direction.0 + direction.1 * direction.1 + s * s + 2.0 * w * z,
             3.0 * s * w,
             2.0 * w * w,
         ];
-        Self { from, way, slope }
+        Self {
+            from,
+            direction,
+            slope,
+        }
     }
 
     /// Returns `t` at the borders eastward or westward, and northward or southward.
     #[inline]
     pub(super) fn to_borders(&self) -> (f32, f32) {
-        let along = |from: f32, way: f32| match way {
-            way if way > 0.0 => (1.0 - from) / way,
-            way if way < 0.0 => from / -way,
+        let along = |from: f32, direction: f32| match direction {
+            direction if direction > 0.0 => (1.0 - from) / direction,
+            direction if direction < 0.0 => from / -direction,
             _ => f32::INFINITY,
         };
-        let ((u, v), (du, dv)) = (self.from, self.way);
+        let ((u, v), (du, dv)) = (self.from, self.direction);
         (along(u, du), along(v, dv))
     }
 
     /// Returns the place at `t`, in the patch.
     #[inline]
     pub(super) fn at(&self, t: f32) -> (f32, f32) {
-        let place = |from: f32, way: f32| larger(smaller(from + t * way, 1.0), 0.0);
-        let ((u, v), (du, dv)) = (self.from, self.way);
+        let place = |from: f32, direction: f32| larger(smaller(from + t * direction, 1.0), 0.0);
+        let ((u, v), (du, dv)) = (self.from, self.direction);
         (place(u, du), place(v, dv))
     }
 
@@ -73,10 +82,10 @@ impl StraightWay {
         let end = smaller(to_east, to_north);
         let (mut u, mut v) = self.at(end);
         if to_east <= end {
-            u = if self.way.0 > 0.0 { 1.0 } else { 0.0 };
+            u = if self.direction.0 > 0.0 { 1.0 } else { 0.0 };
         }
         if to_north <= end {
-            v = if self.way.1 > 0.0 { 1.0 } else { 0.0 };
+            v = if self.direction.1 > 0.0 { 1.0 } else { 0.0 };
         }
         (u, v)
     }
@@ -109,7 +118,7 @@ impl StraightWay {
         // False position (Illinois): an end that stays twice counts half.
         let (mut low, mut high, mut at_low) = (0.0, end, c0);
         let mut stayed = 0;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_STEPS {
             let t = low + (high - low) * (at_low / (at_low - at_high));
             let at = self.slope_at(t);
             if at.abs() <= -FLAT * c0 {
@@ -146,36 +155,36 @@ impl StraightWay {
 
 /// Returns the component of a vector along the tangent plane of these slopes; for a point on a
 /// border, along the direction into the patch with the largest component.
-pub(super) fn steepest(su: f32, sv: f32, border: Side, way: Vec3) -> Vec3 {
+pub(super) fn steepest(su: f32, sv: f32, border: Side, displacement: Vec3) -> Vec3 {
     // The projection onto the plane, multiplied out so that a wall loses no bits.
     let (across, norm) = (su * sv, 1.0 + su * su + sv * sv);
     let free = Vec3::new(
-        ((1.0 + sv * sv) * way.x - across * way.y + su * way.z) / norm,
-        ((1.0 + su * su) * way.y - across * way.x + sv * way.z) / norm,
-        ((su * su + sv * sv) * way.z + su * way.x + sv * way.y) / norm,
+        ((1.0 + sv * sv) * displacement.x - across * displacement.y + su * displacement.z) / norm,
+        ((1.0 + su * su) * displacement.y - across * displacement.x + sv * displacement.z) / norm,
+        ((su * su + sv * sv) * displacement.z + su * displacement.x + sv * displacement.y) / norm,
     );
-    if leads_in(free, border) {
+    if points_inward(free, border) {
         return free;
     }
     let mut best = Vec3::ZERO;
     if border.north != 0 {
-        let east = (way.x + su * way.z) / (1.0 + su * su);
+        let east = (displacement.x + su * displacement.z) / (1.0 + su * su);
         best = longer(best, Vec3::new(east, 0.0, su * east), border);
     }
     if border.east != 0 {
-        let north = (way.y + sv * way.z) / (1.0 + sv * sv);
+        let north = (displacement.y + sv * displacement.z) / (1.0 + sv * sv);
         best = longer(best, Vec3::new(0.0, north, sv * north), border);
     }
     best
 }
 
 /// Returns true if a direction leads into the patch of a point on this border.
-fn leads_in(way: Vec3, border: Side) -> bool {
-    way.x * border.east as f32 <= 0.0 && way.y * border.north as f32 <= 0.0
+fn points_inward(displacement: Vec3, border: Side) -> bool {
+    displacement.x * border.east as f32 <= 0.0 && displacement.y * border.north as f32 <= 0.0
 }
 
 fn longer(best: Vec3, other: Vec3, border: Side) -> Vec3 {
-    if leads_in(other, border) && other.length_squared() > best.length_squared() {
+    if points_inward(other, border) && other.length_squared() > best.length_squared() {
         other
     } else {
         best

@@ -18,19 +18,19 @@ impl Random {
     }
 }
 
-/// Places `step` cells apart, each turned by up to `turn` rad from the last direction, within a
+/// Places `step` cells apart, each turned by up to `max_turn` rad from the last direction, within a
 /// square field of `size` cells and away from its border.
 pub(super) fn wander(
     random: Random,
     ticks: u32,
     size: i32,
     step: f64,
-    turn: f64,
+    max_turn: f64,
 ) -> impl Iterator<Item = [f64; 2]> {
     let (mut random, mut heading) = (random, 0.3_f64);
     let mut at = [0.5 * f64::from(size); 2];
     (0..ticks).map(move |_| {
-        heading += random.between(-turn, turn);
+        heading += random.between(-max_turn, max_turn);
         let next = [at[0] + step * heading.cos(), at[1] + step * heading.sin()];
         if next
             .iter()

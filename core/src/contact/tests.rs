@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use super::budget::Budget;
-use super::sweep::{Path, Swept};
+use super::sweep::{Path, SweepEnd};
 use super::test_random::Random;
 use super::*;
 use crate::cases::cases;
@@ -76,21 +76,21 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Runs a trajectory to the end of every tick and checks each answer.
 fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]]) -> [u32; 4] {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
-    let mut seen = [0; 4];
+    let mut counts = [0; 4];
     for (tick, p) in path.iter().enumerate() {
         let hip = point(*p);
         let mut output = contact.step(&field.window, &hip);
-        let mut turns = 0;
+        let mut ticks = 0;
         while !output.converged {
             output = contact.step(&field.window, &hip);
-            turns += 1;
-            assert!(turns < 5000, "{name} {tick}: never settles {output:?}");
+            ticks += 1;
+            assert!(ticks < 5000, "{name} {tick}: never settles {output:?}");
         }
         let (x, proxy) = (position(&hip), position(&output.proxy));
-        seen[output.state as usize] += 1;
+        counts[output.state as usize] += 1;
         let at = std::format!("{name} tick {tick} hip {x:?} {output:?}");
         assert!(output.displacement.is_finite(), "{at}");
         match output.state {
@@ -111,7 +111,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
             assert!(x[2] > z - bound, "free below the surface: {at} {z}");
         }
     }
-    seen
+    counts
 }
 
 /// No point of the surface on a ring around the proxy is nearer to the HIP.
@@ -190,12 +190,12 @@ fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f6
 /// Random segments that start above everything.
 fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, high: f64) {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
     let mut random = Random(7);
-    let mut seen = [0, 0];
-    const WAYS: u32 = cases(4000, 6);
-    for _ in 0..WAYS {
+    let mut counts = [0, 0];
+    const PATHS: u32 = cases(4000, 6);
+    for _ in 0..PATHS {
         let from = [random.between(0.5, 59.5), random.between(0.5, 59.5), high];
         let reach = if random.unit() < 0.5 { 2.0 } else { 60.0 };
         let to = [
@@ -205,40 +205,45 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
         ];
         let (a, b) = (point(from), point(to));
         let mut path = Path::through_air(a, b);
-        let swept = loop {
+        let end = loop {
             match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
-                Swept::Suspended => {}
-                ended => break ended,
+                SweepEnd::Suspended => {}
+                end => break end,
             }
         };
-        let at = std::format!("{name} {from:?} to {to:?}: {swept:?}");
-        match (swept, dense_crossing(&truth, position(&a), position(&b))) {
-            (Swept::Hit(point), Some([before, after])) => {
-                seen[0] += 1;
+        let at = std::format!("{name} {from:?} to {to:?}: {end:?}");
+        match (end, dense_crossing(&truth, position(&a), position(&b))) {
+            (SweepEnd::Hit(point), Some([before, after])) => {
+                counts[0] += 1;
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
                 // On the path, and not after the crossing of the dense search.
-                let way = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
-                let gone = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
-                let seen_at = ((after[0] - from[0]).powi(2) + (after[1] - from[1]).powi(2)).sqrt();
-                assert!(gone < seen_at + 4e-6, "late by {} {at}", gone - seen_at);
+                let length = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
+                let travelled = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
+                let dense_travelled =
+                    ((after[0] - from[0]).powi(2) + (after[1] - from[1]).powi(2)).sqrt();
+                assert!(
+                    travelled < dense_travelled + 4e-6,
+                    "late by {} {at}",
+                    travelled - dense_travelled
+                );
                 let z = truth.at(x, y).unwrap_or(f64::NAN);
-                let line = from[2] + (to[2] - from[2]) * gone / way;
-                let steep = slope + ((to[2] - from[2]) / way).abs();
+                let line = from[2] + (to[2] - from[2]) * travelled / length;
+                let steep = slope + ((to[2] - from[2]) / length).abs();
                 assert!(
                     (z - line).abs() < 4e-6 * (1.0 + steep),
                     "{} {before:?} {at}",
                     z - line
                 );
             }
-            (Swept::Hit(point), None) => {
+            (SweepEnd::Hit(point), None) => {
                 // A graze between two points of the dense search, or a touch.
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
                 assert!(truth.at(x, y).is_some(), "{at}");
             }
-            (Swept::Clear, None) => seen[1] += 1,
-            (Swept::Clear, Some([_, after])) => {
+            (SweepEnd::Clear, None) => counts[1] += 1,
+            (SweepEnd::Clear, Some([_, after])) => {
                 let z = truth.at(after[0], after[1]).unwrap_or(f64::NAN);
                 assert!(
                     z - after[2] < 4e-6 * (1.0 + slope),
@@ -248,12 +253,12 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
             (other, dense) => panic!("{other:?} {dense:?} {at}"),
         }
     }
-    let enough = seen[0] > WAYS / 8 && seen[1] > WAYS / 40;
-    assert!(enough, "both occur: {seen:?}");
+    let both_occur = counts[0] > PATHS / 8 && counts[1] > PATHS / 40;
+    assert!(both_occur, "both occur: {counts:?}");
 }
 
 #[test]
-fn the_first_crossing_is_found_exactly() {
+fn sweep_finds_the_first_crossing_exactly() {
     sweeps_agree("flat", flat, 0.0, 1.0, 3.0);
     sweeps_agree("hills", hills, 1.5, -3.0, 3.2);
     sweeps_agree("rough", rough, 2.0, 0.0, 2.2);
@@ -270,7 +275,7 @@ fn two_walls(x: i32, _: i32) -> f32 {
 #[test]
 fn proxy_does_not_tunnel_through_a_wall() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), two_walls);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), two_walls);
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
     let mut swept = Contact::new(ContactSettings::AT_1_KHZ);
     swept.step(&field.window, &above);
@@ -288,7 +293,7 @@ fn shifting_the_scene_changes_no_bit() {
     for shift in [1000, 100_000, 100_000_000] {
         let shift = shift / 32 * 32; // whole tiles, so that one function serves
         let mut near_tiles = buffers::<2>();
-        let near = Field::<2>::held(&mut near_tiles, FieldSize::new(SIZE, SIZE), rough);
+        let near = Field::<2>::filled(&mut near_tiles, FieldSize::new(SIZE, SIZE), rough);
         let mut far_tiles = buffers::<2>();
         let far = Field::<2>::shifted(&mut far_tiles, SIZE, shift, rough);
         let (mut a, mut b) = (
@@ -340,16 +345,16 @@ fn denormal(x: i32, y: i32) -> f32 {
 }
 
 #[test]
-fn holds_on_flat_and_smooth_terrain() {
+fn contact_invariants_hold_on_flat_and_smooth_terrain() {
     for seed in SEEDS {
-        let seen = check(
+        let counts = check(
             "flat",
             flat,
             0.0,
             &wander(seed, cases(2000, 150), 0.05, 2.0, 0.6),
         );
         let some = cases(50, 10);
-        assert!(seen[1] > some && seen[2] > some, "{seen:?}");
+        assert!(counts[1] > some && counts[2] > some, "{counts:?}");
         check(
             "hills",
             hills,
@@ -372,7 +377,7 @@ fn holds_on_flat_and_smooth_terrain() {
 }
 
 #[test]
-fn holds_on_rough_terrain() {
+fn contact_invariants_hold_on_rough_terrain() {
     for seed in SEEDS {
         check(
             "rough",
@@ -420,7 +425,7 @@ fn contact_invariants_hold_on_spikes_and_no_data() {
 }
 
 #[test]
-fn holds_when_the_hip_jumps() {
+fn contact_invariants_hold_when_the_hip_jumps() {
     for seed in SEEDS {
         check("flat", flat, 0.0, &teleport(seed, cases(300, 15), 2.0, 2.0));
         check(
@@ -459,23 +464,23 @@ fn holds_when_the_hip_jumps() {
 /// On a path that hardly moves sideways, the sweep resolves poorly where the field begins; a
 /// continuation from beyond would start outside of the terrain.
 #[test]
-fn steep_ways_in_over_the_border_cross_nothing() {
+fn steep_paths_over_the_border_cross_nothing() {
     let mut tiles = buffers::<8>();
-    let mut field = Field::<8>::over(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
-    field.hold_around(Cell::new(36, 36));
+    let mut field = Field::<8>::empty(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
+    field.fill_around(Cell::new(36, 36));
     let mut random = Random(1);
-    for way in 0..cases(1000, 10) {
+    for index in 0..cases(1000, 10) {
         let beside = [random.between(0.0, 72.0), random.between(-1.0, 0.0), 0.2].map(|x| x as f32);
         let from = GridPoint::new([0; 3], Vec3::from(beside));
         let to = GridPoint::new([3, 3, -100_000_000], Vec3::ZERO);
         let mut path = Path::through_air(from, to);
-        let ended = loop {
+        let end = loop {
             match path.advance(&field.window, &mut Budget::new(WORK_PER_TICK)) {
-                Swept::Suspended => {}
-                ended => break ended,
+                SweepEnd::Suspended => {}
+                end => break end,
             }
         };
-        assert!(matches!(ended, Swept::Under), "{way}, {from:?}: {ended:?}");
+        assert!(matches!(end, SweepEnd::Under), "{index}, {from:?}: {end:?}");
     }
 }
 
@@ -492,7 +497,7 @@ fn with_no_data(x: i32, y: i32) -> f32 {
 #[test]
 fn vertical_path_onto_any_valid_sample_touches_surface() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(16, 16), with_no_data);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(16, 16), with_no_data);
     for (x, y) in (0..=16).flat_map(|y| (0..=16).map(move |x| (x, y))) {
         for fast in [0.1, 1.5, 500.0] {
             let at = |z: f32| GridPoint::new([x, y, 0], Vec3::Z * z);
@@ -517,8 +522,8 @@ fn mirrored_path_along_grid_lines_has_mirrored_forces() {
     let [plain, mirrored] = &mut tiles;
     let lopsided = |x: i32, y: i32| with_no_data(x - 2, y + 1) + 0.125 * x as f32;
     let size = FieldSize::new(16, 16);
-    let plain = Field::<2>::held(plain, size, lopsided);
-    let mirrored = Field::<2>::held(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));
+    let plain = Field::<2>::filled(plain, size, lopsided);
+    let mirrored = Field::<2>::filled(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));
     let mut random = Random(5);
     let mut touched = 0;
     for _ in 0..cases(400, 10) {
@@ -526,14 +531,14 @@ fn mirrored_path_along_grid_lines_has_mirrored_forces() {
         let mut at = [8.0, 8.0, 4.0_f32];
         for tick in 0..60 {
             let axis = (random.between(0.0, 3.0) as usize).min(2);
-            let way = 0.25 * random.between(-8.0, 9.0).floor() as f32;
-            let most = if axis == 2 { 4.0 } else { 17.0 };
-            at[axis] = (at[axis] + way).clamp(-1.0, most);
+            let step = 0.25 * random.between(-8.0, 9.0).floor() as f32;
+            let max = if axis == 2 { 4.0 } else { 17.0 };
+            at[axis] = (at[axis] + step).clamp(-1.0, max);
             let [x, y, z] = at;
-            let ways = [[x, y, z], [16.0 - x, 16.0 - y, z]];
+            let positions = [[x, y, z], [16.0 - x, 16.0 - y, z]];
             let mut output = [ContactOutput::default(); 2];
             for (index, field) in [&plain, &mirrored].into_iter().enumerate() {
-                let hip = GridPoint::new([0; 3], Vec3::from(ways[index]));
+                let hip = GridPoint::new([0; 3], Vec3::from(positions[index]));
                 output[index] = *contacts[index].step(&field.window, &hip);
             }
             let [one, other] = output;
@@ -568,11 +573,11 @@ const GROUNDS: [TestGround; 7] = [
 fn side_by_side(
     one: ContactSettings,
     other: ContactSettings,
-    mut look: impl FnMut(&ContactOutput, &ContactOutput, [u32; 2]),
+    mut compare: impl FnMut(&ContactOutput, &ContactOutput, [u32; 2]),
 ) {
     for (height, mid, span) in GROUNDS {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), height);
         let mut contacts = [one, other].map(Contact::new);
         // Usually below the surface, after a start above it.
         let above = [[30.0, 30.0, 2e4]].into_iter();
@@ -580,20 +585,20 @@ fn side_by_side(
             let below = wander(5, cases(1500, 20), step, mid - 0.6 * span, 0.6 * span);
             for p in above.clone().chain(below) {
                 let hip = point(p);
-                let mut turns = [0; 2];
+                let mut ticks = [0; 2];
                 let answers = [0, 1].map(|i| {
                     let before = *contacts[i].output();
                     loop {
-                        turns[i] += 1;
+                        ticks[i] += 1;
                         let output = *contacts[i].step(&field.window, &hip);
                         if output.converged {
                             return output;
                         }
-                        assert!(turns[i] < 10_000, "{hip:?} never converges");
+                        assert!(ticks[i] < 10_000, "{hip:?} never converges");
                         contacts[i].resume(&before);
                     }
                 });
-                look(&answers[0], &answers[1], turns);
+                compare(&answers[0], &answers[1], ticks);
             }
         }
     }
@@ -605,7 +610,7 @@ fn bits(output: &ContactOutput) -> (ContactState, GridPoint, [u32; 3]) {
 }
 
 #[test]
-fn the_shortcuts_change_no_bit() {
+fn fast_paths_change_no_bit() {
     let without = ContactSettings {
         fast_paths: false,
         ..ContactSettings::AT_1_KHZ
@@ -620,22 +625,22 @@ fn the_shortcuts_change_no_bit() {
 }
 
 #[test]
-fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
-    let whole = ContactSettings {
+fn suspended_tick_ends_on_the_same_bits() {
+    let unlimited = ContactSettings {
         work_per_tick: u32::MAX / 2,
         ..ContactSettings::AT_1_KHZ
     };
     let mut cut = 0;
-    for work_per_tick in [ContactSettings::LEAST_WORK, WORK_PER_TICK] {
+    for work_per_tick in [ContactSettings::MIN_WORK, WORK_PER_TICK] {
         let short = ContactSettings {
             work_per_tick,
             ..ContactSettings::AT_1_KHZ
         };
-        side_by_side(whole, short, |whole, short, turns| {
-            assert_eq!(bits(whole), bits(short));
-            assert_eq!(turns[0], 1);
+        side_by_side(unlimited, short, |unlimited, short, ticks| {
+            assert_eq!(bits(unlimited), bits(short));
+            assert_eq!(ticks[0], 1);
             assert!(short.work <= work_per_tick);
-            cut += u32::from(turns[1] > 1);
+            cut += u32::from(ticks[1] > 1);
         });
     }
     assert!(cut > cases(500, 5), "{cut} ticks were cut short");
@@ -653,7 +658,7 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
     };
     for mirrored in [[false, false], [true, false], [false, true], [true, true]] {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), move |x, y| {
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), move |x, y| {
             let turned = |c: i32, turned: bool| if turned { SIZE - c } else { c };
             tent(turned(x, mirrored[0]), turned(y, mirrored[1]), 30)
         });
@@ -661,7 +666,7 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
         contact.step(&field.window, &point([30.0, 30.0, 1.0]));
         let output = *contact.step(&field.window, &point([30.0, 30.0, -0.2]));
         assert_eq!(output.state, ContactState::Touching);
-        let toward = |way: f32, mirrored: bool| if mirrored { -way } else { way };
+        let toward = |component: f32, mirrored: bool| if mirrored { -component } else { component };
         let [east, north, _] = output.displacement.to_array();
         assert!(toward(east, mirrored[0]) > 0.0, "{mirrored:?} {output:?}");
         assert!(toward(north, mirrored[1]) > 0.0, "{mirrored:?} {output:?}");
@@ -671,9 +676,9 @@ fn proxy_leaves_edge_or_vertex_by_its_steepest_side() {
 /// No arm moves by a window in a tick: such a HIP is a new one, without force until it has been
 /// above the surface.
 #[test]
-fn hip_that_leaps_beyond_the_window_begins_anew() {
+fn hip_leap_beyond_the_window_resets_the_contact() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), |_, _| 0.0);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(SIZE, SIZE), |_, _| 0.0);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut state = |hip| contact.step(&field.window, &point(hip)).state;
     assert_eq!(state([2.5, 2.5, 1.0]), ContactState::Free);

@@ -9,7 +9,7 @@ pub(super) const RESOLUTION: f32 = 1.2e-7;
 /// Maximum of the same, for a HIP so far away that its coordinates resolve no better.
 pub(super) const COARSEST_RESOLUTION: f32 = 0.25;
 /// Length below which a step is not taken: a coordinate near 1 cannot resolve it.
-pub(super) const LEAST_STEP: f32 = 6e-8;
+pub(super) const MIN_STEP: f32 = 6e-8;
 /// Length below which a Newton step may be rounding alone, and is compared with the rounding of its
 /// slope.
 pub(super) const DOUBTFUL_STEP: f32 = 1e-3;
@@ -21,7 +21,7 @@ pub(super) const BORDER: f32 = 1e-6;
 pub(super) const BESIDE: f32 = 4.0;
 /// Minimum path into a neighbouring patch, away from the shared border: three units in the last
 /// place.
-pub(super) const LEAST_WAY: f32 = 2e-7;
+pub(super) const MIN_DISPLACEMENT: f32 = 2e-7;
 /// Rounding of a slope of the distance, relative to its summands.
 pub(super) const SLOPE_NOISE: f32 = 1e-6;
 /// Relative difference within which two directions downhill count as equally steep: heights of two
@@ -42,7 +42,7 @@ pub(super) const NEWTON_ERROR: f32 = 5e-8;
 pub(super) const LEVEL: f32 = 1e-5;
 
 /// Distance from a patch's border within which its neighbours may be searched, for a HIP that is
-/// not far (`edge_fade::FAR`): `BESIDE` resolutions at 32 cells.
+/// not far (`edge_fade::FULL_FORCE_DISTANCE`): `BESIDE` resolutions at 32 cells.
 pub(super) const BESIDE_OF_NEAR_HIP: f32 = 4e-5;
 
 /// Rounding of a height, relative to the four corner heights, with some margin.

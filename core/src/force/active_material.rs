@@ -19,7 +19,7 @@ pub(crate) struct ActiveMaterial {
     index: u8,
     /// Material when the change began, and the completed share of the change.
     from: Material,
-    done: f32,
+    progress: f32,
     /// Share of a change in one tick.
     step: f32,
     /// Factor on the stiffness.
@@ -47,7 +47,7 @@ impl ActiveMaterial {
         let mut material = Self {
             index: 0,
             from: default,
-            done: 1.0,
+            progress: 1.0,
             step: rate.tick_s() / MATERIAL_CHANGE_S,
             scale,
             params: *params,
@@ -56,7 +56,7 @@ impl ActiveMaterial {
             rate,
             was_rendered: false,
         };
-        material.feels(&default);
+        material.set_material(&default);
         material.params.texture = default.texture;
         Some(material)
     }
@@ -106,35 +106,35 @@ impl ActiveMaterial {
         if let Some(index) = there
             && index != self.index
         {
-            (self.from, self.done, self.index) = (Material::of(&self.params), 0.0, index);
+            (self.from, self.progress, self.index) = (Material::of(&self.params), 0.0, index);
         }
-        let Some(wanted) = table.at(self.index) else {
+        let Some(target) = table.at(self.index) else {
             return false;
         };
-        let wanted = &scaled(wanted, self.scale);
+        let target = &scaled(target, self.scale);
         if core::mem::replace(&mut self.was_rendered, true) {
-            self.moves_to(wanted)
+            self.blend_toward(target)
         } else {
-            self.done = 1.0;
-            self.feels(wanted);
+            self.progress = 1.0;
+            self.set_material(target);
             self.texture_share = 1.0;
-            self.takes_texture(&wanted.texture)
+            self.set_texture(&target.texture)
         }
     }
 
-    fn moves_to(&mut self, wanted: &Material) -> bool {
-        if self.done < 1.0 {
-            self.done += self.step;
-            if self.done < 1.0 {
-                self.feels(&self.on_the_way_to(wanted));
+    fn blend_toward(&mut self, target: &Material) -> bool {
+        if self.progress < 1.0 {
+            self.progress += self.step;
+            if self.progress < 1.0 {
+                self.set_material(&self.blended_with(target));
             } else {
-                self.done = 1.0;
-                self.feels(wanted);
+                self.progress = 1.0;
+                self.set_material(target);
             }
         }
         // Fade-out takes half of the time, and fade-in the other half.
         let step = 2.0 * self.step;
-        if self.params.texture == wanted.texture {
+        if self.params.texture == target.texture {
             self.texture_share = (self.texture_share + step).min(1.0);
             return false;
         }
@@ -145,13 +145,13 @@ impl ActiveMaterial {
             return false;
         }
         self.texture_share = 0.0;
-        self.takes_texture(&wanted.texture)
+        self.set_texture(&target.texture)
     }
 
     /// Returns the material between the start of the change and the target.
-    fn on_the_way_to(&self, wanted: &Material) -> Material {
-        let mix = |from: f32, to: f32| from + (to - from) * self.done;
-        let (from, to) = (&self.from, wanted);
+    fn blended_with(&self, target: &Material) -> Material {
+        let mix = |from: f32, to: f32| from + (to - from) * self.progress;
+        let (from, to) = (&self.from, target);
         let dynamic_mu = mix(from.friction.dynamic_mu, to.friction.dynamic_mu);
         let static_mu = mix(from.friction.static_mu, to.friction.static_mu);
         Material {
@@ -168,14 +168,14 @@ impl ActiveMaterial {
     }
 
     /// Renders all of a material except its texture.
-    fn feels(&mut self, material: &Material) {
+    fn set_material(&mut self, material: &Material) {
         self.params = SurfaceParams {
             texture: self.params.texture,
             ..material.params(&self.params)
         };
     }
 
-    fn takes_texture(&mut self, texture: &Texture) -> bool {
+    fn set_texture(&mut self, texture: &Texture) -> bool {
         let is_other = self.params.texture != *texture;
         self.params.texture = *texture;
         is_other

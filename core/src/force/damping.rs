@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
+use super::passivity::{DampingCoefficients, MAX_MJ, Motion, Passivity, PassivityInputs};
 use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
@@ -11,12 +11,12 @@ use crate::scalar::{larger, smaller};
 /// reduced. It is a fraction of the force times the sum of a cell and the depth. An edge gives a
 /// quarter of its bend times the part of a cell on which the force turns ([`super::shading`]): this
 /// much at 23°, twice as much at 45°, the maximum.
-const EDGE_GIVES: f32 = 0.1;
+const EDGE_ENERGY_SHARE: f32 = 0.1;
 /// Speed across the force up to which a motion is not damped, mm/s: a resting hand, or an arm in a
 /// limit cycle. They create little energy, and late damping would make them unstable.
 const SLOW_MM_S: f32 = 30.0;
 /// Additional created energy that causes no reduction of the turn, mJ.
-const LEAST_MJ: f32 = 0.1;
+const FREE_MJ: f32 = 0.1;
 
 /// Damping of a surface: it dissipates energy of a motion against the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -86,7 +86,7 @@ impl Damper {
     }
 
     /// Changes the surface from this tick on; the controller stays.
-    pub(crate) const fn feels(&mut self, params: &SurfaceParams) {
+    pub(crate) const fn set_params(&mut self, params: &SurfaceParams) {
         self.params = *params;
     }
 
@@ -101,31 +101,31 @@ impl Damper {
     /// along the force does not dissipate energy from motion across it. The force gives before an
     /// edge what it takes beyond, so the full turn is rendered until more energy was created than
     /// an edge gives.
-    pub(crate) fn turn_left(&self, depth_mm: f32, cell_mm: f32) -> f32 {
+    pub(crate) fn turn_share(&self, depth_mm: f32, cell_mm: f32) -> f32 {
         let spring_n = smaller(
             depth_mm * self.params.stiffness_n_per_mm,
             self.params.max_force_n,
         );
         // At twice this energy nothing is left of the turn. The observer never records more than
         // `MAX_MJ`.
-        let gives_mj = smaller(
-            EDGE_GIVES * spring_n * (cell_mm + depth_mm) + LEAST_MJ,
+        let edge_mj = smaller(
+            EDGE_ENERGY_SHARE * spring_n * (cell_mm + depth_mm) + FREE_MJ,
             0.5 * MAX_MJ,
         );
-        let over = self.created_mj() / gives_mj - 1.0;
+        let over = self.created_mj() / edge_mj - 1.0;
         smaller(larger(1.0 - over, 0.0), 1.0)
     }
 
     /// Resets the controller while no force, or less than the spring's force, is rendered: energy
     /// created before is forgotten.
-    pub(crate) fn rest(&mut self) {
+    pub(crate) fn reset(&mut self) {
         if let Some(controller) = &mut self.controller {
-            controller.rest();
+            controller.reset();
         }
     }
 
     /// Records the energy since the last tick.
-    pub(crate) fn observe(&mut self, now: &Moment) {
+    pub(crate) fn observe(&mut self, now: &PassivityInputs) {
         if let Some(controller) = &mut self.controller {
             controller.observe(&self.params, now);
         }
@@ -145,21 +145,24 @@ impl Damper {
             return spring_n;
         }
         let across_mm_s = beyond(velocity_mm_s - spring_n * share, SLOW_MM_S);
-        let mut takes = self.controller.as_ref().map_or_else(Takes::default, |it| {
-            it.damping_ns_per_mm(&Motion {
-                along,
-                along_squared: along * share,
-                across_squared: across_mm_s.length_squared(),
-            })
-        });
+        let mut damping =
+            self.controller
+                .as_ref()
+                .map_or_else(DampingCoefficients::default, |it| {
+                    it.damping_ns_per_mm(&Motion {
+                        along,
+                        along_squared: along * share,
+                        across_squared: across_mm_s.length_squared(),
+                    })
+                });
         if !(self.params.shading.is_none() && self.params.texture.is_none()) {
             // Such a force does not point to the proxy: damping across it could pull.
-            takes.across = 0.0;
+            damping.across = 0.0;
         }
-        takes.along += 1e-3 * self.params.damping.ns_per_m;
-        let along_n = spring_n * (1.0 - (takes.along * share).clamp(-1.0, 1.0));
+        damping.along += 1e-3 * self.params.damping.ns_per_m;
+        let along_n = spring_n * (1.0 - (damping.along * share).clamp(-1.0, 1.0));
         let max_n = smaller(2.0 * spring_n.length(), self.params.max_force_n);
-        clamp_length(along_n - across_mm_s * takes.across, max_n)
+        clamp_length(along_n - across_mm_s * damping.across, max_n)
     }
 }
 

@@ -37,7 +37,7 @@ fn params(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> Sur
 }
 
 #[test]
-fn damping_is_against_the_motion_and_no_more_than_the_spring() {
+fn damping_opposes_motion_and_never_exceeds_the_spring() {
     let params = params(0.5, 4.0, Controller::Off);
     let damper = damper(&params, 1000).expect("damped");
     let normal = Vec3::new(0.6, 0.0, 0.8);
@@ -48,8 +48,8 @@ fn damping_is_against_the_motion_and_no_more_than_the_spring() {
             let force_n = damper.force_n(params.spring().force_n(normal * deep_mm), velocity_mm_s);
             let spring_n = (0.5 * deep_mm).min(8.5);
             let damping_n = (-0.004 * speed_mm_s).clamp(-spring_n, spring_n);
-            let wanted = normal * (spring_n + damping_n).clamp(0.0, 8.5);
-            let off = (force_n - wanted).length();
+            let expected = normal * (spring_n + damping_n).clamp(0.0, 8.5);
+            let off = (force_n - expected).length();
             assert!(off < 1e-4, "{deep_mm} mm, {speed_mm_s} mm/s: {force_n}");
         }
     }
@@ -58,7 +58,7 @@ fn damping_is_against_the_motion_and_no_more_than_the_spring() {
 }
 
 #[test]
-fn the_controller_acts_on_every_arm_unless_it_is_off() {
+fn controller_acts_on_every_arm_unless_switched_off() {
     let acts = |stiffness, hz, controller| {
         let damper = damper(&params(stiffness, 0.0, controller), hz);
         damper.is_some_and(|damper| damper.controller.is_some())
@@ -79,15 +79,15 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
 
 /// The energy, mJ, that the observer records with `ramps`: with a tip at rest, and with one that
 /// leaves under the full spring force.
-fn created_by(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
+fn created_mj_with(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
     let params = params(1.0, 0.0, Controller::On);
     let mut damper = damper(&params, 1000).expect("controlled");
     let mut at = |tick: u16, up_mm: f32, moved_mm: f32| {
-        damper.observe(&Moment {
+        damper.observe(&PassivityInputs {
             displacement_mm: Vec3::Z * -up_mm,
             moved_mm: Vec3::Z * moved_mm,
             velocity_mm_s: Vec3::ZERO,
-            asked_n: Vec3::Z * 2.0,
+            commanded_n: Vec3::Z * 2.0,
             max_n: 8.5,
             shares: ramps(tick),
         });
@@ -98,7 +98,7 @@ fn created_by(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
 }
 
 #[test]
-fn ramp_and_clutch_book_only_energy_of_the_motion() {
+fn ramp_and_clutch_record_only_energy_of_the_motion() {
     let share = |tick: u16| 0.01 * f32::from(tick.min(50) + 1);
     for ramps in [
         (|share| Shares {
@@ -110,14 +110,17 @@ fn ramp_and_clutch_book_only_energy_of_the_motion() {
             ..Shares::ALL
         },
     ] {
-        let [at_rest, leaving] = created_by(|tick| ramps(share(tick)));
+        let [at_rest, leaving] = created_mj_with(|tick| ramps(share(tick)));
         assert_eq!(at_rest, 0.0);
         // 2 N acted over 0.5 mm, and 0.51 of the spring gave 0.51 · ½ (2² − 1.5²).
-        let given = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
-        assert!((leaving - given).abs() < 1e-5, "{leaving} mJ, not {given}");
+        let released_mj = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
+        assert!(
+            (leaving - released_mj).abs() < 1e-5,
+            "{leaving} mJ, not {released_mj}"
+        );
     }
     // The speed limit also lets a force return, without an action of the user.
-    let [at_rest, _] = created_by(|tick| Shares {
+    let [at_rest, _] = created_mj_with(|tick| Shares {
         speed: share(tick),
         ..Shares::ALL
     });
@@ -125,7 +128,7 @@ fn ramp_and_clutch_book_only_energy_of_the_motion() {
 }
 
 #[test]
-fn damping_is_that_of_the_spring_which_is_let_through() {
+fn damping_scales_with_the_rendered_share_of_the_spring() {
     // Energy created by half of a spring takes as much damping per newton as by all of one.
     let damped = |shares: Shares| {
         let params = params(1.0, 0.0, Controller::On);
@@ -135,11 +138,11 @@ fn damping_is_that_of_the_spring_which_is_let_through() {
         let outside = shares.ramp * shares.speed;
         for tick in 0..20 {
             let deep_mm = 5.0 - 0.1 * tick as f32;
-            damper.observe(&Moment {
+            damper.observe(&PassivityInputs {
                 displacement_mm: Vec3::Z * deep_mm,
                 moved_mm: Vec3::Z * 0.1,
                 velocity_mm_s,
-                asked_n: Vec3::Z * (deep_mm + 0.1) * inside * outside,
+                commanded_n: Vec3::Z * (deep_mm + 0.1) * inside * outside,
                 max_n: 8.5,
                 shares,
             });
@@ -176,32 +179,32 @@ fn damping_is_that_of_the_spring_which_is_let_through() {
 struct Taps {
     hz: u32,
     /// Time from the start of a tick until its force acts, s, and the damper's latency.
-    late_s: f64,
+    latency_s: f64,
     reported_s: f64,
     /// Taps a second; at 9 the tip moves at up to 170 mm/s.
     tap_hz: f64,
 }
 
 impl Taps {
-    const fn new(hz: u32, late_s: f64) -> Self {
+    const fn new(hz: u32, latency_s: f64) -> Self {
         Self {
             hz,
-            late_s,
-            reported_s: late_s,
+            latency_s,
+            reported_s: latency_s,
             tap_hz: 9.0,
         }
     }
 
     /// Energy that the surface gives in each of a few taps, mJ, integrated a hundred times a tick.
     /// The force obeys the guard's rate limit.
-    fn given_mj(self, params: &SurfaceParams) -> Vec<f64> {
+    fn released_mj(self, params: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
         let mut damper = Damper::of(params, &context(self.hz, self.reported_s as f32));
         let tick_s = 1.0 / f64::from(self.hz);
         let slew_n = 1000.0 * tick_s as f32;
         let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * self.tap_hz * t_s);
         let mut forces_n: Vec<f64> = Vec::new();
-        let (mut given, mut taps) = (0.0, Vec::new());
+        let (mut released_mj, mut taps) = (0.0, Vec::new());
         for tick in 0..(5.0 / self.tap_hz / tick_s) as usize {
             let now_s = tick as f64 * tick_s;
             let tip_mm = Vec3::Z * height_mm(now_s) as f32;
@@ -209,54 +212,54 @@ impl Taps {
             let speed_mm_s = (height_mm(now_s) - height_mm(now_s - tick_s)) / tick_s;
             let velocity_mm_s = Vec3::Z * speed_mm_s as f32;
             let moved_mm = Vec3::Z * (height_mm(now_s) - height_mm(now_s - tick_s)) as f32;
-            let asked_n = Vec3::Z * forces_n.last().map_or(0.0, |last| *last as f32);
+            let commanded_n = Vec3::Z * forces_n.last().map_or(0.0, |last| *last as f32);
             let mut force_n = params.spring().force_n(displacement_mm);
             if let Some(damper) = &mut damper {
-                damper.observe(&Moment {
+                damper.observe(&PassivityInputs {
                     displacement_mm,
                     moved_mm,
                     velocity_mm_s,
-                    asked_n,
+                    commanded_n,
                     max_n: 8.5,
                     shares: Shares::ALL,
                 });
                 force_n = damper.force_n(force_n, velocity_mm_s);
             }
-            let change_n = (force_n - asked_n).z.clamp(-slew_n, slew_n);
-            forces_n.push(f64::from(asked_n.z + change_n));
+            let change_n = (force_n - commanded_n).z.clamp(-slew_n, slew_n);
+            forces_n.push(f64::from(commanded_n.z + change_n));
             for part in 0..100 {
                 let (from, to) = (f64::from(part) / 100.0, f64::from(part + 1) / 100.0);
-                let ago = (self.late_s / tick_s - from - 1e-9).ceil().max(0.0) as usize;
+                let ago = (self.latency_s / tick_s - from - 1e-9).ceil().max(0.0) as usize;
                 let acts_n = forces_n.get(tick.wrapping_sub(ago)).copied();
                 let moves_mm = height_mm(now_s + to * tick_s) - height_mm(now_s + from * tick_s);
-                given += acts_n.unwrap_or(0.0) * moves_mm;
+                released_mj += acts_n.unwrap_or(0.0) * moves_mm;
             }
             // Well above the surface: the tap has ended.
-            if height_mm(now_s) > 0.9 * DEEP_MM && given != 0.0 {
-                taps.push(given);
-                given = 0.0;
+            if height_mm(now_s) > 0.9 * DEEP_MM && released_mj != 0.0 {
+                taps.push(released_mj);
+                released_mj = 0.0;
             }
         }
         taps
     }
 }
 
-const LATE_S: [f64; 5] = [0.0, 0.08e-3, 0.2e-3, 0.6e-3, 1.19e-3];
+const LATENCIES_S: [f64; 5] = [0.0, 0.08e-3, 0.2e-3, 0.6e-3, 1.19e-3];
 
 #[test]
-fn passivity_controller_removes_the_energy_every_tap_creates() {
+fn passivity_controller_removes_the_energy_of_every_tap() {
     for hz in [1000, 2000, 4000, 10_000] {
         for stiffness in [0.2, 0.5, 1.0, 2.0, 4.0] {
-            for late_s in LATE_S {
-                let taps = Taps::new(hz, late_s);
-                let without = taps.given_mj(&params(stiffness, 0.0, Controller::Off));
-                let with = taps.given_mj(&params(stiffness, 0.0, Controller::On));
+            for latency_s in LATENCIES_S {
+                let taps = Taps::new(hz, latency_s);
+                let without = taps.released_mj(&params(stiffness, 0.0, Controller::Off));
+                let with = taps.released_mj(&params(stiffness, 0.0, Controller::On));
                 assert!(without.len() >= 4 && with.len() >= 4);
                 assert!(without.iter().all(|mj| *mj > 0.0), "{hz} Hz: {without:?}");
                 for (with, without) in with.iter().zip(&without) {
                     assert!(
                         *with < 1e-4 * without,
-                        "{hz} Hz, {stiffness} N/mm, {late_s} s: {with} mJ, {without} without"
+                        "{hz} Hz, {stiffness} N/mm, {latency_s} s: {with} mJ, {without} without"
                     );
                 }
             }
@@ -266,7 +269,7 @@ fn passivity_controller_removes_the_energy_every_tap_creates() {
 
 /// Energy, mJ, that a point which holds the proxy gives in a second to a tip on circles of 4 mm
 /// around it at 200 mm/s: no motion is along the force.
-fn given_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
+fn released_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
     const RADIUS_MM: f64 = 4.0;
     let tick_s = 1.0 / f64::from(hz);
     let tip_mm = |t_s: f64| {
@@ -274,35 +277,35 @@ fn given_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
         Vec3::new(cos as f32, sin as f32, 0.0) * RADIUS_MM as f32
     };
     let mut damper = Damper::of(params, &context(hz, 0.0));
-    let (mut given_mj, mut asked_n) = (0.0, Vec3::ZERO);
+    let (mut released_mj, mut commanded_n) = (0.0, Vec3::ZERO);
     for tick in 0..hz {
         let now_s = f64::from(tick) * tick_s;
         let moved_mm = tip_mm(now_s) - tip_mm(now_s - tick_s);
         let velocity_mm_s = moved_mm * hz as f32;
         let mut force_n = params.spring().force_n(-tip_mm(now_s));
         if let Some(damper) = &mut damper {
-            damper.observe(&Moment {
+            damper.observe(&PassivityInputs {
                 displacement_mm: -tip_mm(now_s),
                 moved_mm,
                 velocity_mm_s,
-                asked_n,
+                commanded_n,
                 max_n: 8.5,
                 shares: Shares::ALL,
             });
             force_n = damper.force_n(force_n, velocity_mm_s);
         }
-        asked_n = force_n;
-        given_mj += f64::from(force_n.dot(tip_mm(now_s + tick_s) - tip_mm(now_s)));
+        commanded_n = force_n;
+        released_mj += f64::from(force_n.dot(tip_mm(now_s + tick_s) - tip_mm(now_s)));
     }
-    given_mj
+    released_mj
 }
 
 #[test]
-fn a_tip_on_circles_round_a_point_is_given_no_energy() {
+fn tip_on_circles_around_a_point_gains_no_energy() {
     for hz in [1000, 2000, 4000, 10_000] {
         for stiffness in [0.2, 0.5, 1.0, 2.0] {
-            let without = given_on_circles_mj(&params(stiffness, 0.0, Controller::Off), hz);
-            let with = given_on_circles_mj(&params(stiffness, 0.0, Controller::On), hz);
+            let without = released_on_circles_mj(&params(stiffness, 0.0, Controller::Off), hz);
+            let with = released_on_circles_mj(&params(stiffness, 0.0, Controller::On), hz);
             assert!(without > 0.3, "{hz} Hz, {stiffness} N/mm: {without} mJ");
             assert!(
                 with.abs() < 0.02 * without,
@@ -313,7 +316,7 @@ fn a_tip_on_circles_round_a_point_is_given_no_energy() {
 }
 
 #[test]
-fn across_a_shaded_or_textured_force_nothing_is_taken() {
+fn shaded_or_textured_force_is_not_damped_sideways() {
     let texture = Texture {
         pattern: Pattern::Grain,
         amplitude_mm: 0.1,
@@ -329,7 +332,7 @@ fn across_a_shaded_or_textured_force_nothing_is_taken() {
         ..params(1.0, 0.0, Controller::On)
     };
     for params in [shaded, textured] {
-        assert!(given_on_circles_mj(&params, 1000) > 1.0);
+        assert!(released_on_circles_mj(&params, 1000) > 1.0);
     }
 }
 
@@ -342,8 +345,8 @@ fn energy_of_unstated_latency_is_not_all_dissipated() {
         reported_s: 0.1e-3,
         ..known
     };
-    let without = known.given_mj(&params(1.0, 0.0, Controller::Off));
-    let (known, unknown) = (known.given_mj(&on), unknown.given_mj(&on));
+    let without = known.released_mj(&params(1.0, 0.0, Controller::Off));
+    let (known, unknown) = (known.released_mj(&on), unknown.released_mj(&on));
     for ((known, unknown), without) in known.iter().zip(&unknown).zip(&without) {
         assert!(*known < 0.0, "{known} mJ");
         assert!(*unknown > 0.2 * without, "{unknown} mJ, {without} without");
@@ -354,19 +357,19 @@ fn energy_of_unstated_latency_is_not_all_dissipated() {
 fn force_earlier_than_stated_delay_creates_no_energy() {
     // A duty cycle is read 0.5 to 1 ms after it is set.
     for hz in [1000, 2000, 4000] {
-        for late_s in [0.63e-3, 0.88e-3] {
+        for latency_s in [0.63e-3, 0.88e-3] {
             let taps = Taps {
                 reported_s: 1.13e-3,
-                ..Taps::new(hz, late_s)
+                ..Taps::new(hz, latency_s)
             };
-            let with = taps.given_mj(&params(1.0, 0.0, Controller::On));
+            let with = taps.released_mj(&params(1.0, 0.0, Controller::On));
             assert!(with.iter().all(|mj| *mj < 0.0), "{hz} Hz: {with:?} mJ");
         }
     }
 }
 
 #[test]
-fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
+fn tip_beyond_the_force_rate_limit_gains_no_energy() {
     // Up to 565 mm/s: at 4 N/mm the force would exceed its rate limit by a factor of two.
     for hz in [1000, 4000, 10_000] {
         for stiffness in [1.0, 2.0, 4.0] {
@@ -374,7 +377,7 @@ fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
                 tap_hz: 30.0,
                 ..Taps::new(hz, 0.2e-3)
             };
-            let with = taps.given_mj(&params(stiffness, 0.0, Controller::On));
+            let with = taps.released_mj(&params(stiffness, 0.0, Controller::On));
             assert!(
                 with.len() >= 4 && with.iter().all(|mj| *mj < 0.0),
                 "{hz} Hz, {stiffness} N/mm: {with:?} mJ"
@@ -387,12 +390,15 @@ fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
 fn net_dissipation_stays_below_the_created_energy() {
     // With more damping the surface would be rendered as honey.
     for hz in [1000, 4000] {
-        for late_s in LATE_S {
-            let taps = Taps::new(hz, late_s);
-            let without = taps.given_mj(&params(1.0, 0.0, Controller::Off));
-            let with = taps.given_mj(&params(1.0, 0.0, Controller::On));
-            for (given, taken) in without.iter().zip(&with) {
-                assert!(-taken < *given, "{hz} Hz: {taken} mJ, {given} without");
+        for latency_s in LATENCIES_S {
+            let taps = Taps::new(hz, latency_s);
+            let without = taps.released_mj(&params(1.0, 0.0, Controller::Off));
+            let with = taps.released_mj(&params(1.0, 0.0, Controller::On));
+            for (released_mj, taken) in without.iter().zip(&with) {
+                assert!(
+                    -taken < *released_mj,
+                    "{hz} Hz: {taken} mJ, {released_mj} without"
+                );
             }
         }
     }
@@ -405,11 +411,11 @@ fn surface_softens_for_fast_tip_and_recovers_at_rest() {
     let mut share = |up_mm: f32, speed_mm_s: f32, ticks: u32| {
         let displacement_mm = Vec3::Z * (-up_mm).max(0.0);
         for _ in 0..ticks {
-            damper.observe(&Moment {
+            damper.observe(&PassivityInputs {
                 displacement_mm,
                 moved_mm: Vec3::ZERO,
                 velocity_mm_s: Vec3::Z * speed_mm_s,
-                asked_n: Vec3::ZERO,
+                commanded_n: Vec3::ZERO,
                 max_n: 8.5,
                 shares: Shares::ALL,
             });
@@ -438,12 +444,12 @@ fn surface_softens_for_fast_tip_and_recovers_at_rest() {
 fn created_energy_is_capped_and_reset_at_rest() {
     let params = params(1.0, 0.0, Controller::On);
     let mut damper = damper(&params, 1000).expect("controlled");
-    let mut at = |up_mm: f32, asked_n: f32| {
-        damper.observe(&Moment {
+    let mut at = |up_mm: f32, commanded_n: f32| {
+        damper.observe(&PassivityInputs {
             displacement_mm: Vec3::Z * (5.0 - up_mm),
             moved_mm: Vec3::ZERO,
             velocity_mm_s: Vec3::ZERO,
-            asked_n: Vec3::Z * asked_n,
+            commanded_n: Vec3::Z * commanded_n,
             max_n: 8.5,
             shares: Shares::ALL,
         });
@@ -457,6 +463,6 @@ fn created_energy_is_capped_and_reset_at_rest() {
         "{created}"
     );
     assert_eq!(at(-3.0, 0.0), 2.0);
-    damper.rest();
+    damper.reset();
     assert_eq!(damper.created_mj(), 0.0);
 }

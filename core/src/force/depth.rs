@@ -9,7 +9,7 @@ use crate::scalar::larger;
 pub(super) struct Depth {
     pub(super) mm: f32,
     /// Speed at which the depth decreases, mm/s.
-    pub(super) leaves_mm_s: f32,
+    pub(super) exit_speed_mm_s: f32,
 }
 
 impl Depth {
@@ -17,12 +17,15 @@ impl Depth {
     pub(super) fn of(displacement_mm: Vec3, velocity_mm_s: Vec3) -> Self {
         let mm = displacement_mm.length();
         let along = velocity_mm_s.dot(displacement_mm);
-        let leaves_mm_s = if mm > 0.0 { along / mm } else { 0.0 };
-        Self { mm, leaves_mm_s }
+        let exit_speed_mm_s = if mm > 0.0 { along / mm } else { 0.0 };
+        Self {
+            mm,
+            exit_speed_mm_s,
+        }
     }
 
     /// Returns the depth after a time at constant velocity; zero if the tip leaves the surface.
     pub(super) fn after_mm(&self, seconds: f32) -> f32 {
-        larger(self.mm - self.leaves_mm_s * seconds, 0.0)
+        larger(self.mm - self.exit_speed_mm_s * seconds, 0.0)
     }
 }

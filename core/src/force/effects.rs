@@ -25,8 +25,8 @@ impl Effects {
         let shader = Shader::of(params.shading);
         let texturer = Texturer::of(&params.texture, context.cell_mm, context.rate);
         let damper = Damper::of(params, context);
-        let is_there = shader.is_some() || texturer.is_some() || damper.is_some();
-        is_there.then_some(Self {
+        let has_any = shader.is_some() || texturer.is_some() || damper.is_some();
+        has_any.then_some(Self {
             shader,
             texturer,
             damper,
@@ -45,7 +45,7 @@ impl Effects {
         let material = ActiveMaterial::of(table, params, context.cell_mm, context.rate)?;
         let mut damper = Damper::of(&table.hardest(params), context);
         if let Some(damper) = &mut damper {
-            damper.feels(material.params());
+            damper.set_params(material.params());
         }
         Some(Self {
             shader: Shader::of(params.shading),
@@ -85,11 +85,11 @@ impl Effects {
             return shaded;
         };
         let size = plain.length_squared();
-        let left = damper.turn_left(root(size) * self.cell_mm, self.cell_mm);
-        if left >= 1.0 {
+        let share = damper.turn_share(root(size) * self.cell_mm, self.cell_mm);
+        if share >= 1.0 {
             return shaded;
         }
-        let between = plain + (shaded - plain) * left;
+        let between = plain + (shaded - plain) * share;
         let squared = between.length_squared();
         // The two are at most 60° apart, so `between` is at least half as long as they are.
         if squared.is_normal() {
@@ -117,7 +117,7 @@ impl Effects {
             self.texturer = material.texturer();
         }
         if let Some(damper) = &mut self.damper {
-            damper.feels(material.params());
+            damper.set_params(material.params());
         }
         let (proxy, share) = (&contact.output().proxy, material.texture_share());
         match &mut self.texturer {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::contact::ContactSettings;
-use crate::force::{Controller, Damping, Moment, Shading, Shares};
+use crate::force::{Controller, Damping, PassivityInputs, Shading, Shares};
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::terrain::{FieldSize, TileArena};
@@ -29,11 +29,11 @@ fn context() -> EffectContext {
 fn created(effects: &mut Effects, created_mj: f32) {
     if let Some(damper) = &mut effects.damper {
         for moved_mm in [Vec3::ZERO, Vec3::Z] {
-            damper.observe(&Moment {
+            damper.observe(&PassivityInputs {
                 displacement_mm: Vec3::Z,
                 moved_mm,
                 velocity_mm_s: Vec3::ZERO,
-                asked_n: Vec3::Z * created_mj,
+                commanded_n: Vec3::Z * created_mj,
                 max_n: 8.5,
                 shares: Shares::ALL,
             });
@@ -68,21 +68,24 @@ fn shading_turn_shrinks_as_controller_dissipates_more() {
     assert!(angle > 0.1, "{angle}");
     // The energy of an edge at this depth, plus a tenth of a millijoule.
     let deep_mm = plain.length();
-    let gives_mj = 0.1 * 0.5 * deep_mm * (1.0 + deep_mm) + 0.1;
+    let edge_mj = 0.1 * 0.5 * deep_mm * (1.0 + deep_mm) + 0.1;
     for share in [0.3, 0.99] {
-        assert_eq!(beside_a_ridge(&PARAMS, share * gives_mj)[1], shaded);
+        assert_eq!(beside_a_ridge(&PARAMS, share * edge_mj)[1], shaded);
     }
     let mut last = angle;
     for share in [0.1, 0.4, 0.7, 0.9] {
-        let [_, less] = beside_a_ridge(&PARAMS, (1.0 + share) * gives_mj);
+        let [_, less] = beside_a_ridge(&PARAMS, (1.0 + share) * edge_mj);
         assert!((less.length() - plain.length()).abs() < 1e-5 * plain.length());
         let turned = plain.angle_between(less);
-        let wanted = angle * (1.0 - share);
-        assert!((turned - wanted).abs() < 0.1 * angle, "{turned} {wanted}");
+        let expected = angle * (1.0 - share);
+        assert!(
+            (turned - expected).abs() < 0.1 * angle,
+            "{turned} {expected}"
+        );
         assert!(turned < last);
         last = turned;
     }
-    for created_mj in [2.001 * gives_mj, 1.0, 3.0] {
+    for created_mj in [2.001 * edge_mj, 1.0, 3.0] {
         let [_, unturned] = beside_a_ridge(&PARAMS, created_mj);
         assert!((unturned - plain).length() < 1e-6, "{created_mj}");
     }
@@ -96,8 +99,8 @@ fn max_observed_energy_suppresses_the_shading_turn() {
         created(&mut effects, created_mj);
         effects.damper.expect("controlled")
     };
-    assert_eq!(damper(1.0).turn_left(100.0, 1e3), 1.0);
-    assert_eq!(damper(9.0).turn_left(100.0, 1e3), 0.0);
+    assert_eq!(damper(1.0).turn_share(100.0, 1e3), 1.0);
+    assert_eq!(damper(9.0).turn_share(100.0, 1e3), 0.0);
 }
 
 /// Slides 20 mm over facets of two cells at a depth, and compares each tick with the same without
@@ -124,7 +127,7 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
     let mut free = Effects::of(&uncontrolled, &context()).expect("shaded");
     let table = MaterialTable::EMPTY;
     let step = mm_s * TickRate::DEFAULT.tick_s();
-    let (mut last, mut asked_n) = (None, Vec3::ZERO);
+    let (mut last, mut commanded_n) = (None, Vec3::ZERO);
     let (mut steps, mut turned) = ([0.0_f32; 2], [0.0_f32; 2]);
     // First down to the depth, then along it.
     let (down, on) = (100, (20.0 / step) as usize);
@@ -140,15 +143,15 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
             let tip_mm = Vec3::new(x, 0.4, height(x) + above);
             let moved_mm = last.map_or(Vec3::ZERO, |(before, _): (Vec3, _)| tip_mm - before);
             let velocity_mm_s = moved_mm * TickRate::DEFAULT.hz() as f32;
-            damper.observe(&Moment {
+            damper.observe(&PassivityInputs {
                 displacement_mm: context[0],
                 moved_mm,
                 velocity_mm_s,
-                asked_n,
+                commanded_n,
                 max_n: 8.5,
                 shares: Shares::ALL,
             });
-            asked_n = damper.force_n(params.spring().force_n(context[0]), velocity_mm_s);
+            commanded_n = damper.force_n(params.spring().force_n(context[0]), velocity_mm_s);
             let forces = context.map(|displacement| params.spring().force_n(displacement));
             if let Some((_, before)) = last.replace((tip_mm, forces))
                 && tick > down

@@ -160,14 +160,14 @@ impl MaterialTable {
     /// materials: a stability rule must hold for them.
     #[must_use]
     pub fn hardest(&self, params: &SurfaceParams) -> SurfaceParams {
-        let most = |of: fn(&Material) -> f32| {
+        let max_of = |of: fn(&Material) -> f32| {
             let all = self.materials.iter().map(of);
-            all.fold(0.0, |most: f32, one| most.max(one))
+            all.fold(0.0, |max: f32, one| max.max(one))
         };
         SurfaceParams {
-            stiffness_n_per_mm: most(|m| m.stiffness_n_per_mm) * self.stiffness_scale(params),
+            stiffness_n_per_mm: max_of(|m| m.stiffness_n_per_mm) * self.stiffness_scale(params),
             damping: Damping {
-                ns_per_m: most(|m| m.damping_ns_per_m),
+                ns_per_m: max_of(|m| m.damping_ns_per_m),
                 ..params.damping
             },
             ..*params

@@ -25,7 +25,7 @@ pub use damping::{Controller, Damping};
 pub(crate) use effect_context::EffectContext;
 pub(crate) use effects::Effects;
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
-pub(crate) use passivity::{Moment, Shares};
+pub(crate) use passivity::{PassivityInputs, Shares};
 pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture};
 pub use texturer::Texturer;
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn proportional_below_the_limit() {
+    fn force_is_proportional_below_the_limit() {
         let f = SurfaceParams::PREMIUM
             .spring()
             .force_n(Vec3::new(0.0, 0.0, 4.0));
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn clamped_as_a_vector() {
+    fn force_limit_keeps_the_direction() {
         for displacement in [
             Vec3::new(300.0, -400.0, 0.0),
             Vec3::splat(3e38),
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn not_a_number_gives_no_force() {
+    fn non_finite_displacement_gives_no_force() {
         for bad in [f32::NAN, f32::INFINITY] {
             assert_eq!(
                 SurfaceParams::PREMIUM

@@ -28,11 +28,11 @@ const MAX_TICKS: f32 = 2.0;
 /// The same across the force: a uniform motion creates half of the energy that this dissipates.
 const MAX_TICKS_ACROSS: f32 = 1.0;
 /// Share of the force below which hardly any passes the guard, so damping is not scaled up further.
-const LEAST_SHARE: f32 = 1e-4;
+const MIN_SHARE: f32 = 1e-4;
 /// Number of stored forces: the delayed ones, the acting one and the one before it. A power of two.
-const KEPT: usize = 16;
+const STORED_FORCES: usize = 16;
 /// Maximum latency of a force in ticks; a longer latency counts as this one.
-const MAX_LATE: usize = KEPT - 2;
+const MAX_LATENCY_TICKS: usize = STORED_FORCES - 2;
 
 /// The observer's energy record, and the controller.
 #[derive(Clone, Copy, Debug)]
@@ -41,21 +41,21 @@ pub(super) struct Passivity {
     /// Time from the start of a tick until its force acts, s, and the same in whole ticks and a
     /// fraction.
     latency_s: f32,
-    late: (usize, f32),
+    latency_ticks: (usize, f32),
     rate_limit_softening: RateLimitSoftening,
     created_mj: f32,
     /// The created energy, predicted for the end of a tick in which this tick's force acts, without
     /// the work of that force, for a force before the guard's share.
-    coming_mj: f32,
+    predicted_mj: f32,
     /// The spring before the guard's share, N/mm; the clutch's share is included.
     stiffness_n_per_mm: f32,
-    before: Option<Before>,
-    asked: Asked,
+    before: Option<LastTick>,
+    forces: ForceHistory,
 }
 
 /// The state of the last tick.
 #[derive(Clone, Copy, Debug)]
-struct Before {
+struct LastTick {
     depth_mm: f32,
     stiffness_n_per_mm: f32,
     /// Shares of the softening and of the speed limit.
@@ -65,31 +65,31 @@ struct Before {
 
 /// The forces that the guard let through, N.
 #[derive(Clone, Copy, Debug)]
-struct Asked {
-    forces_n: [Vec3; KEPT],
+struct ForceHistory {
+    forces_n: [Vec3; STORED_FORCES],
     newest: usize,
 }
 
-impl Asked {
+impl ForceHistory {
     const NONE: Self = Self {
-        forces_n: [Vec3::ZERO; KEPT],
+        forces_n: [Vec3::ZERO; STORED_FORCES],
         newest: 0,
     };
 
     fn add(&mut self, force_n: Vec3) {
-        self.newest = (self.newest + 1) % KEPT;
-        self.forces_n[self.newest % KEPT] = force_n;
+        self.newest = (self.newest + 1) % STORED_FORCES;
+        self.forces_n[self.newest % STORED_FORCES] = force_n;
     }
 
     /// Returns the force of `ticks` ticks ago.
     const fn ago(&self, ticks: usize) -> Vec3 {
-        self.forces_n[self.newest.wrapping_sub(ticks) % KEPT]
+        self.forces_n[self.newest.wrapping_sub(ticks) % STORED_FORCES]
     }
 }
 
 /// The inputs of a tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Moment {
+pub(crate) struct PassivityInputs {
     /// Vector from the HIP to the proxy.
     pub(crate) displacement_mm: Vec3,
     /// The tip's displacement over the terrain since the last tick.
@@ -97,7 +97,7 @@ pub(crate) struct Moment {
     /// Velocity of the tip.
     pub(crate) velocity_mm_s: Vec3,
     /// The force that the guard let through in the last tick.
-    pub(crate) asked_n: Vec3,
+    pub(crate) commanded_n: Vec3,
     /// The maximum force that the guard lets through.
     pub(crate) max_n: f32,
     /// Shares of the spring's force in this tick.
@@ -127,19 +127,22 @@ impl Shares {
 impl Passivity {
     pub(super) fn new(context: &EffectContext) -> Self {
         let tick_s = context.rate.tick_s();
-        let latency_s = context.latency_s.max(0.0).min(MAX_LATE as f32 * tick_s);
-        let late = latency_s / tick_s;
-        let whole = late as usize;
+        let latency_s = context
+            .latency_s
+            .max(0.0)
+            .min(MAX_LATENCY_TICKS as f32 * tick_s);
+        let latency_ticks = latency_s / tick_s;
+        let whole = latency_ticks as usize;
         Self {
             tick_s,
             latency_s,
-            late: (whole, late - whole as f32),
+            latency_ticks: (whole, latency_ticks - whole as f32),
             rate_limit_softening: RateLimitSoftening::NONE,
             created_mj: 0.0,
-            coming_mj: 0.0,
+            predicted_mj: 0.0,
             stiffness_n_per_mm: 0.0,
             before: None,
-            asked: Asked::NONE,
+            forces: ForceHistory::NONE,
         }
     }
 
@@ -152,9 +155,9 @@ impl Passivity {
         self.created_mj
     }
 
-    pub(super) const fn rest(&mut self) {
-        (self.created_mj, self.coming_mj, self.before) = (0.0, 0.0, None);
-        (self.rate_limit_softening, self.asked) = (RateLimitSoftening::NONE, Asked::NONE);
+    pub(super) const fn reset(&mut self) {
+        (self.created_mj, self.predicted_mj, self.before) = (0.0, 0.0, None);
+        (self.rate_limit_softening, self.forces) = (RateLimitSoftening::NONE, ForceHistory::NONE);
     }
 
     /// Records the energy since the last tick, and predicts the energy until this tick's force has
@@ -163,7 +166,7 @@ impl Passivity {
     /// The spring is the one of the force after the guard: the scene's, times all shares. A spring
     /// that becomes stiffer adds energy. For ramp and clutch this is intended, once each, and not
     /// recorded; everything else is.
-    pub(super) fn observe(&mut self, params: &SurfaceParams, now: &Moment) {
+    pub(super) fn observe(&mut self, params: &SurfaceParams, now: &PassivityInputs) {
         let depth = Depth::of(now.displacement_mm, now.velocity_mm_s);
         let Shares {
             clutch,
@@ -178,9 +181,9 @@ impl Passivity {
         };
         self.rate_limit_softening
             .observe(&ramped, &depth, self.tick_s);
-        self.asked.add(now.asked_n);
-        let (whole, part) = self.late;
-        let (acting_n, before_n) = (self.asked.ago(whole), self.asked.ago(whole + 1));
+        self.forces.add(now.commanded_n);
+        let (whole, part) = self.latency_ticks;
+        let (acting_n, before_n) = (self.forces.ago(whole), self.forces.ago(whole + 1));
         let softening = self.rate_limit_softening.share();
         let spring = Spring {
             stiffness_n_per_mm: softening * stiffness_n_per_mm,
@@ -194,23 +197,23 @@ impl Passivity {
             };
             let before_mj = ramp * before.speed * spring.stored_mj(before.depth_mm);
             let acted_n = acting_n + (before_n - acting_n) * part;
-            let given_mj = acted_n.dot(now.moved_mm);
-            self.created_mj = within(self.created_mj + given_mj + stored_mj - before_mj);
+            let work_mj = acted_n.dot(now.moved_mm);
+            self.created_mj = within(self.created_mj + work_mj + stored_mj - before_mj);
         }
-        self.before = Some(Before {
+        self.before = Some(LastTick {
             depth_mm: depth.mm,
             stiffness_n_per_mm: params.stiffness_n_per_mm,
             softening,
             speed,
         });
-        // At most `MAX_LATE` ticks.
-        let on_their_way = (0..whole).map(|ticks| self.asked.ago(ticks));
-        let sum_n = on_their_way.fold(acting_n * part, |sum_n, asked_n| sum_n + asked_n);
-        let gives_mj = sum_n.dot(now.velocity_mm_s) * self.tick_s;
+        // At most `MAX_LATENCY_TICKS` ticks.
+        let pending = (0..whole).map(|ticks| self.forces.ago(ticks));
+        let sum_n = pending.fold(acting_n * part, |sum_n, commanded_n| sum_n + commanded_n);
+        let predicted_work_mj = sum_n.dot(now.velocity_mm_s) * self.tick_s;
         let depth_mm = depth.after_mm(self.latency_s + self.tick_s);
-        let holds_mj = ramp * speed * spring.stored_mj(depth_mm);
-        let coming_mj = self.created_mj + gives_mj + holds_mj - stored_mj;
-        self.coming_mj = coming_mj / larger(ramp * speed, LEAST_SHARE);
+        let predicted_stored_mj = ramp * speed * spring.stored_mj(depth_mm);
+        let predicted_mj = self.created_mj + predicted_work_mj + predicted_stored_mj - stored_mj;
+        self.predicted_mj = predicted_mj / larger(ramp * speed, MIN_SHARE);
         self.stiffness_n_per_mm = stiffness_n_per_mm;
     }
 
@@ -218,21 +221,21 @@ impl Passivity {
     /// spring's force will have created after acting for a tick: along that force, and across it if
     /// damping along it is not enough, as where the tip moves around a peak or a point that
     /// friction holds.
-    pub(super) fn damping_ns_per_mm(&self, motion: &Motion) -> Takes {
+    pub(super) fn damping_ns_per_mm(&self, motion: &Motion) -> DampingCoefficients {
         // NaN or infinite at rest, where damping has no effect.
-        let takes = |mj: f32, squared: f32, ticks: f32| {
-            let most = (ticks * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
+        let damping = |mj: f32, squared: f32, ticks: f32| {
+            let max_damping = (ticks * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
             match mj / (squared * self.tick_s) {
-                takes if takes < most => takes,
-                _ => most,
+                damping if damping < max_damping => damping,
+                _ => max_damping,
             }
         };
-        let created_mj = within(self.coming_mj + motion.along * self.tick_s);
-        let along = takes(created_mj, motion.along_squared, MAX_TICKS);
+        let created_mj = within(self.predicted_mj + motion.along * self.tick_s);
+        let along = damping(created_mj, motion.along_squared, MAX_TICKS);
         let left_mj = within(created_mj - along * motion.along_squared * self.tick_s);
-        Takes {
+        DampingCoefficients {
             along,
-            across: takes(left_mj, motion.across_squared, MAX_TICKS_ACROSS),
+            across: damping(left_mj, motion.across_squared, MAX_TICKS_ACROSS),
         }
     }
 }
@@ -248,7 +251,7 @@ pub(super) struct Motion {
 
 /// Damping along a force and across it, N·s/mm.
 #[derive(Default)]
-pub(super) struct Takes {
+pub(super) struct DampingCoefficients {
     pub(super) along: f32,
     pub(super) across: f32,
 }

@@ -13,27 +13,27 @@ use crate::scalar::smaller;
 
 /// The spring's share of the rate limit; the rest is for damping.
 const SPRING_PART: f32 = 0.5;
-/// Speed below which a tip rests, mm/s. After the time `RESTED_S`, in s, the surface starts to
+/// Speed below which a tip rests, mm/s. After the time `REST_TIME_S`, in s, the surface starts to
 /// return to its full stiffness.
-const RESTS_MM_S: f32 = 10.0;
-const RESTED_S: f32 = 0.3;
+const REST_SPEED_MM_S: f32 = 10.0;
+const REST_TIME_S: f32 = 0.3;
 /// Energy that the spring gains per second during that, mJ/s. The observer records it, and the
 /// controller dissipates it.
-const RECOVERS_MJ_PER_S: f32 = 5.0;
+const RECOVERY_MJ_PER_S: f32 = 5.0;
 
 /// The rendered share of the stiffness.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RateLimitSoftening {
     share: f32,
     /// Time since the tip came to rest, s.
-    rested_s: f32,
+    rest_s: f32,
 }
 
 impl RateLimitSoftening {
     /// Full stiffness.
     pub(super) const NONE: Self = Self {
         share: 1.0,
-        rested_s: 0.0,
+        rest_s: 0.0,
     };
 
     /// Returns the share, above 0 and at most 1.
@@ -48,18 +48,18 @@ impl RateLimitSoftening {
         if depth.mm <= 0.0 {
             return *self = Self::NONE;
         }
-        let speed_mm_s = depth.leaves_mm_s.abs();
-        if speed_mm_s >= RESTS_MM_S {
-            self.rested_s = 0.0;
-        } else if self.rested_s < RESTED_S {
-            self.rested_s += tick_s;
+        let speed_mm_s = depth.exit_speed_mm_s.abs();
+        if speed_mm_s >= REST_SPEED_MM_S {
+            self.rest_s = 0.0;
+        } else if self.rest_s < REST_TIME_S {
+            self.rest_s += tick_s;
         }
-        if self.share < 1.0 && self.rested_s >= RESTED_S {
-            let recovered = RECOVERS_MJ_PER_S * tick_s / spring.stored_mj(depth.mm);
+        if self.share < 1.0 && self.rest_s >= REST_TIME_S {
+            let recovered = RECOVERY_MJ_PER_S * tick_s / spring.stored_mj(depth.mm);
             self.share = smaller(self.share + recovered, 1.0);
         }
         // Infinite at rest.
-        let most = SPRING_PART * MAX_SLEW_N_PER_S / (spring.stiffness_n_per_mm * speed_mm_s);
-        self.share = smaller(most, self.share);
+        let max_share = SPRING_PART * MAX_SLEW_N_PER_S / (spring.stiffness_n_per_mm * speed_mm_s);
+        self.share = smaller(max_share, self.share);
     }
 }

@@ -24,7 +24,7 @@ pub(super) struct Relief {
 
 /// Height of a relief at a place, and its slopes eastward and northward per cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rise {
+pub(super) struct ReliefPoint {
     pub(super) height: f32,
     pub(super) slopes: [f32; 2],
 }
@@ -38,7 +38,7 @@ impl Relief {
             let (north, east) = sin_cos(texture.direction_deg.to_radians());
             [east * waves_per_cell, north * waves_per_cell]
         };
-        let seed = mixed(texture.seed);
+        let seed = hash(texture.seed);
         Self {
             per_cell,
             seed,
@@ -46,10 +46,10 @@ impl Relief {
         }
     }
 
-    pub(super) fn at(&self, at: &GridPoint) -> Rise {
+    pub(super) fn at(&self, at: &GridPoint) -> ReliefPoint {
         let ([x, y, _], frac) = (at.cell(), at.frac());
         let [east, north] = self.per_cell;
-        let place = [counted(east, x, frac.x), counted(north, y, frac.y)];
+        let place = [fixed_point(east, x, frac.x), fixed_point(north, y, frac.y)];
         let (height, [along_x, along_y]) = if self.is_grain {
             grain(place, self.seed)
         } else {
@@ -58,7 +58,7 @@ impl Relief {
             let (height, slope) = wave(phase as u32);
             (height, [slope; 2])
         };
-        Rise {
+        ReliefPoint {
             height,
             slopes: [along_x * east, along_y * north],
         }
@@ -66,16 +66,16 @@ impl Relief {
 }
 
 /// Returns a coordinate times `per_cell`, in 2⁻³²; the whole part wraps.
-fn counted(per_cell: f32, cell: i32, frac: f32) -> u64 {
+fn fixed_point(per_cell: f32, cell: i32, frac: f32) -> u64 {
     const ONE: f32 = 4_294_967_296.0;
     let per_cell = (per_cell * ONE) as i64;
     let part = i64::from((frac * ONE) as u32);
-    let (whole, rest) = (per_cell >> 32, per_cell & 0xFFFF_FFFF);
+    let (whole, fraction) = (per_cell >> 32, per_cell & 0xFFFF_FFFF);
     let of_cells = i64::from(cell).wrapping_mul(per_cell);
     let of_part = part.wrapping_mul(whole);
     // Both are below 2³².
-    let of_rest = (part as u64 * rest as u64) >> 32;
-    (of_cells.wrapping_add(of_part) as u64).wrapping_add(of_rest)
+    let of_fraction = (part as u64 * fraction as u64) >> 32;
+    (of_cells.wrapping_add(of_part) as u64).wrapping_add(of_fraction)
 }
 
 /// Returns the sine of a phase, where 2³² is a full turn, within 5e-4: its height, and its slope
@@ -109,12 +109,12 @@ fn grain([x, y]: [u64; 2], seed: u32) -> (f32, [f32; 2]) {
         .wrapping_mul(EAST)
         .wrapping_add(row.wrapping_mul(NORTH))
         .wrapping_add(seed);
-    let drawn = |east: u32, north: u32| {
-        let number = mixed(corner.wrapping_add(east).wrapping_add(north));
+    let random_height = |east: u32, north: u32| {
+        let number = hash(corner.wrapping_add(east).wrapping_add(north));
         number as i32 as f32 / (1_u32 << 31) as f32
     };
-    let [sw, se] = [drawn(0, 0), drawn(EAST, 0)];
-    let [nw, ne] = [drawn(0, NORTH), drawn(EAST, NORTH)];
+    let [sw, se] = [random_height(0, 0), random_height(EAST, 0)];
+    let [nw, ne] = [random_height(0, NORTH), random_height(EAST, NORTH)];
     let ((u, steep_u), (v, steep_v)) = (eased(x as u32), eased(y as u32));
     let (south, north) = (mix(sw, se, u), mix(nw, ne, u));
     let along_x = mix(se - sw, ne - nw, v) * steep_u;
@@ -132,7 +132,7 @@ fn mix(x: f32, y: f32, share: f32) -> f32 {
 }
 
 /// Returns a hash that is not correlated with its input (Wellons' `lowbias32`).
-fn mixed(mut x: u32) -> u32 {
+fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7FEB_352D);
     x ^= x >> 15;

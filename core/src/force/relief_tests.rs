@@ -39,7 +39,7 @@ fn exactly(per_cell: f32, cell: i32, frac: f32) -> (i64, f64) {
     ((product >> 56) as i64, rest as f64 / 2_f64.powi(56))
 }
 
-fn drawn(col: i64, row: i64, seed: u32) -> f64 {
+fn random_height(col: i64, row: i64, seed: u32) -> f64 {
     let mut x = (col as u32).wrapping_mul(0x9E37_79B1);
     x = x.wrapping_add((row as u32).wrapping_mul(0x85EB_CA77));
     x = x.wrapping_add(wellons(seed));
@@ -53,7 +53,7 @@ fn wellons(x: u32) -> u32 {
 }
 
 /// The height at a place, from a grain's corners or the sine.
-fn wanted(relief: &Relief, seed: u32, at: &GridPoint) -> f64 {
+fn expected(relief: &Relief, seed: u32, at: &GridPoint) -> f64 {
     let (cell, frac) = (at.cell(), at.frac());
     let x = exactly(relief.per_cell[0], cell[0], frac.x);
     let y = exactly(relief.per_cell[1], cell[1], frac.y);
@@ -63,14 +63,14 @@ fn wanted(relief: &Relief, seed: u32, at: &GridPoint) -> f64 {
     }
     let eased = |x: f64| x * x * (3.0 - 2.0 * x);
     let (u, v) = (eased(x.1), eased(y.1));
-    let at = |east: i64, north: i64| drawn(x.0 + east, y.0 + north, seed);
+    let at = |east: i64, north: i64| random_height(x.0 + east, y.0 + north, seed);
     let south = at(0, 0) * (1.0 - u) + at(1, 0) * u;
     let north = at(0, 1) * (1.0 - u) + at(1, 1) * u;
     south * (1.0 - v) + north * v
 }
 
 #[test]
-fn the_height_is_the_one_of_f64_at_every_scale_near_and_far() {
+fn height_matches_f64_at_every_scale_near_and_far() {
     let mut dice = dice();
     const CASES: u32 = cases(2_000, 20);
     for exponent in -20..=20 {
@@ -82,18 +82,21 @@ fn the_height_is_the_one_of_f64_at_every_scale_near_and_far() {
             for x in CELLS {
                 let y = CELLS[(case as usize) % CELLS.len()];
                 let at = GridPoint::new([x, y, 3], Vec3::new(dice(), dice(), dice()));
-                let (height, wanted) = (relief.at(&at).height, wanted(&relief, seed, &at));
-                let off = (f64::from(height) - wanted).abs();
+                let (height, expected) = (relief.at(&at).height, expected(&relief, seed, &at));
+                let off = (f64::from(height) - expected).abs();
                 // The sine's own error, and rounding.
-                let most = if relief.is_grain { 2e-6 } else { 4.5e-4 };
-                assert!(off < most, "{relief:?} at {at:?}: {height} but {wanted}");
+                let max_error = if relief.is_grain { 2e-6 } else { 4.5e-4 };
+                assert!(
+                    off < max_error,
+                    "{relief:?} at {at:?}: {height} but {expected}"
+                );
             }
         }
     }
 }
 
 #[test]
-fn a_relief_is_as_fine_far_from_the_origin_to_the_bit() {
+fn relief_far_from_origin_has_the_same_bits() {
     // 16 waves per 32 cells, so a grating repeats every 32 cells.
     let relief = Relief::of(&texture(Pattern::Grating, 0.0, 5), 0.5);
     for i in 0..1_000 {
@@ -115,17 +118,21 @@ fn height_and_slope_are_continuous_over_cells_and_grains() {
     for (pattern, waves) in patterns.into_iter().zip([0.37, 0.0213, 3.7]) {
         for along in [Vec3::X, Vec3::Y, Vec3::new(0.8, 0.6, 0.0)] {
             let relief = Relief::of(&texture(pattern, 20.0, 3), waves);
-            let mut before: Option<Rise> = None;
+            let mut before: Option<ReliefPoint> = None;
             for i in 0..40_000 {
                 let at = GridPoint::new([99_999_998; 3], along * (i as f32 * STEP));
                 let rise = relief.at(&at);
                 if let Some(before) = before {
-                    let slope = |rise: &Rise| rise.slopes[0] * along.x + rise.slopes[1] * along.y;
+                    let slope =
+                        |rise: &ReliefPoint| rise.slopes[0] * along.x + rise.slopes[1] * along.y;
                     let mean = 0.5 * (slope(&before) + slope(&rise));
                     let off = (rise.height - before.height - mean * STEP).abs();
                     assert!(off < 1e-6, "{pattern:?} {i}: {off:e}");
-                    let bent = (slope(&rise) - slope(&before)).abs();
-                    assert!(bent < 48.0 * waves * waves * STEP + 1e-5, "{i}: {bent:e}");
+                    let slope_change = (slope(&rise) - slope(&before)).abs();
+                    assert!(
+                        slope_change < 48.0 * waves * waves * STEP + 1e-5,
+                        "{i}: {slope_change:e}"
+                    );
                 }
                 before = Some(rise);
             }
@@ -135,7 +142,7 @@ fn height_and_slope_are_continuous_over_cells_and_grains() {
 
 /// The bounds that the tangential part of the force relies on.
 #[test]
-fn heights_and_slopes_are_within_their_bounds_and_reach_them() {
+fn heights_and_slopes_reach_but_never_exceed_their_bounds() {
     for (pattern, steepest) in [
         (Pattern::Grain, 6.0),
         (Pattern::Grating, std::f32::consts::TAU),
@@ -171,7 +178,7 @@ fn heights_and_slopes_are_within_their_bounds_and_reach_them() {
 }
 
 #[test]
-fn another_seed_is_another_texture() {
+fn each_seed_gives_another_texture() {
     let at = GridPoint::new([5, 6, 7], Vec3::new(0.3, 0.2, 0.1));
     for pattern in [Pattern::Grain, Pattern::Grating] {
         let heights: [f32; 20] = core::array::from_fn(|seed| {

@@ -80,8 +80,8 @@ impl Shader {
         if output.state == ContactState::Touching
             && let Some(slopes) = SlopesAt::point(window, &output.proxy)
         {
-            let normal = output.displacement - contact.held_back();
-            self.turn = Turn::between(met_by(&slopes, normal), slopes.smoothed);
+            let normal = output.displacement - contact.friction_displacement();
+            self.turn = Turn::between(slopes_facing(&slopes, normal), slopes.smoothed);
             self.missing = slopes.missing;
         }
         self.turn.of(output.displacement)
@@ -96,7 +96,7 @@ impl Shader {
 
 /// Returns the slopes whose normal a force points along: those of the patch, or between those of
 /// the patches that meet.
-fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
+fn slopes_facing(slopes: &SlopesAt, force: Vec3) -> Slopes {
     let SlopesAt { east, north, .. } = slopes;
     // Upward, or nearly level.
     let up = if force.z > 0.0 {
@@ -105,9 +105,9 @@ fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
         f32::MIN_POSITIVE
     };
     // Not `f32::clamp`, which may panic.
-    let along = |way: f32, [least, most]: [f32; 2]| match -way / up {
-        slope if slope < least => least,
-        slope if slope > most => most,
+    let along = |component: f32, [min, max]: [f32; 2]| match -component / up {
+        slope if slope < min => min,
+        slope if slope > max => max,
         slope => slope,
     };
     [along(force.x, *east), along(force.y, *north)]

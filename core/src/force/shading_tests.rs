@@ -51,7 +51,7 @@ fn forces_along<const D: usize>(
     field: &Field<'_, D>,
     height: Height,
     friction: Friction,
-    way: impl IntoIterator<Item = [f64; 2]>,
+    path: impl IntoIterator<Item = [f64; 2]>,
 ) -> Vec<ShadedTick> {
     let settings = ContactSettings {
         friction,
@@ -59,10 +59,10 @@ fn forces_along<const D: usize>(
     };
     let mut contact = Contact::new(settings);
     let mut shader = Shader::of(Shading::Smooth).expect("shaded");
-    let mut way = way.into_iter().peekable();
-    let first = *way.peek().expect("a place");
+    let mut path = path.into_iter().peekable();
+    let first = *path.peek().expect("a place");
     contact.step(&field.window, &hip_over(height, first, 1.0));
-    way.map(|at| {
+    path.map(|at| {
         let output = *contact.step(&field.window, &hip_over(height, at, -DEPTH));
         assert_eq!(output.state, ContactState::Touching, "at {at:?}");
         ShadedTick {
@@ -124,11 +124,11 @@ fn cliff(x: i32, _: i32) -> f32 {
 }
 
 #[test]
-fn plane_is_the_same_with_and_without_shading() {
+fn shading_changes_nothing_on_a_plane() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), plane);
-    let way = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
-    for rendered in forces_along(&field, plane, Friction::NONE, way) {
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), plane);
+    let path = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
+    for rendered in forces_along(&field, plane, Friction::NONE, path) {
         let off = (rendered.shaded - rendered.plain).length();
         assert!(off < 2e-6 * rendered.plain.length(), "{off}");
         assert_eq!(rendered.missing, None);
@@ -136,12 +136,12 @@ fn plane_is_the_same_with_and_without_shading() {
 }
 
 #[test]
-fn the_force_turns_evenly_over_valley_and_ridge() {
+fn force_turns_evenly_over_valley_and_ridge() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(8.0, 16.0), (16.0, 24.0)] {
-        let way = straight([from, 9.3], [to, 10.1]);
-        let rendered = forces_along(&field, folds, Friction::NONE, way);
+        let path = straight([from, 9.3], [to, 10.1]);
+        let rendered = forces_along(&field, folds, Friction::NONE, path);
         let (plain, shaded) = max_turns(&rendered);
         assert!(
             plain > 20.0 && shaded < 0.1 * plain,
@@ -157,7 +157,7 @@ fn the_force_turns_evenly_over_valley_and_ridge() {
 #[test]
 fn shaded_normal_at_each_sample_averages_its_adjacent_edges() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), rough);
     for i in 0..cases(400, 20) as i32 {
         // Including samples on tiles' borders.
         let (x, y) = (
@@ -175,11 +175,11 @@ fn shaded_normal_at_each_sample_averages_its_adjacent_edges() {
         let at = rough(x, y);
         let east = mean(rough(x - 1, y), at, rough(x + 1, y));
         let north = mean(rough(x, y - 1), at, rough(x, y + 1));
-        let wanted = Vec3::new(-east as f32, -north as f32, 1.0);
+        let expected = Vec3::new(-east as f32, -north as f32, 1.0);
         let floor = at.floor();
         let proxy = GridPoint::new([x, y, floor as i32], Vec3::new(0.0, 0.0, at - floor));
         let slopes = SlopesAt::point(&field.window, &proxy).expect("a patch");
-        let off = degrees(normal(slopes.smoothed), wanted);
+        let off = degrees(normal(slopes.smoothed), expected);
         assert!(off < 1e-3, "at {x}, {y}: {off}°");
     }
 }
@@ -187,12 +187,12 @@ fn shaded_normal_at_each_sample_averages_its_adjacent_edges() {
 #[test]
 fn shading_cuts_max_force_turn_tenfold_on_rough_terrain() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), rough);
     let (mut plain, mut shaded) = (0.0_f32, 0.0_f32);
     for i in 0..cases(40, 1) {
         let y = 2.0 + f64::from(i);
-        let way = straight([2.1, y], [57.9, y + 13.0 * f64::from(i % 2)]);
-        let rendered = forces_along(&field, rough, Friction::NONE, way);
+        let path = straight([2.1, y], [57.9, y + 13.0 * f64::from(i % 2)]);
+        let rendered = forces_along(&field, rough, Friction::NONE, path);
         let (a, b) = max_turns(&rendered);
         (plain, shaded) = (plain.max(a), shaded.max(b));
     }
@@ -203,9 +203,9 @@ fn shading_cuts_max_force_turn_tenfold_on_rough_terrain() {
 }
 
 #[test]
-fn a_cliff_stays_a_cliff() {
+fn cliff_is_not_smoothed() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), cliff);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), cliff);
     let rendered = forces_along(
         &field,
         cliff,
@@ -216,7 +216,7 @@ fn a_cliff_stays_a_cliff() {
         let to_foot = 10.0 - (rendered.proxy.cell()[0] as f32 + rendered.proxy.frac().x);
         let off = degrees(rendered.shaded, Vec3::Z);
         assert!(
-            off < 0.01 || to_foot < NARROW_AT_MOST,
+            off < 0.01 || to_foot < MAX_NARROW_CELLS,
             "{to_foot} before it: {off}°"
         );
     }
@@ -229,7 +229,7 @@ fn a_cliff_stays_a_cliff() {
 }
 
 /// Maximum distance from a cliff within which its bend is rendered, cells.
-const NARROW_AT_MOST: f32 = 0.2;
+const MAX_NARROW_CELLS: f32 = 0.2;
 
 #[test]
 fn border_of_a_tile_is_rendered_as_its_inside() {
@@ -238,11 +238,11 @@ fn border_of_a_tile_is_rendered_as_its_inside() {
         rough(x - 22, y - 22)
     }
     let mut tiles = (buffers::<2>(), buffers::<2>());
-    let inside = Field::<2>::held(&mut tiles.0, FieldSize::new(60, 60), rough);
-    let across = Field::<2>::held(&mut tiles.1, FieldSize::new(60, 60), moved);
-    let way = || straight([6.3, 7.9], [14.2, 12.1]);
-    let shifted = way().map(|[x, y]| [x + 22.0, y + 22.0]);
-    let one = forces_along(&inside, rough, Friction::NONE, way());
+    let inside = Field::<2>::filled(&mut tiles.0, FieldSize::new(60, 60), rough);
+    let across = Field::<2>::filled(&mut tiles.1, FieldSize::new(60, 60), moved);
+    let path = || straight([6.3, 7.9], [14.2, 12.1]);
+    let shifted = path().map(|[x, y]| [x + 22.0, y + 22.0]);
+    let one = forces_along(&inside, rough, Friction::NONE, path());
     let other = forces_along(&across, moved, Friction::NONE, shifted);
     for (one, other) in one.iter().zip(&other) {
         let off = degrees(one.shaded, other.shaded);
@@ -252,10 +252,10 @@ fn border_of_a_tile_is_rendered_as_its_inside() {
 }
 
 #[test]
-fn missing_tile_is_named_and_ends_the_surface() {
+fn missing_tile_is_reported_and_ends_the_surface() {
     let mut tiles = buffers::<2>();
-    let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), folds);
-    field.install(TileKey::holding(0, Cell::new(5, 5)));
+    let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), folds);
+    field.install(TileKey::containing(0, Cell::new(5, 5)));
     let rendered = forces_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
     let missing: Vec<_> = rendered.iter().map(|record| record.missing).collect();
     assert_eq!(missing, [None, Some(TileIndex::new(1, 0))]);
@@ -271,7 +271,7 @@ fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
         }
     }
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), holed);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), holed);
     // Along the southern border of no-data, half a cell and a tenth of a cell away.
     for y in [8.5, 8.9] {
         let rendered = forces_along(
@@ -291,7 +291,7 @@ fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
         if x > 15 && y < 30 { f32::NAN } else { 3.0 }
     }
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), level);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), level);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut shader = Shader::of(Shading::Smooth).expect("shaded");
     let mut faded = 0;
@@ -308,10 +308,10 @@ fn shading_smooths_beside_no_data_and_keeps_pull_back_force() {
 }
 
 #[test]
-fn a_tile_may_count_its_heights_from_anywhere() {
+fn slopes_are_independent_of_the_tile_base_height() {
     let size = FieldSize::new(60, 60);
     let mut tiles = (buffers::<2>(), buffers::<2>());
-    let even = Field::<2>::held(&mut tiles.0, size, rough);
+    let even = Field::<2>::filled(&mut tiles.0, size, rough);
     let mut slots = tiles.1.iter_mut();
     let mut next = || slots.next().expect("a buffer for every slot");
     let mut window = Window::new([[next(), next()], [next(), next()]]);
@@ -337,7 +337,7 @@ fn a_tile_may_count_its_heights_from_anywhere() {
 #[test]
 fn shading_turns_friction_together_with_normal_force() {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(11.0, 13.0), (13.0, 11.0)] {
         // Into the valley and out of it.
         let rendered = forces_along(

@@ -51,7 +51,7 @@ impl SlopesAt {
         let mut beside = |east, north| {
             let there = cell.offset(east, north);
             window.corners(there).unwrap_or_else(|| {
-                missing = Some(TileIndex::holding(there));
+                missing = Some(TileIndex::containing(there));
                 Corners::NONE
             })
         };
@@ -69,8 +69,8 @@ impl SlopesAt {
             Edges::between([south[1], se, ne, north[3]]),
         ];
         Some(Self {
-            east: met(&rows, u, v),
-            north: met(&columns, v, u),
+            east: slope_range(&rows, u, v),
+            north: slope_range(&columns, v, u),
             smoothed: [smoothed(&rows, u, v), smoothed(&columns, v, u)],
             missing,
         })
@@ -96,15 +96,15 @@ impl Edges {
     /// Returns the smoothed slope at a place of the middle edge, from 0 to 1.
     fn smoothed(&self, place: f32) -> f32 {
         let own = direction(self.own);
-        let at_start = bent(own, self.before, place);
-        let at_end = bent(own, self.after, 1.0 - place);
+        let at_start = direction_change(own, self.before, place);
+        let at_end = direction_change(own, self.after, 1.0 - place);
         (own[1] + at_start[1] + at_end[1]) / (own[0] + at_start[0] + at_end[0])
     }
 }
 
 /// Returns the change of an edge's direction at a distance `place` from the sample where it meets
 /// an edge of the slope `beside`.
-fn bent(own: [f32; 2], beside: f32, place: f32) -> [f32; 2] {
+fn direction_change(own: [f32; 2], beside: f32, place: f32) -> [f32; 2] {
     if beside.is_nan() {
         return [0.0; 2];
     }
@@ -132,7 +132,7 @@ fn smoothed([first, second]: &[Edges; 2], along: f32, across: f32) -> f32 {
 
 /// Returns the minimum and maximum slope at a place of a patch; on the border between edges, those
 /// of both edges.
-fn met([first, second]: &[Edges; 2], along: f32, across: f32) -> [f32; 2] {
+fn slope_range([first, second]: &[Edges; 2], along: f32, across: f32) -> [f32; 2] {
     let own = mix(first.own, second.own, across);
     if along != 0.0 {
         return [own; 2];

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::rate::TickRate;
 
 /// Share of a wavelength per tick up to which the texture is rendered in full.
-pub(super) const WHOLE: f32 = 0.125;
+pub(super) const FULL_TEXTURE_SPEED: f32 = 0.125;
 
 /// Pattern of a texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,14 +82,14 @@ impl Texture {
     /// Returns true if cells of this size can carry the texture.
     #[must_use]
     pub fn fits(&self, cell_mm: f32) -> bool {
-        let (fewest, most) = Self::WAVES_PER_CELL;
-        self.is_none() || (fewest..=most).contains(&(cell_mm / self.wavelength_mm))
+        let (min, max) = Self::WAVES_PER_CELL;
+        self.is_none() || (min..=max).contains(&(cell_mm / self.wavelength_mm))
     }
 
     /// Returns the shortest wavelength, mm, that is rendered in full to a slow hand at a rate.
     #[must_use]
     pub fn shortest_mm(rate: TickRate) -> f32 {
-        let by_rate = Self::SLOW_MM_S * rate.tick_s() / WHOLE;
+        let by_rate = Self::SLOW_MM_S * rate.tick_s() / FULL_TEXTURE_SPEED;
         by_rate.max(Self::WAVELENGTHS_MM.0)
     }
 }

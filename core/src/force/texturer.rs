@@ -8,21 +8,21 @@
 use glam::Vec3;
 
 use super::relief::Relief;
-use super::texture::{Texture, WHOLE};
+use super::texture::{FULL_TEXTURE_SPEED, Texture};
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::scalar::{larger, one_over_root, smaller};
 
 /// Share of a wavelength per tick from which the texture is not rendered.
-const GONE: f32 = 0.25;
+const NO_TEXTURE_SPEED: f32 = 0.25;
 /// Limit of the depth times the amplitude, in squares of the wavelength, for the component along
 /// the surface: its stiffness is then at most that of the surface, since heights bend by at most 48
 /// amplitudes per squared wavelength.
-const DEEPEST: f32 = 1.0 / 48.0;
+const MAX_DEPTH_RATIO: f32 = 1.0 / 48.0;
 /// Speed of a proxy that jumped, or that had no last position, wavelengths a tick.
 const JUMP: f32 = 1.0;
 /// Decay rate of the speed, 1/s: encoders report a slow hand's speed in jumps.
-const FORGETS_PER_S: f32 = 100.0;
+const SPEED_DECAY_PER_S: f32 = 100.0;
 
 /// The texture of one scene at one rate.
 #[derive(Clone, Copy, Debug)]
@@ -31,10 +31,10 @@ pub struct Texturer {
     /// Cells.
     amplitude: f32,
     /// Cells.
-    deepest: f32,
+    max_depth: f32,
     waves_per_cell: f32,
     /// Share of a higher speed that remains after a tick.
-    keeps: f32,
+    decay: f32,
     /// The proxy's speed, wavelengths a tick.
     speed: f32,
     before: Option<GridPoint>,
@@ -49,14 +49,15 @@ impl Texturer {
             return None;
         }
         let waves_per_cell = cell_mm / texture.wavelength_mm;
-        let deepest_mm =
-            DEEPEST * texture.wavelength_mm * (texture.wavelength_mm / texture.amplitude_mm);
+        let max_depth_mm = MAX_DEPTH_RATIO
+            * texture.wavelength_mm
+            * (texture.wavelength_mm / texture.amplitude_mm);
         Some(Self {
             relief: Relief::of(texture, waves_per_cell),
             amplitude: texture.amplitude_mm / cell_mm,
-            deepest: deepest_mm / cell_mm,
+            max_depth: max_depth_mm / cell_mm,
             waves_per_cell,
-            keeps: 1.0 - FORGETS_PER_S * rate.tick_s(),
+            decay: 1.0 - SPEED_DECAY_PER_S * rate.tick_s(),
             speed: 0.0,
             before: None,
         })
@@ -114,7 +115,7 @@ impl Texturer {
         let times = 1.0 + amplitude * rise.height / larger(depth, self.amplitude);
         // Because of rounding it might be negative.
         let times = larger(times, 0.0);
-        displacement * times - along * smaller(depth, self.deepest)
+        displacement * times - along * smaller(depth, self.max_depth)
     }
 
     /// Updates the speed with the proxy's place in a tick; returns the rendered share of the
@@ -122,8 +123,8 @@ impl Texturer {
     fn share_at(&mut self, proxy: &GridPoint) -> f32 {
         let now = match &self.before {
             Some(before) => {
-                let way = before.to(proxy) * self.waves_per_cell;
-                let squared = way.x * way.x + way.y * way.y;
+                let displacement = before.to(proxy) * self.waves_per_cell;
+                let squared = displacement.x * displacement.x + displacement.y * displacement.y;
                 match squared.is_normal() {
                     // A jump is not a speed: limited to a value that decays at once.
                     true => smaller(squared * one_over_root(squared), JUMP),
@@ -134,10 +135,10 @@ impl Texturer {
         };
         self.before = Some(*proxy);
         // The speed rises at once and falls gradually.
-        self.speed = now + larger(0.0, self.speed - now) * self.keeps;
-        let left = (GONE - self.speed) / (GONE - WHOLE);
-        let left = left.clamp(0.0, 1.0);
-        left * left * (3.0 - 2.0 * left)
+        self.speed = now + larger(0.0, self.speed - now) * self.decay;
+        let share = (NO_TEXTURE_SPEED - self.speed) / (NO_TEXTURE_SPEED - FULL_TEXTURE_SPEED);
+        let share = share.clamp(0.0, 1.0);
+        share * share * (3.0 - 2.0 * share)
     }
 }
 

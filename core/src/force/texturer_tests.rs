@@ -46,8 +46,8 @@ fn rendered(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Ve
     let mut texturer = texturer(texture);
     let displacement = Vec3::Z * (depth_mm / CELL_MM);
     let all = (0..100 + ticks).map(|tick| {
-        let way_mm = speed_mm_s * TICK_S * f64::from(tick);
-        texturer.add(displacement, &place(way_mm, 0.3)) * CELL_MM
+        let travel_mm = speed_mm_s * TICK_S * f64::from(tick);
+        texturer.add(displacement, &place(travel_mm, 0.3)) * CELL_MM
     });
     all.skip(100).collect()
 }
@@ -69,14 +69,14 @@ fn amplitude(rendered: &[Vec3], hz: f64, part: fn(&Vec3) -> f32) -> f64 {
 fn texture_reaches_its_amplitude_at_low_speed() {
     for (texture, ticks) in [(GRATING, 2_000), (GRAIN, cases(400_000, 200))] {
         let rendered = rendered(&texture, 10.0, 1.0, ticks);
-        let most = rendered.iter().map(|v| v.z - 1.0).fold(f32::MIN, f32::max);
-        let least = rendered.iter().map(|v| v.z - 1.0).fold(f32::MAX, f32::min);
-        assert!(most <= 0.100_01 && least >= -0.100_01, "{most} {least}");
+        let max = rendered.iter().map(|v| v.z - 1.0).fold(f32::MIN, f32::max);
+        let min = rendered.iter().map(|v| v.z - 1.0).fold(f32::MAX, f32::min);
+        assert!(max <= 0.100_01 && min >= -0.100_01, "{max} {min}");
         if texture.pattern == Pattern::Grating {
-            assert!(most > 0.099 && least < -0.099, "{most} {least}");
+            assert!(max > 0.099 && min < -0.099, "{max} {min}");
         } else if !cfg!(miri) {
             // A straight path rarely meets the middle of a highest or lowest grain.
-            assert!(most > 0.08 && least < -0.08, "{most} {least}");
+            assert!(max > 0.08 && min < -0.08, "{max} {min}");
         }
     }
 }
@@ -93,11 +93,8 @@ fn grating_vibrates_only_at_speed_over_wavelength() {
                 amplitude(&rendered, other, |v| v.z),
                 amplitude(&rendered, other, |v| v.x),
             );
-            let most = if other == 500.0 { 2e-3 } else { 1e-3 };
-            assert!(
-                up < most && along < most,
-                "{other} Hz at {hz}: {up} {along}"
-            );
+            let max = if other == 500.0 { 2e-3 } else { 1e-3 };
+            assert!(up < max && along < max, "{other} Hz at {hz}: {up} {along}");
         }
     }
 }
@@ -139,14 +136,14 @@ fn texture_fades_before_it_would_alias() {
 fn texture_at_rest_is_independent_of_the_previous_position() {
     for texture in [GRATING, GRAIN] {
         let there = place(0.7, -0.4);
-        let rested = |from: GridPoint| {
+        let at_rest = |from: GridPoint| {
             let mut texturer = texturer(&texture);
             texturer.add(Vec3::Z, &from);
             (0..200).map(|_| texturer.add(Vec3::Z, &there)).last()
         };
-        let first = rested(there);
+        let first = at_rest(there);
         for (x, y) in [(0.1, 0.2), (-50.0, 3.0), (1e6, -1e6), (0.7, -0.4)] {
-            assert_eq!(rested(place(x, y)), first, "{x} {y}");
+            assert_eq!(at_rest(place(x, y)), first, "{x} {y}");
         }
     }
 }
@@ -170,9 +167,9 @@ fn texture_is_continuous_across_cells_tiles_and_contact_onset() {
         const STEPS: u32 = cases(40_000, 500);
         for i in 0..STEPS {
             // Over the border of the tile that ends with column and row 32.
-            let (way, depth) = (3.6 + f64::from(i) * 2e-5, depth(f64::from(i)) as f32);
+            let (along, depth) = (3.6 + f64::from(i) * 2e-5, depth(f64::from(i)) as f32);
             let normal = Vec3::new(0.6, 0.0, 0.8);
-            let rendered = texturer.add(normal * depth, &place(way, way));
+            let rendered = texturer.add(normal * depth, &place(along, along));
             if let Some(before) = before
                 && i > 100
             {
@@ -187,7 +184,7 @@ fn texture_is_continuous_across_cells_tiles_and_contact_onset() {
 /// Along the force, the texture never reverses it; it adds no more than is stated; and it vanishes
 /// with the depth.
 #[test]
-fn it_never_pulls_and_keeps_its_bounds() {
+fn textured_force_never_pulls_and_stays_within_bounds() {
     let steep = Texture {
         amplitude_mm: 0.125,
         ..GRAIN
@@ -209,22 +206,22 @@ fn it_never_pulls_and_keeps_its_bounds() {
                 up.abs() <= a.min(depth_mm) * 1.000_01 + rounding,
                 "{depth_mm}: {up}"
             );
-            let most = (depth_mm * std::f32::consts::TAU * a / l).min(0.131 * l);
+            let max = (depth_mm * std::f32::consts::TAU * a / l).min(0.131 * l);
             assert!(
-                along.length() <= most * 1.000_1 + rounding,
+                along.length() <= max * 1.000_1 + rounding,
                 "{depth_mm}: {along}"
             );
             if depth_mm == 3.0 {
                 farthest = farthest.max(along.length());
             }
         }
-        let wanted = if texture.pattern == Pattern::Grain {
+        let expected = if texture.pattern == Pattern::Grain {
             0.09
         } else {
             0.13
         };
         assert!(
-            cfg!(miri) || farthest > wanted * l,
+            cfg!(miri) || farthest > expected * l,
             "{texture:?}: {farthest}"
         );
     }
@@ -232,7 +229,7 @@ fn it_never_pulls_and_keeps_its_bounds() {
 
 /// So a hand that presses hard is not unstable on a wave.
 #[test]
-fn along_the_surface_it_is_no_stiffer_than_the_surface() {
+fn tangential_stiffness_stays_below_the_surface_stiffness() {
     for texture in [
         GRATING,
         GRAIN,
@@ -254,10 +251,10 @@ fn along_the_surface_it_is_no_stiffer_than_the_surface() {
 /// Up to the depth limit of the component along the surface, the force is that of a spring on the
 /// surface with its relief: a closed path gives no energy.
 #[test]
-fn a_round_gives_no_energy() {
+fn closed_loop_over_a_texture_releases_no_energy() {
     for texture in [GRATING, GRAIN] {
         let mut texturer = texturer(&texture);
-        let (mut given, mut size) = (0.0_f64, 0.0);
+        let (mut released, mut size) = (0.0_f64, 0.0);
         let mut before: Option<([f64; 3], Vec3)> = None;
         const STEPS: u32 = cases(40_000, 2_000);
         for i in 0..=2 * STEPS {
@@ -273,14 +270,14 @@ fn a_round_gives_no_energy() {
                 let work: f64 = (0..3)
                     .map(|k| f64::from(force[k]) * (here[k] - there[k]))
                     .sum();
-                given += work;
+                released += work;
                 size += work.abs();
             }
             before = Some((here, rendered));
         }
         assert!(
-            cfg!(miri) || given.abs() < 2e-3 * size,
-            "{given:e} of {size:e}"
+            cfg!(miri) || released.abs() < 2e-3 * size,
+            "{released:e} of {size:e}"
         );
     }
 }
@@ -288,7 +285,7 @@ fn a_round_gives_no_energy() {
 /// A slow hand's proxy moves by an encoder count in one tick and rests in others; after a jump, a
 /// texture fades in evenly.
 #[test]
-fn the_share_of_a_texture_neither_flutters_nor_jumps() {
+fn texture_share_neither_flutters_nor_jumps() {
     let mut coarse = texturer(&GRATING);
     let mut fine = texturer(&GRATING);
     for tick in 0..cases(3_000, 300) {
@@ -325,7 +322,7 @@ fn texture_acts_along_the_normal_of_a_slope() {
         &GridPoint::new([20, 20, 0], Vec3::new(0.0, 0.5, 17.0)),
     );
     let normal = Vec3::new(-0.6, 0.0, 0.8);
-    let mut most = 0.0_f32;
+    let mut max = 0.0_f32;
     for i in 0..3_000 {
         let x = i as f32 * 1e-3;
         let hip = GridPoint::new(
@@ -335,11 +332,11 @@ fn texture_acts_along_the_normal_of_a_slope() {
         let output = *contact.step(&window, &hip);
         let rendered = texturer.add(output.displacement, &output.proxy);
         let up = rendered.dot(normal) - 0.3;
-        most = most.max(up.abs());
+        max = max.max(up.abs());
         assert!(rendered.y.abs() < 1e-5, "the ridges lead north: {rendered}");
     }
-    let wanted = GRATING.amplitude_mm / CELL_MM;
-    assert!((most - wanted).abs() < 0.01 * wanted, "{most}");
+    let expected = GRATING.amplitude_mm / CELL_MM;
+    assert!((max - expected).abs() < 0.01 * expected, "{max}");
 }
 
 #[test]

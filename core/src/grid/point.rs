@@ -142,7 +142,7 @@ impl GridPoint {
 
 /// Maximum offset of the fast path, cells: far too small to bring an out-of-range cell back into
 /// range.
-const NEAR: f32 = 1e6;
+const MAX_FAST_OFFSET: f32 = 1e6;
 
 /// `cell + offset` with the whole cells of `offset` carried over.
 ///
@@ -154,7 +154,7 @@ fn carry(cell: i32, offset: f32) -> (i32, f32) {
         return (cell.clamp(-MAX_CELL, MAX_CELL), offset);
     }
     // The next most frequent case: a few cells away, where nothing has to saturate.
-    if offset.abs() < NEAR {
+    if offset.abs() < MAX_FAST_OFFSET {
         let whole = offset as i32;
         let floor = whole - i32::from(offset < whole as f32);
         let frac = offset - floor as f32;
@@ -164,12 +164,12 @@ fn carry(cell: i32, offset: f32) -> (i32, f32) {
             return (cell, frac);
         }
     }
-    carry_far(cell, offset)
+    carry_any(cell, offset)
 }
 
 /// Carries any offset over.
 #[cold]
-fn carry_far(cell: i32, offset: f32) -> (i32, f32) {
+fn carry_any(cell: i32, offset: f32) -> (i32, f32) {
     let whole = offset as i32;
     let mut cell = cell.saturating_add(whole);
     let mut frac = offset - whole as f32;
@@ -195,8 +195,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_quick_ways_carry_to_the_same_bits() {
-        let mut offsets = std::vec![0.0, 1.0, 1e-9, 0.5, NEAR, 1e9, f32::MAX, f32::INFINITY];
+    fn fast_paths_of_carry_give_the_same_bits() {
+        let mut offsets = std::vec![
+            0.0,
+            1.0,
+            1e-9,
+            0.5,
+            MAX_FAST_OFFSET,
+            1e9,
+            f32::MAX,
+            f32::INFINITY
+        ];
         let mut x = 1e-12_f32;
         while x < 3e6 {
             let whole = (x as i32) as f32;
@@ -215,15 +224,15 @@ mod tests {
         ];
         for offset in offsets.into_iter().flat_map(|x| [x, -x]) {
             for cell in cells {
-                let (quick, far) = (carry(cell, offset), carry_far(cell, offset));
+                let (fast, any) = (carry(cell, offset), carry_any(cell, offset));
                 let bits = |(cell, frac): (i32, f32)| (cell, frac.to_bits());
-                assert_eq!(bits(quick), bits(far), "{cell} + {offset:e}");
+                assert_eq!(bits(fast), bits(any), "{cell} + {offset:e}");
             }
         }
     }
 
     #[test]
-    fn the_same_only_if_every_word_is() {
+    fn points_are_same_only_if_every_word_is() {
         let point = GridPoint {
             cell: [5, -6, 7],
             frac: [0.25, 0.5, 0.75],
@@ -243,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn carries_whole_cells_both_ways() {
+    fn whole_cells_are_carried_in_both_directions() {
         let p = GridPoint::new([5, 5, 5], Vec3::new(2.25, -0.25, -3.0));
         assert_eq!(p.cell(), [7, 4, 2]);
         assert_eq!(p.frac(), Vec3::new(0.25, 0.75, 0.0));
@@ -266,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn midpoint_is_exact_far_out() {
+    fn midpoint_is_exact_at_the_largest_cells() {
         let a = GridPoint::new([-MAX_CELL, MAX_CELL, 3], Vec3::new(0.5, 0.0, 0.25));
         let b = GridPoint::new([-MAX_CELL + 5, MAX_CELL - 1, 4], Vec3::new(0.0, 0.0, 0.25));
         let m = a.midpoint(&b);

@@ -42,7 +42,7 @@ pub(super) struct Arming {
     decided: bool,
     pub(super) decision: Decision,
     /// True if the switch was open at some time during the request.
-    seen_open: bool,
+    was_switch_open: bool,
     /// Rendered share of the force.
     pub(super) gain: f32,
     pub(super) rate: TickRate,
@@ -74,7 +74,7 @@ impl Arming {
         }
         self.blocked = 0;
         self.decided = false;
-        self.seen_open = false;
+        self.was_switch_open = false;
     }
 
     /// Switches off at once; `why` is the decision of an open request.
@@ -109,14 +109,14 @@ impl Arming {
 
     /// Advances by a tick with the amplifiers off, with the blockers other than those that the user
     /// can clear.
-    pub(super) fn wait(&mut self, blockers: Blockers, dead_man: bool) {
+    pub(super) fn advance_off(&mut self, blockers: Blockers, dead_man: bool) {
         self.since = self.since.saturating_add(1);
         match self.mode {
             Mode::Requested => self.wait_for_press(blockers, dead_man),
             Mode::Confirming if !blockers.is_empty() => self.stop(blockers),
             Mode::Confirming if !dead_man => {
                 self.enter(Mode::Requested);
-                self.seen_open = true;
+                self.was_switch_open = true;
             }
             _ => {}
         }
@@ -125,7 +125,7 @@ impl Arming {
     fn wait_for_press(&mut self, blockers: Blockers, dead_man: bool) {
         if !blockers.is_empty() {
             self.blocked += 1;
-            self.seen_open = false;
+            self.was_switch_open = false;
             if self.blocked > self.rate.ticks(BLOCKED_TIMEOUT_MS) {
                 self.stop(blockers);
             }
@@ -136,8 +136,8 @@ impl Arming {
             self.decide(Blockers::empty());
         }
         if !dead_man {
-            self.seen_open = true;
-        } else if self.seen_open {
+            self.was_switch_open = true;
+        } else if self.was_switch_open {
             return self.enter(Mode::Confirming);
         }
         if self.since > self.rate.ticks(SWITCH_TIMEOUT_MS) {
@@ -155,8 +155,8 @@ impl Arming {
         }
     }
 
-    /// Returns the gain of this tick before [`Arming::drive`] sets it; `None` while the force does
-    /// not follow the wanted force.
+    /// Returns the gain of this tick before [`Arming::advance_on`] sets it; `None` while the force
+    /// does not follow the target force.
     pub(super) fn next_gain(&self) -> Option<f32> {
         match self.mode {
             Mode::Ramping => Some(smaller(
@@ -169,7 +169,7 @@ impl Arming {
     }
 
     /// Advances the gain by a tick with the amplifiers on.
-    pub(super) fn drive(&mut self) {
+    pub(super) fn advance_on(&mut self) {
         match self.mode {
             Mode::Ramping => {
                 self.gain = self.next_gain().unwrap_or_default();
@@ -193,9 +193,9 @@ impl Arming {
             Mode::Disarmed => Blockers::HOST_DISARMED,
             _ => Blockers::empty(),
         };
-        let hand = match (self.mode.drives(), dead_man) {
+        let hand = match (self.mode.is_driving(), dead_man) {
             (false, false) => Blockers::DEAD_MAN_RELEASED,
-            (false, true) if self.mode != Mode::Confirming && !self.seen_open => {
+            (false, true) if self.mode != Mode::Confirming && !self.was_switch_open => {
                 Blockers::DEAD_MAN_STILL_HELD
             }
             _ => Blockers::empty(),

@@ -7,7 +7,7 @@ impl Guard {
     pub(super) fn find_blockers(&self, sense: &GuardInputs, around: &Surroundings<'_>) -> Blockers {
         let outside = around.arm.is_some_and(|(_, pose)| {
             let q = pose.angles();
-            !(self.stops.each_allows(q) && self.stops.linkage_allows(q))
+            !(self.stops.contains_joints(q) && self.stops.contains_linkage(q))
         });
         let bits = [
             (around.arm.is_none(), Blockers::NO_CALIBRATION),

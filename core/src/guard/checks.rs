@@ -15,7 +15,7 @@ impl Guard {
         if !around.zeroed || jumped {
             self.counts = None;
         }
-        let is_on = self.mode().drives();
+        let is_on = self.mode().is_driving();
         if let Some(fault) = self.feedback.check(sense, self.currents_a, is_on) {
             self.trip(fault);
         }
@@ -26,10 +26,10 @@ impl Guard {
         if self.motors.too_hot {
             self.trip(Fault::MotorTooHot);
         }
-        if self.mode().drives() {
+        if self.mode().is_driving() {
             self.watch_driven(sense, around);
         }
-        if !self.mode().drives() {
+        if !self.mode().is_driving() {
             self.watch_undriven(sense, around);
         }
         jumped
@@ -37,10 +37,10 @@ impl Guard {
 
     /// Returns true if an encoder moved farther than the arm can.
     fn has_jumped(&mut self, counts: [i32; 3]) -> bool {
-        let most = self.max_counts;
+        let max_counts = self.max_counts;
         let jumped = self.counts.is_some_and(|last| {
             let mut axes = last.iter().zip(counts);
-            axes.any(|(a, b)| a.abs_diff(b) > most)
+            axes.any(|(a, b)| a.abs_diff(b) > max_counts)
         });
         self.counts = Some(counts);
         jumped
@@ -61,12 +61,12 @@ impl Guard {
 
     fn watch_undriven(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) {
         // Nothing is commanded: only a measured current can flow.
-        self.motors.rest(self.feedback.measured_a());
-        self.feedback.rest(sense);
-        self.hold.pass();
+        self.motors.advance_off(self.feedback.measured_a());
+        self.feedback.reset_off(sense);
+        self.hold.count_tick();
         self.speed.restart(sense.counts);
         let blockers = self.find_blockers(sense, around);
-        self.arming.wait(blockers, sense.dead_man);
+        self.arming.advance_off(blockers, sense.dead_man);
         self.blockers = blockers | self.arming.user_blockers(sense.dead_man);
     }
 }

@@ -28,23 +28,23 @@ impl Guard {
         if !around.watchdog_live {
             return Some(Fault::TaskStalled);
         }
-        if !self.stops.each_allows(pose.angles()) {
+        if !self.stops.contains_joints(pose.angles()) {
             return Some(Fault::JointLimit);
         }
-        if !self.stops.linkage_allows(pose.angles()) {
+        if !self.stops.contains_linkage(pose.angles()) {
             return Some(Fault::Linkage);
         }
         match self.speed.check(sense.counts, mechanism, pose) {
             SpeedCheck::NotYet => None,
             SpeedCheck::TooFast => Some(Fault::TooFast),
             SpeedCheck::Moved(moved) => {
-                let bearable = self.motors.continuous_a;
-                let in_vain = self.stall.check(moved, self.currents_a, bearable);
+                let continuous_a = self.motors.continuous_a;
+                let is_stalled = self.stall.check(moved, self.currents_a, continuous_a);
                 let (hz, gain) = (self.speed.hz, self.arming.gain);
                 let jogged = self.jog.as_mut();
                 let jogged =
                     jogged.and_then(|jog| jog.check(moved, hz, mechanism, pose.angles(), gain));
-                in_vain.then_some(Fault::NoMotion).or(jogged)
+                is_stalled.then_some(Fault::NoMotion).or(jogged)
             }
         }
     }

@@ -127,7 +127,7 @@ impl Fault {
 
     /// Returns the remedy, for the user. The fault can be cleared after that.
     #[must_use]
-    pub const fn what_to_do(self) -> &'static str {
+    pub const fn remedy(self) -> &'static str {
         match self {
             Self::NotANumber => "please report it with the terrain and the recording",
             Self::TickOverrun => "choose a lower tick rate; if it is the default, please report it",
@@ -174,7 +174,7 @@ mod tests {
     fn numbers_are_stable() {
         for (i, fault) in Fault::ALL.into_iter().enumerate() {
             assert_eq!(usize::from(fault.number()), i + 1, "{fault:?}");
-            assert!(!fault.meaning().is_empty() && !fault.what_to_do().is_empty());
+            assert!(!fault.meaning().is_empty() && !fault.remedy().is_empty());
         }
         // Repeated here because recordings and pages use these names.
         let named = [

@@ -38,9 +38,9 @@ pub(super) struct Feedback {
     /// Weight of a tick's difference in the average.
     share: f32,
     /// Ticks since the amplifiers were switched on.
-    on: u32,
+    on_ticks: u32,
     /// Ticks in a row in which an amplifier was not ready.
-    unready: u32,
+    unready_ticks: u32,
     /// The command of the tick before the last, A: a monitor is converted at the start of a tick
     /// and read in the next.
     before_a: Vec3,
@@ -60,8 +60,8 @@ impl Feedback {
             enable_ticks: rate.ticks(ENABLE_MS),
             spike_ticks: rate.ticks(SPIKE_MS),
             share: 1.0 / rate.ticks(COMPARE_MS) as f32,
-            on: 0,
-            unready: 0,
+            on_ticks: 0,
+            unready_ticks: 0,
             before_a: Vec3::ZERO,
             is_measured: false,
             measured_a: Vec3::ZERO,
@@ -72,10 +72,10 @@ impl Feedback {
 
     /// Returns true if an enabled amplifier has reported for too long that it is not ready.
     pub(super) fn is_unready(&mut self, sense: &GuardInputs) -> bool {
-        self.on = self.on.saturating_add(1);
-        let counts = sense.amplifier_not_ready && self.on > self.enable_ticks;
-        self.unready = if counts { self.unready + 1 } else { 0 };
-        self.unready > self.spike_ticks
+        self.on_ticks = self.on_ticks.saturating_add(1);
+        let counts = sense.amplifier_not_ready && self.on_ticks > self.enable_ticks;
+        self.unready_ticks = if counts { self.unready_ticks + 1 } else { 0 };
+        self.unready_ticks > self.spike_ticks
     }
 
     /// Returns true if currents are measured.
@@ -89,10 +89,10 @@ impl Feedback {
     }
 
     /// Resets the times while the amplifiers are off.
-    pub(super) const fn rest(&mut self, sense: &GuardInputs) {
+    pub(super) const fn reset_off(&mut self, sense: &GuardInputs) {
         self.is_measured = sense.measured_ma.is_some();
-        self.on = 0;
-        self.unready = 0;
+        self.on_ticks = 0;
+        self.unready_ticks = 0;
     }
 
     /// Compares the measured currents with the commands of the last tick, A (zero while the
@@ -116,7 +116,7 @@ impl Feedback {
         let error_a = measured_a - before_a;
         self.error_a += (error_a - self.error_a) * self.share;
         self.roughness_a += (error_a.abs() - self.roughness_a) * self.share;
-        let within = |error_a: Vec3, most_a| error_a.cmple(Vec3::splat(most_a)).all();
+        let within = |error_a: Vec3, max_a| error_a.cmple(Vec3::splat(max_a)).all();
         // Written so that NaN does not agree.
         let agrees = within(self.error_a.abs(), CURRENT_TOLERANCE_A)
             && within(self.roughness_a, CURRENT_ROUGHNESS_A);

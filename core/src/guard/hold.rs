@@ -7,11 +7,11 @@ use super::{Guard, Mode};
 use crate::rate::TickRate;
 
 /// Maximum time for which outputs are held, s.
-pub const HOLD_S: u32 = 60;
+pub const MAX_HOLD_S: u32 = 60;
 
 /// Held outputs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hold {
+pub(super) struct OutputHold {
     ticks_a_second: u32,
     /// Shares of full scale, -1 to 1.
     shares: Vec3,
@@ -19,7 +19,7 @@ pub(super) struct Hold {
     left: u32,
 }
 
-impl Hold {
+impl OutputHold {
     pub(super) const fn new(rate: TickRate) -> Self {
         Self {
             ticks_a_second: rate.hz(),
@@ -35,7 +35,7 @@ impl Hold {
     }
 
     /// Counts a tick.
-    pub(super) fn pass(&mut self) {
+    pub(super) fn count_tick(&mut self) {
         self.left = self.left.saturating_sub(1);
         if self.left == 0 {
             self.end();
@@ -46,7 +46,7 @@ impl Hold {
 impl Guard {
     /// Holds the outputs at shares of full scale, each clamped to -1..=1, or ends the hold. Works
     /// only while disarmed and without a fault: the enable line stays low, so no current flows. The
-    /// hold ends after [`HOLD_S`], and when the guard arms, disarms, faults or changes its
+    /// hold ends after [`MAX_HOLD_S`], and when the guard arms, disarms, faults or changes its
     /// settings. A share that is not a number holds zero.
     pub fn hold(&mut self, shares: Option<[f32; 3]>) {
         self.hold.end();
@@ -55,13 +55,13 @@ impl Guard {
         };
         if self.mode() == Mode::Disarmed && self.fault.is_none() {
             self.hold.shares = shares.clamp(Vec3::NEG_ONE, Vec3::ONE);
-            self.hold.left = HOLD_S * self.hold.ticks_a_second;
+            self.hold.left = MAX_HOLD_S * self.hold.ticks_a_second;
         }
     }
 
     /// Returns the shares of full scale at which the outputs are held, or zero.
     #[must_use]
-    pub const fn held(&self) -> Vec3 {
+    pub const fn held_shares(&self) -> Vec3 {
         self.hold.shares
     }
 }

@@ -7,8 +7,8 @@
 //! weight: the hand holds only the arm and this one motor.
 //!
 //! All other checks of the guard stay active, with three more: no joint may move faster than
-//! [`FAST_RAD_S`] or farther than [`FAR_RAD`], whichever motor really turns it
-//! ([`Fault::JogRanAway`]), and at half the current the joint's encoder must have moved
+//! [`MAX_JOG_SPEED_RAD_S`] or farther than [`MAX_JOG_ROTATION_RAD`], whichever motor really turns
+//! it ([`Fault::JogRanAway`]), and at half the current the joint's encoder must have moved
 //! ([`Fault::NoMotion`]).
 
 use glam::Vec3;
@@ -25,9 +25,9 @@ pub const JOG_SHARE: f32 = 0.25;
 pub const JOG_MAX_MS: u16 = 5_000;
 /// Maximum speed of a joint during a jog, rad/s: 0.2 m/s at the tip of a Premium 1.5. Measured over
 /// one millisecond, to within a count.
-pub const FAST_RAD_S: f32 = 1.0;
+pub const MAX_JOG_SPEED_RAD_S: f32 = 1.0;
 /// Maximum rotation of a joint during a jog, rad: some 40 mm at the tip of a Premium 1.5.
-pub const FAR_RAD: f32 = 0.2;
+pub const MAX_JOG_ROTATION_RAD: f32 = 0.2;
 /// Counts that the joint's encoder must exceed by half the current: an encoder with one dead
 /// channel still alternates by one count.
 const STILL_COUNTS: f32 = 1.0;
@@ -48,15 +48,15 @@ impl Jog {
     /// Returns true if a device with this calibration record accepts the jog unchanged.
     #[must_use]
     pub fn is_valid(&self, record: &Calibration) -> bool {
-        let most = JOG_SHARE * record.continuous_current_a;
-        let most = most.to_array().get(usize::from(self.axis)).copied();
-        most.is_some_and(|most| self.current_a.abs() <= most) && self.hold_ms <= JOG_MAX_MS
+        let max_a = JOG_SHARE * record.continuous_current_a;
+        let max_a = max_a.to_array().get(usize::from(self.axis)).copied();
+        max_a.is_some_and(|max_a| self.current_a.abs() <= max_a) && self.hold_ms <= JOG_MAX_MS
     }
 }
 
 /// A jog in progress.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct JogRun {
+pub(super) struct ActiveJog {
     /// The axis' unit vector.
     axis: Vec3,
     /// The full current of each axis, A; zero except for this one.
@@ -69,7 +69,7 @@ pub(super) struct JogRun {
     moved: bool,
 }
 
-impl JogRun {
+impl ActiveJog {
     /// Creates a jog; an invalid axis or a current that is not a number gives no current.
     pub(super) fn new(jog: Jog, rate: TickRate) -> Self {
         let axis = Vec3::AXES.get(usize::from(jog.axis));
@@ -102,24 +102,25 @@ impl JogRun {
         // A reading may be off by a count.
         let fast = (moved - Vec3::ONE) * per_count * hz;
         let from = *self.from_rad.get_or_insert(angles_rad);
-        let way = (angles_rad - from).abs();
-        let within = fast.cmple(Vec3::splat(FAST_RAD_S)) & way.cmple(Vec3::splat(FAR_RAD));
+        let rotation = (angles_rad - from).abs();
+        let within = fast.cmple(Vec3::splat(MAX_JOG_SPEED_RAD_S))
+            & rotation.cmple(Vec3::splat(MAX_JOG_ROTATION_RAD));
         if !within.all() {
             return Some(Fault::JogRanAway);
         }
         // Angles are whole counts, apart from rounding.
-        self.moved |= (way / per_count).dot(self.axis) > STILL_COUNTS + 0.5;
+        self.moved |= (rotation / per_count).dot(self.axis) > STILL_COUNTS + 0.5;
         (gain >= 0.5 && !self.moved).then_some(Fault::NoMotion)
     }
 
     /// Returns a tick's currents, A, with the share `gain`, clamped to a jog's limit.
     pub(super) fn currents_a(&self, continuous_a: Vec3, gain: f32) -> Vec3 {
-        let most = JOG_SHARE * continuous_a;
-        self.full_a.clamp(-most, most) * gain
+        let max_a = JOG_SHARE * continuous_a;
+        self.full_a.clamp(-max_a, max_a) * gain
     }
 
     /// Counts a tick at full current. Returns true if the jog's time is over.
-    pub(super) fn hold(&mut self) -> bool {
+    pub(super) fn count_hold_tick(&mut self) -> bool {
         self.left = self.left.saturating_sub(1);
         self.left == 0
     }

@@ -25,11 +25,11 @@ impl<'t> Bench<'t> {
             rate,
             drives: Vec::new(),
         };
-        bench.say(Command::Zero([0; 3]));
+        bench.send(Command::Zero([0; 3]));
         bench
     }
 
-    fn say(&mut self, command: Command<'t>) {
+    fn send(&mut self, command: Command<'t>) {
         assert!(matches!(self.haptics.accept(command), Ok(None)));
     }
 
@@ -37,12 +37,12 @@ impl<'t> Bench<'t> {
         self.haptics.report()
     }
 
-    /// Runs a tick; once a millisecond the encoders move as `moves` computes from the currents.
-    fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
+    /// Runs a tick; once a millisecond the encoders move as `motion` computes from the currents.
+    fn tick(&mut self, motion: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
         let drive = self.haptics.tick(&self.sense, true).drive;
         self.drives.push(drive);
         let is_ms = (self.drives.len() as u32).is_multiple_of(self.rate.ticks(1));
-        let moved = moves(drive.currents_a).map(|counts| if is_ms { counts } else { 0 });
+        let moved = motion(drive.currents_a).map(|counts| if is_ms { counts } else { 0 });
         for (count, moved) in self.sense.counts.iter_mut().zip(moved) {
             *count += moved;
         }
@@ -50,11 +50,11 @@ impl<'t> Bench<'t> {
     }
 
     /// Requests a jog, presses the switch a moment later, and runs for `ms`.
-    fn jog(&mut self, jog: Jog, ms: u32, moves: impl Fn(Vec3) -> [i32; 3]) {
-        self.say(Command::Jog(jog));
+    fn jog(&mut self, jog: Jog, ms: u32, motion: impl Fn(Vec3) -> [i32; 3]) {
+        self.send(Command::Jog(jog));
         for tick in 0..self.rate.ticks(ms) {
             self.sense.dead_man = tick > self.rate.ticks(20);
-            self.tick(&moves);
+            self.tick(&motion);
         }
     }
 }
@@ -66,7 +66,7 @@ const JOG: Jog = Jog {
 };
 
 /// A held joint: it moves by some counts when the current has overcome its friction.
-fn held(current: Vec3) -> [i32; 3] {
+fn held_joint(current: Vec3) -> [i32; 3] {
     [0, i32::from((0.05..0.052).contains(&-current.y)), 0]
 }
 
@@ -75,7 +75,7 @@ fn jog_drives_only_its_motor_at_its_current_and_duration() {
     for rate in [1_000, 10_000].map(|hz| TickRate::new(hz).expect("in range")) {
         let (mut storage, ms) = (TileArena::<1>::new(), rate.ticks(1) as usize);
         let mut bench = Bench::new(&mut storage, rate);
-        bench.jog(JOG, 4_000, held);
+        bench.jog(JOG, 4_000, held_joint);
         assert_eq!(bench.report().fault, None);
         assert_eq!(bench.report().mode, Mode::Disarmed);
         let on = || bench.drives.iter().filter(|drive| drive.enabled);
@@ -90,73 +90,73 @@ fn jog_drives_only_its_motor_at_its_current_and_duration() {
             (a - b).abs()
         });
         // No step is larger than the fade-out's, 0.3 A in 100 ms.
-        let most = steps.fold(0.0, f32::max);
-        assert!(most <= 0.3 / (100 * ms) as f32 + 1e-5, "{most}");
+        let max = steps.fold(0.0, f32::max);
+        assert!(max <= 0.3 / (100 * ms) as f32 + 1e-5, "{max}");
     }
 }
 
 #[test]
-fn it_takes_a_press_and_is_over_when_it_is_over() {
+fn jog_needs_a_press_and_is_not_repeated() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     // Without a jog and without a scene, the arm cannot be armed.
-    bench.say(Command::Arm);
-    (0..100).for_each(|_| _ = bench.tick(held));
+    bench.send(Command::Arm);
+    (0..100).for_each(|_| _ = bench.tick(held_joint));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     // A switch that was held from the start does not count.
     bench.sense.dead_man = true;
-    bench.say(Command::Jog(JOG));
+    bench.send(Command::Jog(JOG));
     for _ in 0..1_000 {
-        assert!(!bench.tick(held).enabled);
+        assert!(!bench.tick(held_joint).enabled);
     }
-    bench.jog(JOG, 4_000, held);
+    bench.jog(JOG, 4_000, held_joint);
     assert_eq!(bench.report().mode, Mode::Disarmed);
     assert!(bench.drives.iter().any(|drive| drive.enabled));
     // Another arm command does not repeat the jog.
     bench.drives.clear();
     bench.sense.dead_man = false;
-    bench.say(Command::Arm);
-    (0..100).for_each(|_| _ = bench.tick(held));
+    bench.send(Command::Arm);
+    (0..100).for_each(|_| _ = bench.tick(held_joint));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
 }
 
 /// Also without a tick in between, and in the tick after the fade-out.
 #[test]
-fn a_plain_arm_does_not_arm_for_a_jog_of_before() {
+fn plain_arm_command_does_not_arm_for_an_earlier_jog() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     for between in [Some(Command::Disarm), None] {
-        bench.say(Command::Jog(JOG));
-        between.into_iter().for_each(|command| bench.say(command));
-        bench.say(Command::Arm);
-        (0..100).for_each(|_| _ = bench.tick(held));
+        bench.send(Command::Jog(JOG));
+        between.into_iter().for_each(|command| bench.send(command));
+        bench.send(Command::Arm);
+        (0..100).for_each(|_| _ = bench.tick(held_joint));
         let refused = bench.report().decision.refused;
         assert!(refused.contains(Blockers::NO_SCENE), "{refused:?}");
     }
-    bench.jog(JOG, 1_500, held);
-    assert!(bench.report().mode.drives());
-    bench.say(Command::Disarm);
-    while bench.report().mode.drives() {
-        bench.tick(held);
+    bench.jog(JOG, 1_500, held_joint);
+    assert!(bench.report().mode.is_driving());
+    bench.send(Command::Disarm);
+    while bench.report().mode.is_driving() {
+        bench.tick(held_joint);
     }
-    bench.say(Command::Arm);
+    bench.send(Command::Arm);
     bench.sense.dead_man = false;
-    (0..100).for_each(|_| _ = bench.tick(held));
+    (0..100).for_each(|_| _ = bench.tick(held_joint));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
 }
 
 #[test]
-fn whatever_blocks_arming_blocks_a_jog() {
+fn blockers_of_arming_also_block_a_jog() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.sense.emergency_stop = true;
-    bench.jog(JOG, 1_000, held);
+    bench.jog(JOG, 1_000, held_joint);
     let refused = bench.report().decision.refused;
     assert!(refused.contains(Blockers::EMERGENCY_STOP), "{refused:?}");
     bench.sense.emergency_stop = false;
-    bench.say(Command::Trip(Fault::Hardware));
-    bench.jog(JOG, 1_000, held);
+    bench.send(Command::Trip(Fault::Hardware));
+    bench.jog(JOG, 1_000, held_joint);
     let refused = bench.report().decision.refused;
     assert!(refused.contains(Blockers::FAULT_LATCHED), "{refused:?}");
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
@@ -166,37 +166,40 @@ fn whatever_blocks_arming_blocks_a_jog() {
 fn dead_man_release_ends_a_jog_within_the_tick() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-    bench.jog(JOG, 1_500, held);
-    assert!(bench.report().mode.drives());
+    bench.jog(JOG, 1_500, held_joint);
+    assert!(bench.report().mode.is_driving());
     bench.sense.dead_man = false;
-    assert_eq!(bench.tick(held), GuardOutputs::default());
+    assert_eq!(bench.tick(held_joint), GuardOutputs::default());
     assert_eq!(bench.report().fault, Some(Fault::DeadManReleased));
 }
 
 #[test]
-fn a_joint_that_runs_away_is_a_fault_whichever_it_is() {
+fn runaway_of_any_joint_is_a_fault() {
     for axis in 0..3 {
         for speed in [9, -9, 30, 2] {
             let mut storage = TileArena::<1>::new();
             let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
             // For two of the three, a joint that is not the motor's own.
             bench.jog(JOG, 4_000, |current| {
-                let mut moved = held(current);
+                let mut moved = held_joint(current);
                 moved[axis] += if current.y < -0.1 { speed } else { 0 };
                 moved
             });
             let fault = bench.report().fault;
             assert_eq!(fault, Some(Fault::JogRanAway), "{axis} {speed}");
             let counts = bench.sense.counts[axis].unsigned_abs() as f32;
-            let way = counts / RECORD.counts_per_radian()[axis];
-            assert!(way < FAR_RAD * 1.1, "{axis} {speed}: {way} rad");
+            let rotation = counts / RECORD.counts_per_radian()[axis];
+            assert!(
+                rotation < MAX_JOG_ROTATION_RAD * 1.1,
+                "{axis} {speed}: {rotation} rad"
+            );
         }
     }
 }
 
 #[test]
-fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
-    for moves in [
+fn stationary_encoder_is_detected_at_half_the_current() {
+    for motion in [
         |_| [0; 3],
         |current: Vec3| {
             // One dead channel: a count up and down. Then another joint moves.
@@ -205,10 +208,10 @@ fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
     ] {
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-        bench.jog(JOG, 4_000, moves);
+        bench.jog(JOG, 4_000, motion);
         assert_eq!(bench.report().fault, Some(Fault::NoMotion));
-        let most = bench.drives.iter().map(|drive| -drive.currents_a.y);
-        assert!(most.fold(0.0, f32::max) < 0.152);
+        let max = bench.drives.iter().map(|drive| -drive.currents_a.y);
+        assert!(max.fold(0.0, f32::max) < 0.152);
     }
 }
 
@@ -230,12 +233,12 @@ fn out_of_range_jog_is_invalid_and_stays_bounded() {
         assert!(!jog.is_valid(&RECORD), "{jog:?}");
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-        bench.jog(jog, 10_000, |current| held(-current));
-        let most = bench
+        bench.jog(jog, 10_000, |current| held_joint(-current));
+        let max = bench
             .drives
             .iter()
             .map(|d| d.currents_a.abs().max_element());
-        assert!(most.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
+        assert!(max.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
         let on = bench.drives.iter().filter(|drive| drive.enabled).count();
         assert!(on <= 2_100 + usize::from(JOG_MAX_MS) + 10, "{on}");
         let one = |drive: &GuardOutputs| drive.currents_a * Vec3::Y == drive.currents_a;
@@ -245,11 +248,11 @@ fn out_of_range_jog_is_invalid_and_stays_bounded() {
 }
 
 #[test]
-fn a_scene_or_new_settings_end_a_jog() {
+fn scene_zero_disarm_or_new_settings_end_a_jog() {
     let ends: [fn(&mut Bench<'_>); 4] = [
-        |bench| bench.say(Command::Disarm),
-        |bench| bench.say(Command::DropScene),
-        |bench| bench.say(Command::Zero([0; 3])),
+        |bench| bench.send(Command::Disarm),
+        |bench| bench.send(Command::DropScene),
+        |bench| bench.send(Command::Zero([0; 3])),
         |bench| {
             bench
                 .haptics
@@ -259,15 +262,15 @@ fn a_scene_or_new_settings_end_a_jog() {
     for end in ends {
         let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-        bench.jog(JOG, 1_500, held);
-        assert!(bench.report().mode.drives());
+        bench.jog(JOG, 1_500, held_joint);
+        assert!(bench.report().mode.is_driving());
         end(&mut bench);
         bench.drives.clear();
-        (0..200).for_each(|_| _ = bench.tick(held));
+        (0..200).for_each(|_| _ = bench.tick(held_joint));
         assert_eq!(bench.report().mode, Mode::Disarmed);
         assert!(bench.drives[101..].iter().all(|drive| !drive.enabled));
         assert!(matches!(bench.haptics.accept(Command::Arm), Ok(None)));
-        (0..100).for_each(|_| _ = bench.tick(held));
+        (0..100).for_each(|_| _ = bench.tick(held_joint));
         assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
     }
 }

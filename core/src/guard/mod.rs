@@ -31,18 +31,18 @@ pub use arming::{Decision, SMALL_FORCE_N};
 pub use fault::Fault;
 pub use feedback::{CURRENT_ROUGHNESS_A, CURRENT_TOLERANCE_A};
 pub use flags::{Blockers, Limits};
-pub use hold::HOLD_S;
-pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MAX_MS, JOG_SHARE, Jog};
+pub use hold::MAX_HOLD_S;
+pub use jog::{JOG_MAX_MS, JOG_SHARE, Jog, MAX_JOG_ROTATION_RAD, MAX_JOG_SPEED_RAD_S};
 pub use mode::Mode;
-pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
+pub use stall::MAX_OTHERS_TRAVEL;
 
 use crate::phantom::{JointLimits, Kinematics, Pose};
 pub use crate::rate::MAX_SLEW_N_PER_S;
 use crate::rate::TickRate;
 use arming::Arming;
 use feedback::Feedback;
-use hold::Hold;
-use jog::JogRun;
+use hold::OutputHold;
+use jog::ActiveJog;
 use speed::SpeedMonitor;
 use stall::StallDetector;
 use thermal::{Motors, Temperatures};
@@ -179,15 +179,15 @@ pub struct Guard {
     max_force_n: f32,
     force_n: Vec3,
     /// The force at full gain, while fading.
-    held_n: Vec3,
+    fade_from_n: Vec3,
     currents_a: Vec3,
     speed: SpeedMonitor,
     stall: StallDetector,
     motors: Motors,
     feedback: Feedback,
-    hold: Hold,
+    hold: OutputHold,
     /// The requested or active jog; `None` while disarmed.
-    jog: Option<JogRun>,
+    jog: Option<ActiveJog>,
 }
 
 impl Guard {
@@ -197,7 +197,7 @@ impl Guard {
         Self {
             max_counts: MAX_COUNTS_PER_S.div_ceil(rate.hz()),
             max_slew_n: MAX_SLEW_N_PER_S / rate.hz() as f32,
-            stops: JointLimits::NOWHERE,
+            stops: JointLimits::EMPTY,
             arming: Arming::new(rate),
             fault: found_at_boot,
             blockers: Blockers::empty(),
@@ -205,13 +205,13 @@ impl Guard {
             counts: None,
             max_force_n: 0.0,
             force_n: Vec3::ZERO,
-            held_n: Vec3::ZERO,
+            fade_from_n: Vec3::ZERO,
             currents_a: Vec3::ZERO,
             speed: SpeedMonitor::new(rate),
             stall: StallDetector::default(),
             motors: Motors::new(rate),
             feedback: Feedback::new(rate),
-            hold: Hold::new(rate),
+            hold: OutputHold::new(rate),
             jog: None,
         }
     }
@@ -257,7 +257,7 @@ impl Guard {
 
     /// Returns the maximum force that the guard lets through, N.
     #[must_use]
-    pub const fn most_force_n(&self) -> f32 {
+    pub const fn max_force_n(&self) -> f32 {
         self.max_force_n
     }
 
@@ -271,7 +271,7 @@ impl Guard {
     }
 
     /// Adds limits to the tick's report.
-    pub(crate) fn says(&mut self, limits: Limits) {
+    pub(crate) fn add_limits(&mut self, limits: Limits) {
         self.limits |= limits;
     }
 
@@ -289,8 +289,8 @@ impl Guard {
     }
 
     /// Sets the initial motor temperatures; [`Guard::new`] assumes the temperature of the air.
-    pub fn begin_at(&mut self, temperatures: Temperatures) {
-        self.motors.begin_at(temperatures);
+    pub fn set_temperatures(&mut self, temperatures: Temperatures) {
+        self.motors.set_temperatures(temperatures);
     }
 
     /// Latches a fault and switches off. The first fault stays.
@@ -306,8 +306,8 @@ impl Guard {
     }
 
     /// Clears the fault like [`Self::clear`], if it is the one that the user has seen.
-    pub fn clear_seen(&mut self, seen: Option<Fault>) {
-        if self.fault.is_none() || self.fault == seen {
+    pub fn clear_if_acknowledged(&mut self, acknowledged: Option<Fault>) {
+        if self.fault.is_none() || self.fault == acknowledged {
             self.clear();
         }
     }
@@ -316,7 +316,7 @@ impl Guard {
     /// continues.
     pub fn arm(&mut self) {
         self.hold.end();
-        if !self.mode().drives() {
+        if !self.mode().is_driving() {
             self.jog = None;
         }
         self.arming.request();
@@ -326,16 +326,16 @@ impl Guard {
     pub fn jog(&mut self, jog: Jog) {
         self.stop();
         self.arming.request();
-        self.jog = Some(JogRun::new(jog, self.arming.rate));
+        self.jog = Some(ActiveJog::new(jog, self.arming.rate));
     }
 
     /// Fades the force out, then switches off.
     pub fn disarm(&mut self) {
         self.hold.end();
         let gain = self.arming.gain;
-        if self.mode().drives() && self.mode() != Mode::Fading {
+        if self.mode().is_driving() && self.mode() != Mode::Fading {
             // Divided by the gain, so that the fade starts at the present force.
-            self.held_n = if gain > 0.0 {
+            self.fade_from_n = if gain > 0.0 {
                 self.force_n / gain
             } else {
                 Vec3::ZERO

@@ -48,7 +48,7 @@ impl Mode {
 
     /// Returns true if the amplifiers are on.
     #[must_use]
-    pub const fn drives(self) -> bool {
+    pub const fn is_driving(self) -> bool {
         matches!(self, Self::Ramping | Self::Armed | Self::Fading)
     }
 }

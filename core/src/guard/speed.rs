@@ -85,7 +85,7 @@ impl SpeedMonitor {
             return SpeedCheck::NotYet;
         }
         self.ticks = 0;
-        self.readings.take(counts);
+        self.readings.push(counts);
         let moved = self.readings.moved();
         let speed_of =
             |counts: Vec3| pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count());
@@ -120,8 +120,8 @@ impl SpeedMonitor {
     /// as much as the rest of a tick.
     fn is_roughly_slow(&self, moved: [i32; 3], speed_of: impl Fn(Vec3) -> Vec3) -> bool {
         let [x, y, z] = moved.map(|moved| moved as f32);
-        let most = self.limit_mm_s - self.rough_mm_s;
-        most > 0.0 && speed_of(Vec3::new(x, y, z)).length_squared() <= most * most
+        let max_mm_s = self.limit_mm_s - self.rough_mm_s;
+        max_mm_s > 0.0 && speed_of(Vec3::new(x, y, z)).length_squared() <= max_mm_s * max_mm_s
     }
 }
 
@@ -137,9 +137,9 @@ mod tests {
         let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
         let mut rough = SpeedMonitor::new(TickRate::DEFAULT);
         rough.configure(&mechanism);
-        let mut close = rough;
-        close.rough_mm_s = f32::INFINITY;
-        close.surely_slow = [0; 3];
+        let mut exact = rough;
+        exact.rough_mm_s = f32::INFINITY;
+        exact.surely_slow = [0; 3];
         let (mut counts, mut rates, mut state) = ([0_i32; 3], [0_i32; 3], 1_u32);
         let mut dice = |sides: u32| {
             state ^= state << 13;
@@ -158,13 +158,13 @@ mod tests {
                 counts = [dice(4_000), dice(4_000), dice(4_000)];
                 rates = [0; 3];
                 rough.restart(counts);
-                close.restart(counts);
+                exact.restart(counts);
             }
             let pose = mechanism.pose(counts, [0; 3]);
-            let looks = [&mut rough, &mut close].map(|s| s.check(counts, &mechanism, &pose));
-            assert_eq!(looks[0], looks[1], "{tick}");
-            assert_eq!(rough.share.to_bits(), close.share.to_bits(), "{tick}");
-            assert_eq!(rough.too_fast, close.too_fast, "{tick}");
+            let checks = [&mut rough, &mut exact].map(|s| s.check(counts, &mechanism, &pose));
+            assert_eq!(checks[0], checks[1], "{tick}");
+            assert_eq!(rough.share.to_bits(), exact.share.to_bits(), "{tick}");
+            assert_eq!(rough.too_fast, exact.too_fast, "{tick}");
             if rough.share < 1.0 {
                 slowed += 1;
             } else {

@@ -11,15 +11,15 @@
 use glam::Vec3;
 
 /// Readings (a millisecond each) for which all encoders may be stationary under load.
-const ALL_STILL: u32 = 2_000;
+const MAX_ALL_STILL: u32 = 2_000;
 /// Counts that the other joints may move together while one is stationary: about 200 mm. A hand
 /// that turns one joint only, at up to half a metre a second, with a tremor of 0.2 mm (measured on
 /// the virtual Phantom), moves them by a third of this. A hand that rubs along a straight line
 /// without a tremor also moves them by less.
-pub const TRAVEL: u32 = 8_000;
+pub const MAX_OTHERS_TRAVEL: u32 = 8_000;
 /// Distance, in counts, within which a joint counts as stationary: an encoder with one dead channel
 /// still alternates by one count.
-const BAND: u32 = 1;
+const STATIONARY_BAND: u32 = 1;
 
 /// Detector of motors that push without a motion.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,19 +49,22 @@ impl StallDetector {
         } else {
             0
         };
-        let way = moved.map(i32::unsigned_abs);
-        let all = way.iter().fold(0, |sum: u32, w| sum.saturating_add(*w));
+        let distances = moved.map(i32::unsigned_abs);
+        let all = distances
+            .iter()
+            .fold(0, |sum: u32, w| sum.saturating_add(*w));
         let loaded = load.cmpgt(0.5 * continuous_a);
         let axes = self.off.iter_mut().zip(&mut self.others);
         for (axis, ((off, others), moved)) in axes.zip(moved).enumerate() {
             *off = off.saturating_add(moved);
-            if loaded.test(axis) && off.unsigned_abs() <= BAND {
+            if loaded.test(axis) && off.unsigned_abs() <= STATIONARY_BAND {
                 *others = others.saturating_add(all - moved.unsigned_abs());
             } else {
                 (*off, *others) = (0, 0);
             }
         }
-        self.all_still > ALL_STILL || self.others.iter().any(|others| *others > TRAVEL)
+        self.all_still > MAX_ALL_STILL
+            || self.others.iter().any(|others| *others > MAX_OTHERS_TRAVEL)
     }
 }
 
@@ -77,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn resting_and_sliding_are_not_suspicious() {
+    fn resting_and_sliding_are_not_detected_as_stalls() {
         assert_eq!(ticks_until_found([0; 3], Vec3::splat(1.2)), None);
         assert_eq!(ticks_until_found([3, 1, -1], Vec3::splat(5.5)), None);
         // Motion in one joint only: the others do not push.
@@ -106,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_creeps_stands_only_for_a_while() {
+    fn creeping_joint_is_not_detected_as_dead() {
         let mut detector = StallDetector::default();
         let found = (1..100_000).find(|i| {
             let moved = [-10, i32::from(i % 60 == 0), 0];

@@ -17,7 +17,7 @@ struct Bench {
     scene: SceneKind,
     watchdog_live: bool,
     calibrated: bool,
-    wanted_n: Vec3,
+    target_n: Vec3,
     force_n: Vec3,
     modes: Vec<Mode>,
 }
@@ -39,7 +39,7 @@ impl Bench {
             scene: SceneKind::Arm,
             watchdog_live: true,
             calibrated: true,
-            wanted_n: Vec3::ZERO,
+            target_n: Vec3::ZERO,
             force_n: Vec3::ZERO,
             modes: Vec::from([Mode::Disarmed]),
         }
@@ -56,7 +56,7 @@ impl Bench {
         };
         let lost = self.guard.watch(&self.sense, &around);
         self.note();
-        self.force_n = self.guard.limit_force(self.wanted_n);
+        self.force_n = self.guard.limit_force(self.target_n);
         self.note();
         let torques = pose.torques_nm(self.force_n);
         let drive = self
@@ -64,7 +64,7 @@ impl Bench {
             .limit_currents(self.mechanism.currents_a(torques));
         self.note();
         self.zeroed &= !lost;
-        assert_eq!(drive.enabled, self.guard.mode().drives());
+        assert_eq!(drive.enabled, self.guard.mode().is_driving());
         assert!(drive.enabled || drive == GuardOutputs::default());
         drive
     }
@@ -104,9 +104,9 @@ impl Bench {
 }
 
 #[test]
-fn boots_disarmed_and_stays_so_whatever_is_wanted() {
+fn guard_boots_disarmed_and_stays_so_for_any_force() {
     let mut bench = Bench::new();
-    bench.wanted_n = Vec3::new(3.0, 2.0, 1.0);
+    bench.target_n = Vec3::new(3.0, 2.0, 1.0);
     for dead_man in [false, true, false, true] {
         bench.sense.dead_man = dead_man;
         bench.ticks(1_000);
@@ -115,7 +115,7 @@ fn boots_disarmed_and_stays_so_whatever_is_wanted() {
 }
 
 #[test]
-fn each_blocker_is_named_and_refuses_by_itself() {
+fn each_blocker_alone_refuses_arming_and_is_reported() {
     type Case = (fn(&mut Bench), Blockers);
     let cases: [Case; 11] = [
         (|b| b.calibrated = false, Blockers::NO_CALIBRATION),
@@ -158,7 +158,7 @@ fn each_blocker_is_named_and_refuses_by_itself() {
 }
 
 #[test]
-fn a_dead_man_switch_held_all_along_does_not_arm() {
+fn dead_man_switch_held_since_boot_does_not_arm() {
     let mut bench = Bench::new();
     bench.sense.dead_man = true;
     bench.ticks(10);
@@ -171,18 +171,18 @@ fn a_dead_man_switch_held_all_along_does_not_arm() {
     bench.sense.dead_man = true;
     bench.ticks(2_200);
     assert_eq!(bench.guard.mode(), Mode::Armed);
-    let way = [
+    let modes = [
         Mode::Disarmed,
         Mode::Requested,
         Mode::Confirming,
         Mode::Ramping,
         Mode::Armed,
     ];
-    assert_eq!(bench.modes, way);
+    assert_eq!(bench.modes, modes);
 }
 
 #[test]
-fn a_request_does_not_wait_for_ever() {
+fn arm_request_times_out_without_a_press() {
     let mut bench = Bench::new();
     bench.guard.arm();
     bench.ticks(30_002);
@@ -199,7 +199,7 @@ fn a_request_does_not_wait_for_ever() {
 #[test]
 fn confirming_requires_small_force_and_dead_man_press() {
     let mut bench = Bench::new();
-    bench.wanted_n = Vec3::Z * 0.25;
+    bench.target_n = Vec3::Z * 0.25;
     bench.guard.arm();
     bench.tick();
     bench.sense.dead_man = true;
@@ -213,12 +213,12 @@ fn confirming_requires_small_force_and_dead_man_press() {
         (Mode::Requested, None)
     );
     bench.sense.dead_man = true;
-    bench.wanted_n = Vec3::Z * 0.2;
+    bench.target_n = Vec3::Z * 0.2;
     // A large force in between restarts the hundred ticks.
     bench.ticks(90);
-    bench.wanted_n = Vec3::Z;
+    bench.target_n = Vec3::Z;
     bench.tick();
-    bench.wanted_n = Vec3::ZERO;
+    bench.target_n = Vec3::ZERO;
     bench.ticks(99);
     assert_eq!(bench.guard.mode(), Mode::Confirming);
     bench.ticks(2);
@@ -236,7 +236,7 @@ fn force_ramp_takes_two_seconds_at_any_tick_rate() {
         while bench.guard.mode() != Mode::Ramping {
             bench.tick();
         }
-        bench.wanted_n = Vec3::Z * 2.0;
+        bench.target_n = Vec3::Z * 2.0;
         bench.ticks(1_000 * khz);
         assert!((bench.force_n.z - 1.0).abs() < 0.01, "{}", bench.force_n);
         assert!(bench.guard.report().limits.contains(Limits::RAMPING));
@@ -248,7 +248,7 @@ fn force_ramp_takes_two_seconds_at_any_tick_rate() {
 }
 
 #[test]
-fn every_change_of_mode_is_one_that_the_mode_lists() {
+fn modes_change_only_through_their_listed_exits() {
     let mut dice = 7u32;
     let mut random = move |n: u32| {
         dice = dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -275,18 +275,18 @@ fn every_change_of_mode_is_one_that_the_mode_lists() {
             3 => bench.sense.emergency_stop = true,
             4 => bench.watchdog_live = false,
             5 => bench.scene = SceneKind::None,
-            6 => bench.wanted_n = Vec3::Z * random(3) as f32,
+            6 => bench.target_n = Vec3::Z * random(3) as f32,
             7 => bench.sense.dead_man = false,
             _ => {}
         }
         bench.note();
         bench.ticks(random(150));
-        bench.wanted_n = Vec3::ZERO;
+        bench.target_n = Vec3::ZERO;
     }
-    let mut seen = std::collections::HashSet::new();
+    let mut taken = std::collections::HashSet::new();
     for pair in bench.modes.windows(2) {
         assert!(pair[0].exits().contains(&pair[1]), "{pair:?}");
-        seen.insert((pair[0], pair[1]));
+        taken.insert((pair[0], pair[1]));
     }
     let all = [
         Mode::Disarmed,
@@ -297,12 +297,12 @@ fn every_change_of_mode_is_one_that_the_mode_lists() {
         Mode::Fading,
     ];
     let listed: usize = all.iter().map(|mode| mode.exits().len()).sum();
-    assert_eq!(seen.len(), listed, "ways that are listed and never taken");
+    assert_eq!(taken.len(), listed, "exits that are listed and never taken");
 }
 
 /// Failures while armed, and the faults that they must latch within the tick.
 #[test]
-fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
+fn each_fault_switches_off_in_its_tick_and_latches() {
     type Case = (fn(&mut Bench), Fault);
     let cases: [Case; 10] = [
         (|b| b.sense.dead_man = false, Fault::DeadManReleased),
@@ -314,14 +314,14 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         ),
         (|b| b.watchdog_live = false, Fault::TaskStalled),
         (|b| b.sense.counts[1] += 129, Fault::EncoderJump),
-        (|b| b.wanted_n.x = f32::NAN, Fault::NotANumber),
-        (|b| b.wanted_n.z = f32::INFINITY, Fault::NotANumber),
+        (|b| b.target_n.x = f32::NAN, Fault::NotANumber),
+        (|b| b.target_n.z = f32::INFINITY, Fault::NotANumber),
         (|b| b.guard.trip(Fault::TickOverrun), Fault::TickOverrun),
         (|b| b.calibrated = false, Fault::CalibrationCorrupt),
     ];
     for (spoil, fault) in cases {
         let mut bench = Bench::armed();
-        bench.wanted_n = Vec3::Z * 2.0;
+        bench.target_n = Vec3::Z * 2.0;
         bench.ticks(10);
         let before = bench.sense;
         spoil(&mut bench);
@@ -331,7 +331,7 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         // The cause has ended; the fault stays.
         bench.sense = before;
         (bench.watchdog_live, bench.calibrated) = (true, true);
-        bench.wanted_n = Vec3::ZERO;
+        bench.target_n = Vec3::ZERO;
         bench.ticks(3_000);
         assert_eq!(bench.guard.report().fault, Some(fault));
         bench.guard.arm();
@@ -350,7 +350,7 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
 }
 
 #[test]
-fn the_first_fault_stays() {
+fn first_fault_is_kept() {
     let mut bench = Bench::armed();
     bench.sense.emergency_stop = true;
     bench.sense.dead_man = false;
@@ -418,7 +418,7 @@ fn encoder_jump_limit_scales_with_the_tick_period() {
 #[test]
 fn force_clamp_keeps_direction_and_is_reported() {
     let mut bench = Bench::armed();
-    bench.wanted_n = Vec3::new(30.0, -40.0, 0.0);
+    bench.target_n = Vec3::new(30.0, -40.0, 0.0);
     bench.ticks(20);
     assert!(bench.force_n.length() <= 7.65 && bench.force_n.length() > 7.649);
     let direction = Vec3::new(0.6, -0.8, 0.0);
@@ -429,7 +429,7 @@ fn force_clamp_keeps_direction_and_is_reported() {
 #[test]
 fn slew_limit_bounds_force_change_and_is_reported() {
     let mut bench = Bench::armed();
-    bench.wanted_n = Vec3::Z * 2.5;
+    bench.target_n = Vec3::Z * 2.5;
     bench.tick();
     assert!((bench.force_n.z - 1.0).abs() < 1e-6);
     assert_eq!(bench.guard.report().limits, Limits::SLEW_LIMITED);
@@ -459,7 +459,7 @@ fn current_limit_keeps_direction_and_is_reported() {
 #[test]
 fn hard_working_motor_is_derated_below_its_limit() {
     let mut bench = Bench::armed();
-    bench.wanted_n = Vec3::Z * 6.0;
+    bench.target_n = Vec3::Z * 6.0;
     let mut derated = None;
     for tick in 0..60_000u32 {
         // A hand that trembles: a stationary one would be another fault.
@@ -479,7 +479,7 @@ fn hard_working_motor_is_derated_below_its_limit() {
 }
 
 #[test]
-fn a_winding_above_its_limit_is_a_fault() {
+fn winding_above_its_limit_is_a_fault() {
     let mut bench = Bench::armed();
     for _ in 0..60_000 {
         // As if the amplifier drove more than its command.
@@ -496,7 +496,7 @@ fn a_winding_above_its_limit_is_a_fault() {
 /// Joint 2 turns by `counts_a_tick` while 1 N is wanted.
 fn hurried(counts_a_tick: i32, ticks: u32) -> Bench {
     let mut bench = Bench::armed();
-    bench.wanted_n = Vec3::Z;
+    bench.target_n = Vec3::Z;
     bench.ticks(20);
     for _ in 0..ticks {
         bench.sense.counts[1] += counts_a_tick;
@@ -522,10 +522,10 @@ fn speed_limit_reduces_force_and_excess_speed_is_a_fault() {
 }
 
 #[test]
-fn a_motor_that_pushes_in_vain_is_a_fault() {
+fn motor_that_pushes_without_motion_is_a_fault() {
     let mut bench = Bench::armed();
     // 2 N on the lever of joint 2 is 1.6 A, above its continuous current.
-    bench.wanted_n = Vec3::Z * 2.0;
+    bench.target_n = Vec3::Z * 2.0;
     bench.ticks(1_900);
     assert_eq!(bench.guard.report().fault, None);
     bench.ticks(200);
@@ -535,12 +535,12 @@ fn a_motor_that_pushes_in_vain_is_a_fault() {
 #[test]
 fn host_disarm_fades_force_out_without_a_step() {
     let mut bench = Bench::armed();
-    bench.wanted_n = Vec3::new(1.0, 2.0, 6.0);
+    bench.target_n = Vec3::new(1.0, 2.0, 6.0);
     bench.ticks(20);
     let full = bench.force_n;
     bench.guard.disarm();
     // The wanted force no longer matters.
-    bench.wanted_n = Vec3::X * 8.0;
+    bench.target_n = Vec3::X * 8.0;
     let mut last = full;
     let mut ticks = 0;
     while bench.guard.mode() != Mode::Disarmed {
@@ -554,7 +554,7 @@ fn host_disarm_fades_force_out_without_a_step() {
     assert_eq!(bench.guard.report().fault, None);
     // Released during the fade: off at once, without a fault, because the host disarmed first.
     let mut bench = Bench::armed();
-    bench.wanted_n = Vec3::Z;
+    bench.target_n = Vec3::Z;
     bench.ticks(5);
     bench.guard.disarm();
     bench.tick();
@@ -579,7 +579,7 @@ fn arming_during_force_fade_out_is_refused() {
 }
 
 #[test]
-fn a_fault_found_at_boot_blocks_until_cleared() {
+fn fault_found_at_boot_blocks_until_cleared() {
     let mut bench = Bench::new();
     bench.guard = Guard::new(TickRate::DEFAULT, Some(Fault::WatchdogReset));
     bench.guard.configure(&bench.mechanism);

@@ -28,7 +28,7 @@ pub const TRIP_C: f32 = 110.0;
 /// Maximum excess of a winding over the temperatures kept before a reset, K: 0.2 s of an RE25's
 /// peak current, 22 K a second. Temperatures are kept every 0.1 s, and a watchdog resets within
 /// 0.06 s.
-pub const UNSEEN_K: f32 = 5.0;
+pub const RESET_MARGIN_K: f32 = 5.0;
 /// Upper limit of a node above the one beside it, K, more than any can reach. The model stops there
 /// with the amplifiers off: monitors without supply may report false currents for hours.
 const MAX_K: Vec3 = Vec3::splat(200.0);
@@ -51,7 +51,7 @@ impl Temperatures {
 
     /// Motors after hours of maximum work under derating: the winding at [`CONTINUOUS_C`], divided
     /// between the nodes by an RE25's 3.1 and 14 K/W. Derating keeps every motor at or below this
-    /// (`derating_lets_no_motor_become_hotter`), so a reset cannot hide more.
+    /// (`derated_motor_never_exceeds_the_hot_start_temperatures`), so a reset cannot hide more.
     ///
     /// From here a motor has its continuous current at once, and its peak current after 70 s
     /// without load (`hot_motor_has_continuous_current_at_once_and_peak_later`).
@@ -68,17 +68,18 @@ impl Temperatures {
 
     /// Returns the initial temperatures from those kept over a reset.
     ///
-    /// The kept ones are up to [`UNSEEN_K`] too low, because the motors had current after they were
-    /// kept. Returns `None` if a number is outside of the model's range: the memory may be corrupt.
+    /// The kept ones are up to [`RESET_MARGIN_K`] too low, because the motors had current after
+    /// they were kept. Returns `None` if a number is outside of the model's range: the memory may
+    /// be corrupt.
     #[must_use]
     pub fn after_reset(self) -> Option<Self> {
         let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MAX_K).all();
         let is_possible = possible(self.winding_k) && possible(self.housing_k);
         // Not above the end of derating: repeated resets alone must not trip the guard.
-        let room = Vec3::splat(CONTINUOUS_C - AIR_C) - self.winding_k - self.housing_k;
-        let unseen = room.clamp(Vec3::ZERO, Vec3::splat(UNSEEN_K));
+        let headroom = Vec3::splat(CONTINUOUS_C - AIR_C) - self.winding_k - self.housing_k;
+        let margin = headroom.clamp(Vec3::ZERO, Vec3::splat(RESET_MARGIN_K));
         is_possible.then_some(Self {
-            winding_k: self.winding_k + unseen,
+            winding_k: self.winding_k + margin,
             ..self
         })
     }
@@ -130,7 +131,7 @@ impl Motors {
     }
 
     /// Sets the temperatures.
-    pub fn begin_at(&mut self, temperatures: Temperatures) {
+    pub fn set_temperatures(&mut self, temperatures: Temperatures) {
         self.at = temperatures;
         self.update_limits();
     }
@@ -148,7 +149,7 @@ impl Motors {
     }
 
     /// Advances by a tick with the amplifiers off, in which `measured_a` may still flow.
-    pub fn rest(&mut self, measured_a: Vec3) {
+    pub fn advance_off(&mut self, measured_a: Vec3) {
         self.heat(measured_a);
         // With the amplifiers on, the guard trips long before.
         self.at.winding_k = self.at.winding_k.min(MAX_K);
@@ -208,21 +209,21 @@ mod tests {
     use super::*;
 
     /// Requests a current for some time, limited to the permitted one.
-    fn after(rate: TickRate, seconds: u32, wanted_a: f32) -> (Motors, Vec3) {
+    fn after(rate: TickRate, seconds: u32, target_a: f32) -> (Motors, Vec3) {
         let mut motors = Motors::new(rate);
         motors.configure(&Calibration::PREMIUM_1_5);
-        let mut given = Vec3::ZERO;
+        let mut allowed_a = Vec3::ZERO;
         for _ in 0..seconds * rate.hz() {
-            given = Vec3::splat(wanted_a).min(motors.allowed_a);
-            motors.heat(given);
+            allowed_a = Vec3::splat(target_a).min(motors.allowed_a);
+            motors.heat(allowed_a);
         }
-        (motors, given)
+        (motors, allowed_a)
     }
 
     /// Seconds without load until a motor has its peak current again.
     fn seconds_to_peak(from: Temperatures) -> u32 {
         let mut motors = Motors::new(khz(1));
-        motors.begin_at(from);
+        motors.set_temperatures(from);
         motors.configure(&Calibration::PREMIUM_1_5);
         let cooled = |_: &u32| {
             for _ in 0..1_000 {
@@ -236,7 +237,7 @@ mod tests {
     #[test]
     fn hot_motor_has_continuous_current_at_once_and_peak_later() {
         let mut motors = Motors::new(khz(1));
-        motors.begin_at(Temperatures::HOT);
+        motors.set_temperatures(Temperatures::HOT);
         motors.configure(&Calibration::PREMIUM_1_5);
         assert!((motors.winding_c().x - CONTINUOUS_C).abs() < 1e-3);
         assert!((motors.allowed_a.x - 1.24).abs() < 1e-3, "{motors:?}");
@@ -251,9 +252,9 @@ mod tests {
     }
 
     #[test]
-    fn begun_hot_and_pressed_at_once_it_derates_and_never_trips() {
+    fn hot_motor_under_full_load_derates_and_never_trips() {
         let mut motors = Motors::new(khz(1));
-        motors.begin_at(Temperatures::HOT);
+        motors.set_temperatures(Temperatures::HOT);
         motors.configure(&Calibration::PREMIUM_1_5);
         for _ in 0..600_000 {
             motors.heat(Vec3::splat(5.5).min(motors.allowed_a));
@@ -264,19 +265,19 @@ mod tests {
     /// With any motion of a hand, no node exceeds the temperatures that are assumed without
     /// information.
     #[test]
-    fn derating_lets_no_motor_become_hotter() {
+    fn derated_motor_never_exceeds_the_hot_start_temperatures() {
         let mut motors = Motors::new(khz(1));
         motors.configure(&Calibration::PREMIUM_1_5);
         let hot = Temperatures::HOT;
         let hottest_c = (hot.winding_k + hot.housing_k).x + AIR_C;
         // A constant press on axis 1, in bursts on the others.
         for ms in 0..4_000_000_u32 {
-            let wanted = Vec3::new(
+            let requested = Vec3::new(
                 5.5,
                 if ms % 9_000 < 4_000 { 5.5 } else { 0.0 },
                 if ms % 100_000 < 60_000 { 5.5 } else { 0.5 },
             );
-            motors.heat(wanted.min(motors.allowed_a));
+            motors.heat(requested.min(motors.allowed_a));
             if ms % 10 == 0 {
                 let housing = motors.at.housing_k.max_element();
                 assert!(housing < hot.housing_k.x + 0.1, "{housing} K");
@@ -287,43 +288,47 @@ mod tests {
     }
 
     #[test]
-    fn kept_temperatures_are_raised_after_a_reset() {
-        let kept = Temperatures {
+    fn stored_temperatures_are_raised_after_a_reset() {
+        let stored = Temperatures {
             winding_k: Vec3::new(0.0, 10.0, 20.0),
             housing_k: Vec3::new(0.0, 60.0, 60.0),
         };
-        let begun = kept.after_reset().expect("possible");
-        let sum = begun.winding_k + begun.housing_k;
+        let start = stored.after_reset().expect("possible");
+        let sum = start.winding_k + start.housing_k;
         // Never beyond the end of derating, and never colder either.
         assert!((sum - Vec3::new(5.0, 75.0, 80.0)).abs().max_element() < 1e-4);
-        assert_eq!(begun.housing_k, kept.housing_k);
+        assert_eq!(start.housing_k, stored.housing_k);
     }
 
     #[test]
-    fn a_reset_hides_no_more_than_is_added() {
+    fn reset_margin_covers_the_heat_of_the_unrecorded_time() {
         let mut motors = Motors::new(khz(1));
         motors.configure(&Calibration::PREMIUM_1_5);
         for _ in 0..200 {
             motors.heat(Vec3::splat(5.5));
         }
-        assert!(motors.at.winding_k.x < UNSEEN_K, "{}", motors.at.winding_k);
         assert!(
-            motors.at.winding_k.x > 0.8 * UNSEEN_K,
+            motors.at.winding_k.x < RESET_MARGIN_K,
+            "{}",
+            motors.at.winding_k
+        );
+        assert!(
+            motors.at.winding_k.x > 0.8 * RESET_MARGIN_K,
             "{}",
             motors.at.winding_k
         );
     }
 
     #[test]
-    fn impossible_kept_temperatures_are_rejected() {
+    fn impossible_stored_temperatures_are_rejected() {
         for bad in [f32::NAN, f32::INFINITY, -0.1, 201.0] {
             for axis in 0..3 {
-                let mut kept = Temperatures::HOT;
-                kept.winding_k[axis] = bad;
-                assert_eq!(kept.after_reset(), None, "{bad}");
-                let mut kept = Temperatures::HOT;
-                kept.housing_k[axis] = bad;
-                assert_eq!(kept.after_reset(), None, "{bad}");
+                let mut stored = Temperatures::HOT;
+                stored.winding_k[axis] = bad;
+                assert_eq!(stored.after_reset(), None, "{bad}");
+                let mut stored = Temperatures::HOT;
+                stored.housing_k[axis] = bad;
+                assert_eq!(stored.after_reset(), None, "{bad}");
             }
         }
     }
@@ -338,23 +343,23 @@ mod tests {
     }
 
     #[test]
-    fn a_cool_motor_may_have_its_peak() {
-        let (motors, given) = after(khz(1), 1, 5.5);
-        assert_eq!(given.x, 5.5);
+    fn cool_motor_may_have_its_peak_current() {
+        let (motors, allowed) = after(khz(1), 1, 5.5);
+        assert_eq!(allowed.x, 5.5);
         assert!(motors.winding_c().x < DERATE_C);
     }
 
     #[test]
     fn permanent_peak_request_derates_and_never_trips() {
-        let (motors, given) = after(khz(1), 3000, 5.5);
+        let (motors, allowed) = after(khz(1), 3000, 5.5);
         assert!(!motors.too_hot, "{:?}", motors.winding_c());
-        assert!(given.x < 1.4 && given.x >= 1.24, "{given}");
+        assert!(allowed.x < 1.4 && allowed.x >= 1.24, "{allowed}");
     }
 
     #[test]
-    fn the_continuous_current_is_borne_for_ever() {
-        let (motors, given) = after(khz(1), 4000, 1.24);
-        assert_eq!(given.x, 1.24);
+    fn continuous_current_is_permitted_without_limit() {
+        let (motors, allowed) = after(khz(1), 4000, 1.24);
+        assert_eq!(allowed.x, 1.24);
         assert!(motors.winding_c().x < CONTINUOUS_C);
         // 1.24² A² · 2.82 Ω · 17.1 K/W above the air.
         assert!(
@@ -365,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn as_warm_at_ten_kilohertz_as_at_one() {
+    fn temperatures_are_independent_of_the_tick_rate() {
         let (slow, _) = after(khz(1), 200, 1.3);
         let (fast, _) = after(khz(10), 200, 1.3);
         let difference = (slow.winding_c() - fast.winding_c()).abs().max_element();

@@ -40,52 +40,52 @@ impl Calibration {
         let preset = self.model.preset();
         let (mine, theirs) = (&self.thermal, &preset.thermal);
         let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);
-        self.each_at_most(CalibrationField::PeakCurrent, peak, preset.peak_current_a)?;
-        let most = preset.continuous_current_a;
-        self.each_at_most(CalibrationField::ContinuousCurrent, continuous, most)?;
+        self.check_each_max(CalibrationField::PeakCurrent, peak, preset.peak_current_a)?;
+        let max = preset.continuous_current_a;
+        self.check_each_max(CalibrationField::ContinuousCurrent, continuous, max)?;
         // A motor model that warms less than the preset's, or later, is dangerous.
-        self.at_least(
+        self.check_min(
             CalibrationField::Resistance,
             mine.resistance_ohm,
             theirs.resistance_ohm,
         )?;
-        self.at_least(
+        self.check_min(
             CalibrationField::WindingResistance,
             mine.winding_k_per_w,
             theirs.winding_k_per_w,
         )?;
-        self.at_least(
+        self.check_min(
             CalibrationField::HousingResistance,
             mine.housing_k_per_w,
             theirs.housing_k_per_w,
         )?;
-        self.at_most(
+        self.check_max(
             CalibrationField::WindingTime,
             mine.winding_s,
             theirs.winding_s,
         )?;
-        self.at_most(
+        self.check_max(
             CalibrationField::HousingTime,
             mine.housing_s,
             theirs.housing_s,
         )?;
-        self.at_most(
+        self.check_max(
             CalibrationField::MaxForce,
             self.max_force_n,
             preset.max_force_n,
         )?;
-        self.at_most(
+        self.check_max(
             CalibrationField::MaxSpeed,
             self.max_speed_mm_s,
             SPEED_SHARE * preset.max_speed_mm_s,
         )?;
         self.check_geometry(&preset)?;
         let leverage = preset.ratio * preset.torque_constant;
-        let least = LEVERAGE_SHARE * leverage / self.ratio;
+        let min = LEVERAGE_SHARE * leverage / self.ratio;
         for axis in 0..3 {
-            let (value, least) = (self.torque_constant[axis], least[axis]);
-            let bound = self.bound(least, f32::INFINITY);
-            let good = value >= least * (1.0 - ROUNDING);
+            let (value, min) = (self.torque_constant[axis], min[axis]);
+            let bound = self.bound(min, f32::INFINITY);
+            let good = value >= min * (1.0 - ROUNDING);
             check(
                 CalibrationField::TorqueConstant,
                 Some(axis),
@@ -99,24 +99,24 @@ impl Calibration {
 
     /// Checks that the arm has about the size, the count resolution and the range of its model.
     fn check_geometry(&self, preset: &Self) -> Result<(), CalibrationError> {
-        self.at_most(CalibrationField::L1, self.l1_mm, LINK_SHARE * preset.l1_mm)?;
-        self.at_most(CalibrationField::L2, self.l2_mm, LINK_SHARE * preset.l2_mm)?;
+        self.check_max(CalibrationField::L1, self.l1_mm, LINK_SHARE * preset.l1_mm)?;
+        self.check_max(CalibrationField::L2, self.l2_mm, LINK_SHARE * preset.l2_mm)?;
         self.check_counts(preset)?;
         let (mine, theirs) = (&self.limits, &preset.limits);
         let widest = theirs.max_rad + Vec3::splat(STOPS_RAD);
-        self.each_at_most(CalibrationField::MaxAngle, mine.max_rad, widest)?;
+        self.check_each_max(CalibrationField::MaxAngle, mine.max_rad, widest)?;
         for axis in 0..3 {
-            let (value, least) = (mine.min_rad[axis], theirs.min_rad[axis] - STOPS_RAD);
-            let bound = self.bound(least, CalibrationField::MinAngle.range().1);
-            let good = value >= least - ROUNDING;
+            let (value, min) = (mine.min_rad[axis], theirs.min_rad[axis] - STOPS_RAD);
+            let bound = self.bound(min, CalibrationField::MinAngle.range().1);
+            let good = value >= min - ROUNDING;
             check(CalibrationField::MinAngle, Some(axis), value, bound, good)?;
         }
-        self.at_most(
+        self.check_max(
             CalibrationField::Q2MinusQ3,
             mine.q2_minus_q3_max_rad,
             theirs.q2_minus_q3_max_rad + STOPS_RAD,
         )?;
-        self.at_most(
+        self.check_max(
             CalibrationField::Q3MinusQ2,
             mine.q3_minus_q2_max_rad,
             theirs.q3_minus_q2_max_rad + STOPS_RAD,
@@ -126,12 +126,12 @@ impl Calibration {
     /// Checks that each joint has about as many counts per radian as the model's. If not, the error
     /// contains the number that is farther from the preset's.
     fn check_counts(&self, preset: &Self) -> Result<(), CalibrationError> {
-        let (least, most) = match preset.has_guessed_ratios() {
+        let (min, max) = match preset.has_guessed_ratios() {
             true => COUNTS_SHARE_OF_A_GUESS,
             false => COUNTS_SHARE,
         };
         let within =
-            |share: f32| share >= least * (1.0 - ROUNDING) && share <= most * (1.0 + ROUNDING);
+            |share: f32| share >= min * (1.0 - ROUNDING) && share <= max * (1.0 + ROUNDING);
         let of_encoder = self.counts_per_turn / preset.counts_per_turn;
         for axis in 0..3 {
             let of_ratio = self.ratio[axis] / preset.ratio[axis];
@@ -142,13 +142,7 @@ impl Calibration {
             };
             // The number that would give the preset's counts, with the other number unchanged.
             let unit = value / (of_encoder * of_ratio);
-            check(
-                field,
-                at,
-                value,
-                self.bound(least * unit, most * unit),
-                good,
-            )?;
+            check(field, at, value, self.bound(min * unit, max * unit), good)?;
         }
         Ok(())
     }
@@ -182,39 +176,39 @@ impl Calibration {
         }
     }
 
-    fn each_at_most(
+    fn check_each_max(
         &self,
         field: CalibrationField,
         values: Vec3,
-        most: Vec3,
+        max: Vec3,
     ) -> Result<(), CalibrationError> {
         for axis in 0..3 {
-            let (value, most) = (values[axis], most[axis]);
-            let bound = self.bound(field.range().0, most);
-            let good = value <= most * (1.0 + ROUNDING);
+            let (value, max) = (values[axis], max[axis]);
+            let bound = self.bound(field.range().0, max);
+            let good = value <= max * (1.0 + ROUNDING);
             check(field, Some(axis), value, bound, good)?;
         }
         Ok(())
     }
 
-    fn at_most(
+    fn check_max(
         &self,
         field: CalibrationField,
         value: f32,
-        most: f32,
+        max: f32,
     ) -> Result<(), CalibrationError> {
-        let bound = self.bound(field.range().0, most);
-        check(field, None, value, bound, value <= most * (1.0 + ROUNDING))
+        let bound = self.bound(field.range().0, max);
+        check(field, None, value, bound, value <= max * (1.0 + ROUNDING))
     }
 
-    fn at_least(
+    fn check_min(
         &self,
         field: CalibrationField,
         value: f32,
-        least: f32,
+        min: f32,
     ) -> Result<(), CalibrationError> {
-        let bound = self.bound(least, field.range().1);
-        check(field, None, value, bound, value >= least * (1.0 - ROUNDING))
+        let bound = self.bound(min, field.range().1);
+        check(field, None, value, bound, value >= min * (1.0 - ROUNDING))
     }
 }
 
@@ -338,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_may_be_more_careful() {
+    fn record_below_its_model_limits_is_valid() {
         for model in MODELS {
             let mut record = model.preset();
             record.peak_current_a *= 0.5;

@@ -109,7 +109,7 @@ impl Calibration {
 
 impl JointLimits {
     /// Limits that contain no pose.
-    pub(crate) const NOWHERE: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         min_rad: Vec3::INFINITY,
         max_rad: Vec3::NEG_INFINITY,
         q2_minus_q3_max_rad: f32::NEG_INFINITY,
@@ -130,22 +130,22 @@ impl JointLimits {
 
     /// Returns true if a pose lies inside, within `margin_rad`. Not-a-number lies outside.
     #[must_use]
-    pub fn allow(&self, q: Vec3, margin_rad: f32) -> bool {
+    pub fn contains(&self, q: Vec3, margin_rad: f32) -> bool {
         let wide = self.widened(margin_rad);
-        wide.each_allows(q) && wide.linkage_allows(q)
+        wide.contains_joints(q) && wide.contains_linkage(q)
     }
 
     /// Returns true if each joint alone lies inside.
     #[must_use]
     #[inline]
-    pub fn each_allows(&self, q: Vec3) -> bool {
+    pub fn contains_joints(&self, q: Vec3) -> bool {
         q.cmpge(self.min_rad).all() && q.cmple(self.max_rad).all()
     }
 
     /// Returns true if the linkage allows q2 and q3 together.
     #[must_use]
     #[inline]
-    pub fn linkage_allows(&self, q: Vec3) -> bool {
+    pub fn contains_linkage(&self, q: Vec3) -> bool {
         let spread = q.y - q.z;
         spread <= self.q2_minus_q3_max_rad && -spread <= self.q3_minus_q2_max_rad
     }

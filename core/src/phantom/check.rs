@@ -197,56 +197,56 @@ impl Calibration {
     pub fn validate(&self) -> Result<(), CalibrationError> {
         let (limits, thermal) = (&self.limits, &self.thermal);
         let (min, max) = (limits.min_rad, limits.max_rad);
-        one(CalibrationField::CountsPerTurn, self.counts_per_turn)?;
-        each(CalibrationField::Ratio, self.ratio)?;
-        each_is(
+        check_number(CalibrationField::CountsPerTurn, self.counts_per_turn)?;
+        check_axes(CalibrationField::Ratio, self.ratio)?;
+        check_axes_if(
             CalibrationField::EncoderSign,
             self.encoder_sign,
             self.encoder_sign.abs().cmpeq(Vec3::ONE),
         )?;
-        each_is(
+        check_axes_if(
             CalibrationField::MotorSign,
             self.motor_sign,
             self.motor_sign.abs().cmpeq(Vec3::ONE),
         )?;
-        one(CalibrationField::L1, self.l1_mm)?;
-        one(CalibrationField::L2, self.l2_mm)?;
-        each(CalibrationField::MinAngle, min)?;
-        each(CalibrationField::MaxAngle, max)?;
-        one(CalibrationField::Q2MinusQ3, limits.q2_minus_q3_max_rad)?;
-        one(CalibrationField::Q3MinusQ2, limits.q3_minus_q2_max_rad)?;
-        each_is(CalibrationField::MaxAngle, max, max.cmpgt(min))?;
-        each(CalibrationField::Zero, self.zero_rad)?;
+        check_number(CalibrationField::L1, self.l1_mm)?;
+        check_number(CalibrationField::L2, self.l2_mm)?;
+        check_axes(CalibrationField::MinAngle, min)?;
+        check_axes(CalibrationField::MaxAngle, max)?;
+        check_number(CalibrationField::Q2MinusQ3, limits.q2_minus_q3_max_rad)?;
+        check_number(CalibrationField::Q3MinusQ2, limits.q3_minus_q2_max_rad)?;
+        check_axes_if(CalibrationField::MaxAngle, max, max.cmpgt(min))?;
+        check_axes(CalibrationField::Zero, self.zero_rad)?;
         // Some rigs are zeroed with the arm against its stops.
-        let inside = limits.allow(self.zero_rad, 0.05);
-        each_is(CalibrationField::Zero, self.zero_rad, BVec3::splat(inside))?;
-        each(CalibrationField::TorqueConstant, self.torque_constant)?;
+        let inside = limits.contains(self.zero_rad, 0.05);
+        check_axes_if(CalibrationField::Zero, self.zero_rad, BVec3::splat(inside))?;
+        check_axes(CalibrationField::TorqueConstant, self.torque_constant)?;
         let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);
-        each(CalibrationField::PeakCurrent, peak)?;
-        each(CalibrationField::ContinuousCurrent, continuous)?;
-        each_is(
+        check_axes(CalibrationField::PeakCurrent, peak)?;
+        check_axes(CalibrationField::ContinuousCurrent, continuous)?;
+        check_axes_if(
             CalibrationField::ContinuousCurrent,
             continuous,
             continuous.cmple(peak),
         )?;
         // Motors that hold the arm must keep a reserve to push: half of their continuous current.
-        let bearable = 0.5 * continuous * self.ratio * self.torque_constant;
+        let max_holding_nm = 0.5 * continuous * self.ratio * self.torque_constant;
         let (gravity_2, gravity_3) = (self.gravity_2_nm, self.gravity_3_nm);
-        one(CalibrationField::Gravity2, gravity_2)?;
-        one(CalibrationField::Gravity3, gravity_3)?;
-        for (field, value, most) in [
-            (CalibrationField::Gravity2, gravity_2, bearable.y),
-            (CalibrationField::Gravity3, gravity_3, bearable.z),
+        check_number(CalibrationField::Gravity2, gravity_2)?;
+        check_number(CalibrationField::Gravity3, gravity_3)?;
+        for (field, value, max) in [
+            (CalibrationField::Gravity2, gravity_2, max_holding_nm.y),
+            (CalibrationField::Gravity3, gravity_3, max_holding_nm.z),
         ] {
-            check(field, None, value, Bound::Range, value.abs() <= most)?;
+            check(field, None, value, Bound::Range, value.abs() <= max)?;
         }
-        one(CalibrationField::Resistance, thermal.resistance_ohm)?;
-        one(CalibrationField::WindingResistance, thermal.winding_k_per_w)?;
-        one(CalibrationField::HousingResistance, thermal.housing_k_per_w)?;
-        one(CalibrationField::WindingTime, thermal.winding_s)?;
-        one(CalibrationField::HousingTime, thermal.housing_s)?;
-        one(CalibrationField::MaxForce, self.max_force_n)?;
-        one(CalibrationField::MaxSpeed, self.max_speed_mm_s)?;
+        check_number(CalibrationField::Resistance, thermal.resistance_ohm)?;
+        check_number(CalibrationField::WindingResistance, thermal.winding_k_per_w)?;
+        check_number(CalibrationField::HousingResistance, thermal.housing_k_per_w)?;
+        check_number(CalibrationField::WindingTime, thermal.winding_s)?;
+        check_number(CalibrationField::HousingTime, thermal.housing_s)?;
+        check_number(CalibrationField::MaxForce, self.max_force_n)?;
+        check_number(CalibrationField::MaxSpeed, self.max_speed_mm_s)?;
         self.check_absolute_limits()
     }
 }
@@ -272,21 +272,25 @@ pub(super) fn check(
 }
 
 /// Checks a number against its range.
-fn one(field: CalibrationField, value: f32) -> Result<(), CalibrationError> {
+fn check_number(field: CalibrationField, value: f32) -> Result<(), CalibrationError> {
     let (min, max, _) = field.range();
     let good = (min..=max).contains(&value);
     check(field, None, value, Bound::Range, good)
 }
 
 /// Checks a number of each axis against its range.
-fn each(field: CalibrationField, values: Vec3) -> Result<(), CalibrationError> {
+fn check_axes(field: CalibrationField, values: Vec3) -> Result<(), CalibrationError> {
     let (min, max, _) = field.range();
     let (min, max) = (Vec3::splat(min), Vec3::splat(max));
-    each_is(field, values, values.cmpge(min) & values.cmple(max))
+    check_axes_if(field, values, values.cmpge(min) & values.cmple(max))
 }
 
 /// Checks a number of each axis against a condition.
-fn each_is(field: CalibrationField, values: Vec3, good: BVec3) -> Result<(), CalibrationError> {
+fn check_axes_if(
+    field: CalibrationField,
+    values: Vec3,
+    good: BVec3,
+) -> Result<(), CalibrationError> {
     (0..3).try_for_each(|axis| {
         let (value, good) = (values[axis], good.test(axis));
         check(field, Some(axis), value, Bound::Range, good)
@@ -302,7 +306,7 @@ mod tests {
     type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
     #[test]
-    fn each_number_that_is_wrong_is_named() {
+    fn error_names_each_wrong_number() {
         let cases: [Case; 24] = [
             (
                 |c| c.counts_per_turn = 0.0,
@@ -404,9 +408,9 @@ mod tests {
             l1_mm: 3.0,
             ..Calibration::PREMIUM_1_5
         };
-        let stated = format!("{}", record.validate().expect_err("too short"));
+        let message = format!("{}", record.validate().expect_err("too short"));
         assert_eq!(
-            stated,
+            message,
             "L1 is 3, expected 30 to 1000 mm: measure the upper link between its joint axes"
         );
     }

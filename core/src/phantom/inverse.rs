@@ -59,8 +59,8 @@ impl Calibration {
             let q2 = atan2f(z, r) + inner;
             Vec3::new(q1, q2, q2 - elbow + FRAC_PI_2)
         };
-        let ways = [pose(atan2f(y, x), r), pose(atan2f(-y, -x), -r)];
-        let found = ways.into_iter().find_map(|q| self.turned_inside(q));
+        let candidates = [pose(atan2f(y, x), r), pose(atan2f(-y, -x), -r)];
+        let found = candidates.into_iter().find_map(|q| self.turned_inside(q));
         found.ok_or(Unreachable::BeyondLimits)
     }
 
@@ -69,9 +69,9 @@ impl Calibration {
         let (l1, l2) = (self.l1_mm, self.l2_mm);
         // Differences of squares as products: no digits are lost with the links nearly in line,
         // folded or stretched.
-        let far = libm::hypotf(r, z);
-        let short_of_full = (l1 + l2 - far) * (l1 + l2 + far) / (2.0 * l1 * l2);
-        let past_folded = (far - (l1 - l2)) * (far + (l1 - l2)) / (2.0 * l1 * l2);
+        let distance = libm::hypotf(r, z);
+        let short_of_full = (l1 + l2 - distance) * (l1 + l2 + distance) / (2.0 * l1 * l2);
+        let past_folded = (distance - (l1 - l2)) * (distance + (l1 - l2)) / (2.0 * l1 * l2);
         if short_of_full < -ROUNDING {
             return Err(Unreachable::TooFar);
         }
@@ -89,7 +89,7 @@ impl Calibration {
         let turn = Vec3::new(0.0, TAU, TAU);
         [q, q + turn, q - turn]
             .into_iter()
-            .find(|q| self.limits.allow(*q, 1e-5))
+            .find(|q| self.limits.contains(*q, 1e-5))
     }
 }
 

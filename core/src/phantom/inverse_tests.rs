@@ -29,12 +29,12 @@ fn inverse_kinematics_round_trips_within_a_micrometre() {
             for q2 in along(&limits, 1, cases(60, 8)) {
                 for q3 in along(&limits, 2, cases(60, 8)) {
                     let q = Vec3::new(q1, q2, q3);
-                    if !limits.allow(q, 0.0) {
+                    if !limits.contains(q, 0.0) {
                         continue;
                     }
                     let at = tip(&record, q);
                     let found = record.joints_at(at).expect("it came from a pose");
-                    assert!(limits.allow(found, 1e-5), "{q} {found}");
+                    assert!(limits.contains(found, 1e-5), "{q} {found}");
                     worst = worst.max((tip(&record, found) - at).length());
                     same += u32::from((found - q).abs().max_element() < 1e-3);
                     poses += 1;
@@ -52,11 +52,11 @@ fn inverse_kinematics_round_trips_within_a_micrometre() {
 }
 
 #[test]
-fn the_branch_inside_the_limits_is_taken() {
+fn inverse_kinematics_takes_the_branch_inside_limits() {
     let record = Calibration::PREMIUM_1_5;
     // Leaning over backwards, turned by 80°: turning towards the tip would need −100°.
     let q = Vec3::new(80f32.to_radians(), 115f32.to_radians(), 169f32.to_radians());
-    assert!(record.limits.allow(q, 0.0));
+    assert!(record.limits.contains(q, 0.0));
     let at = tip(&record, q);
     let pose = Pose::from_angles(&record, q);
     assert!(pose.reach_mm() < -10.0, "{}", pose.reach_mm());
@@ -74,7 +74,7 @@ fn inverse_kinematics_is_accurate_near_singular_poses() {
         for q2 in [0.3f32, 0.8] {
             for spread in [1.5 - off, -1.5 + off] {
                 let q = Vec3::new(0.2, q2, q2 - spread);
-                if !record.limits.allow(q, 0.0) {
+                if !record.limits.contains(q, 0.0) {
                     continue;
                 }
                 let at = tip(&record, q);
@@ -109,7 +109,7 @@ fn joint_angles_beyond_half_a_turn_are_found() {
     record.limits.min_rad = Vec3::new(-1.5, -4.0, -4.0);
     record.limits.max_rad = Vec3::new(1.5, 2.0, 2.0);
     let q = Vec3::new(0.1, -3.4, -3.2);
-    assert!(record.limits.allow(q, 0.0));
+    assert!(record.limits.contains(q, 0.0));
     let found = record.joints_at(tip(&record, q)).expect("reachable");
     assert!((found - q).abs().max_element() < 1e-4, "{found}");
 }

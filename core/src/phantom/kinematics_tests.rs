@@ -37,7 +37,7 @@ fn lever_f64(q: [f64; 3], joint: usize) -> [f64; 3] {
 }
 
 #[test]
-fn the_tip_is_within_its_bound_over_the_workspace() {
+fn tip_error_stays_within_its_bound_over_the_workspace() {
     let mut worst = 0.0_f64;
     for q in workspace() {
         // The input is the angle rounded to f32, so this rounding is not an error of the code.
@@ -119,7 +119,7 @@ fn torques_stay_within_levers_even_in_singular_poses() {
 }
 
 #[test]
-fn frames_turn_into_each_other() {
+fn device_and_terrain_frames_convert_back() {
     let v = Vec3::new(1.0, 2.0, 3.0);
     assert_eq!(to_terrain_frame(to_device_frame(v)), v);
     // Away from the user is north, which is toward the base.

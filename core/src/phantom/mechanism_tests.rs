@@ -39,7 +39,7 @@ fn workspace(record: &Calibration, step: usize) -> impl Iterator<Item = Vec3> {
         .flat_map(move |q1| {
             along(1).flat_map(move |q2| along(2).map(move |q3| Vec3::new(q1, q2, q3)))
         })
-        .filter(move |q| limits.allow(*q, 0.0))
+        .filter(move |q| limits.contains(*q, 0.0))
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn one_newton_up_at_home_needs_the_current_of_its_lever() {
 }
 
 #[test]
-fn a_record_that_makes_no_sense_gives_no_mechanism() {
+fn invalid_record_is_refused_by_kinematics() {
     let record = Calibration {
         ratio: Vec3::ZERO,
         ..Calibration::PREMIUM_1_5

@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn within_the_stated_bound_of_f64() {
+    fn sin_cos_error_stays_within_the_stated_bound() {
         let worst = worst(sin_cos);
         assert!(worst < 1.5e-7, "{worst:e}");
     }

@@ -20,7 +20,7 @@ pub const WINDOW: usize = 15;
 /// Maximum error of two readings together, counts: half a count each.
 const NOISE: f32 = 1.0;
 /// Number of stored readings, a power of two.
-const KEPT: usize = WINDOW + 1;
+const STORED: usize = WINDOW + 1;
 
 /// 1/i for the reading i ticks ago, starting with 1.
 const RECIPROCAL: [f32; WINDOW] = {
@@ -33,10 +33,10 @@ const RECIPROCAL: [f32; WINDOW] = {
     values
 };
 /// 6/(n(n+1)(n+2)) for a window of n, the factor of the best-fit slope.
-const FIT: [f32; KEPT] = {
-    let mut values = [0.0; KEPT];
+const FIT: [f32; STORED] = {
+    let mut values = [0.0; STORED];
     let mut n = 1;
-    while n < KEPT {
+    while n < STORED {
         values[n] = 6.0 / (n * (n + 1) * (n + 2)) as f32;
         n += 1;
     }
@@ -48,7 +48,7 @@ const FIT: [f32; KEPT] = {
 pub struct Readings {
     /// Readings from `newest` on, the newest first. Each is stored twice, so that they are
     /// contiguous from every `newest`.
-    counts: [[i32; 3]; 2 * KEPT],
+    counts: [[i32; 3]; 2 * STORED],
     newest: usize,
     /// Number of readings before the newest, at most [`WINDOW`].
     before: usize,
@@ -56,16 +56,16 @@ pub struct Readings {
 
 impl Readings {
     /// Adds the next reading.
-    pub fn take(&mut self, counts: [i32; 3]) {
-        self.newest = self.newest.wrapping_sub(1) % KEPT;
-        self.counts[self.newest % KEPT] = counts;
-        self.counts[self.newest % KEPT + KEPT] = counts;
+    pub fn push(&mut self, counts: [i32; 3]) {
+        self.newest = self.newest.wrapping_sub(1) % STORED;
+        self.counts[self.newest % STORED] = counts;
+        self.counts[self.newest % STORED + STORED] = counts;
         self.before = (self.before + 1).min(WINDOW);
     }
 
     /// Forgets all readings but this one.
     pub fn restart(&mut self, counts: [i32; 3]) {
-        self.take(counts);
+        self.push(counts);
         self.before = 0;
     }
 
@@ -75,7 +75,7 @@ impl Readings {
         if self.before == 0 {
             return [0; 3];
         }
-        let newest = self.newest % KEPT;
+        let newest = self.newest % STORED;
         let (newest, before) = (&self.counts[newest], &self.counts[newest + 1]);
         core::array::from_fn(|axis| newest[axis].wrapping_sub(before[axis]))
     }
@@ -86,9 +86,9 @@ impl Readings {
     /// by a sweep); that of raw differences is up to 1.
     #[must_use]
     pub fn velocity(&self) -> Vec3 {
-        let newest = self.newest % KEPT;
-        let kept = newest..newest + 1 + self.before.min(WINDOW);
-        let readings = self.counts.get(kept).unwrap_or_default();
+        let newest = self.newest % STORED;
+        let stored = newest..newest + 1 + self.before.min(WINDOW);
+        let readings = self.counts.get(stored).unwrap_or_default();
         Vec3::new(
             slope(readings, |counts| counts[0]),
             slope(readings, |counts| counts[1]),

@@ -12,7 +12,7 @@ struct Errors {
 }
 
 impl Errors {
-    fn take(&mut self, error: f64) {
+    fn add(&mut self, error: f64) {
         self.worst = self.worst.max(error.abs());
         self.squares += error * error;
         self.n += 1;
@@ -31,14 +31,14 @@ fn errors(ticks: u32, at: impl Fn(f64) -> f64, speed: impl Fn(f64) -> f64) -> (E
     let (mut fitted, mut raw) = (Errors::default(), Errors::default());
     for tick in 1..ticks {
         let t = f64::from(tick);
-        readings.take([at(t).round() as i32; 3]);
+        readings.push([at(t).round() as i32; 3]);
         if tick < WINDOW as u32 {
             continue;
         }
         let velocity = readings.velocity();
         assert_eq!(velocity.x, velocity.z);
-        fitted.take(f64::from(velocity.y) - speed(t));
-        raw.take(f64::from(readings.moved()[1]) - speed(t));
+        fitted.add(f64::from(velocity.y) - speed(t));
+        raw.add(f64::from(readings.moved()[1]) - speed(t));
     }
     (fitted, raw)
 }
@@ -81,7 +81,7 @@ fn sudden_stop_is_detected_within_two_readings() {
     let mut counts = 0;
     for tick in 0..100 {
         counts += if tick < 50 { 20 } else { 0 };
-        readings.take([counts; 3]);
+        readings.push([counts; 3]);
         if tick == 49 {
             assert!((readings.velocity().x - 20.0).abs() < 0.01);
         }
@@ -100,7 +100,7 @@ fn sudden_stop_is_detected_within_two_readings() {
 fn restart_clears_velocity_and_wrapping_counts_are_handled() {
     let mut readings = Readings::default();
     for i in 0..40 {
-        readings.take([i * 10; 3]);
+        readings.push([i * 10; 3]);
     }
     readings.restart([-5000; 3]);
     assert_eq!(readings.velocity(), Vec3::ZERO);
@@ -109,7 +109,7 @@ fn restart_clears_velocity_and_wrapping_counts_are_handled() {
     readings.restart([count; 3]);
     for _ in 0..20 {
         count = count.wrapping_add(3);
-        readings.take([count; 3]);
+        readings.push([count; 3]);
     }
     assert!((readings.velocity().x - 3.0).abs() < 1e-5);
 }

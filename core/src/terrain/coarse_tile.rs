@@ -80,7 +80,7 @@ impl CoarseTile {
 
     /// Returns two flags: true if the tile covers a cell of the scene's level, and true if it
     /// covers at least one of the cell's corners.
-    pub(super) fn reaches(&self, cell: Cell) -> [bool; 2] {
+    pub(super) fn coverage(&self, cell: Cell) -> [bool; 2] {
         let span = (TILE_CELLS as i32) << self.shift;
         let off = [(cell.x, self.first.x), (cell.y, self.first.y)];
         let off = off.map(|(at, first)| at.wrapping_sub(first));
@@ -91,7 +91,7 @@ impl CoarseTile {
     }
 
     /// Returns the heights of `tile`, which must be this one, at the corners of a cell of the
-    /// scene's level that it [covers](Self::reaches), in the order of [`Tile::corners`]. Each is
+    /// scene's level that it [covers](Self::coverage), in the order of [`Tile::corners`]. Each is
     /// equal to [`Self::height`] to the bit, except for the sign of zero. `None` beside its
     /// no-data.
     pub(super) fn corners(&self, tile: &Tile, cell: Cell) -> Option<[f32; 4]> {
@@ -112,9 +112,9 @@ impl CoarseTile {
 
     /// Returns the start and the end of a cell in its coarse cell, from 0 to 1.
     fn shares(&self, off: i32) -> [f32; 2] {
-        let rest = off & (self.spacing() - 1);
+        let remainder = off & (self.spacing() - 1);
         let per_cell = 1.0 / self.spacing() as f32;
-        [rest, rest + 1].map(|rest| rest as f32 * per_cell)
+        [remainder, remainder + 1].map(|remainder| remainder as f32 * per_cell)
     }
 
     /// Returns the height of `tile`, which must be this one, at a sample of the scene's level, in
@@ -123,8 +123,8 @@ impl CoarseTile {
     /// The result depends only on the sample, so two patches that share it agree to the bit.
     pub(super) fn height(&self, tile: &Tile, sample: Cell) -> Option<f32> {
         let (cell, [east, north]) = self.place(sample)?;
-        let posts = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
-        Some(mix(along(&posts, east), north))
+        let corners = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
+        Some(mix(along(&corners, east), north))
     }
 
     /// Returns the minimum and maximum of `tile`, which must be this one, over a tile of the
@@ -143,7 +143,7 @@ impl CoarseTile {
         let mut range = [f32::INFINITY, f32::NEG_INFINITY];
         for row in rows {
             for col in columns.clone() {
-                let height = tile.post(col as usize, row as usize);
+                let height = tile.sample(col as usize, row as usize);
                 // Comparisons with NaN are false.
                 if height < range[0] {
                     range[0] = height;
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bilinear_field_is_the_same_through_it_everywhere() {
+    fn coarse_tile_reproduces_a_bilinear_field() {
         let field = |x: f32, y: f32| 3.0 + 0.5 * x - 0.25 * y + 0.125 * x * y;
         let coarse = tile(|col, row| field(col as f32, row as f32));
         for x in (-7..=249).step_by(5) {
@@ -239,12 +239,12 @@ mod tests {
         for shift in [2, 3, 7] {
             let place = CoarseTile { shift, ..COARSE };
             let span = 32 << shift;
-            let mut beside_hole = 0;
+            let mut beside_no_data = 0;
             for at in 0..span * span {
                 let cell = place.first.offset(at % span, at / span);
-                assert_eq!(place.reaches(cell), [true; 2]);
+                assert_eq!(place.coverage(cell), [true; 2]);
                 let Some(corners) = place.corners(&coarse, cell) else {
-                    beside_hole += 1;
+                    beside_no_data += 1;
                     continue;
                 };
                 for (corner, height) in (0..).zip(corners) {
@@ -253,20 +253,20 @@ mod tests {
                     assert_eq!(height.to_bits(), expected.to_bits(), "{cell:?} {corner}");
                 }
             }
-            assert_eq!(beside_hole, 4 << (2 * shift));
-            let reaches = |east, north| place.reaches(place.first.offset(east, north));
-            assert_eq!(reaches(-1, span), [false, true]);
+            assert_eq!(beside_no_data, 4 << (2 * shift));
+            let coverage = |east, north| place.coverage(place.first.offset(east, north));
+            assert_eq!(coverage(-1, span), [false, true]);
             assert_eq!(
-                (reaches(-2, 0), reaches(0, span + 1)),
+                (coverage(-2, 0), coverage(0, span + 1)),
                 ([false; 2], [false; 2])
             );
         }
         let far = Cell::new(i32::MIN, i32::MAX);
-        assert_eq!(COARSE.reaches(far), [false; 2]);
+        assert_eq!(COARSE.coverage(far), [false; 2]);
     }
 
     #[test]
-    fn its_range_over_a_tile_bounds_every_height_there() {
+    fn range_over_a_tile_bounds_its_heights() {
         let hash = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 101) as f32;
         let coarse = tile(hash);
         for shift in [2, 3, 5, 8] {

@@ -102,9 +102,9 @@ impl CellBox {
     }
 
     /// Returns the side, as a power of two, of the smallest blocks that cover the box with at most
-    /// two in each direction; at least `least`.
-    pub(super) fn cover_shift(&self, least: u32) -> u32 {
+    /// two in each direction; at least `min_shift`.
+    pub(super) fn cover_shift(&self, min_shift: u32) -> u32 {
         let extent = (self.to.x - self.from.x).max(self.to.y - self.from.y);
-        (32 - extent.leading_zeros()).max(least)
+        (32 - extent.leading_zeros()).max(min_shift)
     }
 }

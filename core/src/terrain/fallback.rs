@@ -48,36 +48,36 @@ impl Fallback {
 }
 
 /// The fallback of a window: its place, and its tiles that have arrived.
-pub(super) struct Laid<'t> {
+pub(super) struct FallbackSlots<'t> {
     /// Place of the fallback, if the scene has one.
     place: Option<Fallback>,
     /// The tiles that have arrived, or their vacant buffers.
     tiles: [Option<&'t mut Tile>; PARTS],
 }
 
-impl<'t> Laid<'t> {
-    pub(super) const NOTHING: Self = Self {
+impl<'t> FallbackSlots<'t> {
+    pub(super) const EMPTY: Self = Self {
         place: None,
         tiles: [const { None }; PARTS],
     };
 
     /// Sets another place. The buffers of the previous tiles are kept for the new ones.
-    pub(super) fn lay(&mut self, place: Option<Fallback>) {
+    pub(super) fn set_place(&mut self, place: Option<Fallback>) {
         self.place = place;
         for tile in self.tiles.iter_mut().flatten() {
             tile.vacate();
         }
     }
 
-    pub(super) const fn is_wanted(&self) -> bool {
+    pub(super) const fn is_set(&self) -> bool {
         self.place.is_some()
     }
 
     /// Returns a buffer that the fallback no longer needs, if any.
     pub(super) fn take_spare(&mut self) -> Option<&'t mut Tile> {
         let parts = self.place.map_or([None; PARTS], |place| place.parts());
-        let mut kept = parts.iter().zip(&mut self.tiles);
-        kept.find_map(|(part, tile)| match part {
+        let mut slots = parts.iter().zip(&mut self.tiles);
+        slots.find_map(|(part, tile)| match part {
             Some(_) => None,
             None => tile.take(),
         })
@@ -91,42 +91,42 @@ impl<'t> Laid<'t> {
 
     /// Stores a tile, and returns the replaced buffer.
     pub(super) fn put(&mut self, part: usize, tile: &'t mut Tile) -> Option<&'t mut Tile> {
-        let Some(kept) = self.tiles.get_mut(part) else {
+        let Some(slot) = self.tiles.get_mut(part) else {
             return Some(tile);
         };
-        let spent = kept.replace(tile)?;
+        let spent = slot.replace(tile)?;
         spent.vacate();
         Some(spent)
     }
 
     /// Returns the fallback once all its tiles have arrived. One tile alone is not rendered: the
     /// surface would jump when the other arrives.
-    pub(super) fn loaded(&self) -> Option<Coarse<'_>> {
+    pub(super) fn loaded(&self) -> Option<LoadedFallback<'_>> {
         let place = self.place?;
         let [wide, near] = &self.tiles;
         let near = match place.near {
-            Some(part) => Some((part, come(near)?)),
+            Some(part) => Some((part, arrived_tile(near)?)),
             None => None,
         };
-        Some(Coarse {
-            wide: (place.wide, come(wide)?),
+        Some(LoadedFallback {
+            wide: (place.wide, arrived_tile(wide)?),
             near,
         })
     }
 }
 
 /// Returns the tile in a buffer, if any.
-fn come<'w>(buffer: &'w Option<&mut Tile>) -> Option<&'w Tile> {
+fn arrived_tile<'w>(buffer: &'w Option<&mut Tile>) -> Option<&'w Tile> {
     buffer.as_deref().filter(|tile| tile.key().is_some())
 }
 
 /// A fallback whose tiles have all arrived.
-pub(super) struct Coarse<'w> {
+pub(super) struct LoadedFallback<'w> {
     wide: (CoarseTile, &'w Tile),
     near: Option<(CoarseTile, &'w Tile)>,
 }
 
-impl Coarse<'_> {
+impl LoadedFallback<'_> {
     /// Returns the base height of the wide tile, whole cells.
     pub(super) fn base(&self) -> i32 {
         self.wide.1.base()
@@ -146,13 +146,13 @@ impl Coarse<'_> {
 
     /// Returns the heights at the corners of a cell, in the order of [`Tile::corners`].
     pub(super) fn corners(&self, cell: Cell, base: i32) -> [f32; 4] {
-        let [is_over_near, touches_near] = match &self.near {
-            Some((near, _)) => near.reaches(cell),
+        let [covers_near, touches_near] = match &self.near {
+            Some((near, _)) => near.coverage(cell),
             None => [false; 2],
         };
         let under = match &self.near {
-            Some(near) if is_over_near => Some(near),
-            _ if !touches_near && self.wide.0.reaches(cell)[0] => Some(&self.wide),
+            Some(near) if covers_near => Some(near),
+            _ if !touches_near && self.wide.0.coverage(cell)[0] => Some(&self.wide),
             _ => None,
         };
         if let Some((place, tile)) = under

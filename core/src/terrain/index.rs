@@ -39,7 +39,7 @@ impl TileIndex {
     /// Returns the index of the tile that holds the patch over `cell`.
     #[must_use]
     #[inline]
-    pub const fn holding(cell: Cell) -> Self {
+    pub const fn containing(cell: Cell) -> Self {
         Self::new(cell.x >> TILE_SHIFT, cell.y >> TILE_SHIFT)
     }
 
@@ -96,10 +96,10 @@ impl TileKey {
 
     /// Returns the key of the tile of `level` that holds the patch over `cell`.
     #[must_use]
-    pub const fn holding(level: u8, cell: Cell) -> Self {
+    pub const fn containing(level: u8, cell: Cell) -> Self {
         Self {
             level,
-            index: TileIndex::holding(cell),
+            index: TileIndex::containing(cell),
         }
     }
 }

@@ -20,7 +20,7 @@ pub use fallback::Fallback;
 pub use index::{TILE_CELLS, TILE_SAMPLES, TILE_SHIFT, TileIndex, TileKey};
 pub use storage::{FieldError, TileArena};
 pub use tile::{MAX_STEP_CELLS, Tile, TileError};
-pub use tile_blend::SETTLING_MM_S;
+pub use tile_blend::BLEND_MM_S;
 pub use tile_requests::{
     HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, RequestHint, TileRequester,
 };

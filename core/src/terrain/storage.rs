@@ -35,12 +35,12 @@ pub struct TileArena<const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FieldError {
     /// No cells, or more than fit.
-    #[error("a field of {} × {} cells; this storage holds from 1 × 1 to {most} × {most}", size.columns, size.rows)]
+    #[error("a field of {} × {} cells; this storage holds from 1 × 1 to {max} × {max}", size.columns, size.rows)]
     Size {
         /// The field's size.
         size: FieldSize,
         /// Maximum cells per side.
-        most: i32,
+        max: i32,
     },
     /// The number of heights is wrong: a field of the size has this many.
     #[error("a field of this size has {0} heights: one more than cells each way")]
@@ -151,8 +151,8 @@ impl<const D: usize> TileArena<D> {
         }
         let fits = |cells: i32| (1..=Self::MAX_CELLS).contains(&cells);
         if !fits(size.columns) || !fits(size.rows) {
-            let most = Self::MAX_CELLS;
-            return Err(FieldError::Size { size, most });
+            let max = Self::MAX_CELLS;
+            return Err(FieldError::Size { size, max });
         }
         let mut heights = heights.into_iter();
         for y in 0..=size.rows {
@@ -162,14 +162,14 @@ impl<const D: usize> TileArena<D> {
             }
         }
         self.size = size;
-        let held = self.tiles.as_flattened().iter();
-        if !held.into_iter().all(Tile::is_climbable) {
+        let tiles = self.tiles.as_flattened().iter();
+        if !tiles.into_iter().all(Tile::has_valid_steps) {
             self.size = FieldSize::new(0, 0);
             return Err(FieldError::Step);
         }
         for index in size.tiles() {
             let tile = &mut self.tiles[index.row as usize][index.col as usize];
-            tile.close(TileKey { level: 0, index }, 0);
+            tile.complete(TileKey { level: 0, index }, 0);
         }
         Ok(())
     }
@@ -194,16 +194,16 @@ impl<const D: usize> TileArena<D> {
     /// Returns an upper bound of all samples, in whole cells.
     #[must_use]
     pub fn top(&self) -> i32 {
-        let held = self.tiles.as_flattened().iter();
-        let held = held.filter(|tile| tile.key().is_some());
-        held.map(Tile::top).max().unwrap_or(i32::MIN)
+        let tiles = self.tiles.as_flattened().iter();
+        let tiles = tiles.filter(|tile| tile.key().is_some());
+        tiles.map(Tile::top).max().unwrap_or(i32::MIN)
     }
 
     /// Returns a window over the stored field, without missing tiles.
     pub fn window(&mut self) -> Window<'_, D> {
         let (size, top) = (self.size, self.top());
         let tiles = self.tiles.each_mut();
-        Window::holding(tiles.map(<[Tile; D]>::each_mut), size, top)
+        Window::filled(tiles.map(<[Tile; D]>::each_mut), size, top)
     }
 
     /// Returns buffers for [`Window::new`] and for the loop, which fill them tile by tile. Discards
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn every_patch_reads_back_its_samples_also_across_tiles() {
+    fn patches_read_back_their_samples_across_tiles() {
         let mut storage = TileArena::<2>::from_fn(FieldSize::new(40, 33), rough).unwrap();
         let window = storage.window();
         for (x, y) in [(0, 0), (31, 31), (32, 31), (31, 32), (32, 32), (39, 32)] {
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn it_fills_whole_tiles_as_well_as_parts_of_them() {
+    fn arena_fills_whole_and_partial_tiles() {
         let mut storage = TileArena::<2>::new();
         for (columns, rows) in [(64, 64), (1, 1), (32, 33)] {
             let size = FieldSize::new(columns, rows);
@@ -285,7 +285,7 @@ mod tests {
         for (columns, rows) in [(33, 1), (1, i32::MAX), (0, 5), (5, i32::MIN)] {
             let size = FieldSize::new(columns, rows);
             let error = storage.fill(size, core::iter::repeat(0.0)).unwrap_err();
-            assert_eq!(error, FieldError::Size { size, most: 32 });
+            assert_eq!(error, FieldError::Size { size, max: 32 });
             assert_eq!(
                 storage.window().ground(Cell::default()),
                 CellContent::NoData

@@ -26,7 +26,7 @@ pub(crate) struct Field<'t, const D: usize> {
 
 impl<'t, const D: usize> Field<'t, D> {
     /// An empty field in these buffers.
-    pub(crate) fn over(
+    pub(crate) fn empty(
         buffers: &'t mut [Tile],
         size: FieldSize,
         height: impl Fn(i32, i32) -> f32 + 'static,
@@ -46,15 +46,15 @@ impl<'t, const D: usize> Field<'t, D> {
     }
 
     /// A field with all of its tiles stored.
-    pub(crate) fn held(
+    pub(crate) fn filled(
         buffers: &'t mut [Tile],
         size: FieldSize,
         height: impl Fn(i32, i32) -> f32 + 'static,
     ) -> Self {
-        let mut field = Self::over(buffers, size, height);
+        let mut field = Self::empty(buffers, size, height);
         let last = size.last_tile();
         assert!(last.col.max(last.row) < D as i32, "the window is too small");
-        size.tiles().for_each(|tile| field.take(tile));
+        size.tiles().for_each(|tile| field.store(tile));
         field
     }
 
@@ -67,34 +67,34 @@ impl<'t, const D: usize> Field<'t, D> {
         height: fn(i32, i32) -> f32,
     ) -> Self {
         let whole = FieldSize::new(size + shift, size + shift);
-        let mut field = Self::over(buffers, whole, move |x, y| {
+        let mut field = Self::empty(buffers, whole, move |x, y| {
             if x < shift || y < shift {
                 return f32::NAN;
             }
             height(x - shift, y - shift)
         });
         field.base = shift;
-        let first = TileIndex::holding(Cell::new(shift, shift)).col;
-        field.hold(first..first + D as i32, first..first + D as i32);
+        let first = TileIndex::containing(Cell::new(shift, shift)).col;
+        field.fill(first..first + D as i32, first..first + D as i32);
         field
     }
 
     /// Stores the existing ones of the D × D tiles around a cell.
-    pub(crate) fn hold_around(&mut self, cell: Cell) {
-        let TileIndex { col, row } = TileIndex::holding(cell);
+    pub(crate) fn fill_around(&mut self, cell: Cell) {
+        let TileIndex { col, row } = TileIndex::containing(cell);
         let reach = D as i32 / 2;
-        self.hold(col - reach..col + reach, row - reach..row + reach);
+        self.fill(col - reach..col + reach, row - reach..row + reach);
     }
 
-    fn hold(&mut self, cols: core::ops::Range<i32>, rows: core::ops::Range<i32>) {
+    fn fill(&mut self, cols: core::ops::Range<i32>, rows: core::ops::Range<i32>) {
         for row in rows {
             for col in cols.clone() {
-                self.take(TileIndex::new(col, row));
+                self.store(TileIndex::new(col, row));
             }
         }
     }
 
-    fn take(&mut self, index: TileIndex) {
+    fn store(&mut self, index: TileIndex) {
         let key = TileKey { level: 0, index };
         if self.window.occupant(key) != Some(key) && self.window.expects(key) {
             let spent = self.install(key);
@@ -103,7 +103,7 @@ impl<'t, const D: usize> Field<'t, D> {
     }
 
     /// Installs a tile; the buffer that returns becomes spare.
-    pub(crate) fn give_back(&mut self, key: TileKey) {
+    pub(crate) fn reinstall(&mut self, key: TileKey) {
         let spent = self.install(key);
         self.spare.push(spent);
     }

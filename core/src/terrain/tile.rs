@@ -51,15 +51,15 @@ pub struct Tile {
     base: i32,
     /// Heights above `base` in cells, `[row][column]` from the south-west;
     /// NaN where there is no surface.
-    posts: [[f32; TILE_SAMPLES]; TILE_SAMPLES],
+    samples: [[f32; TILE_SAMPLES]; TILE_SAMPLES],
     blocks: [[f32; BLOCKS]; BLOCKS],
     quarters: [[f32; QUARTERS]; QUARTERS],
     highest: f32,
     lowest: f32,
     /// True if the tile has materials.
     has_materials: bool,
-    /// For each sample, in the order of `posts`, its index in the scene's table of materials; valid
-    /// only if `has_materials`.
+    /// For each sample, in the order of `samples`, its index in the scene's table of materials;
+    /// valid only if `has_materials`.
     materials: [[u8; TILE_SAMPLES]; TILE_SAMPLES],
 }
 
@@ -71,7 +71,7 @@ impl Tile {
         content: Content::Nothing,
         is_whole: false,
         base: 0,
-        posts: [[0.0; TILE_SAMPLES]; TILE_SAMPLES],
+        samples: [[0.0; TILE_SAMPLES]; TILE_SAMPLES],
         blocks: [[0.0; BLOCKS]; BLOCKS],
         quarters: [[0.0; QUARTERS]; QUARTERS],
         highest: 0.0,
@@ -120,10 +120,10 @@ impl Tile {
         materials: &mut dyn Iterator<Item = u8>,
     ) -> Result<(), TileError> {
         let mut is_right = self.content != Content::Nothing;
-        for place in self.materials.as_flattened_mut() {
+        for slot in self.materials.as_flattened_mut() {
             // A missing index becomes one beyond every table.
-            *place = materials.next().unwrap_or(u8::MAX);
-            is_right &= usize::from(*place) < count;
+            *slot = materials.next().unwrap_or(u8::MAX);
+            is_right &= usize::from(*slot) < count;
         }
         if !is_right || materials.next().is_some() {
             self.vacate();
@@ -149,7 +149,7 @@ impl Tile {
     }
 
     /// Marks the tile as rendered unchanged.
-    pub(super) fn become_surface(&mut self) {
+    pub(super) fn mark_as_surface(&mut self) {
         if self.content == Content::Tile {
             self.content = Content::Surface;
         }
@@ -186,15 +186,15 @@ impl Tile {
                 self.set(col, row, height(col, row));
             }
         }
-        if !self.is_climbable() {
+        if !self.has_valid_steps() {
             return Err(TileError::Step);
         }
-        self.close(key, base);
+        self.complete(key, base);
         Ok(())
     }
 
     /// Returns true if no neighbouring samples differ by more than [`MAX_STEP_CELLS`].
-    pub(super) fn is_climbable(&self) -> bool {
+    pub(super) fn has_valid_steps(&self) -> bool {
         // NaN (no-data) makes no step.
         let steps = |a: f32, b: f32| (a - b).abs() > MAX_STEP_CELLS;
         let in_row = |row: &[f32; TILE_SAMPLES]| {
@@ -204,10 +204,10 @@ impl Tile {
         let between = |south: &[f32; TILE_SAMPLES], north: &[f32; TILE_SAMPLES]| {
             south.iter().zip(north).any(|(a, b)| steps(*a, *b))
         };
-        let north = self.posts.iter().skip(1);
-        !self.posts.iter().any(in_row)
+        let north = self.samples.iter().skip(1);
+        !self.samples.iter().any(in_row)
             && !self
-                .posts
+                .samples
                 .iter()
                 .zip(north)
                 .any(|(south, north)| between(south, north))
@@ -216,21 +216,21 @@ impl Tile {
     /// Discards the tile, and sets every sample to no-data.
     pub(super) fn clear(&mut self) {
         self.vacate();
-        self.posts = [[f32::NAN; TILE_SAMPLES]; TILE_SAMPLES];
+        self.samples = [[f32::NAN; TILE_SAMPLES]; TILE_SAMPLES];
     }
 
     /// Sets a sample of a vacant buffer.
     pub(super) fn set(&mut self, col: usize, row: usize, height: f32) {
-        if let Some(post) = self.posts.get_mut(row).and_then(|row| row.get_mut(col)) {
+        if let Some(sample) = self.samples.get_mut(row).and_then(|row| row.get_mut(col)) {
             let addressable = height.abs() <= MAX_CELL as f32;
-            *post = if addressable { height } else { f32::NAN };
+            *sample = if addressable { height } else { f32::NAN };
         }
     }
 
     /// Completes a tile from the samples that were set.
-    pub(super) fn close(&mut self, key: TileKey, base: i32) {
+    pub(super) fn complete(&mut self, key: TileKey, base: i32) {
         self.base = base;
-        self.measure();
+        self.update_bounds();
         (self.index, self.level) = (key.index, key.level);
         self.content = Content::Tile;
     }
@@ -263,12 +263,12 @@ impl Tile {
     /// [`TileError::Length`] unless there are exactly 33 × 33 of them.
     pub fn load(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), TileError> {
         self.vacate();
-        let (posts, rest) = bytes.as_chunks::<4>();
-        if posts.len() != TILE_SAMPLES * TILE_SAMPLES || !rest.is_empty() {
+        let (samples, rest) = bytes.as_chunks::<4>();
+        if samples.len() != TILE_SAMPLES * TILE_SAMPLES || !rest.is_empty() {
             return Err(TileError::Length);
         }
         self.fill(key, base, |col, row| {
-            posts
+            samples
                 .get(row * TILE_SAMPLES + col)
                 .map_or(f32::NAN, |le| f32::from_le_bytes(*le))
         })
@@ -301,7 +301,7 @@ impl Tile {
     #[inline]
     pub fn corners(&self, cell: Cell) -> [f32; 4] {
         let [u, v] = within(cell);
-        let (south, north) = (&self.posts[v], &self.posts[v + 1]);
+        let (south, north) = (&self.samples[v], &self.samples[v + 1]);
         [south[u], south[u + 1], north[u], north[u + 1]]
     }
 
@@ -313,18 +313,18 @@ impl Tile {
         let ([u, v], [u1, v1]) = (within(from), within(to));
         let low = low.above(self.base);
         [v, v + 1, v1 + 1].into_iter().all(|row| {
-            let row = &self.posts[row];
+            let row = &self.samples[row];
             // False for NaN.
-            let reaches = |post: f32| post >= low;
-            !(reaches(row[u]) || reaches(row[u + 1]) || reaches(row[u1 + 1]))
+            let is_reached = |sample: f32| sample >= low;
+            !(is_reached(row[u]) || is_reached(row[u + 1]) || is_reached(row[u1 + 1]))
         })
     }
 
     /// Returns the sample in a column and row of `0..33`, cells above the base; NaN beyond.
     #[must_use]
-    pub(super) fn post(&self, col: usize, row: usize) -> f32 {
-        let post = self.posts.get(row).and_then(|row| row.get(col));
-        post.copied().unwrap_or(f32::NAN)
+    pub(super) fn sample(&self, col: usize, row: usize) -> f32 {
+        let sample = self.samples.get(row).and_then(|row| row.get(col));
+        sample.copied().unwrap_or(f32::NAN)
     }
 
     /// Returns true if every sample has data.
@@ -369,12 +369,14 @@ impl Tile {
         low.above(self.base) > self.highest
     }
 
-    fn measure(&mut self) {
-        let Self { posts, blocks, .. } = self;
+    fn update_bounds(&mut self) {
+        let Self {
+            samples, blocks, ..
+        } = self;
         for (row, blocks) in blocks.iter_mut().enumerate() {
             for (col, block) in blocks.iter_mut().enumerate() {
                 *block = highest_of(
-                    posts,
+                    samples,
                     col << BLOCK_SHIFT,
                     row << BLOCK_SHIFT,
                     (1 << BLOCK_SHIFT) + 1,
@@ -387,7 +389,7 @@ impl Tile {
             }
         }
         self.highest = highest_of(&self.quarters, 0, 0, QUARTERS);
-        (self.lowest, self.is_whole) = lowest_of(self.posts.as_flattened());
+        (self.lowest, self.is_whole) = lowest_of(self.samples.as_flattened());
     }
 }
 
@@ -460,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_is_all_or_nothing() {
+    fn failed_load_leaves_the_tile_vacant() {
         let mut tile = filled(|_, _| 0.0);
         assert_eq!(tile.load(KEY, 0, &[0; 7]), Err(TileError::Length));
         assert_eq!(tile.key(), None);
@@ -471,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn materials_are_those_of_the_table_and_as_many_as_samples() {
+    fn materials_must_be_in_the_table_and_match_the_samples() {
         const ALL: usize = TILE_SAMPLES * TILE_SAMPLES;
         let mut tile = filled(|_, _| 0.0);
         let kinds = |count: usize| (0..count).map(|i| (i % 5) as u8);

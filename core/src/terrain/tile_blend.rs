@@ -22,7 +22,7 @@ use super::index::{TileIndex, wrap};
 /// Speed of the surface from the coarse fallback to an arrived tile, millimetres of the tip a
 /// second. It changes a force by at most this times the stiffness: 25 N/s at 0.5 N/mm, compared
 /// with the guard's limit of 1,000 N/s.
-pub const SETTLING_MM_S: f32 = 50.0;
+pub const BLEND_MM_S: f32 = 50.0;
 
 /// Maximum distance of a window's tiles from the coarse fallback.
 pub(super) struct TileBlend<const D: usize> {
@@ -38,19 +38,19 @@ pub(super) struct TileBlend<const D: usize> {
 #[derive(Clone, Copy)]
 pub(super) struct Allowance {
     pub(super) now: f32,
-    pub(super) far: f32,
+    pub(super) end: f32,
 }
 
 impl Allowance {
     /// Allowance of a slot whose tile does not blend: unlimited.
     const ANY: Self = Self {
         now: f32::INFINITY,
-        far: 0.0,
+        end: 0.0,
     };
 }
 
 impl<const D: usize> TileBlend<D> {
-    pub(super) const NOTHING: Self = Self {
+    pub(super) const NONE: Self = Self {
         slots: [[Allowance::ANY; D]; D],
         count: 0,
         has_changed: false,
@@ -61,17 +61,17 @@ impl<const D: usize> TileBlend<D> {
     }
 
     /// Starts the blend of the tile in the slot of `index`, or renders it unchanged.
-    pub(super) fn begin(&mut self, index: TileIndex, far: Option<f32>) {
+    pub(super) fn begin(&mut self, index: TileIndex, end: Option<f32>) {
         let (row, col) = Self::slot(index);
         let slot = &mut self.slots[row][col];
         if slot.now < f32::INFINITY {
             self.count -= 1;
         }
-        *slot = match far {
-            Some(far) => Allowance { now: 0.0, far },
+        *slot = match end {
+            Some(end) => Allowance { now: 0.0, end },
             None => Allowance::ANY,
         };
-        self.count += u16::from(far.is_some());
+        self.count += u16::from(end.is_some());
     }
 
     pub(super) fn allowed(&self, index: TileIndex) -> f32 {

@@ -24,7 +24,7 @@ pub const IN_FLIGHT: usize = 4;
 /// Weight of the latest answer in the mean answer time.
 const ANSWER_SHARE: f32 = 0.125;
 /// Number of steps along the predicted path at which tiles are requested.
-const LOOK_AHEAD: i32 = 8;
+const PATH_STEPS: i32 = 8;
 
 /// Position and motion after the last tick, for which the loop needs terrain, in cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,7 +42,8 @@ pub struct RequestHint {
 impl RequestHint {
     /// Returns the tile around which others are requested: the missing one, otherwise the proxy's.
     fn centre(&self) -> TileIndex {
-        self.missing_tile.unwrap_or(TileIndex::holding(self.proxy))
+        self.missing_tile
+            .unwrap_or(TileIndex::containing(self.proxy))
     }
 }
 
@@ -56,21 +57,21 @@ impl RequestHint {
 /// requester.reset(0, FieldSize::new(10_000, 10_000));
 /// // HIP and proxy are in the middle of a tile and move east, 0.1 cell a tick.
 /// let cell = Cell::new(80, 48);
-/// let demand = RequestHint { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..RequestHint::default() };
-/// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 2, 1)));
-/// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 3, 1)));
-/// assert_eq!(requester.next_request(0, &demand), None);
+/// let hint = RequestHint { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..RequestHint::default() };
+/// assert_eq!(requester.next_request(0, &hint), Some(TileKey::new(0, 2, 1)));
+/// assert_eq!(requester.next_request(0, &hint), Some(TileKey::new(0, 3, 1)));
+/// assert_eq!(requester.next_request(0, &hint), None);
 /// requester.received(TileKey::new(0, 2, 1));
 /// assert_eq!(requester.in_flight(), 1);
 /// ```
 pub struct TileRequester<const D: usize> {
     level: u8,
     size: FieldSize,
-    held: [[Option<TileKey>; D]; D],
+    stored: [[Option<TileKey>; D]; D],
     /// The fallback's tiles, with true for each that is stored; they are requested before all
     /// others.
     fallback: [Option<(TileKey, bool)>; PARTS],
-    asked: Vec<(TileKey, u32), IN_FLIGHT>,
+    pending: Vec<(TileKey, u32), IN_FLIGHT>,
     /// Tick of the last search for a request, and mean answer time in ticks.
     now: u32,
     answer_ticks: f32,
@@ -89,9 +90,9 @@ impl<const D: usize> TileRequester<D> {
         Self {
             level: 0,
             size: FieldSize::new(0, 0),
-            held: [[None; D]; D],
+            stored: [[None; D]; D],
             fallback: [None; PARTS],
-            asked: Vec::new(),
+            pending: Vec::new(),
             now: 0,
             answer_ticks: 0.0,
         }
@@ -105,21 +106,21 @@ impl<const D: usize> TileRequester<D> {
     }
 
     /// Sets the field's fallback, which is not stored yet, or none. Equally coarse fallbacks have
-    /// the same keys, so earlier requests must be discarded ([`Self::forget_asked`]).
-    pub fn lay(&mut self, fallback: Option<Fallback>) {
+    /// the same keys, so earlier requests must be discarded ([`Self::clear_pending`]).
+    pub fn set_fallback(&mut self, fallback: Option<Fallback>) {
         let keys = fallback.map_or([None; PARTS], |fallback| fallback.keys(self.level));
         self.fallback = keys.map(|key| key.map(|key| (key, false)));
     }
 
     /// Discards the open requests, for instance after the link was lost; stored tiles stay.
-    pub fn forget_asked(&mut self) {
-        self.asked.clear();
+    pub fn clear_pending(&mut self) {
+        self.pending.clear();
     }
 
     /// Makes the open requests `ticks` older, for a loop that runs no ticks while it waits for
     /// answers.
     pub fn age(&mut self, ticks: u32) {
-        for (_, at) in &mut self.asked {
+        for (_, at) in &mut self.pending {
             *at = at.wrapping_sub(ticks);
         }
     }
@@ -127,76 +128,76 @@ impl<const D: usize> TileRequester<D> {
     /// Returns the number of unanswered requests.
     #[must_use]
     pub fn in_flight(&self) -> usize {
-        self.asked.len()
+        self.pending.len()
     }
 
     /// Returns true if this tile was requested; any other answer is dropped.
     #[must_use]
-    pub fn awaits(&self, key: TileKey) -> bool {
-        self.asked.iter().any(|(asked, _)| *asked == key)
+    pub fn is_pending(&self, key: TileKey) -> bool {
+        self.pending.iter().any(|(pending, _)| *pending == key)
     }
 
     /// Records that the tile was handed to the window.
     pub fn received(&mut self, key: TileKey) {
-        if let Some((_, at)) = self.asked.iter().find(|(asked, _)| *asked == key) {
+        if let Some((_, at)) = self.pending.iter().find(|(pending, _)| *pending == key) {
             let ticks = self.now.wrapping_sub(*at).min(RETRY_TICKS) as f32;
             self.answer_ticks += (ticks - self.answer_ticks) * ANSWER_SHARE;
         }
-        self.asked.retain(|(asked, _)| *asked != key);
-        match self.part_is_held(key) {
-            Some(is_held) => *is_held = true,
+        self.pending.retain(|(pending, _)| *pending != key);
+        match self.fallback_flag_mut(key) {
+            Some(is_stored) => *is_stored = true,
             None => *self.slot(key) = Some(key),
         }
     }
 
     /// Records that the window has not kept the tile.
     pub fn lost(&mut self, key: TileKey) {
-        match self.part_is_held(key) {
-            Some(is_held) => *is_held = false,
-            None => drop(self.slot(key).take_if(|held| *held == key)),
+        match self.fallback_flag_mut(key) {
+            Some(is_stored) => *is_stored = false,
+            None => drop(self.slot(key).take_if(|stored| *stored == key)),
         }
     }
 
     /// Returns the flag of a fallback's tile: true if the tile is stored.
-    fn part_is_held(&mut self, key: TileKey) -> Option<&mut bool> {
+    fn fallback_flag_mut(&mut self, key: TileKey) -> Option<&mut bool> {
         let mut parts = self.fallback.iter_mut().flatten();
-        parts.find_map(|(part, is_held)| (*part == key).then_some(is_held))
+        parts.find_map(|(part, is_stored)| (*part == key).then_some(is_stored))
     }
 
     fn slot(&mut self, key: TileKey) -> &mut Option<TileKey> {
-        &mut self.held[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)]
+        &mut self.stored[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)]
     }
 
     /// Returns the next tile to request at tick `now`, most urgent first; `None` if no tile is
     /// needed or enough requests are open. Call until `None`.
-    pub fn next_request(&mut self, now: u32, demand: &RequestHint) -> Option<TileKey> {
-        if let Some(key) = self.next_repeat(now, demand) {
+    pub fn next_request(&mut self, now: u32, hint: &RequestHint) -> Option<TileKey> {
+        if let Some(key) = self.next_repeat(now, hint) {
             return Some(key);
         }
-        if self.asked.is_full() {
+        if self.pending.is_full() {
             return None;
         }
         let mut fallback = self.fallback.iter().flatten();
-        let key = match fallback.find(|(key, is_held)| !is_held && !self.awaits(*key)) {
+        let key = match fallback.find(|(key, is_stored)| !is_stored && !self.is_pending(*key)) {
             Some((key, _)) => *key,
-            None => self.most_urgent(demand)?,
+            None => self.most_urgent(hint)?,
         };
-        self.asked.push((key, now)).ok()?;
+        self.pending.push((key, now)).ok()?;
         Some(key)
     }
 
     /// Returns the next tile whose request is overdue and is repeated: for a device without room
     /// for more tiles.
     #[inline(never)]
-    pub fn next_repeat(&mut self, now: u32, demand: &RequestHint) -> Option<TileKey> {
+    pub fn next_repeat(&mut self, now: u32, hint: &RequestHint) -> Option<TileKey> {
         self.now = now;
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
-        let (level, centre) = (self.level, demand.centre());
-        let is_near = |key: &TileKey| key.level != level || Self::reaches(centre, key.index);
+        let (level, centre) = (self.level, hint.centre());
+        let is_near = |key: &TileKey| key.level != level || Self::is_in_reach(centre, key.index);
         // The proxy has moved on: an answer now would replace a nearer tile.
-        self.asked
+        self.pending
             .retain(|(key, at)| !is_overdue(at) || is_near(key));
-        let (key, at) = self.asked.iter_mut().find(|(_, at)| is_overdue(at))?;
+        let (key, at) = self.pending.iter_mut().find(|(_, at)| is_overdue(at))?;
         *at = now;
         Some(*key)
     }
@@ -206,8 +207,8 @@ impl<const D: usize> TileRequester<D> {
     ///
     /// Only tiles nearer to the centre than half the torus are candidates, so that none can replace
     /// a nearer tile.
-    fn most_urgent(&self, demand: &RequestHint) -> Option<TileKey> {
-        let centre = demand.centre();
+    fn most_urgent(&self, hint: &RequestHint) -> Option<TileKey> {
+        let centre = hint.centre();
         // Over a fallback no tick needs a tile that the HIP leaves before it arrives.
         let first = if self.fallback[0].is_some() {
             self.answer_ticks
@@ -216,15 +217,15 @@ impl<const D: usize> TileRequester<D> {
         };
         // The casts saturate, so any velocity gives a valid cell.
         let after = |from: Cell, ticks: f32| {
-            let [east, north] = demand.velocity.map(|v| (v * ticks) as i32);
+            let [east, north] = hint.velocity.map(|v| (v * ticks) as i32);
             from.offset(east, north)
         };
-        let ahead = (0..=LOOK_AHEAD).map(|step| {
-            let ticks = (step * HORIZON_TICKS / LOOK_AHEAD) as f32;
-            after(demand.hip, first + ticks)
+        let ahead = (0..=PATH_STEPS).map(|step| {
+            let ticks = (step * HORIZON_TICKS / PATH_STEPS) as f32;
+            after(hint.hip, first + ticks)
         });
-        let mut places = core::iter::once(after(demand.proxy, first)).chain(ahead);
-        let missing = demand.missing_tile;
+        let mut places = core::iter::once(after(hint.proxy, first)).chain(ahead);
+        let missing = hint.missing_tile;
         missing
             .and_then(|tile| self.candidate(tile, centre))
             .or_else(|| places.find_map(|cell| self.around(cell, centre)))
@@ -244,22 +245,23 @@ impl<const D: usize> TileRequester<D> {
             (-m, m),
             (m, m),
         ];
-        near.iter()
-            .find_map(|(dx, dy)| self.candidate(TileIndex::holding(cell.offset(*dx, *dy)), centre))
+        near.iter().find_map(|(dx, dy)| {
+            self.candidate(TileIndex::containing(cell.offset(*dx, *dy)), centre)
+        })
     }
 
     /// Returns the tile's key, unless it is outside, too far, stored or requested already.
     fn candidate(&self, index: TileIndex, centre: TileIndex) -> Option<TileKey> {
         let level = self.level;
         let key = TileKey { level, index };
-        let held = self.held[wrap::<D>(index.row)][wrap::<D>(index.col)] == Some(key);
-        let wanted = !held && !self.awaits(key) && Self::reaches(centre, index);
-        (wanted && self.size.has_tile(index)).then_some(key)
+        let is_stored = self.stored[wrap::<D>(index.row)][wrap::<D>(index.col)] == Some(key);
+        let is_needed = !is_stored && !self.is_pending(key) && Self::is_in_reach(centre, index);
+        (is_needed && self.size.has_tile(index)).then_some(key)
     }
 
     /// Returns true if a tile is nearer to the centre than half the torus: each of these tiles has
     /// its own slot.
-    fn reaches(centre: TileIndex, TileIndex { col, row }: TileIndex) -> bool {
+    fn is_in_reach(centre: TileIndex, TileIndex { col, row }: TileIndex) -> bool {
         let reach = (D as i32 - 1) / 2;
         col.abs_diff(centre.col).max(row.abs_diff(centre.row)) <= reach.unsigned_abs()
     }
@@ -271,8 +273,8 @@ mod tests {
     use crate::terrain::CoarseTile;
     use std::vec::Vec;
 
-    fn drain(requester: &mut TileRequester<4>, now: u32, demand: &RequestHint) -> Vec<(i32, i32)> {
-        core::iter::from_fn(|| requester.next_request(now, demand))
+    fn drain(requester: &mut TileRequester<4>, now: u32, hint: &RequestHint) -> Vec<(i32, i32)> {
+        core::iter::from_fn(|| requester.next_request(now, hint))
             .map(|k| (k.index.col, k.index.row))
             .collect()
     }
@@ -303,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_still_hand_wants_only_what_is_within_the_margin() {
+    fn still_hand_requests_only_tiles_within_the_margin() {
         let mut requester = requester();
         assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
         requester.received(TileKey::new(0, 1, 1));
@@ -315,7 +317,7 @@ mod tests {
     fn fallback_tiles_are_requested_first_and_once() {
         let mut requester = requester();
         let fallback = fallback(Some(2));
-        requester.lay(Some(fallback));
+        requester.set_fallback(Some(fallback));
         let near = fallback.near.expect("near").key(0);
         let key = fallback.wide.key(0);
         assert_eq!(requester.next_request(0, &at(48, 48)), Some(key));
@@ -324,13 +326,13 @@ mod tests {
         assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
         // The fallback is never too far away to be requested again.
         assert_eq!(drain(&mut requester, RETRY_TICKS, &at(400, 48)).len(), 2);
-        assert!(requester.awaits(key));
+        assert!(requester.is_pending(key));
         requester.received(key);
         assert_eq!(
             drain(&mut requester, 3 * RETRY_TICKS, &at(400, 48)),
             [(12, 1)]
         );
-        assert!(!requester.awaits(key));
+        assert!(!requester.is_pending(key));
         requester.received(TileKey::new(0, 12, 1));
         requester.lost(key);
         assert_eq!(
@@ -339,11 +341,11 @@ mod tests {
         );
         requester.received(key);
         // Another fallback with the same keys is requested anew.
-        requester.lay(Some(fallback));
+        requester.set_fallback(Some(fallback));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(near));
-        requester.lay(None);
-        requester.forget_asked();
+        requester.set_fallback(None);
+        requester.clear_pending();
         assert_eq!(drain(&mut requester, 0, &at(400, 48)), []);
     }
 
@@ -352,7 +354,7 @@ mod tests {
         for has_fallback in [false, true] {
             let mut requester = requester();
             if has_fallback {
-                requester.lay(Some(fallback(None)));
+                requester.set_fallback(Some(fallback(None)));
                 requester.received(fallback(None).wide.key(0));
             }
             // Answers take 60 ticks each.
@@ -364,11 +366,11 @@ mod tests {
                 }
             }
             // One cell a tick: in 60 ticks the HIP has moved two tiles on.
-            let demand = RequestHint {
+            let hint = RequestHint {
                 velocity: [1.0, 0.0],
                 ..at(16 * 32 + 16, 48)
             };
-            let first = drain(&mut requester, 4000, &demand);
+            let first = drain(&mut requester, 4000, &hint);
             assert_eq!(first.contains(&(16, 1)), !has_fallback, "{first:?}");
             // A HIP at rest is still there when the tile arrives.
             let first = drain(&mut requester, 4000, &at(16 * 32 + 16, 48));
@@ -379,38 +381,38 @@ mod tests {
     #[test]
     fn tile_that_blocks_the_proxy_is_requested_first() {
         let mut requester = requester();
-        let demand = RequestHint {
+        let hint = RequestHint {
             missing_tile: Some(TileIndex::new(9, 9)),
             ..at(48, 48)
         };
-        assert_eq!(drain(&mut requester, 0, &demand)[0], (9, 9));
+        assert_eq!(drain(&mut requester, 0, &hint)[0], (9, 9));
     }
 
     #[test]
-    fn a_moving_hand_wants_what_lies_ahead() {
+    fn moving_hand_requests_tiles_ahead() {
         let mut requester = requester();
-        let demand = RequestHint {
+        let hint = RequestHint {
             velocity: [0.3, 0.0],
             ..at(48, 48)
         };
-        assert_eq!(drain(&mut requester, 0, &demand), [(1, 1), (2, 1)]);
+        assert_eq!(drain(&mut requester, 0, &hint), [(1, 1), (2, 1)]);
     }
 
     #[test]
-    fn a_window_of_three_reaches_as_far_as_one_of_four() {
-        fn asked<const D: usize>() -> Vec<TileKey> {
+    fn windows_of_three_and_four_tiles_have_the_same_reach() {
+        fn requested<const D: usize>() -> Vec<TileKey> {
             let mut requester = TileRequester::<D>::new();
             requester.reset(0, FieldSize::new(640, 640));
-            let mut asked = Vec::new();
+            let mut requested = Vec::new();
             for (x, y) in [(33, 33), (62, 62), (62, 33), (33, 62), (300, 300), (33, 33)] {
                 while let Some(key) = requester.next_request(0, &at(x, y)) {
                     requester.received(key);
-                    asked.push(key);
+                    requested.push(key);
                 }
             }
-            asked
+            requested
         }
-        let (three, four) = (asked::<3>(), asked::<4>());
+        let (three, four) = (requested::<3>(), requested::<4>());
         let around: Vec<_> = three.iter().take(9).collect();
         assert!(four.iter().take(9).eq(around), "{three:?}");
         // The distant tile has replaced one of them, which is requested again.
@@ -436,7 +438,7 @@ mod tests {
         assert_eq!(drain(&mut requester, 0, &at(48, 48)), [(1, 1)]);
         let far = drain(&mut requester, RETRY_TICKS, &at(400, 48));
         assert_eq!(far, [(12, 1)]);
-        assert!(!requester.awaits(TileKey::new(0, 1, 1)));
+        assert!(!requester.is_pending(TileKey::new(0, 1, 1)));
         let back = drain(&mut requester, RETRY_TICKS + 1, &at(48, 48));
         assert_eq!(back, [(1, 1)]);
     }
@@ -455,12 +457,12 @@ mod tests {
     #[test]
     fn requests_stay_inside_the_field_and_within_the_limit() {
         let mut requester = requester();
-        let demand = RequestHint {
+        let hint = RequestHint {
             velocity: [-f32::MAX, f32::NAN],
             ..at(0, 0)
         };
-        let asked = drain(&mut requester, 0, &demand);
-        assert_eq!(asked, [(0, 0)]);
+        let requested = drain(&mut requester, 0, &hint);
+        assert_eq!(requested, [(0, 0)]);
         let corner = at(31, 31);
         assert!(drain(&mut requester, 0, &corner).len() <= IN_FLIGHT);
     }

@@ -3,7 +3,7 @@
 mod late_tiles;
 
 use super::extent::{CellBox, FieldSize};
-use super::fallback::Laid;
+use super::fallback::FallbackSlots;
 use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
 use super::tile::Tile;
@@ -64,7 +64,7 @@ impl Corners {
 ///
 /// // A tile comes in, and a buffer for the next one goes out.
 /// let mut spare = Tile::VACANT;
-/// let key = TileKey::holding(0, cell);
+/// let key = TileKey::containing(0, cell);
 /// spare.fill_from(key, 0, size, |_x, _y| 1.5).expect("base 0 is in range");
 /// assert_eq!(window.install(&mut spare).key(), None);
 /// let CellContent::Patch(corners) = window.ground(cell) else { panic!("a patch") };
@@ -86,7 +86,7 @@ pub struct Window<'t, const D: usize> {
     level: u8,
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
-    pub(super) fallback: Laid<'t>,
+    pub(super) fallback: FallbackSlots<'t>,
     pub(super) tile_blend: TileBlend<D>,
 }
 
@@ -95,33 +95,33 @@ impl<'t, const D: usize> Window<'t, D> {
     #[must_use]
     pub fn new(slots: [[&'t mut Tile; D]; D]) -> Self {
         let none = FieldSize::default();
-        let mut window = Self::holding(slots, none, i32::MIN);
+        let mut window = Self::filled(slots, none, i32::MIN);
         window.reset(0, none, i32::MIN);
         window
     }
 
     /// Creates a window over a field whose tiles are all in their slots.
-    pub(super) fn holding(slots: [[&'t mut Tile; D]; D], size: FieldSize, top: i32) -> Self {
+    pub(super) fn filled(slots: [[&'t mut Tile; D]; D], size: FieldSize, top: i32) -> Self {
         let mut window = Self {
             slots,
             pyramid: MaxPyramid::unknown(),
             level: 0,
             size,
             top,
-            fallback: Laid::NOTHING,
-            tile_blend: TileBlend::NOTHING,
+            fallback: FallbackSlots::EMPTY,
+            tile_blend: TileBlend::NONE,
         };
         for key in size.tiles() {
-            window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].become_surface();
-            if let Some(top) = window.held(key).map(Tile::top) {
-                window.renew_maxima(key, top);
+            window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].mark_as_surface();
+            if let Some(top) = window.surface_tile(key).map(Tile::top) {
+                window.update_maxima(key, top);
             }
         }
         window
     }
 
-    /// Discards every tile and sets a new field without fallback ([`Self::lay`]): its level, its
-    /// size, and an upper bound of its samples in whole cells.
+    /// Discards every tile and sets a new field without fallback ([`Self::set_fallback`]): its
+    /// level, its size, and an upper bound of its samples in whole cells.
     // Not inlined: the loop over the tiles would be unrolled in each caller.
     #[inline(never)]
     pub fn reset(&mut self, level: u8, size: FieldSize, top: i32) {
@@ -132,7 +132,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.level = level;
         self.size = size;
         self.top = top;
-        self.lay(None);
+        self.set_fallback(None);
     }
 
     /// Puts `tile` in its slot and returns the replaced buffer; returns `tile` itself if it is
@@ -147,8 +147,8 @@ impl<'t, const D: usize> Window<'t, D> {
         self.put(tile, false)
     }
 
-    /// [`Self::install`] for a tile that blends in from the fallback if `settles` is true.
-    pub(super) fn put(&mut self, tile: &'t mut Tile, settles: bool) -> &'t mut Tile {
+    /// [`Self::install`] for a tile that blends in from the fallback if `blends` is true.
+    pub(super) fn put(&mut self, tile: &'t mut Tile, blends: bool) -> &'t mut Tile {
         let Some(key) = tile.key().filter(|key| self.expects(*key)) else {
             return tile;
         };
@@ -159,8 +159,8 @@ impl<'t, const D: usize> Window<'t, D> {
         if was_here {
             spent.vacate();
         }
-        self.has_come(key.index, settles, was_here);
-        self.renew_maxima(key.index, top);
+        self.record_arrival(key.index, blends, was_here);
+        self.update_maxima(key.index, top);
         spent
     }
 
@@ -195,8 +195,8 @@ impl<'t, const D: usize> Window<'t, D> {
         if !self.has_cell(cell) {
             return CellContent::NoData;
         }
-        let Some(tile) = self.held(TileIndex::holding(cell)) else {
-            return self.unsettled_ground(cell);
+        let Some(tile) = self.surface_tile(TileIndex::containing(cell)) else {
+            return self.blended_ground(cell);
         };
         let heights = tile.corners(cell);
         let [sw, se, nw, ne] = heights;
@@ -216,8 +216,8 @@ impl<'t, const D: usize> Window<'t, D> {
         if !self.has_cell(cell) {
             return Some(Corners::NONE);
         }
-        let Some(tile) = self.held(TileIndex::holding(cell)) else {
-            return match self.unsettled_ground(cell) {
+        let Some(tile) = self.surface_tile(TileIndex::containing(cell)) else {
+            return match self.blended_ground(cell) {
                 CellContent::Patch(corners) => Some(corners),
                 CellContent::NoData => Some(Corners::NONE),
                 CellContent::Missing => None,
@@ -247,12 +247,12 @@ impl<'t, const D: usize> Window<'t, D> {
     #[inline]
     pub fn is_clear_nearby(&self, span: CellBox, low: Altitude) -> bool {
         let CellBox { from, to } = span;
-        let tile = TileIndex::holding(from);
+        let tile = TileIndex::containing(from);
         let small = (to.x - from.x) | (to.y - from.y) <= 1;
         small
-            && TileIndex::holding(to) == tile
+            && TileIndex::containing(to) == tile
             && self
-                .held(tile)
+                .surface_tile(tile)
                 .is_some_and(|tile| tile.is_below_around(from, to, low))
     }
 
@@ -286,9 +286,9 @@ impl<'t, const D: usize> Window<'t, D> {
         let up = TILE_SHIFT - shift;
         let first = Cell::new(col << shift, row << shift);
         let index = TileIndex::new(col >> up, row >> up);
-        match self.held(index) {
+        match self.surface_tile(index) {
             Some(tile) => tile.block_is_below(shift, first, low),
-            None => self.unsettled_is_below(index, low),
+            None => self.blended_is_below(index, low),
         }
     }
 
@@ -297,7 +297,7 @@ impl<'t, const D: usize> Window<'t, D> {
         if !self.size.has(col, row, TILE_SHIFT + level) {
             i32::MIN
         } else if self
-            .held(TileIndex::new(col << level, row << level))
+            .surface_tile(TileIndex::new(col << level, row << level))
             .is_some()
         {
             // A node is known only while all its tiles are stored, so its south-west tile
@@ -310,7 +310,7 @@ impl<'t, const D: usize> Window<'t, D> {
 
     // Not inlined: it has several callers.
     #[inline(never)]
-    pub(super) fn renew_maxima(&mut self, tile: TileIndex, top: i32) {
+    pub(super) fn update_maxima(&mut self, tile: TileIndex, top: i32) {
         self.pyramid.set(0, tile.col, tile.row, top);
         for level in 1..=MaxPyramid::<D>::HEIGHT {
             let (col, row) = (tile.col >> level, tile.row >> level);
@@ -324,7 +324,7 @@ impl<'t, const D: usize> Window<'t, D> {
 
     /// Returns the tile, if it is rendered unchanged.
     #[inline]
-    pub(super) fn held(&self, index: TileIndex) -> Option<&Tile> {
+    pub(super) fn surface_tile(&self, index: TileIndex) -> Option<&Tile> {
         let tile = &*self.slots[wrap::<D>(index.row)][wrap::<D>(index.col)];
         // `install` accepts tiles of the field's level only.
         tile.is_surface_of(index).then_some(tile)
@@ -351,10 +351,10 @@ mod tests {
     }
 
     #[test]
-    fn every_held_patch_reads_back_its_samples() {
+    fn stored_patches_read_back_their_samples() {
         let mut buffers = buffers::<4>();
-        let mut field = Field::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
-        field.hold_around(Cell::new(100, 70));
+        let mut field = Field::<4>::empty(&mut buffers, FieldSize::new(640, 640), rough);
+        field.fill_around(Cell::new(100, 70));
         for (x, y) in [(100, 70), (95, 63), (96, 64), (127, 95), (64, 32)] {
             let heights = [
                 rough(x, y),
@@ -374,21 +374,21 @@ mod tests {
     }
 
     #[test]
-    fn clear_means_clear_whatever_is_held() {
+    fn clear_boxes_are_clear_for_any_stored_tiles() {
         let mut buffers = buffers::<4>();
-        let mut field = Field::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
-        let mut seen = [0, 0];
+        let mut field = Field::<4>::empty(&mut buffers, FieldSize::new(640, 640), rough);
+        let mut counts = [0, 0];
         const EACH: u32 = cases(1, 8);
         for step in (0..4000_i32).step_by(EACH as usize) {
             if step % 97 == 0 {
-                field.hold_around(Cell::new((step * 5) % 640, (step * 11) % 640));
+                field.fill_around(Cell::new((step * 5) % 640, (step * 11) % 640));
             }
             let a = Cell::new((step * 7) % 640, (step * 13) % 640);
             let b = a.offset(step % 41 - 20, step * 3 % 57 - 28);
             let low = Altitude::new(step % 68, 0.5);
             let span = CellBox::around(a, b);
             let clear = field.window.is_clear(span, low);
-            seen[usize::from(clear)] += 1;
+            counts[usize::from(clear)] += 1;
             if clear {
                 for y in span.from.y.max(0)..=span.to.y.min(639) {
                     for x in span.from.x.max(0)..=span.to.x.min(639) {
@@ -398,22 +398,22 @@ mod tests {
             }
         }
         assert!(
-            seen[0] > 100 / EACH && seen[1] > cases(10, 0),
-            "both answers occur: {seen:?}"
+            counts[0] > 100 / EACH && counts[1] > cases(10, 0),
+            "both answers occur: {counts:?}"
         );
     }
 
     #[test]
     fn three_tile_window_reports_clear_boxes_correctly() {
         let mut buffers = buffers::<3>();
-        let mut field = Field::<3>::over(&mut buffers, FieldSize::new(640, 640), rough);
-        let mut seen = [0, 0];
+        let mut field = Field::<3>::empty(&mut buffers, FieldSize::new(640, 640), rough);
+        let mut counts = [0, 0];
         for step in 0..cases(4000, 500) as i32 {
             let a = Cell::new((step * 7) % 640, (step * 13) % 640);
             if step % 3 == 0 {
-                let key = TileKey::holding(0, a.offset(step % 65 - 32, step % 33));
+                let key = TileKey::containing(0, a.offset(step % 65 - 32, step % 33));
                 if field.window.expects(key) && field.window.occupant(key) != Some(key) {
-                    field.give_back(key);
+                    field.reinstall(key);
                 }
             }
             // Also over all three tiles.
@@ -424,7 +424,7 @@ mod tests {
             let low = Altitude::new(step % 80, 0.5);
             let span = CellBox::around(a, b);
             let clear = field.window.is_clear(span, low);
-            seen[usize::from(clear)] += 1;
+            counts[usize::from(clear)] += 1;
             if clear {
                 for y in span.from.y.max(0)..=span.to.y.min(639) {
                     for x in span.from.x.max(0)..=span.to.x.min(639) {
@@ -434,16 +434,16 @@ mod tests {
             }
         }
         assert!(
-            seen[0] > 100 && seen[1] > 20,
-            "both answers occur: {seen:?}"
+            counts[0] > 100 && counts[1] > 20,
+            "both answers occur: {counts:?}"
         );
     }
 
     #[test]
-    fn a_held_window_answers_for_long_boxes() {
+    fn full_window_decides_for_large_boxes() {
         let mut buffers = buffers::<8>();
-        let mut field = Field::<8>::over(&mut buffers, FieldSize::new(256, 256), |_, _| 3.0);
-        field.hold_around(Cell::new(128, 128));
+        let mut field = Field::<8>::empty(&mut buffers, FieldSize::new(256, 256), |_, _| 3.0);
+        field.fill_around(Cell::new(128, 128));
         let whole = CellBox::around(Cell::new(0, 0), Cell::new(255, 255));
         // The field's own bound is higher, so the pyramid has to answer.
         assert!(field.window.is_clear(whole, Altitude::new(4, 0.0)));
@@ -451,11 +451,11 @@ mod tests {
     }
 
     #[test]
-    fn an_installed_tile_gives_its_predecessor_back() {
+    fn install_returns_the_replaced_tile() {
         let mut buffers = buffers::<4>();
-        let mut field = Field::<4>::over(&mut buffers, FieldSize::new(640, 640), rough);
-        field.hold_around(Cell::new(20, 20));
-        let old = TileKey::holding(0, Cell::new(20, 20));
+        let mut field = Field::<4>::empty(&mut buffers, FieldSize::new(640, 640), rough);
+        field.fill_around(Cell::new(20, 20));
+        let old = TileKey::containing(0, Cell::new(20, 20));
         let new = TileKey::new(0, 4, old.index.row);
         assert_eq!(field.window.occupant(new), Some(old));
         assert_eq!(field.install(new).key(), Some(old));

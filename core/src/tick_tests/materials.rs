@@ -52,7 +52,7 @@ impl<'t> Ground<'t> {
         };
         scene.params.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
         scene.params.shading = shading;
-        haptics.take_materials(&table);
+        haptics.set_materials(&table);
         assert!(matches!(haptics.accept(Command::Scene(scene)), Ok(None)));
         assert!(haptics.scene.is_some(), "taken");
         let mut ground = Self {
@@ -94,7 +94,7 @@ impl<'t> Ground<'t> {
         for _ in 0..200 {
             self.ticks += 1;
             let outcome = self.haptics.tick(&GuardInputs::default(), true);
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 return outcome.sample;
             }
             if let Some(TileIndex { col, .. }) = outcome.sample.missing_tile {
@@ -152,12 +152,9 @@ fn stiffness_is_continuous_across_border_midway_between_samples() {
         assert_eq!(forces[49].z, from * depth, "{step}: before {border}");
         assert!(forces[51].z > from * depth, "{step}: {}", forces[51]);
         assert_eq!(forces[51 + CHANGE as usize].z, to * depth, "{step}");
-        let most = (to - from) * depth / CHANGE as f32;
+        let max = (to - from) * depth / CHANGE as f32;
         let largest = max_step(&forces);
-        assert!(
-            largest < 1.001 * most,
-            "{step}: {largest} N, {most} at most"
-        );
+        assert!(largest < 1.001 * max, "{step}: {largest} N, {max} at most");
     }
 }
 
@@ -188,9 +185,9 @@ fn friction_blends_evenly_and_stuck_proxy_keeps_its_material() {
     let (held, pressed) = (-forces[399].x, forces[399].z);
     assert!((held / pressed - 0.8).abs() < 1e-3, "{held} {pressed}");
     // The maximum is the change of friction in a tick plus a hand's motion of 0.02 in a tick.
-    let most = 0.4 * (depth * 0.8 / CHANGE as f32 + 0.02);
+    let max = 0.4 * (depth * 0.8 / CHANGE as f32 + 0.02);
     let largest = max_step(&forces[1..]);
-    assert!(largest < 1.01 * most, "{largest} N, {most} at most");
+    assert!(largest < 1.01 * max, "{largest} N, {max} at most");
 
     // The proxy sticks east of the border while the HIP moves over it: the proxy's material counts.
     let mut tiles = self::tiles();
@@ -240,27 +237,27 @@ fn texture_fades_out_before_the_next_fades_in() {
         let goes_out = !table[0].texture.is_none();
         assert!(!goes_out || between < 4e-3, "{table:?}: {between}");
         for (material, rendered) in table.iter().zip([before, after]) {
-            let wanted = if material.texture.is_none() {
+            let expected = if material.texture.is_none() {
                 0.0
             } else {
                 0.04
             };
-            let least = if wanted > 0.0 { 0.2 } else { 0.0 };
+            let min = if expected > 0.0 { 0.2 } else { 0.0 };
             assert!(
-                rendered >= least * wanted && rendered < 1.01 * wanted + 1e-6,
+                rendered >= min * expected && rendered < 1.01 * expected + 1e-6,
                 "{rendered}"
             );
         }
         // No more than the wave itself: 2π A / λ times the stiffness and the path.
-        let most = 0.4 * 0.02 * core::f32::consts::TAU * 0.1 * 2.0 + 0.04 / 25.0;
+        let max = 0.4 * 0.02 * core::f32::consts::TAU * 0.1 * 2.0 + 0.04 / 25.0;
         let largest = max_step(&forces[100..]);
-        assert!(largest < most, "{table:?}: {largest} of {most}");
+        assert!(largest < max, "{table:?}: {largest} of {max}");
         assert!(forces.iter().all(|force| force.z >= 0.0), "it pulls");
     }
 }
 
 #[test]
-fn damping_is_that_of_the_material() {
+fn damping_follows_the_material() {
     let damped = Material {
         damping_ns_per_m: 10.0,
         ..SOFT
@@ -272,10 +269,10 @@ fn damping_is_that_of_the_material() {
         ground.at([x, 0.5, -3.0], 0);
         // A cell of a millimetre in a tick of a millisecond, and a tenth of it.
         let rendered = ground.at([x, 0.5, -3.1], 0).force_n.z;
-        let wanted = 0.4 * 3.1 + 1e-3 * ns_per_m * 100.0;
+        let expected = 0.4 * 3.1 + 1e-3 * ns_per_m * 100.0;
         assert!(
-            (rendered - wanted).abs() < 1e-3,
-            "{x}: {rendered}, not {wanted}"
+            (rendered - expected).abs() < 1e-3,
+            "{x}: {rendered}, not {expected}"
         );
     }
 }
@@ -291,8 +288,8 @@ fn rendered(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) 
     let mut tiles = tiles();
     let mut ground = Ground::of(&mut tiles, &[SOFT, rough], border, shading);
     ground.at([29.0, 0.5, 1.0], 0);
-    let way = steps(29.0, 0.02, 300);
-    let rendered = way.map(|x| {
+    let path = steps(29.0, 0.02, 300);
+    let rendered = path.map(|x| {
         let mut sample = ground.at([x, 0.5, -1.5], late);
         // The tick number and the cost of a sample are not part of the force.
         (sample.tick, sample.work, sample.missing_tile) = (0, 0, None);
@@ -302,7 +299,7 @@ fn rendered(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) 
 }
 
 #[test]
-fn a_tick_that_is_repeated_for_a_tile_leaves_no_trace() {
+fn repeated_tick_gives_the_same_record() {
     for border in [31, 32, 33] {
         for shading in [Shading::None, Shading::Smooth] {
             let (early, ticks) = rendered(0, border, shading);
@@ -328,8 +325,8 @@ fn replayed<'t, const D: usize>(
     };
     scene.params.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
     scene.params.shading = Shading::Smooth;
-    device.haptics.take_materials(&table);
-    device.say(Command::Scene(scene));
+    device.haptics.set_materials(&table);
+    device.send(Command::Scene(scene));
     device.requester.reset(0, scene.size);
     device.material = material;
     device
@@ -358,7 +355,7 @@ fn tile_without_materials_keeps_previous_material() {
 }
 
 #[test]
-fn small_tile_windows_render_the_same_bits_as_a_large_one() {
+fn small_windows_render_the_same_bits_as_a_large_one() {
     fn rendered<const D: usize>() -> Vec<(GridPoint, Vec3)> {
         let rough = Material {
             friction: Friction::coulomb(0.4),
@@ -377,7 +374,7 @@ fn small_tile_windows_render_the_same_bits_as_a_large_one() {
         let patches = |_: TileKey, [x, y]: [i32; 2]| Some(((x / 6 + y / 4) % 4) as u8);
         let table = [SOFT, rough, damped, HARD];
         let mut device = replayed::<D>(&mut tiles, &table, hills, patches);
-        let mut way = (0..cases(3_000, 40)).map(|i| {
+        let mut path = (0..cases(3_000, 40)).map(|i| {
             let (t, down) = (f64::from(i), i % 500 > 3);
             let x = 300.0 + 40.0 * libm::sin(t * 0.011) + 20.0 * libm::sin(t * 0.0017);
             let y = 310.0 + 35.0 * libm::cos(t * 0.007);
@@ -388,7 +385,7 @@ fn small_tile_windows_render_the_same_bits_as_a_large_one() {
             let sample = device.step(i, GridPoint::new([x, y, z], Vec3::new(u, v, w)));
             (sample.proxy, sample.force_n)
         });
-        way.by_ref().collect()
+        path.by_ref().collect()
     }
     let large = rendered::<8>();
     assert!(
@@ -404,7 +401,7 @@ fn small_tile_windows_render_the_same_bits_as_a_large_one() {
 }
 
 #[test]
-fn a_scene_whose_table_is_not_here_is_refused() {
+fn scene_without_its_material_table_is_refused() {
     let mut tiles = tiles();
     let mut ground = Ground::of(&mut tiles, &[SOFT, HARD], 20, Shading::None);
     let before = ground.haptics.scene;
@@ -419,7 +416,7 @@ fn a_scene_whose_table_is_not_here_is_refused() {
         Some(RefusedScene)
     );
     assert_eq!(ground.haptics.scene, None);
-    ground.haptics.take_materials(&other);
+    ground.haptics.set_materials(&other);
     assert!(matches!(
         ground.haptics.accept(Command::Scene(scene)),
         Ok(None)
@@ -442,7 +439,7 @@ fn a_scene_whose_table_is_not_here_is_refused() {
     ] {
         let broken = MaterialTable::new(&[broken]).expect("one");
         assert!(!broken.is_valid());
-        ground.haptics.take_materials(&broken);
+        ground.haptics.set_materials(&broken);
         let scene = Scene {
             materials: Some(broken.check_sum()),
             ..scene

@@ -52,7 +52,7 @@ fn rendered(late: u32) -> (Vec<Vec3>, u32) {
         loop {
             ticks += 1;
             let outcome = haptics.tick(&GuardInputs::default(), true);
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 forces.push(outcome.sample.force_n);
                 break;
             }
@@ -69,7 +69,7 @@ fn rendered(late: u32) -> (Vec<Vec3>, u32) {
 }
 
 #[test]
-fn a_tile_that_is_waited_for_leaves_no_trace_in_the_texture() {
+fn late_tile_does_not_change_textured_forces() {
     let (early, ticks) = rendered(0);
     let (late, more) = rendered(20);
     assert_eq!(more, ticks + 20);

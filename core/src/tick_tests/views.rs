@@ -1,7 +1,7 @@
 //! The clutch, and changes of the placement while it is open.
 
 use super::*;
-use crate::clutch::ClutchHold::{self, InPlace, LetGo, WithHand};
+use crate::clutch::ClutchMode::{self, InPlace, Released, WithHand};
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scene::SceneChange;
 
@@ -14,21 +14,25 @@ const GENTLE_N: f32 = 0.0851;
 const DEEP: [i32; 3] = [0, -170, 0];
 
 /// A monitor of every tick: the arm stays armed, and the force makes no step.
-struct Watched<'t> {
+struct MonitoredArm<'t> {
     device: Device<'t, 4>,
     last: Outcome,
     counts: [i32; 3],
     max_n: f32,
 }
 
-impl<'t> Watched<'t> {
+impl<'t> MonitoredArm<'t> {
     /// An armed arm, pressed into the ground.
     fn pressed(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
         let mut device = Device::<4>::armed(tiles, height);
         let deeper = (0..-DEEP[1]).map(|n| [0, -n, 0]);
-        let way = (0..=420).map(|n| [0, n, 0]);
+        let path = (0..=420).map(|n| [0, n, 0]);
         let back = (0..=420).map(|n| [0, 420 - n, 0]);
-        let last = way.chain(back).chain(deeper).map(|c| device.tick(c)).last();
+        let last = path
+            .chain(back)
+            .chain(deeper)
+            .map(|c| device.tick(c))
+            .last();
         Self {
             device,
             last: last.expect("ticks"),
@@ -52,8 +56,8 @@ impl<'t> Watched<'t> {
         (0..count).fold(self.last.sample, |_, _| self.tick())
     }
 
-    fn clutch(&mut self, hold: ClutchHold) {
-        self.device.say(Command::Clutch(hold));
+    fn clutch(&mut self, hold: ClutchMode) {
+        self.device.send(Command::Clutch(hold));
     }
 
     /// Applies a new placement, with these heights.
@@ -64,7 +68,7 @@ impl<'t> Watched<'t> {
         if !view.keeps_tiles {
             self.device.requester.reset(scene.level, scene.size);
         }
-        self.device.say(Command::SceneChange(view));
+        self.device.send(Command::SceneChange(view));
     }
 
     fn depth_mm(&self, cell_mm: f32) -> f32 {
@@ -105,9 +109,9 @@ fn halved(point: GridPoint) -> GridPoint {
 }
 
 #[test]
-fn held_clutch_has_no_force_and_carries_the_terrain() {
+fn held_clutch_has_no_force_and_shifts_the_terrain() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, plane);
+    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
     let rendered = arm.tick();
     assert!(rendered.force_n.z > 2.0, "{}", rendered.force_n);
     arm.clutch(WithHand);
@@ -122,9 +126,9 @@ fn held_clutch_has_no_force_and_carries_the_terrain() {
         arm.counts = [n, DEEP[1] + 2 * n, -n];
         assert!(arm.tick().hip.is_same(&open.hip));
     }
-    let home = |arm: &Watched<'_>| arm.device.haptics.scene.expect("a scene").home;
+    let home = |arm: &MonitoredArm<'_>| arm.device.haptics.scene.expect("a scene").home;
     let before = home(&arm);
-    arm.clutch(LetGo);
+    arm.clutch(Released);
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
     assert!(open.hip.to(&back.hip).length() < 1e-4, "{:?}", back.hip);
@@ -138,7 +142,7 @@ fn held_clutch_has_no_force_and_carries_the_terrain() {
 }
 
 /// Moves the arm there, with `counts` in each tick.
-fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
+fn move_to(arm: &mut MonitoredArm<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
     let from = arm.counts;
     for n in 1..=ticks {
         arm.counts = [0, 1, 2].map(|axis| from[axis] + (counts[axis] - from[axis]) * n / ticks);
@@ -150,20 +154,20 @@ fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
 #[test]
 fn terrain_stays_while_held_for_another_placement() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, plane);
+    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
     let rendered = arm.tick();
     arm.clutch(InPlace);
     let open = arm.ticks(105);
     // The hand yields by some 2 mm, and then moves 3 mm to the side.
-    go(&mut arm, [60, DEEP[1] - 70, 0], 100);
+    move_to(&mut arm, [60, DEEP[1] - 70, 0], 100);
     assert!(arm.last.sample.hip.is_same(&open.hip));
     // The same ground, twice as large.
-    let mut wanted = view(1, 0, open.hip);
-    wanted.scene.cell_mm = 2.0;
-    wanted.keeps_tiles = true;
-    arm.put(wanted, plane);
+    let mut change = view(1, 0, open.hip);
+    change.scene.cell_mm = 2.0;
+    change.keeps_tiles = true;
+    arm.put(change, plane);
     arm.ticks(20);
-    arm.clutch(LetGo);
+    arm.clutch(Released);
     let deeper = arm.ticks(510);
     assert_eq!(deeper.limits, Limits::empty());
     assert!(
@@ -172,7 +176,7 @@ fn terrain_stays_while_held_for_another_placement() {
         deeper.force_n
     );
     // The arm is pushed back to its earlier place.
-    let back = go(&mut arm, DEEP, 300);
+    let back = move_to(&mut arm, DEEP, 300);
     let change = back.force_n - rendered.force_n;
     assert!(
         change.length() < 2e-3,
@@ -183,43 +187,43 @@ fn terrain_stays_while_held_for_another_placement() {
 }
 
 #[test]
-fn far_hand_motion_carries_terrain_with_clutch_in_place() {
+fn far_hand_motion_shifts_terrain_in_place_mode() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, plane);
-    let home = |arm: &Watched<'_>| arm.device.haptics.scene.expect("a scene").home;
+    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
+    let home = |arm: &MonitoredArm<'_>| arm.device.haptics.scene.expect("a scene").home;
     let before = home(&arm);
     let hip = arm.tick().hip;
     arm.clutch(InPlace);
     arm.ticks(105);
-    go(&mut arm, [0, DEEP[1] + 1_000, 0], 500);
-    arm.clutch(LetGo);
+    move_to(&mut arm, [0, DEEP[1] + 1_000, 0], 500);
+    arm.clutch(Released);
     let back = arm.ticks(510);
     // Cells are millimetres here.
-    let kept = hip.to(&back.hip).length();
-    assert!((kept - 10.0).abs() < 0.01, "{kept} mm");
+    let moved = hip.to(&back.hip).length();
+    assert!((moved - 10.0).abs() < 0.01, "{moved} mm");
     let along = before.to(&home(&arm)).length();
     assert!(along > 15.0, "{along} mm");
 }
 
 #[test]
-fn one_with_hand_hold_carries_terrain_until_clutch_closes() {
+fn with_hand_mode_shifts_terrain_until_clutch_closes() {
     let mut tiles = buffers::<4>();
     for holds in [[InPlace, WithHand, InPlace], [WithHand, InPlace, InPlace]] {
-        let mut arm = Watched::pressed(&mut tiles, plane);
+        let mut arm = MonitoredArm::pressed(&mut tiles, plane);
         let hip = arm.tick().hip;
         for hold in holds {
             arm.clutch(hold);
             arm.ticks(60);
         }
-        go(&mut arm, [0, DEEP[1] + 100, 0], 50);
-        arm.clutch(LetGo);
+        move_to(&mut arm, [0, DEEP[1] + 100, 0], 50);
+        arm.clutch(Released);
         let back = arm.ticks(510).hip;
         assert!(hip.to(&back).length() < 1e-3, "{holds:?}: {back:?}");
         // The next time starts from zero.
         arm.clutch(InPlace);
         arm.ticks(110);
-        go(&mut arm, [0, DEEP[1] + 60, 0], 50);
-        arm.clutch(LetGo);
+        move_to(&mut arm, [0, DEEP[1] + 60, 0], 50);
+        arm.clutch(Released);
         let moved = hip.to(&arm.ticks(510).hip).length();
         assert!(moved > 1.0, "{moved} mm");
     }
@@ -228,25 +232,25 @@ fn one_with_hand_hold_carries_terrain_until_clutch_closes() {
 #[test]
 fn clutch_stays_open_until_board_input_and_host_release_it() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, plane);
+    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
     let rendered = arm.tick();
-    arm.device.say(Command::ClutchInput(true));
+    arm.device.send(Command::ClutchInput(true));
     let open = arm.ticks(105);
     let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
     assert_eq!((open.limits, open.force_n), (limits, Vec3::ZERO));
     // The terrain follows the hand, even if the host requests otherwise.
     arm.clutch(InPlace);
-    go(&mut arm, [0, DEEP[1] + 100, 0], 50);
-    arm.clutch(LetGo);
+    move_to(&mut arm, [0, DEEP[1] + 100, 0], 50);
+    arm.clutch(Released);
     assert_eq!(arm.ticks(50).limits, limits);
     arm.clutch(InPlace);
-    arm.device.say(Command::ClutchInput(false));
+    arm.device.send(Command::ClutchInput(false));
     assert_eq!(
         arm.ticks(50).limits,
         Limits::CLUTCH_OPEN,
         "the host holds it"
     );
-    arm.clutch(LetGo);
+    arm.clutch(Released);
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
     assert!((back.force_n - rendered.force_n).length() < 1e-3);
@@ -256,22 +260,22 @@ fn clutch_stays_open_until_board_input_and_host_release_it() {
 fn held_clutch_input_opens_next_scene_but_no_replay() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
-    device.say(Command::ClutchInput(true));
+    device.send(Command::ClutchInput(true));
     let mut points = scene(Source::Points);
     points.epoch = 7;
     device.requester.reset(0, points.size);
-    device.say(Command::Scene(points));
+    device.send(Command::Scene(points));
     let at = |z| GridPoint::new([320, 320, 0], Vec3::new(0.5, 0.5, z));
     assert_eq!(device.step(0, at(9.0)).limits, Limits::empty());
     let again = scene(Source::Encoders);
     device.requester.reset(0, again.size);
-    device.say(Command::Scene(again));
+    device.send(Command::Scene(again));
     let mut limits = Limits::empty();
     for _ in 0..110 {
         limits = device.tick([0; 3]).sample.limits;
     }
     assert_eq!(limits, Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT);
-    device.say(Command::ClutchInput(false));
+    device.send(Command::ClutchInput(false));
     for _ in 0..510 {
         limits = device.tick([0; 3]).sample.limits;
     }
@@ -281,15 +285,15 @@ fn held_clutch_input_opens_next_scene_but_no_replay() {
 #[test]
 fn clutch_released_early_opens_fully_then_closes() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, plane);
+    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
     arm.clutch(WithHand);
     arm.ticks(20);
-    arm.clutch(LetGo);
-    let mut least = f32::MAX;
+    arm.clutch(Released);
+    let mut min = f32::MAX;
     for _ in 0..620 {
-        least = least.min(arm.tick().force_n.z);
+        min = min.min(arm.tick().force_n.z);
     }
-    assert_eq!(least, 0.0);
+    assert_eq!(min, 0.0);
     let limits = arm.tick().limits;
     assert_eq!(limits, Limits::empty(), "and closes again");
     assert!(arm.last.sample.force_n.z > 2.0);
@@ -298,7 +302,7 @@ fn clutch_released_early_opens_fully_then_closes() {
 #[test]
 fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
     arm.clutch(WithHand);
     arm.ticks(110);
     let depth = arm.depth_mm(1.0);
@@ -315,7 +319,7 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     assert_eq!((sample.view, sample.state), (1, ContactState::Touching));
     assert_eq!(sample.force_n, Vec3::ZERO, "not before it is let go");
     assert!(sample.tick > ticks_before, "ticks go on");
-    arm.clutch(LetGo);
+    arm.clutch(Released);
     arm.ticks(510);
     let now = arm.depth_mm(1.0);
     assert!(now <= depth + 1e-3 && now > 0.5 * depth, "{now} of {depth}");
@@ -326,8 +330,8 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
 #[test]
 fn placement_sets_the_position_of_a_free_hip() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, gentle);
-    go(&mut arm, [0, 420, 0], 600);
+    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
+    move_to(&mut arm, [0, 420, 0], 600);
     assert_eq!(arm.tick().state, ContactState::Free);
     arm.clutch(InPlace);
     arm.ticks(110);
@@ -335,7 +339,7 @@ fn placement_sets_the_position_of_a_free_hip() {
     let there = GridPoint::new([x + 20, y - 9, z + 3], Vec3::splat(0.25));
     arm.put(view(1, 0, there), gentle);
     assert!(arm.ticks(40).hip.is_same(&there));
-    arm.clutch(LetGo);
+    arm.clutch(Released);
     let closed = arm.ticks(510);
     assert!(closed.hip.to(&there).length() < 1e-3, "{:?}", closed.hip);
     assert_eq!(
@@ -345,20 +349,20 @@ fn placement_sets_the_position_of_a_free_hip() {
 }
 
 #[test]
-fn eight_views_one_after_the_other_make_no_step() {
+fn eight_placements_in_a_row_make_no_force_step() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
     for number in 1..=8 {
         arm.clutch(WithHand);
         arm.ticks(101);
         let hip = arm.last.sample.hip;
-        let mut wanted = view(number, 0, hip);
+        let mut change = view(number, 0, hip);
         // Twice as large in the hand: the same tiles, in cells.
-        wanted.scene.cell_mm = f32::from(1u16 << number);
-        wanted.keeps_tiles = true;
+        change.scene.cell_mm = f32::from(1u16 << number);
+        change.keeps_tiles = true;
         let served = arm.device.served;
-        arm.put(wanted, gentle);
-        arm.clutch(LetGo);
+        arm.put(change, gentle);
+        arm.clutch(Released);
         arm.ticks(550);
         assert!(arm.device.served - served < 5, "its tiles stay");
         assert_eq!(arm.last.sample.view, number);
@@ -369,13 +373,13 @@ fn eight_views_one_after_the_other_make_no_step() {
 #[test]
 fn clutch_stays_open_until_a_placement_has_its_tiles() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
     arm.clutch(WithHand);
     arm.ticks(110);
-    let wanted = view(1, 1, halved(arm.last.sample.hip));
-    arm.device.say(Command::SceneChange(wanted));
-    arm.clutch(LetGo);
-    let outcome = |arm: &mut Watched<'_>| {
+    let change = view(1, 1, halved(arm.last.sample.hip));
+    arm.device.send(Command::SceneChange(change));
+    arm.clutch(Released);
+    let outcome = |arm: &mut MonitoredArm<'_>| {
         let sense = GuardInputs {
             counts: DEEP,
             dead_man: true,
@@ -390,8 +394,8 @@ fn clutch_stays_open_until_a_placement_has_its_tiles() {
         assert!(now.sample.missing_tile.is_some());
         assert!(now.sample.limits.contains(Limits::CLUTCH_OPEN));
     }
-    arm.device.requester.reset(1, wanted.scene.size);
-    (arm.device.height, arm.device.size) = (coarse, wanted.scene.size);
+    arm.device.requester.reset(1, change.scene.size);
+    (arm.device.height, arm.device.size) = (coarse, change.scene.size);
     arm.last = outcome(&mut arm);
     arm.ticks(560);
     assert!(arm.last.sample.force_n.length() > 1.0);
@@ -400,10 +404,10 @@ fn clutch_stays_open_until_a_placement_has_its_tiles() {
 #[test]
 fn placement_during_contact_disarms_as_another_scene_does() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
     let before = arm.last.sample.force_n;
-    let wanted = view(1, 0, arm.last.sample.hip);
-    arm.device.say(Command::SceneChange(wanted));
+    let change = view(1, 0, arm.last.sample.hip);
+    arm.device.send(Command::SceneChange(change));
     let now = arm.device.tick(DEEP);
     assert_eq!(now.sample.mode, Mode::Fading);
     assert!((now.sample.force_n - before).length() < 0.1);
@@ -412,54 +416,54 @@ fn placement_during_contact_disarms_as_another_scene_does() {
 #[test]
 fn force_rise_rate_stays_bounded_under_random_commands() {
     let mut tiles = buffers::<4>();
-    let mut arm = Watched::pressed(&mut tiles, gentle);
+    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
     let mut rng = 12_345_u32;
-    let mut given_n = 0.0;
+    let mut rise_n = 0.0;
     for tick in 0..cases(20_000, 2_000) {
         rng = rng.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let dice = rng >> 24;
         match dice {
             0..32 => arm.clutch(WithHand),
             32..64 => arm.clutch(InPlace),
-            64..150 => arm.clutch(LetGo),
-            150..155 => arm.device.say(Command::ClutchInput(true)),
-            155..160 => arm.device.say(Command::ClutchInput(false)),
+            64..150 => arm.clutch(Released),
+            150..155 => arm.device.send(Command::ClutchInput(true)),
+            155..160 => arm.device.send(Command::ClutchInput(false)),
             160..200 if arm.last.sample.limits.contains(Limits::CLUTCH_OPEN) => {
-                let mut wanted = view(tick as u8, 0, arm.last.sample.hip);
-                wanted.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];
-                wanted.keeps_tiles = dice.is_multiple_of(2);
-                arm.put(wanted, gentle);
+                let mut change = view(tick as u8, 0, arm.last.sample.hip);
+                change.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];
+                change.keeps_tiles = dice.is_multiple_of(2);
+                arm.put(change, gentle);
             }
             _ => {}
         }
         let before = arm.last.sample.force_n.length();
         let after = arm.tick().force_n.length();
-        given_n += (after - before).max(0.0);
+        rise_n += (after - before).max(0.0);
     }
     // The full force returns no faster than once in 0.5 s.
-    let most = 7.65 * cases(20_000, 2_000) as f32 / 500.0;
-    assert!(given_n <= most, "{given_n} N came in, {most} at most");
+    let max = 7.65 * cases(20_000, 2_000) as f32 / 500.0;
+    assert!(rise_n <= max, "{rise_n} N came in, {max} at most");
 }
 
 #[test]
-fn the_ground_is_not_armed_into_by_holding_the_clutch() {
+fn held_clutch_does_not_allow_arming_inside_the_ground() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
-    device.say(Command::Zero([0; 3]));
+    device.send(Command::Zero([0; 3]));
     let deeper = (0..60).map(|n| [0, -n, 0]);
     let last = dip().chain(deeper).map(|c| device.tick(c)).last();
     assert_eq!(last.expect("ticks").sample.state, ContactState::Touching);
-    device.say(Command::Clutch(WithHand));
+    device.send(Command::Clutch(WithHand));
     for _ in 0..110 {
         let _ = device.tick([0, -60, 0]);
     }
-    device.say(Command::Arm);
+    device.send(Command::Arm);
     let open = device.tick([0, -60, 0]).sample.limits;
     assert!(open.contains(Limits::CLUTCH_OPEN));
     device.dead_man = true;
     for _ in 0..500 {
         let sample = device.tick([0, -60, 0]).sample;
-        assert!(!sample.mode.drives());
+        assert!(!sample.mode.is_driving());
     }
     let blockers = device.haptics.report().blockers;
     assert!(blockers.contains(Blockers::FORCE_TOO_LARGE));
@@ -474,21 +478,21 @@ fn point_replay_continues_after_a_scene_change() {
     assert_eq!(device.step(0, at(9.0)).state, ContactState::Free);
     let before = device.step(1, at(2.0));
     assert_eq!(before.state, ContactState::Touching);
-    let wanted = SceneChange {
+    let change = SceneChange {
         scene: Scene {
             source: Source::Points,
             ..view(1, 1, at(0.0)).scene
         },
         ..view(1, 1, halved(at(2.0)))
     };
-    device.requester.reset(1, wanted.scene.size);
-    (device.height, device.size) = (coarse, wanted.scene.size);
-    device.say(Command::SceneChange(wanted));
-    let after = device.step(2, wanted.hip);
+    device.requester.reset(1, change.scene.size);
+    (device.height, device.size) = (coarse, change.scene.size);
+    device.send(Command::SceneChange(change));
+    let after = device.step(2, change.hip);
     assert_eq!((after.state, after.view), (ContactState::Touching, 1));
     // The same as on an arm.
     assert!(after.force_n.length() < 0.1 * before.force_n.length());
-    let after = (3..40).map(|seq| device.step(seq, wanted.hip)).last();
+    let after = (3..40).map(|seq| device.step(seq, change.hip)).last();
     let after = after.expect("points");
     assert!(after.force_n.length() > 0.5, "{}", after.force_n);
 }

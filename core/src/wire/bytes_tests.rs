@@ -11,7 +11,7 @@ use super::materials::{MAX_TABLE_BYTES, MaterialTile, TileMaterials, table_bytes
 use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
-use crate::clutch::ClutchHold;
+use crate::clutch::ClutchMode;
 use crate::contact::{ContactState, Friction};
 use crate::force::{
     Controller, Damping, Material, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
@@ -44,7 +44,7 @@ const FALLBACK: Fallback = Fallback {
 };
 
 #[test]
-fn a_scene() {
+fn scene_bytes() {
     let scene = Scene {
         epoch: 300,
         level: 2,
@@ -72,7 +72,7 @@ fn a_scene() {
         hold_clock: true,
         materials: Some(300),
     };
-    let wanted = [
+    let expected = [
         std::vec![1, 0xAC, 0x02, 2],
         std::vec![0x80, 0x0A, 0x82, 0x02, 0x05],
         std::vec![1, 0xD8, 0x04, 0x01, 4],
@@ -97,11 +97,11 @@ fn a_scene() {
         // The scene's materials.
         std::vec![1, 0xAC, 0x02],
     ];
-    assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
+    assert_eq!(bytes(&ToDevice::Scene(scene)), expected.concat());
 }
 
 #[test]
-fn a_sample() {
+fn tick_record_bytes() {
     let sample = TickRecord {
         tick: 9,
         hip: GridPoint::new([1, 2, 3], Vec3::X * 0.5),
@@ -119,7 +119,7 @@ fn a_sample() {
         late: 3,
     };
     let place = [float(0.5), float(0.0), float(0.0)].concat();
-    let wanted = [
+    let expected = [
         std::vec![9, 2, 4, 6],
         place.clone(),
         std::vec![2, 4, 8],
@@ -132,20 +132,20 @@ fn a_sample() {
         std::vec![0xC8, 0x01, 1, 2, 3],
     ]
     .concat();
-    assert_eq!(bytes(&sample), wanted);
+    assert_eq!(bytes(&sample), expected);
     let answer = ToHost::PointAnswer { seq: 5, sample };
-    assert_eq!(bytes(&answer), [std::vec![4, 5], wanted.clone()].concat());
+    assert_eq!(bytes(&answer), [std::vec![4, 5], expected.clone()].concat());
     let telemetry = Telemetry {
         first: 6,
         dropped: 7,
         samples: core::iter::once(sample).collect(),
     };
     let telemetry = bytes(&ToHost::Telemetry(telemetry));
-    assert_eq!(telemetry, [std::vec![3, 6, 7, 1], wanted].concat());
+    assert_eq!(telemetry, [std::vec![3, 6, 7, 1], expected].concat());
 }
 
 #[test]
-fn a_view_and_the_clutch() {
+fn scene_change_and_clutch_bytes() {
     let scene = Scene {
         epoch: 7,
         level: 1,
@@ -166,28 +166,28 @@ fn a_view_and_the_clutch() {
         keeps_tiles: true,
     };
     let scene = bytes(&ToDevice::Scene(scene)).split_off(1);
-    let wanted = [
+    let expected = [
         std::vec![11, 200],
         scene,
         std::vec![2, 4, 1],
         [float(0.0), float(0.0), float(0.0)].concat(),
         std::vec![1],
     ];
-    assert_eq!(bytes(&ToDevice::SceneChange(view)), wanted.concat());
+    assert_eq!(bytes(&ToDevice::SceneChange(view)), expected.concat());
     let holds = [
-        (ClutchHold::LetGo, 0),
-        (ClutchHold::WithHand, 1),
-        (ClutchHold::InPlace, 2),
+        (ClutchMode::Released, 0),
+        (ClutchMode::WithHand, 1),
+        (ClutchMode::InPlace, 2),
     ];
     for (hold, byte) in holds {
         let request = Request::Clutch { hold };
-        let asked = ToDevice::Request { number: 4, request };
-        assert_eq!(bytes(&asked), [5, 4, 10, byte]);
+        let query = ToDevice::Request { number: 4, request };
+        assert_eq!(bytes(&query), [5, 4, 10, byte]);
     }
 }
 
 #[test]
-fn a_tile_and_the_request_for_it() {
+fn tile_and_tile_request_bytes() {
     let key = TileKey::new(1, -2, 100);
     let request = ToHost::TileRequest { epoch: 7, key };
     assert_eq!(bytes(&request), [2, 7, 1, 3, 0xC8, 0x01]);
@@ -199,8 +199,8 @@ fn a_tile_and_the_request_for_it() {
             height: 0.5,
         },
     });
-    let wanted = [std::vec![2, 7, 1, 3, 0xC8, 0x01, 1, 1], float(0.5)].concat();
-    assert_eq!(bytes(&tile), wanted);
+    let expected = [std::vec![2, 7, 1, 3, 0xC8, 0x01, 1, 1], float(0.5)].concat();
+    assert_eq!(bytes(&tile), expected);
     let heights = Heights::Packed {
         base: -3,
         bytes: &[9, 0, 7],
@@ -210,19 +210,19 @@ fn a_tile_and_the_request_for_it() {
         key,
         heights,
     });
-    let wanted = [2, 7, 1, 3, 0xC8, 0x01, 3, 5, 3, 9, 0, 7];
-    assert_eq!(bytes(&tile), wanted);
+    let expected = [2, 7, 1, 3, 0xC8, 0x01, 3, 5, 3, 9, 0, 7];
+    assert_eq!(bytes(&tile), expected);
 }
 
 #[test]
-fn a_tile_with_materials_and_their_table() {
+fn material_tile_and_table_bytes() {
     let tile = TileMessage {
         epoch: 7,
         key: TileKey::new(1, -2, 100),
         heights: Heights::NoData,
     };
     let plain = bytes(&ToDevice::Tile(tile)).split_off(1);
-    for (materials, wanted) in [
+    for (materials, expected) in [
         (TileMaterials::One(3), std::vec![0, 3]),
         (TileMaterials::Runs(&[3, 255]), std::vec![1, 2, 3, 255]),
         (TileMaterials::Each(&[0x21]), std::vec![2, 1, 0x21]),
@@ -230,7 +230,7 @@ fn a_tile_with_materials_and_their_table() {
         let tile = ToDevice::MaterialTile(MaterialTile { tile, materials });
         assert_eq!(
             bytes(&tile),
-            [std::vec![13], plain.clone(), wanted].concat()
+            [std::vec![13], plain.clone(), expected].concat()
         );
     }
     let material = Material {
@@ -252,7 +252,7 @@ fn a_tile_with_materials_and_their_table() {
     let table = MaterialTable::new(&[material]).expect("one");
     let numbers = [0.5, 0.75, 0.5, 0.25, 2.0].map(float).concat();
     let texture = [0.125, 1.0, 0.0].map(float).concat();
-    let wanted = [
+    let expected = [
         std::vec![1],
         numbers,
         std::vec![1],
@@ -260,12 +260,12 @@ fn a_tile_with_materials_and_their_table() {
         std::vec![0xAC, 0x02],
     ]
     .concat();
-    let mut room = [0; MAX_TABLE_BYTES];
-    assert_eq!(table_bytes(&table, &mut room), wanted);
+    let mut buffer = [0; MAX_TABLE_BYTES];
+    assert_eq!(table_bytes(&table, &mut buffer), expected);
 }
 
 #[test]
-fn a_hello_in_its_session() {
+fn host_hello_bytes() {
     let hello = InSession {
         session: SessionNumber::new(300),
         message: ToDevice::Hello(HostHello {
@@ -279,7 +279,7 @@ fn a_hello_in_its_session() {
 }
 
 #[test]
-fn a_device_that_introduces_itself() {
+fn device_hello_bytes() {
     let serial: [u8; 12] = core::array::from_fn(|i| 0xA0 + i as u8);
     let hello = ToHost::Hello(DeviceHello {
         protocol: PROTOCOL,
@@ -303,26 +303,26 @@ fn a_device_that_introduces_itself() {
             },
         },
     });
-    let wanted = [
+    let expected = [
         std::vec![0, 14, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],
     ];
-    assert_eq!(bytes(&hello), wanted.concat());
+    assert_eq!(bytes(&hello), expected.concat());
     let shown = std::format!("{}", SerialNumber::new(serial));
     assert_eq!(shown, "A0A1A2A3A4A5A6A7A8A9AAAB");
     assert!(SerialNumber::NONE.is_none() && !SerialNumber::new(serial).is_none());
 }
 
 #[test]
-fn a_detach_and_its_answer() {
+fn detach_and_answer_bytes() {
     assert_eq!(bytes(&ToDevice::Detach), [10]);
     assert_eq!(bytes(&ToHost::Detached), [11]);
 }
 
 #[test]
-fn a_hello_that_is_over() {
+fn session_closed_bytes() {
     for (end, byte) in [(SessionEnd::Replaced, 2), (SessionEnd::HostSilent, 3)] {
         assert_eq!(
             bytes(&ToHost::SessionClosed { number: 9, end }),
@@ -332,7 +332,7 @@ fn a_hello_that_is_over() {
 }
 
 #[test]
-fn a_question_and_its_answer() {
+fn query_and_answer_bytes() {
     let number = 200;
     assert_eq!(bytes(&ToDevice::Status { number }), [6, 200]);
     assert_eq!(bytes(&ToDevice::GetCalibration { number }), [7, 200]);
@@ -345,7 +345,7 @@ fn a_question_and_its_answer() {
 }
 
 #[test]
-fn a_request_and_its_answer() {
+fn request_and_answer_bytes() {
     let request = Request::Zero {
         counts: [1, -1, 64],
     };

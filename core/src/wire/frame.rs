@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn joins_in_the_middle() {
+    fn reader_joins_in_the_middle_of_a_stream() {
         let bytes = [frame(123_456), frame(5)].concat();
         for cut in 1..frame(123_456).len() - 1 {
             let found = frames(&mut FrameReader::new(), &bytes[cut..]);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_storm_without_end_is_dropped_and_the_next_frame_found() {
+    fn endless_noise_is_dropped_and_the_next_frame_is_found() {
         let mut reader = FrameReader::new();
         assert_eq!(frames(&mut reader, &[0xA5; 1000]), []);
         let found = frames(&mut reader, &[&[0], &*frame(9)].concat());

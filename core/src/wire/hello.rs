@@ -20,7 +20,7 @@ pub struct HostHello {
     pub number: u8,
     /// Time, in seconds, for which the host may be silent before the device fades the force out and
     /// disarms. Clamped to [`SILENCE_S`](super::session::SILENCE_S);
-    /// [`ONLY_LOOKS`](super::session::ONLY_LOOKS) opens no session.
+    /// [`READ_ONLY_SILENCE_S`](super::session::READ_ONLY_SILENCE_S) opens no session.
     pub silence_s: u16,
 }
 

@@ -37,8 +37,8 @@ impl MaterialScene<'_> {
 
 /// Writes a table in the link's format; every table fits.
 #[must_use]
-pub fn table_bytes<'b>(table: &MaterialTable, room: &'b mut [u8; MAX_TABLE_BYTES]) -> &'b [u8] {
-    match postcard::to_slice(table, room) {
+pub fn table_bytes<'b>(table: &MaterialTable, buffer: &'b mut [u8; MAX_TABLE_BYTES]) -> &'b [u8] {
+    match postcard::to_slice(table, buffer) {
         Ok(bytes) => bytes,
         Err(_) => &[],
     }
@@ -71,19 +71,19 @@ pub enum TileMaterials<'a> {
 impl<'a> TileMaterials<'a> {
     /// Packs the materials of a tile's samples, each below 16, in the shortest form.
     #[must_use]
-    pub fn pack(materials: &[u8; SAMPLES], room: &'a mut [u8; MAX_TILE_BYTES]) -> Self {
+    pub fn pack(materials: &[u8; SAMPLES], buffer: &'a mut [u8; MAX_TILE_BYTES]) -> Self {
         if materials.iter().all(|material| *material == materials[0]) {
             return Self::One(materials[0]);
         }
-        match runs(materials, room) {
-            Some(length) => Self::Runs(room.get(..length).unwrap_or(&[])),
+        match runs(materials, buffer) {
+            Some(length) => Self::Runs(buffer.get(..length).unwrap_or(&[])),
             None => {
                 let pairs = materials.chunks(2);
-                for (byte, pair) in room.iter_mut().zip(pairs) {
+                for (byte, pair) in buffer.iter_mut().zip(pairs) {
                     let half = |i: usize| pair.get(i).map_or(0, |material| material & 15);
                     *byte = half(0) | half(1) << 4;
                 }
-                Self::Each(room.as_slice())
+                Self::Each(buffer.as_slice())
             }
         }
     }
@@ -122,12 +122,12 @@ impl<'a> TileMaterials<'a> {
 }
 
 /// Writes runs; returns their number of bytes, if it is less than with two samples per byte.
-fn runs(materials: &[u8; SAMPLES], room: &mut [u8; MAX_TILE_BYTES]) -> Option<usize> {
+fn runs(materials: &[u8; SAMPLES], buffer: &mut [u8; MAX_TILE_BYTES]) -> Option<usize> {
     let mut length = 0;
     let alike = materials.chunk_by(|one, next| one == next);
     // A byte counts up to 256 samples.
     for run in alike.flat_map(|run| run.chunks(256)) {
-        let pair = room.get_mut(length..length + 2)?;
+        let pair = buffer.get_mut(length..length + 2)?;
         let more = u8::try_from(run.len() - 1).ok()?;
         pair.copy_from_slice(&[*run.first()?, more]);
         length += 2;
@@ -169,20 +169,20 @@ mod tests {
     #[test]
     fn packed_materials_round_trip_in_shortest_form() {
         let noise = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 61 % 16) as u8;
-        let mut room = [0xAA; MAX_TILE_BYTES];
+        let mut buffer = [0xAA; MAX_TILE_BYTES];
         let border = |col: usize, row: usize| u8::from(col + row / 3 > 20) * 9;
-        for (all, most) in [
+        for (all, max) in [
             (materials(|_, _| 15), 1),
             (materials(|_, row| u8::from(row > 16)), 12),
             (materials(border), 2 * 2 * TILE_SAMPLES),
             (materials(noise), MAX_TILE_BYTES),
         ] {
-            let packed = TileMaterials::pack(&all, &mut room);
+            let packed = TileMaterials::pack(&all, &mut buffer);
             let length = match packed {
                 TileMaterials::One(_) => 1,
                 TileMaterials::Runs(bytes) | TileMaterials::Each(bytes) => bytes.len(),
             };
-            assert!(length <= most, "{length} of {most}");
+            assert!(length <= max, "{length} of {max}");
             let mut tile = filled();
             assert_eq!(packed.fill(&mut tile, 16), Ok(()));
             assert_eq!(read(&tile), all);
@@ -224,12 +224,12 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_table_fits_and_a_scene_has_its_own() {
+    fn largest_table_fits_and_must_match_its_scene() {
         let mut material = Material::of(&SurfaceParams::PREMIUM);
         material.texture.seed = u32::MAX;
         let table = MaterialTable::new(&[material; MaterialTable::MAX]).expect("fits");
-        let mut room = [0; MAX_TABLE_BYTES];
-        let bytes = table_bytes(&table, &mut room).to_vec();
+        let mut buffer = [0; MAX_TABLE_BYTES];
+        let bytes = table_bytes(&table, &mut buffer).to_vec();
         assert!(bytes.len() > 600, "{}", bytes.len());
         let scene = |materials| Scene {
             epoch: 1,

@@ -9,7 +9,7 @@ use crate::guard::GuardInputs;
 
 /// Message from plant to board: the state of encoders and switches at a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Sensed {
+pub struct PlantState {
     /// Number of the tick.
     pub tick: u32,
     /// Encoders and switches.

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::clutch::ClutchHold;
+use crate::clutch::ClutchMode;
 use crate::guard::{Blockers, Fault, Jog};
 use crate::phantom::{Calibration, CalibrationError};
 
@@ -36,7 +36,7 @@ pub enum Request {
     /// `None`, if no fault was shown, clears none.
     ClearFault {
         /// The fault that was shown.
-        seen: Option<Fault>,
+        fault: Option<Fault>,
     },
     /// Drops the scene: disarms after a fade-out of the force.
     DropScene,
@@ -47,13 +47,13 @@ pub enum Request {
     Jog(Jog),
     /// Holds the outputs at these shares of full scale, -1 to 1, with the amplifiers off, or ends
     /// the hold. Only while disarmed and without a fault; it ends automatically
-    /// ([`HOLD_S`](crate::guard::HOLD_S)).
+    /// ([`MAX_HOLD_S`](crate::guard::MAX_HOLD_S)).
     HoldOutputs(Option<[f32; 3]>),
     /// Holds or releases the clutch: while it is held there is no force, and the placement may
     /// change. It is released when the session ends.
     Clutch {
         /// Use of the clutch from now on.
-        hold: ClutchHold,
+        hold: ClutchMode,
     },
     /// Marks a tick: the board's mark pin is high for
     /// [`MARK_PULSE_MS`](crate::scene::MARK_PULSE_MS) from the end of that tick on. Answered by
@@ -85,9 +85,9 @@ pub enum Refusal {
     /// The device still works on the last request of this kind.
     #[error("the device is still busy with the last request of this kind")]
     Busy,
-    /// The user did not press the dead-man switch within [`PRESS_MS`].
+    /// The user did not press the dead-man switch within [`PRESS_TIMEOUT_MS`].
     ///
-    /// [`PRESS_MS`]: super::status::PRESS_MS
+    /// [`PRESS_TIMEOUT_MS`]: super::status::PRESS_TIMEOUT_MS
     #[error("the dead-man switch was not pressed: the calibration is in use but not stored")]
     NotPressed,
     /// The device's memory is full; the device frees memory at its start.

@@ -75,6 +75,6 @@ pub struct LastSession {
 /// Minimum and maximum time for which a host may be silent while the arm is armed, seconds.
 pub const SILENCE_S: (u16, u16) = (5, 3_600);
 /// Silence time of a host that only reads: it opens no session, and its silence ends nothing.
-pub const ONLY_LOOKS: u16 = 0;
+pub const READ_ONLY_SILENCE_S: u16 = 0;
 /// The silence time of a session whose host states none, seconds.
 pub const DEFAULT_SILENCE_S: u16 = 180;

@@ -85,7 +85,7 @@ pub const RESETS_BELOW_MV: u16 = 2_600;
 impl BootReport {
     /// Returns true if the chip runs at a supply voltage below its working range.
     #[must_use]
-    pub fn lacks_brown_out_reset(&self) -> bool {
+    pub fn is_brown_out_level_low(&self) -> bool {
         (1..RESETS_BELOW_MV).contains(&self.resets_below_mv)
     }
 
@@ -186,7 +186,7 @@ pub struct Status {
 
 /// Time for which a request to store something permanently waits for a press of the dead-man
 /// switch, ms.
-pub const PRESS_MS: u32 = 10_000;
+pub const PRESS_TIMEOUT_MS: u32 = 10_000;
 
 #[cfg(test)]
 mod tests {
@@ -220,9 +220,9 @@ mod tests {
         let browned_out = boot(ResetCause::BrownOut, None);
         assert_eq!(browned_out, Some(Fault::SupplyLow));
         assert_eq!(boot(ResetCause::PowerOn, None), None);
-        let kept = |kind| boot(ResetCause::Software, Some(crash(kind)));
-        assert_eq!(kept(CrashKind::StackOverflow), Some(Fault::StackOverflow));
-        assert_eq!(kept(CrashKind::SupplyLow), Some(Fault::SupplyLow));
+        let stored = |kind| boot(ResetCause::Software, Some(crash(kind)));
+        assert_eq!(stored(CrashKind::StackOverflow), Some(Fault::StackOverflow));
+        assert_eq!(stored(CrashKind::SupplyLow), Some(Fault::SupplyLow));
     }
 
     #[test]
@@ -232,14 +232,14 @@ mod tests {
             ..BootReport::default()
         };
         assert_eq!(boot.fault(), Some(Fault::SupplyLow));
-        let lacks = |resets_below_mv| {
+        let is_low = |resets_below_mv| {
             let boot = BootReport {
                 resets_below_mv,
                 ..BootReport::default()
             };
-            boot.lacks_brown_out_reset()
+            boot.is_brown_out_level_low()
         };
-        assert!(!lacks(0), "no chip says so");
-        assert!(lacks(1_700) && lacks(2_500) && !lacks(2_700) && !lacks(2_800));
+        assert!(!is_low(0), "no chip says so");
+        assert!(is_low(1_700) && is_low(2_500) && !is_low(2_700) && !is_low(2_800));
     }
 }

@@ -4,9 +4,9 @@
 //! ones: protocols 1 to 3 had a hello of variant 0 and a refusal of variant 1, each followed only
 //! by the protocol's number.
 //!
-//! - A host sends [`VersionCheck::Asked`] before each hello. A device of protocol 3 answers with
+//! - A host sends [`VersionCheck::Query`] before each hello. A device of protocol 3 answers with
 //!   its refusal; a device of this protocol ignores it, because the hello follows.
-//! - A device answers [`VersionCheck::Asked`] of another protocol with [`VersionCheck::Refused`].
+//! - A device answers [`VersionCheck::Query`] of another protocol with [`VersionCheck::Refused`].
 //!   That changes nothing else: an open session stays open.
 //! - A host accepts a refusal only while it waits for the device's hello, and only if the refusal
 //!   contains another protocol than its own.
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum VersionCheck {
     /// From host to device: the host's protocol.
-    Asked {
+    Query {
         /// The host's protocol.
         protocol: u16,
     },
@@ -47,9 +47,9 @@ mod tests {
     #[test]
     fn version_check_has_the_bytes_of_protocol_3() {
         let mut buffer = [0; 8];
-        let asked = VersionCheck::Asked { protocol: 3 };
+        let query = VersionCheck::Query { protocol: 3 };
         assert_eq!(
-            postcard::to_slice(&asked, &mut buffer).ok(),
+            postcard::to_slice(&query, &mut buffer).ok(),
             Some(&mut [0, 3][..])
         );
         let refused = VersionCheck::Refused { protocol: 3 };

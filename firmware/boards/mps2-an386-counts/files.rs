@@ -47,10 +47,10 @@ impl Frames {
                 }
             }
             let bytes = &self.chunk[self.from..self.to];
-            let ends = bytes.iter().position(|byte| *byte == 0);
-            if let Some(ends) = ends {
-                self.from += ends + 1;
-                let (_, frame) = self.reader.push(&bytes[..=ends]);
+            let end = bytes.iter().position(|byte| *byte == 0);
+            if let Some(end) = end {
+                self.from += end + 1;
+                let (_, frame) = self.reader.push(&bytes[..=end]);
                 let frame = frame.expect("a frame").expect("well encoded");
                 return Some(decode(frame).expect("a known message"));
             }

@@ -19,9 +19,10 @@
 //!   order. In a scene fed by points, each point is one [`Contact::step`] in real time, and another
 //!   scene may follow. With materials, each point is one [`Haptics::tick`], and a point without an
 //!   answer is repeated.
-//! - `counts.frames`, for a scene fed by encoders: [`Sensed`] frames, each one [`Haptics::tick`],
-//!   from count to current, after the arm was armed at the first of them. In `replay.frames` of
-//!   such a scene a point is a mark: the tiles after it are stored before the tick with its number.
+//! - `counts.frames`, for a scene fed by encoders: [`PlantState`] frames, each one
+//!   [`Haptics::tick`], from count to current, after the arm was armed at the first of them. In
+//!   `replay.frames` of such a scene a point is a mark: the tiles after it are stored before the
+//!   tick with its number.
 //!
 //! and writes `ticks.bin`: [`RECORD`] little-endian words a tick. For a scene fed by points it also
 //! writes `tiles.bin`: as many words for each tile, which count the filling of a buffer.
@@ -52,7 +53,7 @@ use hapterra_core::terrain::{Tile, Window};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 use hapterra_core::wire::materials::MaterialTile;
 use hapterra_core::wire::message::ToDevice;
-use hapterra_core::wire::plant::Sensed;
+use hapterra_core::wire::plant::PlantState;
 use hapterra_firmware::link::fill_tile;
 use static_cell::ConstStaticCell;
 
@@ -138,7 +139,7 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
 fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
-    let mut count = take_scene(&mut haptics, scene, table);
+    let mut count = set_scene(&mut haptics, scene, table);
     let mut spare = Some(SPARE.take());
     let mut outcome = Outcome::default();
     let stopwatch = Stopwatch::start();
@@ -146,7 +147,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
         match message {
             ToDevice::MaterialScene(both) => {
                 let table = both.table().expect("the host made it well");
-                count = take_scene(&mut haptics, &both.scene, &table);
+                count = set_scene(&mut haptics, &both.scene, &table);
             }
             ToDevice::MaterialTile(tile) => {
                 let buffer = spare.take().expect("every tile gives a buffer back");
@@ -157,7 +158,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
                 let _ = haptics.accept(Command::Hip(black_box(point)));
                 let sense = black_box(GuardInputs::default());
                 let (cost, ()) = stopwatch.counted(|| tick(&mut haptics, &sense, &mut outcome));
-                let is_answered = u32::from(outcome.answers.is_some());
+                let is_answered = u32::from(outcome.answered_seq.is_some());
                 let sample = &outcome.sample;
                 let first = [cost, sample.state as u32, is_answered, sample.work];
                 records.add(first, sample.force_n, &sample.proxy);
@@ -168,12 +169,12 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
 }
 
 /// Begins a scene with its table and returns the number of its materials.
-fn take_scene(
+fn set_scene(
     haptics: &mut Haptics<'static, WINDOW>,
     scene: &Scene,
     table: &MaterialTable,
 ) -> usize {
-    haptics.take_materials(table);
+    haptics.set_materials(table);
     let _ = haptics.accept(Command::Scene(*scene));
     table.materials().len()
 }
@@ -212,25 +213,25 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
     haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let count = match table {
-        Some(table) => take_scene(&mut haptics, scene, table),
+        Some(table) => set_scene(&mut haptics, scene, table),
         None => {
             let _ = haptics.accept(Command::Scene(*scene));
             0
         }
     };
     let mut spares = SPARES.take().each_mut().map(Some);
-    let mut next = take_tiles(&mut haptics, &mut spares, frames, count);
+    let mut next = store_tiles(&mut haptics, &mut spares, frames, count);
     let mut sensed = Frames::open(c"counts.frames");
     let stopwatch = Stopwatch::start();
     let mut armed = false;
     let mut outcome = Outcome::default();
-    while let Some(Sensed { sense, tick: at }) = sensed.next() {
+    while let Some(PlantState { sense, tick: at }) = sensed.next() {
         if !armed {
             arm(&mut haptics, sense, &mut outcome);
             armed = true;
         }
         if next == Some(at) {
-            next = take_tiles(&mut haptics, &mut spares, frames, count);
+            next = store_tiles(&mut haptics, &mut spares, frames, count);
         }
         let sense = black_box(GuardInputs {
             dead_man: true,
@@ -253,7 +254,7 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
 
 /// Stores the tiles up to the next point. Returns the number of the tick before which the tiles
 /// after that point are stored.
-fn take_tiles(
+fn store_tiles(
     haptics: &mut Haptics<'static, WINDOW>,
     spares: &mut [Option<&'static mut Tile>],
     frames: &mut Frames,

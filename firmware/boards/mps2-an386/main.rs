@@ -47,7 +47,7 @@ use hapterra_firmware::amplifier::CURRENT_LOOP_US;
 use hapterra_firmware::app::Hardware;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
-use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::monitor::{Monitor, WatchedPart};
 use hapterra_firmware::native::{FULL_SCALE_A, VirtualAmplifiersOff};
 use hapterra_firmware::store::Stored;
 
@@ -113,7 +113,7 @@ const STACK_POLLS: u32 = 1_000;
 struct Emulated {
     monitor: &'static Monitor,
     polls: Cell<u32>,
-    drives_arm: Cell<bool>,
+    is_arm_in_use: Cell<bool>,
 }
 
 impl Emulated {
@@ -121,7 +121,7 @@ impl Emulated {
         Self {
             monitor,
             polls: Cell::new(0),
-            drives_arm: Cell::new(false),
+            is_arm_in_use: Cell::new(false),
         }
     }
 
@@ -145,13 +145,15 @@ impl LinkBoard for Emulated {
             ending::done();
         }
         // There is no watchdog here, but the tick expects one to be fed.
-        let _ = self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link]);
+        let _ = self
+            .monitor
+            .may_feed_watchdog(&[WatchedPart::Tick, WatchedPart::Link]);
         self.measure_stack();
-        let drives_arm = link.drives_arm();
-        if self.drives_arm.replace(drives_arm) != drives_arm {
-            plant::expect(drives_arm);
+        let is_arm_in_use = link.is_arm_in_use();
+        if self.is_arm_in_use.replace(is_arm_in_use) != is_arm_in_use {
+            plant::expect(is_arm_in_use);
         }
-        if link.may_stand_still() {
+        if link.may_stop_clock() {
             time::hold(Reason::Link);
         } else {
             time::release(Reason::Link);

@@ -13,7 +13,7 @@ use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
 use hapterra_core::guard::GuardOutputs;
 use hapterra_core::wire::frame::{FrameReader, decode, encode};
-use hapterra_core::wire::plant::{Currents, Sensed};
+use hapterra_core::wire::plant::{Currents, PlantState};
 use hapterra_firmware::board::{Encoders, GuardInputs, TickClock};
 use heapless::spsc::{Consumer, Producer, Queue};
 use static_cell::ConstStaticCell;
@@ -24,10 +24,10 @@ use crate::time::{self, Reason};
 /// Maximum length of a frame on this line.
 const FRAME: usize = 64;
 
-static COUNTS: ConstStaticCell<Queue<Sensed, 4>> = ConstStaticCell::new(Queue::new());
+static COUNTS: ConstStaticCell<Queue<PlantState, 4>> = ConstStaticCell::new(Queue::new());
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
 /// True if counts wait for a tick.
-static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
+static COUNTS_PENDING: AtomicBool = AtomicBool::new(false);
 /// Raised when a tick has stored its currents.
 pub(crate) static ANSWERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
@@ -50,7 +50,7 @@ pub(crate) fn open() -> (PlantEncoders, PlantPort) {
 
 /// Sets whether the scene is rendered through the encoders, so that ticks wait for counts.
 pub(crate) fn expect(counts: bool) {
-    if counts && !COUNTS_WAIT.load(Ordering::Acquire) {
+    if counts && !COUNTS_PENDING.load(Ordering::Acquire) {
         time::hold(Reason::Plant);
     } else {
         time::release(Reason::Plant);
@@ -59,7 +59,7 @@ pub(crate) fn expect(counts: bool) {
 
 /// The virtual Phantom's encoders, as the tick reads them.
 pub(crate) struct PlantEncoders {
-    counts: Consumer<'static, Sensed>,
+    counts: Consumer<'static, PlantState>,
     currents: Producer<'static, Currents>,
     latest: GuardInputs,
     /// The number of the tick whose counts were read but not answered yet.
@@ -70,12 +70,12 @@ impl Encoders for PlantEncoders {
     fn sense(&mut self) -> GuardInputs {
         // Read in place: taking it out of the queue would copy it byte by byte, twice (150
         // instructions a tick).
-        if let Some(Sensed { tick, sense }) = self.counts.peek() {
+        if let Some(PlantState { tick, sense }) = self.counts.peek() {
             self.latest = *sense;
             self.unanswered = Some(*tick);
             self.counts.dequeue();
         }
-        COUNTS_WAIT.store(self.counts.ready(), Ordering::Release);
+        COUNTS_PENDING.store(self.counts.ready(), Ordering::Release);
         self.latest
     }
 }
@@ -102,7 +102,7 @@ impl PlantEncoders {
 
 /// The task's side of the line.
 pub(crate) struct PlantPort {
-    counts: Producer<'static, Sensed>,
+    counts: Producer<'static, PlantState>,
     currents: Consumer<'static, Currents>,
 }
 
@@ -122,14 +122,14 @@ impl PlantPort {
 
     fn take(&mut self, reader: &mut FrameReader<FRAME>, mut bytes: &[u8]) {
         while !bytes.is_empty() {
-            let (taken, frame) = reader.push(bytes);
+            let (consumed, frame) = reader.push(bytes);
             if let Some(Ok(counts)) = frame.map(|frame| frame.and_then(decode)) {
                 // A plant that does not wait for its answers loses counts.
                 let _ = self.counts.enqueue(counts);
-                COUNTS_WAIT.store(true, Ordering::Release);
+                COUNTS_PENDING.store(true, Ordering::Release);
                 time::release(Reason::Plant);
             }
-            bytes = bytes.get(taken..).unwrap_or(&[]);
+            bytes = bytes.get(consumed..).unwrap_or(&[]);
         }
     }
 

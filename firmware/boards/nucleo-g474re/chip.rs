@@ -161,7 +161,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
 
 /// Reads and clears the cause of the chip's last reset.
 pub(crate) fn take_reset_cause() -> ResetCause {
-    let ran_before = leave_mark();
+    let ran_before = mark_ram();
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
     match flags {
@@ -181,7 +181,7 @@ pub(crate) const fn write_back(_address: usize, _bytes: usize) {}
 
 /// Marks the RAM as this program's. Returns true if it was marked already: a program ran before,
 /// and the RAM has kept its content since.
-fn leave_mark() -> bool {
+fn mark_ram() -> bool {
     /// "HAP4".
     const OURS: u32 = 0x4841_5034;
     #[unsafe(link_section = ".uninit.mark")]
@@ -234,7 +234,7 @@ pub(crate) fn resets_below_mv() -> u16 {
 /// Lets the watchdog and the clock of embassy's time run while a debugger halts the core, whatever
 /// the debugger has set: the watchdog resets the chip, and by the clock the next tick detects the
 /// halt.
-pub(crate) fn let_a_halt_stop_the_arm() {
+pub(crate) fn set_debug_freeze() {
     pac::DBGMCU.apb1lfzr().modify(|w| {
         w.set_iwdg(false);
         w.set_tim5(false);

@@ -133,7 +133,7 @@ impl FrameBus for Bus {
         wait(DWT::cycle_count(), us.saturating_mul(CYCLES_PER_US));
     }
 
-    fn tell(&mut self, as_set: bool) {
+    fn report_state(&mut self, as_set: bool) {
         NOT_AS_SET.store(!as_set, Ordering::Relaxed);
     }
 }

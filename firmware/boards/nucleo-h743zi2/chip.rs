@@ -97,7 +97,7 @@ pub(crate) fn sample_slowly(channels: [u8; 3]) {
 pub(crate) fn prepare(core: &mut Core) {
     revision::refuse_older();
     tick_memory::protect(&core.MPU);
-    flash::tell_bus_faults(core);
+    flash::enable_bus_fault(core);
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
 }
@@ -267,7 +267,7 @@ pub(crate) fn resets_below_mv() -> u16 {
 /// the debugger has set: the watchdog resets the chip, and by the clock the next tick detects the
 /// halt. TIM15, which lets the duty cycles continue, runs too. TIM1 stops in the halt; its outputs
 /// are then off as by a break (RM0433, 38.3.28).
-pub(crate) fn let_a_halt_stop_the_arm() {
+pub(crate) fn set_debug_freeze() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));
     pac::DBGMCU.apb1lfzr1().modify(|w| w.set_tim5(false));
     pac::DBGMCU.apb2fzr1().modify(|w| {

@@ -52,7 +52,7 @@ global_asm!(
 
 /// Enables the handler of bus faults, below the tick: a bus fault in the tick or in a critical
 /// section remains a hard fault.
-pub(crate) fn tell_bus_faults(core: &mut Peripherals) {
+pub(crate) fn enable_bus_fault(core: &mut Peripherals) {
     // SAFETY: no critical section depends on a fault's priority.
     unsafe {
         core.SCB.set_priority(SystemHandler::BusFault, OTHERS as u8);

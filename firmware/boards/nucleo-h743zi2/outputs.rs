@@ -26,7 +26,7 @@ pub(crate) const LATENCY_US: u16 = 121 + (2_000_000 / DUTY_HZ) as u16 + CURRENT_
 
 /// Time after the last command until the duty cycles end, µs: two ticks, because two consecutive
 /// commands may be almost that far apart.
-const COMMAND_HOLDS_US: u32 = 2_000_000 / TICK_HZ;
+const COMMAND_VALID_US: u32 = 2_000_000 / TICK_HZ;
 
 /// Three duty cycles: 15 % and 85 % are the ends of the range, 50 % is no current.
 pub(crate) struct Outputs {
@@ -77,7 +77,7 @@ fn close_after_commands(_: Peri<'static, TIM15>) {
     rcc::enable_and_reset::<TIM15>();
     let counts_a_us = rcc::frequency::<TIM15>().0 / 1_000_000;
     pac::TIM15.psc().write_value((counts_a_us - 1) as u16);
-    let last = (COMMAND_HOLDS_US - 1) as u16;
+    let last = (COMMAND_VALID_US - 1) as u16;
     pac::TIM15.arr().write(|w| w.set_arr(last));
     // Loads the prescaler.
     pac::TIM15.egr().write(|w| w.set_ug(true));

@@ -54,7 +54,7 @@ pub trait FrameBus {
 
     /// Receives true if all registers read back as they were written, for
     /// [`GuardInputs::outputs_not_as_set`](crate::board::GuardInputs).
-    fn tell(&mut self, as_set: bool);
+    fn report_state(&mut self, as_set: bool);
 }
 
 /// The converter on a bus of its own.
@@ -63,9 +63,9 @@ pub struct Ad5754<B> {
     /// Codes as last written.
     codes: [u16; 3],
     /// The register that is read next, below [`REGISTERS`].
-    turn: u8,
+    next_register: u8,
     /// Number of correct readings in a row, up to [`REGISTERS`].
-    right: u8,
+    correct_readings: u8,
 }
 
 impl<B: FrameBus> Ad5754<B> {
@@ -74,8 +74,8 @@ impl<B: FrameBus> Ad5754<B> {
         Self {
             bus,
             codes: [0; 3],
-            turn: 0,
-            right: 0,
+            next_register: 0,
+            correct_readings: 0,
         }
     }
 
@@ -100,7 +100,7 @@ impl<B: FrameBus> Ad5754<B> {
     /// value.
     fn expected(&self) -> (u8, u16, u16) {
         let [a, b, c] = self.codes;
-        match self.turn {
+        match self.next_register {
             0 => (RANGE, RANGE_BITS, BIPOLAR_10_V),
             1 => (RANGE | 1, RANGE_BITS, BIPOLAR_10_V),
             2 => (RANGE | 2, RANGE_BITS, BIPOLAR_10_V),
@@ -122,13 +122,13 @@ impl<B: FrameBus> CurrentOutputs for Ad5754<B> {
     /// stages and has then lost its settings. The next frame is sent in the next tick, at least 100
     /// µs later, so no wait is needed.
     fn maintain(&mut self) {
-        if self.right == 0 {
+        if self.correct_readings == 0 {
             self.set_up();
         }
     }
 
     fn are_as_set(&self) -> bool {
-        self.right == REGISTERS
+        self.correct_readings == REGISTERS
     }
 
     /// Sends four frames: one that requests a register, and the three commands. The answer arrives
@@ -141,17 +141,17 @@ impl<B: FrameBus> CurrentOutputs for Ad5754<B> {
         self.write(DATA | 1, b);
         self.write(DATA | 2, c);
         self.codes = [a, b, c];
-        self.turn = if self.turn + 1 < REGISTERS {
-            self.turn + 1
+        self.next_register = if self.next_register + 1 < REGISTERS {
+            self.next_register + 1
         } else {
             0
         };
-        self.right = if found & bits == expected {
-            REGISTERS.min(self.right + 1)
+        self.correct_readings = if found & bits == expected {
+            REGISTERS.min(self.correct_readings + 1)
         } else {
             0
         };
-        self.bus.tell(self.right == REGISTERS);
+        self.bus.report_state(self.correct_readings == REGISTERS);
     }
 }
 

@@ -11,14 +11,14 @@ use crate::board::{Amplifiers, EnabledAmplifiers};
 
 /// The converter at the other end of the wires.
 #[derive(Default)]
-struct Part {
+struct Converter {
     /// The frames that were sent.
     frames: Vec<[u8; 3]>,
     range: [u16; 4],
     power: u16,
     data: [u16; 4],
     /// Register that the last frame requested.
-    asked: u16,
+    requested: u16,
     /// The converter does not answer.
     is_silent: bool,
     /// Last reported state.
@@ -27,7 +27,7 @@ struct Part {
 }
 
 #[derive(Clone, Default)]
-struct Wires(Rc<RefCell<Part>>);
+struct Wires(Rc<RefCell<Converter>>);
 
 impl Wires {
     fn take_frames(&self) -> Vec<[u8; 3]> {
@@ -41,12 +41,12 @@ impl FrameBus for Wires {
         part.frames.push(frame);
         let [head, high, low] = frame;
         let value = u16::from_be_bytes([high, low]);
-        let back = core::mem::take(&mut part.asked);
+        let back = core::mem::take(&mut part.requested);
         let channel = usize::from(head & 7);
         match (head & READ != 0, head & 0x38) {
-            (true, DATA) => part.asked = part.data[channel],
-            (true, RANGE) => part.asked = part.range[channel],
-            (true, _) => part.asked = part.power,
+            (true, DATA) => part.requested = part.data[channel],
+            (true, RANGE) => part.requested = part.range[channel],
+            (true, _) => part.requested = part.power,
             (false, DATA) if channel == 4 => part.data = [value; 4],
             (false, DATA) => part.data[channel] = value,
             (false, RANGE) => part.range = [value; 4],
@@ -63,7 +63,7 @@ impl FrameBus for Wires {
         self.0.borrow_mut().paused_us += us;
     }
 
-    fn tell(&mut self, as_set: bool) {
+    fn report_state(&mut self, as_set: bool) {
         self.0.borrow_mut().as_set = as_set;
     }
 }
@@ -80,7 +80,7 @@ fn off() -> (Off<Ad5754<Wires>, Pin>, Wires, Pin) {
 /// Returns amplifiers that are on, after enough ticks at rest to read all registers.
 fn on() -> (On<Ad5754<Wires>, Pin>, Wires, Pin) {
     let (mut off, wires, pin) = off();
-    (0..7).for_each(|_| off.rest([0.0; 3]));
+    (0..7).for_each(|_| off.set_held_outputs([0.0; 3]));
     let on = off.enable();
     assert!(pin.is_high());
     wires.take_frames();
@@ -97,7 +97,7 @@ fn converter_has_range_and_zero_before_power() {
 }
 
 #[test]
-fn currents_become_three_frames_one_a_channel() {
+fn three_currents_become_one_frame_per_channel() {
     let (mut on, wires, _) = on();
     on.write([2.5, -2.5, f32::NAN]);
     let frames = wires.take_frames();
@@ -110,16 +110,16 @@ fn currents_become_three_frames_one_a_channel() {
 }
 
 #[test]
-fn every_register_is_read_in_turn() {
+fn every_register_is_read_back() {
     let (mut on, wires, _) = on();
-    let mut asked = Vec::new();
+    let mut requested = Vec::new();
     for _ in 0..7 {
         on.write([1.0, 2.0, 3.0]);
-        asked.push(wires.take_frames()[0][0]);
+        requested.push(wires.take_frames()[0][0]);
         assert!(wires.0.borrow().as_set);
     }
-    asked.sort_unstable();
-    assert_eq!(asked, [0x80, 0x81, 0x82, 0x88, 0x89, 0x8A, 0x90]);
+    requested.sort_unstable();
+    assert_eq!(requested, [0x80, 0x81, 0x82, 0x88, 0x89, 0x8A, 0x90]);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn enable_stays_low_until_all_registers_read_back() {
     for ticks in 0..10 {
         let (mut off, wires, pin) = off();
         wires.take_frames();
-        (0..ticks).for_each(|_| off.rest([0.0; 3]));
+        (0..ticks).for_each(|_| off.set_held_outputs([0.0; 3]));
         let on = off.enable();
         // Start-up and the enable also read a register.
         assert_eq!(pin.is_high(), ticks >= 5, "after {ticks} ticks");
@@ -140,11 +140,11 @@ fn enable_stays_low_until_all_registers_read_back() {
 #[test]
 fn lost_range_or_overload_is_reported_within_seven_ticks() {
     for lose in [
-        |part: &mut Part| part.range[2] = 0,
-        |part: &mut Part| part.power = 0,
-        |part: &mut Part| part.power |= 1 << 5,
-        |part: &mut Part| part.power |= 1 << 7,
-        |part: &mut Part| part.power |= 1 << 10,
+        |part: &mut Converter| part.range[2] = 0,
+        |part: &mut Converter| part.power = 0,
+        |part: &mut Converter| part.power |= 1 << 5,
+        |part: &mut Converter| part.power |= 1 << 7,
+        |part: &mut Converter| part.power |= 1 << 10,
     ] {
         let (mut on, wires, pin) = on();
         lose(&mut wires.0.borrow_mut());
@@ -155,7 +155,7 @@ fn lost_range_or_overload_is_reported_within_seven_ticks() {
         let mut off = on.disable();
         assert!(reported.is_some());
         assert!(!pin.is_high());
-        (0..20).for_each(|_| off.rest([0.0; 3]));
+        (0..20).for_each(|_| off.set_held_outputs([0.0; 3]));
         assert!(wires.0.borrow().as_set, "set up anew");
         assert_eq!(wires.0.borrow().range, [4; 4]);
     }
@@ -168,7 +168,7 @@ fn broken_wire_is_reported_at_once_and_blocks_enable() {
     on.write([1.0, 2.0, 3.0]);
     assert!(!wires.0.borrow().as_set);
     let mut off = on.disable();
-    (0..50).for_each(|_| off.rest([0.0; 3]));
+    (0..50).for_each(|_| off.set_held_outputs([0.0; 3]));
     let _on = off.enable();
     assert!(!pin.is_high());
 }
@@ -176,16 +176,16 @@ fn broken_wire_is_reported_at_once_and_blocks_enable() {
 #[test]
 fn held_outputs_are_written_disabled_and_zeroed_before_enable() {
     let (mut off, wires, pin) = off();
-    (0..7).for_each(|_| off.rest([0.0; 3]));
+    (0..7).for_each(|_| off.set_held_outputs([0.0; 3]));
     wires.take_frames();
-    off.rest([0.5, -9.0, f32::NAN]);
+    off.set_held_outputs([0.5, -9.0, f32::NAN]);
     assert_eq!(
         wires.take_frames()[1..],
         [[0x00, 0x40, 0x00], [0x01, 0x80, 0x00], [0x02, 0x00, 0x00]]
     );
-    off.rest([0.0; 3]);
+    off.set_held_outputs([0.0; 3]);
     assert_eq!(wires.take_frames()[1..], ZERO);
-    off.rest([1.0; 3]);
+    off.set_held_outputs([1.0; 3]);
     wires.take_frames();
     let _on = off.enable();
     assert!(pin.is_high());

@@ -102,7 +102,7 @@ impl<O: CurrentOutputs, E: OutputPin> Amplifiers for Off<O, E> {
         On(self)
     }
 
-    fn rest(&mut self, held: [f32; 3]) {
+    fn set_held_outputs(&mut self, held: [f32; 3]) {
         self.set(held);
         self.outputs.maintain();
     }

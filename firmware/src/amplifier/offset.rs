@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn a_monitor_reads_back_what_was_put_out() {
+    fn monitor_reads_back_the_commanded_current() {
         for fraction in [-1.0, -0.3, 0.0, 0.01, 0.77, 1.0] {
             let back = monitor_ma(offset_code(fraction), 5.5);
             let commanded = 5500.0 * fraction;

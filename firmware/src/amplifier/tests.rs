@@ -85,8 +85,8 @@ fn command_is_clamped_to_full_scale_for_any_input() {
 #[test]
 fn held_outputs_do_not_touch_the_enable_pin() {
     let (mut off, log) = amplifiers();
-    off.rest([1.0, -0.5, f32::NAN]);
+    off.set_held_outputs([1.0, -0.5, f32::NAN]);
     assert_eq!(log.take(), ["850", "325", "500"]);
-    off.rest([0.0; 3]);
+    off.set_held_outputs([0.0; 3]);
     assert_eq!(log.take(), ["500", "500", "500"]);
 }

@@ -6,10 +6,10 @@
 use hapterra_core::rate::TickRate;
 
 /// Time for which the input has to read "held" before it counts, ms.
-const HELD_MS: u32 = 5;
+const PRESS_DEBOUNCE_MS: u32 = 5;
 /// Time for which the input has to read "released" before it counts, ms: longer than switches
 /// bounce.
-const LET_GO_MS: u32 = 20;
+const RELEASE_DEBOUNCE_MS: u32 = 20;
 
 /// The debounced input, updated in each tick.
 #[derive(Clone, Copy, Debug)]
@@ -17,18 +17,21 @@ pub(super) struct ClutchInput {
     /// The debounced state.
     held: bool,
     /// Ticks in a row with the other reading.
-    otherwise: u16,
+    changed_ticks: u16,
     /// Ticks after which another reading counts: for held, for released.
-    enough: [u16; 2],
+    debounce_ticks: [u16; 2],
 }
 
 impl ClutchInput {
     pub(super) const fn new(rate: TickRate) -> Self {
         Self {
             held: false,
-            otherwise: 0,
+            changed_ticks: 0,
             // At most 200 ticks.
-            enough: [rate.ticks(HELD_MS) as u16, rate.ticks(LET_GO_MS) as u16],
+            debounce_ticks: [
+                rate.ticks(PRESS_DEBOUNCE_MS) as u16,
+                rate.ticks(RELEASE_DEBOUNCE_MS) as u16,
+            ],
         }
     }
 
@@ -36,21 +39,21 @@ impl ClutchInput {
     #[inline]
     pub(super) fn tick(&mut self, reads: bool) -> Option<bool> {
         if reads == self.held {
-            self.otherwise = 0;
+            self.changed_ticks = 0;
             return None;
         }
-        self.reads_otherwise()
+        self.count_change()
     }
 
     #[cold]
-    fn reads_otherwise(&mut self) -> Option<bool> {
-        self.otherwise += 1;
-        let [to_hold, to_let_go] = self.enough;
-        let enough = if self.held { to_let_go } else { to_hold };
-        if self.otherwise < enough {
+    fn count_change(&mut self) -> Option<bool> {
+        self.changed_ticks += 1;
+        let [to_hold, to_release] = self.debounce_ticks;
+        let debounce_ticks = if self.held { to_release } else { to_hold };
+        if self.changed_ticks < debounce_ticks {
             return None;
         }
-        self.otherwise = 0;
+        self.changed_ticks = 0;
         self.held = !self.held;
         Some(self.held)
     }

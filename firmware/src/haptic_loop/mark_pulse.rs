@@ -10,12 +10,12 @@ use crate::queues::Marked;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// Ticks of a pulse and its gap, and of the gap alone.
-    whole: u32,
+    total: u32,
     gap: u32,
     /// Remaining ticks of both; 0 if nothing is marked.
-    left: u32,
-    under_way: Marked,
-    over: Marked,
+    remaining: u32,
+    current: Marked,
+    completed: Marked,
     edge: Option<bool>,
 }
 
@@ -23,37 +23,37 @@ impl Mark {
     pub(super) fn new(rate: TickRate) -> Self {
         let gap = rate.ticks(MARK_GAP_MS);
         Self {
-            whole: rate.ticks(MARK_PULSE_MS) + gap,
+            total: rate.ticks(MARK_PULSE_MS) + gap,
             gap,
-            left: 0,
-            under_way: Marked::default(),
-            over: Marked::default(),
+            remaining: 0,
+            current: Marked::default(),
+            completed: Marked::default(),
             edge: None,
         }
     }
 
     /// Marks the current tick.
     pub(super) fn begin(&mut self, number: u8) {
-        self.under_way.number = number;
-        self.left = self.whole;
+        self.current.number = number;
+        self.remaining = self.total;
     }
 
     /// Ends a tick of this number.
     pub(super) fn tick(&mut self, tick: u32) {
-        if self.left == 0 {
+        if self.remaining == 0 {
             return;
         }
-        self.edge = match self.left {
-            left if left == self.whole => {
-                self.under_way.tick = tick;
+        self.edge = match self.remaining {
+            remaining if remaining == self.total => {
+                self.current.tick = tick;
                 Some(true)
             }
-            left if left == self.gap => Some(false),
+            remaining if remaining == self.gap => Some(false),
             _ => None,
         };
-        self.left -= 1;
-        if self.left == 0 {
-            self.over = self.under_way;
+        self.remaining -= 1;
+        if self.remaining == 0 {
+            self.completed = self.current;
         }
     }
 
@@ -64,7 +64,7 @@ impl Mark {
 
     /// Returns the latest mark whose pulse and gap are over.
     pub(super) const fn latest(&self) -> Marked {
-        self.over
+        self.completed
     }
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pulse_lasts_ten_milliseconds_at_each_tick_rate() {
+    fn pulse_lasts_ten_milliseconds_at_each_tick_rate() {
         for khz in [1, 4, 10] {
             let mut mark = Mark::new(TickRate::new(khz * 1000).expect("in range"));
             mark.tick(6);
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_within_a_pulse_begins_it_anew() {
+    fn mark_during_a_pulse_restarts_it() {
         let mut mark = Mark::new(TickRate::DEFAULT);
         mark.begin(1);
         mark.tick(1);

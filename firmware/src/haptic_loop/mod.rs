@@ -19,7 +19,7 @@ use hapterra_core::scene::Scene;
 use hapterra_core::tick::{Command, Haptics, HipSource, Outcome};
 
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
-use crate::monitor::Part;
+use crate::monitor::WatchedPart;
 use crate::motor_memory::{MotorLog, Words};
 use crate::queues::{LoopEnds, LoopReport, QueuedTick};
 use clutch_input::ClutchInput;
@@ -99,31 +99,31 @@ where
         if began.after_gap {
             // Before all else: the force of the last tick has acted for too long.
             self.drive(&GuardOutputs::default());
-            self.give_to_haptics(Command::Trip(Fault::TickGap));
+            self.apply_command(Command::Trip(Fault::TickGap));
         }
         self.ends.monitor.count_tick();
-        self.ends.monitor.check_in(Part::Tick);
+        self.ends.monitor.check_in(WatchedPart::Tick);
         let live = self.liveness.tick(self.ends.monitor.fed());
         let drive = match self.unsent.take() {
             Some(record) => {
                 self.answer(record);
-                self.follow_arm(live)
+                self.monitor_arm(live)
             }
             None => {
-                self.take_commands();
+                self.drain_commands();
                 self.render(live)
             }
         };
         self.mark.tick(self.outcome.sample.tick);
         if self.timing.end(&self.clock, began) {
-            self.give_to_haptics(Command::Trip(Fault::TickOverrun));
+            self.apply_command(Command::Trip(Fault::TickOverrun));
         }
         drive
     }
 
     /// Returns the state to keep across a reset, if any: the index and the content of one of the
     /// two copies of the motors' temperatures. Call it after each tick.
-    pub fn motors_to_keep(&mut self) -> Option<(usize, Words)> {
+    pub fn due_motor_copy(&mut self) -> Option<(usize, Words)> {
         self.motor_log.tick(&self.haptics.temperatures())
     }
 
@@ -145,7 +145,7 @@ where
         self.haptics.temperatures()
     }
 
-    fn take_commands(&mut self) {
+    fn drain_commands(&mut self) {
         if let Some(mechanism) = self.ends.settings.dequeue() {
             self.haptics.configure(mechanism);
         }
@@ -155,16 +155,16 @@ where
             };
             match &command {
                 Command::Scene(scene) => {
-                    take_materials(&mut self.haptics, &mut self.ends, scene);
+                    set_materials(&mut self.haptics, &mut self.ends, scene);
                 }
                 Command::Mark(number) => self.mark.begin(*number),
                 _ => {}
             }
-            self.give_to_haptics(command);
+            self.apply_command(command);
         }
     }
 
-    fn give_to_haptics(&mut self, command: Command<'t>) {
+    fn apply_command(&mut self, command: Command<'t>) {
         // A refused scene needs no handling: the loop then has no scene, and the guard reports
         // that.
         if let Ok(Some(tile)) = self.haptics.accept(command) {
@@ -177,7 +177,7 @@ where
         match self.haptics.source() {
             HipSource::Encoders | HipSource::None => self.render_arm(watchdog_live),
             HipSource::Points { pending: true } => self.render_point(watchdog_live),
-            HipSource::Points { pending: false } => self.follow_arm(watchdog_live),
+            HipSource::Points { pending: false } => self.monitor_arm(watchdog_live),
         }
     }
 
@@ -191,13 +191,13 @@ where
     fn render_arm(&mut self, watchdog_live: bool) -> GuardOutputs {
         let sense = self.encoders.sense();
         if let Some(held) = self.clutch_input.tick(sense.clutch) {
-            self.give_to_haptics(Command::ClutchInput(held));
+            self.apply_command(Command::ClutchInput(held));
         }
         self.run_tick(&sense, watchdog_live);
         let drive = self.outcome.drive;
         self.drive(&drive);
         let is_rendered = self.haptics.source() == HipSource::Encoders;
-        if is_rendered && self.reporter.sends_sample(&self.outcome.sample) {
+        if is_rendered && self.reporter.is_sample_due(&self.outcome.sample) {
             let record = self.record(None);
             if self.ends.records.enqueue(record).is_err() {
                 self.ends.monitor.count_dropped();
@@ -214,8 +214,8 @@ where
         let sense = self.encoders.sense();
         self.run_tick(&sense, watchdog_live);
         self.report(&sense, &drive);
-        let record = self.record(self.outcome.answers);
-        if record.answers.is_some() {
+        let record = self.record(self.outcome.answered_seq);
+        if record.answered_seq.is_some() {
             self.answer(record);
         } else {
             // It only reports which tile the point lacks; the next record repeats that.
@@ -225,20 +225,20 @@ where
     }
 
     /// Runs a tick of a replay without a point: nothing is rendered, and the arm is monitored.
-    fn follow_arm(&mut self, watchdog_live: bool) -> GuardOutputs {
+    fn monitor_arm(&mut self, watchdog_live: bool) -> GuardOutputs {
         let drive = GuardOutputs::default();
         self.drive(&drive);
         let sense = self.encoders.sense();
-        self.haptics.follow(&sense, watchdog_live);
+        self.haptics.monitor(&sense, watchdog_live);
         self.report(&sense, &drive);
         drive
     }
 
-    fn record(&mut self, answers: Option<u32>) -> QueuedTick {
+    fn record(&mut self, answered_seq: Option<u32>) -> QueuedTick {
         self.timing.fill(&mut self.outcome.sample);
         QueuedTick {
             sample: self.outcome.sample,
-            answers,
+            answered_seq,
         }
     }
 
@@ -246,7 +246,7 @@ where
     /// full, the next tick reports.
     fn report(&mut self, sense: &GuardInputs, drive: &GuardOutputs) {
         let (report, marked) = (self.haptics.report(), self.mark.latest());
-        if self.reporter.sends_report(&report, marked.number) && self.ends.health.ready() {
+        if self.reporter.is_report_due(&report, marked.number) && self.ends.health.ready() {
             let health = self.haptics.health(sense, drive);
             let epoch = self.haptics.scene().map(|scene| scene.epoch);
             // `ready` has found room.
@@ -255,7 +255,7 @@ where
                 epoch,
                 marked,
             });
-            self.reporter.sent_report(&report, marked.number);
+            self.reporter.mark_reported(&report, marked.number);
         }
     }
 
@@ -267,10 +267,10 @@ where
     /// Sets the amplifiers to the outputs of the tick.
     fn drive(&mut self, drive: &GuardOutputs) {
         let power = self.power.take().map(|power| match (power, drive.enabled) {
-            (Power::Off(off), false) => Power::Off(rested(off, drive)),
+            (Power::Off(off), false) => Power::Off(write_held(off, drive)),
             (Power::On(on), false) => Power::Off(on.disable()),
-            (Power::Off(off), true) => Power::On(written(off.enable(), drive)),
-            (Power::On(on), true) => Power::On(written(on, drive)),
+            (Power::Off(off), true) => Power::On(write_currents(off.enable(), drive)),
+            (Power::On(on), true) => Power::On(write_currents(on, drive)),
         });
         // An assignment would drop the old value. That is `None`, but the drivers' destructors,
         // which can panic, would become part of the tick.
@@ -280,7 +280,7 @@ where
 
 /// Sets the table of a scene with materials, if the queued table is this scene's. It may be a later
 /// scene's if this scene continues with the previous table.
-fn take_materials<const D: usize>(
+fn set_materials<const D: usize>(
     haptics: &mut Haptics<'_, D>,
     ends: &mut LoopEnds<'_>,
     scene: &Scene,
@@ -288,19 +288,19 @@ fn take_materials<const D: usize>(
     if let (Some(sum), Some(table)) = (scene.materials, ends.materials.peek())
         && table.check_sum() == sum
     {
-        haptics.take_materials(table);
+        haptics.set_materials(table);
         // The table stays in the queue until it is copied.
         drop(ends.materials.dequeue());
     }
 }
 
-fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: &GuardOutputs) -> A {
+fn write_currents<A: EnabledAmplifiers>(mut amplifiers: A, drive: &GuardOutputs) -> A {
     amplifiers.write(drive.currents_a.to_array());
     amplifiers
 }
 
-fn rested<A: Amplifiers>(mut amplifiers: A, drive: &GuardOutputs) -> A {
-    amplifiers.rest(drive.held.to_array());
+fn write_held<A: Amplifiers>(mut amplifiers: A, drive: &GuardOutputs) -> A {
+    amplifiers.set_held_outputs(drive.held.to_array());
     amplifiers
 }
 

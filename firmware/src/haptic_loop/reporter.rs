@@ -36,7 +36,7 @@ impl Reporter {
     }
 
     /// Returns true if this tick's sample is sent.
-    pub(super) fn sends_sample(&mut self, sample: &TickRecord) -> bool {
+    pub(super) fn is_sample_due(&mut self, sample: &TickRecord) -> bool {
         // The first sample of a scene is always sent.
         let is_first = sample.tick == 1;
         self.ticks_since_sample = match self.ticks_since_sample + 1 {
@@ -48,13 +48,13 @@ impl Reporter {
 
     /// Returns true if this tick's report is sent; `mark` is the number of the latest mark that is
     /// over.
-    pub(super) fn sends_report(&mut self, report: &Report, mark: u8) -> bool {
+    pub(super) fn is_report_due(&mut self, report: &Report, mark: u8) -> bool {
         self.ticks_since_report = self.ticks_since_report.saturating_add(1);
         self.ticks_since_report >= self.report_every || self.last_report != packed(report, mark)
     }
 
     /// Records that this report was sent.
-    pub(super) fn sent_report(&mut self, report: &Report, mark: u8) {
+    pub(super) fn mark_reported(&mut self, report: &Report, mark: u8) {
         self.ticks_since_report = 0;
         self.last_report = packed(report, mark);
     }
@@ -86,7 +86,7 @@ mod tests {
                 ..TickRecord::default()
             };
             let sent: Vec<u32> = (1..=5 * khz)
-                .filter(|tick| reporter.sends_sample(&sample(*tick)))
+                .filter(|tick| reporter.is_sample_due(&sample(*tick)))
                 .collect();
             assert_eq!(sent, Vec::from_iter((0..5).map(|ms| 1 + ms * khz)));
         }
@@ -102,8 +102,8 @@ mod tests {
                 report.mode = Mode::Requested;
             }
             report.limits.toggle(Limits::FORCE_CLAMPED);
-            if reporter.sends_report(&report, 0) {
-                reporter.sent_report(&report, 0);
+            if reporter.is_report_due(&report, 0) {
+                reporter.mark_reported(&report, 0);
                 reported += 1;
             }
         }

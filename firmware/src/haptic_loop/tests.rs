@@ -58,7 +58,7 @@ fn drain(link_ends: &mut LinkEnds<'_>) -> Vec<QueuedTick> {
 }
 
 #[test]
-fn samples_that_find_no_room_are_counted() {
+fn samples_without_room_are_counted() {
     let (mut haptic_loop, mut link_ends) = looped(Source::Encoders);
     for _ in 0..200 {
         haptic_loop.tick();
@@ -78,7 +78,7 @@ fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
 }
 
 #[test]
-fn the_arm_is_followed_in_every_tick_of_a_replay() {
+fn arm_is_monitored_in_every_tick_of_a_replay() {
     let (mut haptic_loop, mut link_ends) = looped(Source::Encoders);
     assert!(link_ends.commands.enqueue(Command::Zero([0; 3])).is_ok());
     let at = wave(&mut haptic_loop, 0, 2);
@@ -93,7 +93,7 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     let at = wave(&mut haptic_loop, at, 50);
     // While its answer has no room in the queue.
     let tile = Box::leak(Box::new(Tile::VACANT));
-    let key = TileKey::holding(0, Cell::new(100, 100));
+    let key = TileKey::containing(0, Cell::new(100, 100));
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     let at = wave(&mut haptic_loop, at, 50);
@@ -114,7 +114,7 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
 }
 
 #[test]
-fn an_answer_that_finds_no_room_is_kept_until_it_does() {
+fn unsent_answer_is_sent_once_there_is_room() {
     let (mut haptic_loop, mut link_ends) = looped(Source::Points);
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
     let point = HipCommand { seq: 9, hip };
@@ -124,49 +124,49 @@ fn an_answer_that_finds_no_room_is_kept_until_it_does() {
         haptic_loop.tick();
     }
     let tile = Box::leak(Box::new(Tile::VACANT));
-    let key = TileKey::holding(0, Cell::new(100, 100));
+    let key = TileKey::containing(0, Cell::new(100, 100));
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     for _ in 0..5 {
         haptic_loop.tick();
     }
     let early = drain(&mut link_ends);
-    assert!(early.iter().all(|record| record.answers.is_none()));
+    assert!(early.iter().all(|record| record.answered_seq.is_none()));
     for _ in 0..5 {
         haptic_loop.tick();
     }
     let late: Vec<_> = drain(&mut link_ends)
         .into_iter()
-        .filter_map(|record| record.answers)
+        .filter_map(|record| record.answered_seq)
         .collect();
     assert_eq!(late, [9], "once, and only once");
 }
 
 /// Amplifiers that store the last command where a test can read it.
 #[derive(Clone, Default)]
-struct Seen(std::rc::Rc<core::cell::RefCell<(bool, [f32; 3])>>);
+struct RecordedAmplifiers(std::rc::Rc<core::cell::RefCell<(bool, [f32; 3])>>);
 
-impl Amplifiers for Seen {
-    type Enabled = SeenOn;
+impl Amplifiers for RecordedAmplifiers {
+    type Enabled = RecordedAmplifiersOn;
 
-    fn enable(self) -> SeenOn {
+    fn enable(self) -> RecordedAmplifiersOn {
         *self.0.borrow_mut() = (true, [0.0; 3]);
-        SeenOn(self)
+        RecordedAmplifiersOn(self)
     }
 
-    fn rest(&mut self, held: [f32; 3]) {
+    fn set_held_outputs(&mut self, held: [f32; 3]) {
         *self.0.borrow_mut() = (false, held);
     }
 }
 
-struct SeenOn(Seen);
+struct RecordedAmplifiersOn(RecordedAmplifiers);
 
-impl EnabledAmplifiers for SeenOn {
-    type Disabled = Seen;
+impl EnabledAmplifiers for RecordedAmplifiersOn {
+    type Disabled = RecordedAmplifiers;
 
     fn write(&mut self, _currents_a: [f32; 3]) {}
 
-    fn disable(self) -> Seen {
+    fn disable(self) -> RecordedAmplifiers {
         *self.0.0.borrow_mut() = (false, [0.0; 3]);
         self.0
     }
@@ -178,13 +178,13 @@ fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
     let memory = Box::leak(Box::new(WorkingMemory::new()));
     let (loop_ends, mut link_ends) = memory.queues.split();
     let haptics = Haptics::new(tiles.split().0, TickRate::DEFAULT, None);
-    let seen = Seen::default();
+    let recorded = RecordedAmplifiers::default();
     let encoders = VirtualEncoders::default();
     let mut haptic_loop = HapticLoop::new(
         haptics,
         loop_ends,
         encoders,
-        seen.clone(),
+        recorded.clone(),
         StoppedClock::<1>,
     );
     let held = [0.5, -1.0, 0.25];
@@ -193,12 +193,17 @@ fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
         let command = Command::HoldOutputs(command);
         assert!(link_ends.commands.enqueue(command).is_ok());
         haptic_loop.tick();
-        assert_eq!(*seen.0.borrow(), (false, expected));
+        assert_eq!(*recorded.0.borrow(), (false, expected));
     }
 }
 
 /// Returns the clutch's state after `ticks` ticks with this reading of the input.
-fn clutched(haptic_loop: &mut Loop, ends: &mut LinkEnds<'_>, ticks: u32, reads: bool) -> Limits {
+fn limits_after(
+    haptic_loop: &mut Loop,
+    ends: &mut LinkEnds<'_>,
+    ticks: u32,
+    reads: bool,
+) -> Limits {
     for _ in 0..ticks {
         haptic_loop.encoders_mut().0.clutch = reads;
         let _ = haptic_loop.tick();
@@ -207,17 +212,18 @@ fn clutched(haptic_loop: &mut Loop, ends: &mut LinkEnds<'_>, ticks: u32, reads: 
 }
 
 #[test]
-fn the_clutch_input_holds_the_clutch_once_it_does_not_bounce() {
+fn debounced_clutch_input_opens_the_clutch() {
     let (mut haptic_loop, mut ends) = looped(Source::Encoders);
     let of_clutch = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN | Limits::CLUTCH_MOVES;
-    let mut limits = |ticks, reads| clutched(&mut haptic_loop, &mut ends, ticks, reads) & of_clutch;
+    let mut limits =
+        |ticks, reads| limits_after(&mut haptic_loop, &mut ends, ticks, reads) & of_clutch;
     assert_eq!(limits(4, true), Limits::empty());
     assert_eq!(limits(10, false), Limits::empty());
-    let moves = Limits::CLUTCH_INPUT | Limits::CLUTCH_MOVES;
-    assert_eq!(limits(6, true), moves);
+    let opening = Limits::CLUTCH_INPUT | Limits::CLUTCH_MOVES;
+    assert_eq!(limits(6, true), opening);
     let open = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN;
     for _ in 0..3 {
-        assert_eq!(limits(30, true), moves, "it takes 0.1 s");
+        assert_eq!(limits(30, true), opening, "it takes 0.1 s");
     }
     assert_eq!(limits(30, true), open);
     assert_eq!(limits(19, false), open);
@@ -225,7 +231,7 @@ fn the_clutch_input_holds_the_clutch_once_it_does_not_bounce() {
 }
 
 #[test]
-fn a_refused_scene_leaves_nothing_to_render() {
+fn refused_scene_leaves_nothing_to_render() {
     for source in [Source::Encoders, Source::Points] {
         let (mut haptic_loop, mut link_ends) = looped(source);
         haptic_loop.tick();

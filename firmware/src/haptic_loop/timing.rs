@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn cost_is_counted_through_the_wrap_and_the_worst_is_kept() {
+    fn cost_is_measured_across_counter_wrap_and_maximum_is_kept() {
         let mut timing = Timing::new::<Fake>();
         let mut clock = Fake {
             now: u32::MAX - 4,
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn late_at_the_beginning_and_late_at_the_end_both_count() {
+    fn late_start_and_late_end_are_both_counted() {
         let mut timing = Timing::new::<Fake>();
         let mut clock = Fake {
             now: 0,
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_begins_above_one_and_a_half_periods() {
+    fn gap_is_detected_above_one_and_a_half_periods() {
         let mut timing = Timing::new::<Fake>();
         let mut after = |since_last_tick| {
             let mut clock = Fake {

@@ -33,9 +33,9 @@ impl<'t, const D: usize> Link<'t, D> {
                 | Command::ClearFault(_)
                 | Command::Trip(_)
         );
-        self.commands_taken = false;
+        self.commands_drained = false;
         // There is room: this is the queue's only producer, and each place is reserved once.
-        let taken = self.ends.commands.enqueue(command);
-        debug_assert!(taken.is_ok());
+        let sent = self.ends.commands.enqueue(command);
+        debug_assert!(sent.is_ok());
     }
 }

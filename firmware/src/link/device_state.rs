@@ -19,15 +19,15 @@ use crate::dead_man_press::PressWait;
 /// Progress of storing a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Storing {
-    No,
+    Idle,
     /// The user has to press the dead-man switch.
-    Waiting(PressWait),
+    AwaitingPress(PressWait),
     /// The calibration waits for the board.
-    Wanted,
+    Due,
 }
 
 /// Data of the arm at the board's start.
-pub(crate) struct KnownArm {
+pub(crate) struct ArmConfig {
     /// The calibration in force.
     pub(crate) calibration: Option<Calibration>,
     /// Its source, or the reason why there is none.
@@ -70,7 +70,7 @@ impl DeviceState {
     pub(crate) fn new<C: TickClock, const D: usize>(
         (board, serial): (&str, SerialNumber),
         boot: BootReport,
-        arm: KnownArm,
+        arm: ArmConfig,
     ) -> Self {
         Self {
             hello: DeviceHello {
@@ -97,7 +97,7 @@ impl DeviceState {
             arming: None,
             mark: 0,
             request: LatestRequest::default(),
-            storing: Storing::No,
+            storing: Storing::Idle,
         }
     }
 
@@ -106,7 +106,7 @@ impl DeviceState {
         self.reported = None;
         self.arming = None;
         self.request = LatestRequest::default();
-        self.forget_press();
+        self.cancel_press();
     }
 
     /// Answers the open message with this number, of a host that may return to `scene`.
@@ -129,31 +129,31 @@ impl DeviceState {
     }
 
     /// Returns true if the amplifiers are on.
-    pub(super) const fn drives(&self) -> bool {
-        self.health.report.mode.drives()
+    pub(super) const fn is_driving(&self) -> bool {
+        self.health.report.mode.is_driving()
     }
 
     /// Returns true if nothing is driven, no arm command waits for the loop and no calibration for
     /// a press.
-    pub(super) fn is_at_rest(&self) -> bool {
-        !self.drives() && self.arming.is_none() && !self.waits_for_press()
+    pub(super) fn is_idle(&self) -> bool {
+        !self.is_driving() && self.arming.is_none() && !self.is_awaiting_press()
     }
 
     /// Returns true if a dead-man press will store a calibration.
-    pub(super) const fn waits_for_press(&self) -> bool {
-        matches!(self.storing, Storing::Waiting(_))
+    pub(super) const fn is_awaiting_press(&self) -> bool {
+        matches!(self.storing, Storing::AwaitingPress(_))
     }
 
     /// Handles a report of the loop, received in tick `now`.
-    pub(super) fn take_health(&mut self, health: Health, now: u32) {
+    pub(super) fn on_health(&mut self, health: Health, now: u32) {
         self.health = health;
-        if let Storing::Waiting(wait) = &mut self.storing
-            && let Some(decided) = wait.look(&self.health, now)
+        if let Storing::AwaitingPress(wait) = &mut self.storing
+            && let Some(decided) = wait.check(&self.health, now)
         {
             match decided {
-                Ok(()) => self.storing = Storing::Wanted,
+                Ok(()) => self.storing = Storing::Due,
                 Err(refused) => {
-                    self.storing = Storing::No;
+                    self.storing = Storing::Idle;
                     self.request.stored(Err(refused));
                 }
             }
@@ -171,17 +171,17 @@ impl DeviceState {
 
     /// Ends the wait for a press, because its host is gone: a later press would have another
     /// purpose.
-    pub(super) fn forget_press(&mut self) {
-        if matches!(self.storing, Storing::Waiting(_)) {
-            self.storing = Storing::No;
+    pub(super) fn cancel_press(&mut self) {
+        if matches!(self.storing, Storing::AwaitingPress(_)) {
+            self.storing = Storing::Idle;
         }
     }
 
     /// Ends the wait for a press, because its host is silent. The host receives an answer if it
     /// returns.
-    pub(super) fn give_up_press(&mut self) {
-        if self.waits_for_press() {
-            self.storing = Storing::No;
+    pub(super) fn expire_press(&mut self) {
+        if self.is_awaiting_press() {
+            self.storing = Storing::Idle;
             self.request.stored(Err(Refusal::NotPressed));
         }
     }
@@ -195,7 +195,7 @@ impl DeviceState {
 
     /// Returns true if an arm command is pending and the amplifiers are still off.
     pub(super) fn is_being_armed(&self) -> bool {
-        self.may_drive && !self.drives()
+        self.may_drive && !self.is_driving()
     }
 
     /// Checks that the arm is disarmed, as every change of settings requires.
@@ -207,9 +207,11 @@ impl DeviceState {
     }
 
     /// Checks that the fault to clear is the one that the host has seen.
-    pub(super) fn may_clear(&self, seen: Option<Fault>) -> Result<(), Refusal> {
+    pub(super) fn may_clear(&self, acknowledged: Option<Fault>) -> Result<(), Refusal> {
         match self.health.report.fault {
-            Some(fault) if Some(fault) != seen => Err(Refusal::Blocked(Blockers::FAULT_LATCHED)),
+            Some(fault) if Some(fault) != acknowledged => {
+                Err(Refusal::Blocked(Blockers::FAULT_LATCHED))
+            }
             _ => Ok(()),
         }
     }
@@ -224,7 +226,7 @@ impl DeviceState {
     }
 
     pub(super) fn is_storing(&self) -> bool {
-        self.storing != Storing::No
+        self.storing != Storing::Idle
     }
 
     pub(super) fn set_calibration(&mut self, calibration: &Calibration) {
@@ -242,32 +244,32 @@ impl DeviceState {
         if self.is_storing() {
             return Err(Refusal::Busy);
         }
-        self.storing = Storing::Waiting(PressWait::new(now, self.ticks_per_ms()));
+        self.storing = Storing::AwaitingPress(PressWait::new(now, self.ticks_per_ms()));
         Ok(())
     }
 
     pub(super) fn to_store(&self) -> Option<Calibration> {
-        let wanted = self.storing == Storing::Wanted;
-        self.calibration.filter(|_| wanted)
+        let is_due = self.storing == Storing::Due;
+        self.calibration.filter(|_| is_due)
     }
 
     pub(super) fn stored(&mut self, result: Result<(), Refusal>) {
         if result.is_ok() {
             self.source = CalibrationSource::Stored;
         }
-        self.storing = Storing::No;
+        self.storing = Storing::Idle;
         self.request.stored(result);
     }
 
     /// Returns the next message to the host, once.
     pub(super) fn next_message(&mut self) -> Option<ToHost> {
-        self.look_at_decision();
+        self.check_decision();
         let answer = self.request.take_answer();
         answer.or_else(|| self.guard_changed().map(ToHost::Guard))
     }
 
     /// Reads the loop's decision on the pending arm command.
-    fn look_at_decision(&mut self) {
+    fn check_decision(&mut self) {
         let decision = self.health.report.decision;
         if self.arming.is_none_or(|before| before == decision.count) {
             return;

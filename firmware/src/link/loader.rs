@@ -15,11 +15,11 @@ pub(super) enum LoaderEntry {
     /// The board has one.
     Offered,
     /// The host has requested it. This is final.
-    Wanted,
+    Requested,
 }
 
 impl<const D: usize> Link<'_, D> {
-    /// Declares that the board enters a loader when [`Self::enters_loader`] returns true.
+    /// Declares that the board enters a loader when [`Self::is_loader_due`] returns true.
     pub fn offer_loader(&mut self) {
         self.loader = LoaderEntry::Offered;
     }
@@ -27,27 +27,27 @@ impl<const D: usize> Link<'_, D> {
     /// Returns true if the board is to enter its loader: the host has requested it and received the
     /// answer, the amplifiers are off, and the loop holds no output.
     #[must_use]
-    pub fn enters_loader(&self) -> bool {
-        let is_wanted = self.loader == LoaderEntry::Wanted;
-        is_wanted
+    pub fn is_loader_due(&self) -> bool {
+        let is_requested = self.loader == LoaderEntry::Requested;
+        is_requested
             && self.tx.is_empty()
             && self.ends.commands.is_empty()
             && self.device.may_change_settings().is_ok()
     }
 
     /// Returns true if the board is about to enter its loader and does nothing else.
-    pub(super) fn is_leaving(&self) -> bool {
-        self.loader == LoaderEntry::Wanted
+    pub(super) fn is_entering_loader(&self) -> bool {
+        self.loader == LoaderEntry::Requested
     }
 
     /// Handles the request for the loader: accepted only while the arm is disarmed, without a
     /// pending arm command or calibration to store.
-    pub(super) fn want_loader(&mut self, room: CommandRoom) -> Result<(), Refusal> {
+    pub(super) fn request_loader(&mut self, room: CommandRoom) -> Result<(), Refusal> {
         if self.loader == LoaderEntry::None {
             return Err(Refusal::NoLoader);
         }
         self.device.may_change_settings()?;
-        if !self.device.is_at_rest() {
+        if !self.device.is_idle() {
             return Err(Refusal::NotWhileArmed);
         }
         if self.device.is_storing() {
@@ -56,7 +56,7 @@ impl<const D: usize> Link<'_, D> {
         // The command also ends held outputs: a converter outside the chip would keep them through
         // the whole update.
         self.command(room, Command::Disarm);
-        self.loader = LoaderEntry::Wanted;
+        self.loader = LoaderEntry::Requested;
         Ok(())
     }
 }

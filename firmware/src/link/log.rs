@@ -20,7 +20,7 @@ pub(super) fn ended() {
     defmt::info!("the host closed the session; disarmed");
 }
 
-pub(super) fn forsaken() {
+pub(super) fn host_silent() {
     #[cfg(feature = "defmt")]
     defmt::warn!("the host has been silent for too long: the arm is disarmed");
 }

@@ -10,7 +10,7 @@ use super::commands::CommandRoom;
 
 /// Material table of the loop.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct KnownTable {
+pub(super) struct LoopMaterials {
     sum: u32,
     /// Number of materials that it has.
     count: usize,
@@ -24,19 +24,19 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Handles a scene with its table.
-    pub(super) fn take_material_scene(&mut self, message: &MaterialScene<'_>, room: CommandRoom) {
+    pub(super) fn on_material_scene(&mut self, message: &MaterialScene<'_>, room: CommandRoom) {
         let scene = message.scene;
         if let Some(table) = message.table()
             && scene.is_valid()
             && !self.has_materials_of(&scene)
         {
-            self.give_materials(table);
+            self.queue_materials(table);
         }
-        self.take_scene(scene, room);
+        self.on_scene(scene, room);
     }
 
-    fn give_materials(&mut self, table: MaterialTable) {
-        self.materials = Some(KnownTable {
+    fn queue_materials(&mut self, table: MaterialTable) {
+        self.materials = Some(LoopMaterials {
             sum: table.check_sum(),
             count: table.materials().len(),
         });

@@ -6,13 +6,13 @@ use hapterra_core::tick::Command;
 use hapterra_core::wire::frame::{FrameError, decode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::session::{InSession, ONLY_LOOKS, SessionEnd, SessionNumber};
+use hapterra_core::wire::session::{InSession, READ_ONLY_SILENCE_S, SessionEnd, SessionNumber};
 use hapterra_core::wire::status::{StackFigures, Status, TickFigures};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::commands::CommandRoom;
-use super::session::{Greeting, SessionState};
-use super::views::ClutchOfHost;
+use super::session::{OpenKind, SessionState};
+use super::views::HostClutch;
 use super::{Link, ReplayProgress, log};
 
 impl<const D: usize> Link<'_, D> {
@@ -34,7 +34,7 @@ impl<const D: usize> Link<'_, D> {
 
     /// Answers a host of another protocol. A host of this protocol also sends a hello.
     fn on_version_check(&mut self, check: VersionCheck) {
-        if let VersionCheck::Asked { protocol } = check
+        if let VersionCheck::Query { protocol } = check
             && protocol != PROTOCOL
         {
             self.refuse(protocol);
@@ -51,8 +51,8 @@ impl<const D: usize> Link<'_, D> {
         if let ToDevice::Hello(hello) = message {
             return self.on_hello(session, hello, room);
         }
-        if !self.session.is_of(session) && self.looker == Some(session) {
-            return self.on_look(session, &message);
+        if !self.session.is_of(session) && self.read_only_session == Some(session) {
+            return self.on_read_only(session, &message);
         }
         if !self.session.is_of(session) {
             self.foreign_frames = self.foreign_frames.saturating_add(1);
@@ -68,22 +68,22 @@ impl<const D: usize> Link<'_, D> {
                 SessionState::Closed
                 | SessionState::Ended(_)
                 | SessionState::Detached
-                | SessionState::Gone,
+                | SessionState::Acknowledged,
             ) => {}
-            (ToDevice::Heartbeat, _) => self.on_alive(),
-            (ToDevice::Status { number }, _) => self.tell_status(session, number),
-            (ToDevice::GetCalibration { number }, _) => self.tell_calibration(session, number),
-            (_, SessionState::Leaving) => {}
-            (ToDevice::Scene(scene), _) => self.take_scene(scene, room),
-            (ToDevice::SceneChange(view), _) => self.take_view(view, room),
-            (ToDevice::Tile(tile), _) => self.take_tile(&tile, None, room),
-            (ToDevice::MaterialScene(scene), _) => self.take_material_scene(&scene, room),
+            (ToDevice::Heartbeat, _) => self.on_heartbeat(),
+            (ToDevice::Status { number }, _) => self.send_status(session, number),
+            (ToDevice::GetCalibration { number }, _) => self.send_calibration(session, number),
+            (_, SessionState::Closing) => {}
+            (ToDevice::Scene(scene), _) => self.on_scene(scene, room),
+            (ToDevice::SceneChange(view), _) => self.on_scene_change(view, room),
+            (ToDevice::Tile(tile), _) => self.on_tile(&tile, None, room),
+            (ToDevice::MaterialScene(scene), _) => self.on_material_scene(&scene, room),
             (ToDevice::MaterialTile(message), _) => {
-                self.take_tile(&message.tile, Some(message.materials), room);
+                self.on_tile(&message.tile, Some(message.materials), room);
             }
-            (ToDevice::Hip(point), _) => self.take_point(point),
+            (ToDevice::Hip(point), _) => self.on_point(point),
             (ToDevice::Request { number, request }, _) => {
-                self.take_request(number, &request, room);
+                self.on_request(number, &request, room);
             }
             (ToDevice::Hello(_) | ToDevice::Close, _) => {}
         }
@@ -93,58 +93,58 @@ impl<const D: usize> Link<'_, D> {
         if hello.protocol != PROTOCOL {
             return self.refuse(hello.protocol);
         }
-        if hello.silence_s == ONLY_LOOKS && !self.session.is_of(session) {
-            self.looker = Some(session);
+        if hello.silence_s == READ_ONLY_SILENCE_S && !self.session.is_of(session) {
+            self.read_only_session = Some(session);
             let hello = self.device.hello(hello.number, self.scene, &self.session);
-            return self.say_in(session, &ToHost::Hello(hello));
+            return self.send_in(session, &ToHost::Hello(hello));
         }
-        match self.session.greeting(session) {
-            Greeting::Stale => {
+        match self.session.classify_open(session) {
+            OpenKind::Stale => {
                 self.foreign_frames = self.foreign_frames.saturating_add(1);
                 return;
             }
-            Greeting::Over(end) => {
+            OpenKind::Ended(end) => {
                 self.foreign_frames = self.foreign_frames.saturating_add(1);
                 let number = hello.number;
-                return self.say_in(session, &ToHost::SessionClosed { number, end });
+                return self.send_in(session, &ToHost::SessionClosed { number, end });
             }
-            Greeting::Again => {}
-            Greeting::Opens => self.open(session, hello.number, room),
+            OpenKind::Repeated => {}
+            OpenKind::New => self.open(session, hello.number, room),
         }
         self.session.received(self.ends.monitor.ticks());
         let tick_hz = self.device.tick_hz();
         self.session.set_silence(hello.silence_s, tick_hz);
         let hello = self.device.hello(hello.number, self.scene, &self.session);
-        self.say(&ToHost::Hello(hello));
+        self.send(&ToHost::Hello(hello));
     }
 
     /// Answers a host that only reads, without an effect on the open session or its time-out.
-    fn on_look(&mut self, session: SessionNumber, message: &ToDevice<'_>) {
+    fn on_read_only(&mut self, session: SessionNumber, message: &ToDevice<'_>) {
         match *message {
-            ToDevice::Status { number } => self.tell_status(session, number),
-            ToDevice::GetCalibration { number } => self.tell_calibration(session, number),
+            ToDevice::Status { number } => self.send_status(session, number),
+            ToDevice::GetCalibration { number } => self.send_calibration(session, number),
             _ => {}
         }
     }
 
-    fn tell_status(&mut self, session: SessionNumber, number: u8) {
+    fn send_status(&mut self, session: SessionNumber, number: u8) {
         let status = self.status();
-        self.say_in(session, &ToHost::Status { number, status });
+        self.send_in(session, &ToHost::Status { number, status });
     }
 
-    fn tell_calibration(&mut self, session: SessionNumber, number: u8) {
+    fn send_calibration(&mut self, session: SessionNumber, number: u8) {
         let calibration = self.device.calibration;
         let answer = ToHost::Calibration {
             number,
             calibration,
         };
-        self.say_in(session, &answer);
+        self.send_in(session, &answer);
     }
 
     /// Opens a session; the scene and its stored tiles stay.
     fn open(&mut self, session: SessionNumber, hello: u8, room: CommandRoom) {
-        self.forget_conversation();
-        self.forsake_clutch();
+        self.clear_messages();
+        self.abandon_clutch();
         let dropped = self.samples_dropped();
         self.session.open(session, hello, dropped);
         self.device.session_opened();
@@ -155,16 +155,16 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    fn on_alive(&mut self) {
+    fn on_heartbeat(&mut self) {
         let (count, report) = (self.sample_count(), self.device.report());
         let epoch = self.scene.map(|scene| scene.epoch);
-        self.say(&ToHost::Heartbeat {
+        self.send(&ToHost::Heartbeat {
             count,
             epoch,
             report,
         });
         // If the clock stands still until a tile arrives, its request would never time out.
-        if self.may_stand_still() {
+        if self.may_stop_clock() {
             self.requester.age(RETRY_TICKS / 2);
         }
     }
@@ -175,15 +175,15 @@ impl<const D: usize> Link<'_, D> {
             | SessionState::Detached
             | SessionState::Ended(SessionEnd::HostSilent) => {
                 self.read_records();
-                self.device.forget_press();
+                self.device.cancel_press();
                 self.drop_scene(room);
-                self.session.leave();
+                self.session.begin_close();
             }
             // The host has missed the answer.
-            SessionState::Ended(_) | SessionState::Gone => {
-                self.say(&ToHost::Goodbye(self.sample_count()));
+            SessionState::Ended(_) | SessionState::Acknowledged => {
+                self.send(&ToHost::Goodbye(self.sample_count()));
             }
-            SessionState::Closed | SessionState::Leaving => {}
+            SessionState::Closed | SessionState::Closing => {}
         }
     }
 
@@ -191,20 +191,20 @@ impl<const D: usize> Link<'_, D> {
     /// cancelled.
     fn on_detach(&mut self, state: SessionState, room: CommandRoom) {
         match state {
-            SessionState::Closed | SessionState::Leaving => return,
+            SessionState::Closed | SessionState::Closing => return,
             SessionState::Open => {
-                self.device.forget_press();
+                self.device.cancel_press();
                 self.drop_samples();
-                self.forsake_clutch();
+                self.abandon_clutch();
                 if self.device.is_being_armed() {
                     self.command(room, Command::Disarm);
                 }
                 self.session.detach();
             }
             // The host has missed the answer.
-            SessionState::Detached | SessionState::Ended(_) | SessionState::Gone => {}
+            SessionState::Detached | SessionState::Ended(_) | SessionState::Acknowledged => {}
         }
-        self.say(&ToHost::Detached);
+        self.send(&ToHost::Detached);
     }
 
     /// Disarms and drops the scene; the loop ramps the force down.
@@ -213,21 +213,21 @@ impl<const D: usize> Link<'_, D> {
             Some(_) => Command::DropScene,
             None => Command::Disarm,
         };
-        self.forget_scene();
+        self.clear_scene();
         self.command(room, command);
     }
 
     /// Discards the link's copy of the scene, which the loop drops or has dropped.
-    pub(super) fn forget_scene(&mut self) {
+    pub(super) fn clear_scene(&mut self) {
         self.scene = None;
-        self.forget_positions();
-        self.requester.forget_asked();
+        self.clear_positions();
+        self.requester.clear_pending();
     }
 
     /// Discards the state that depends on positions in one scene.
-    fn forget_positions(&mut self) {
+    fn clear_positions(&mut self) {
         self.view = 0;
-        self.clutch = ClutchOfHost::LetGo;
+        self.clutch = HostClutch::Released;
         self.request_hint = None;
         self.points.clear();
         self.replay = ReplayProgress::default();
@@ -239,12 +239,12 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Drops pending messages and requests; keeps the scene and the stored tiles.
-    pub(super) fn forget_conversation(&mut self) {
+    pub(super) fn clear_messages(&mut self) {
         self.nothing_to_request_at = None;
         self.tx.clear();
         self.drop_samples();
         self.points.clear();
-        self.requester.forget_asked();
+        self.requester.clear_pending();
     }
 
     /// Drops the samples that are not packed yet, and counts them.
@@ -255,7 +255,7 @@ impl<const D: usize> Link<'_, D> {
 
     /// Drops and counts the samples of a scene that another replaces.
     fn drop_scene_samples(&mut self) {
-        if self.renders_arm() && self.session.is_open() {
+        if self.is_arm_scene() && self.session.is_open() {
             while self.ends.records.dequeue().is_some() {
                 self.dropped = self.dropped.wrapping_add(1);
             }
@@ -263,33 +263,33 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    pub(super) fn take_scene(&mut self, scene: Scene, room: CommandRoom) {
+    pub(super) fn on_scene(&mut self, scene: Scene, room: CommandRoom) {
         let accepted = scene.is_valid() && self.has_materials_of(&scene);
         // The same scene continues: its host has returned.
         if accepted && self.scene != Some(scene) {
             self.drop_scene_samples();
             self.requester.reset(scene.level, scene.size);
-            self.requester.lay(scene.fallback);
-            self.forget_positions();
+            self.requester.set_fallback(scene.fallback);
+            self.clear_positions();
             self.scene = Some(scene);
             self.command(room, Command::Scene(scene));
         }
         let epoch = scene.epoch;
         log::scene(epoch, accepted);
-        self.say(&ToHost::SceneAck { epoch, accepted });
+        self.send(&ToHost::SceneAck { epoch, accepted });
     }
 
     /// Queues a point. Each is rendered once; the last answer is repeated if its point arrives
     /// again.
-    fn take_point(&mut self, point: HipCommand) {
-        if self.renders_arm() || self.scene.is_none() {
+    fn on_point(&mut self, point: HipCommand) {
+        if self.is_arm_scene() || self.scene.is_none() {
             return;
         }
         let is = |seq: u32| seq == point.seq;
-        if let Some(last) = self.replay.last.filter(|r| r.answers.is_some_and(is)) {
+        if let Some(last) = self.replay.last.filter(|r| r.answered_seq.is_some_and(is)) {
             return self.answer_point(last);
         }
-        if self.replay.under_way.is_some_and(is) || self.points.iter().any(|p| is(p.seq)) {
+        if self.replay.current.is_some_and(is) || self.points.iter().any(|p| is(p.seq)) {
             return;
         }
         // A host that does not wait for answers loses points.

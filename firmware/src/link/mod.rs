@@ -47,13 +47,13 @@ use heapless::{Deque, Vec};
 use crate::led::LedPattern;
 use crate::queues::{LinkEnds, QueuedTick, SPARES};
 use commands::CommandRoom;
-pub(crate) use device_state::{DeviceState, KnownArm};
+pub(crate) use device_state::{ArmConfig, DeviceState};
 use loader::LoaderEntry;
-use materials::KnownTable;
+use materials::LoopMaterials;
 use session::{Session, SessionState};
 pub use tiles::fill_tile;
 use tx_queue::TxQueue;
-use views::ClutchOfHost;
+use views::HostClutch;
 
 /// Capacity for samples that wait for the writer; when it is full, new ones are dropped.
 const SAMPLES: usize = 16;
@@ -82,7 +82,7 @@ impl Buffers {
 #[derive(Clone, Copy, Debug, Default)]
 struct ReplayProgress {
     /// The number of the point that the loop is rendering.
-    under_way: Option<u32>,
+    current: Option<u32>,
     /// The last answer, for a host that missed it.
     last: Option<QueuedTick>,
 }
@@ -96,19 +96,19 @@ pub struct Link<'t, const D: usize> {
     ends: LinkEnds<'t>,
     session: Session,
     /// Session of the last host that only reads.
-    looker: Option<SessionNumber>,
+    read_only_session: Option<SessionNumber>,
     /// True if the command queue was empty when the loop's reports were last read.
-    commands_taken: bool,
+    commands_drained: bool,
     /// State of arming, calibration and status.
     device: DeviceState,
     /// Entry into the loader in the chip's ROM.
     loader: LoaderEntry,
     scene: Option<Scene>,
     /// The last table of materials sent to the loop.
-    materials: Option<KnownTable>,
+    materials: Option<LoopMaterials>,
     /// Number of the latest placement; samples with another number are older.
     view: u8,
-    clutch: ClutchOfHost,
+    clutch: HostClutch,
     requester: TileRequester<D>,
     /// Millisecond in which the tile requester last found nothing to request; cleared by any
     /// change. Its search is long, so it is not repeated in every tick.
@@ -140,14 +140,14 @@ impl<'t, const D: usize> Link<'t, D> {
             samples: &mut buffers.samples,
             ends,
             session: Session::new(),
-            looker: None,
-            commands_taken: false,
+            read_only_session: None,
+            commands_drained: false,
             device,
             loader: LoaderEntry::default(),
             scene: None,
             materials: None,
             view: 0,
-            clutch: ClutchOfHost::default(),
+            clutch: HostClutch::default(),
             requester: TileRequester::new(),
             nothing_to_request_at: None,
             request_hint: None,
@@ -167,8 +167,8 @@ impl<'t, const D: usize> Link<'t, D> {
     /// Returns the number of bytes read. It is less than the input, even zero, while the loop or
     /// the writer has to catch up: pass the rest again after a poll.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
-        let mut taken = 0;
-        while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
+        let mut consumed = 0;
+        while let Some(rest) = bytes.get(consumed..).filter(|rest| !rest.is_empty()) {
             let Some(room) = self.room_for_message() else {
                 break;
             };
@@ -176,7 +176,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 break;
             };
             let (n, frame) = reader.push(rest);
-            taken += n;
+            consumed += n;
             let received =
                 frame.map(|frame| frame.and_then(|content| self.on_content(content, room)));
             if let Some(Err(bad)) = received {
@@ -184,7 +184,7 @@ impl<'t, const D: usize> Link<'t, D> {
             }
             self.reader = Some(reader);
         }
-        taken
+        consumed
     }
 
     /// Returns room for one message, which may need one command, one table and one answer.
@@ -199,7 +199,7 @@ impl<'t, const D: usize> Link<'t, D> {
         if let Some(reader) = &mut self.reader {
             **reader = FrameReader::new();
         }
-        self.forget_conversation();
+        self.clear_messages();
     }
 
     /// Returns true if the loop has nothing to do until a message of the host arrives.
@@ -208,33 +208,33 @@ impl<'t, const D: usize> Link<'t, D> {
     /// a requested tile is missing. An emulated board then stops its clock, and a caller that runs
     /// the device in lock-step runs no tick; a real board keeps ticking.
     #[must_use]
-    pub fn may_stand_still(&self) -> bool {
-        let waits = match &self.scene {
+    pub fn may_stop_clock(&self) -> bool {
+        let is_waiting = match &self.scene {
             None => true,
-            Some(scene) if scene.source == Source::Points => self.replay.under_way.is_none(),
+            Some(scene) if scene.source == Source::Points => self.replay.current.is_none(),
             Some(scene) if scene.hold_clock && self.requester.in_flight() > 0 => return true,
             Some(_) => false,
         };
         // Commands have to reach the loop, the force has to ramp down, and a host that closes has
         // to receive its answer.
-        let leaves = self.session.is_leaving();
-        waits
-            && !(leaves && self.device.may_drive)
+        let is_closing = self.session.is_closing();
+        is_waiting
+            && !(is_closing && self.device.may_drive)
             && self.ends.commands.is_empty()
             && self.ends.settings.is_empty()
-            && self.device.is_at_rest()
+            && self.device.is_idle()
     }
 
     /// Returns true if the current scene is rendered through the encoders.
-    fn renders_arm(&self) -> bool {
+    fn is_arm_scene(&self) -> bool {
         self.scene.is_some_and(|s| s.source == Source::Encoders)
     }
 
     /// Returns true if the arm is in use: the current scene is rendered through the encoders, or a
     /// force still ramps down.
     #[must_use]
-    pub fn drives_arm(&self) -> bool {
-        self.renders_arm() || self.device.drives()
+    pub fn is_arm_in_use(&self) -> bool {
+        self.is_arm_scene() || self.device.is_driving()
     }
 
     /// Returns the pattern of the board's status LED.
@@ -260,12 +260,12 @@ impl<'t, const D: usize> Link<'t, D> {
     /// Returns true if the session has ended with a disarmed arm, and its last answer was sent.
     #[must_use]
     pub fn has_ended(&self) -> bool {
-        self.session.state() == SessionState::Gone && self.tx.is_empty()
+        self.session.state() == SessionState::Acknowledged && self.tx.is_empty()
     }
 
     /// Returns the count of the session's samples that were sent before the next message.
     fn sample_count(&self) -> SampleCount {
-        let waiting = if self.tx.telemetry_waits() {
+        let waiting = if self.tx.is_telemetry_pending() {
             self.batch
         } else {
             0
@@ -273,11 +273,11 @@ impl<'t, const D: usize> Link<'t, D> {
         self.session.count(waiting, self.samples_dropped())
     }
 
-    fn say(&mut self, message: &ToHost) {
-        self.say_in(self.session.number(), message);
+    fn send(&mut self, message: &ToHost) {
+        self.send_in(self.session.number(), message);
     }
 
-    fn say_in(&mut self, session: SessionNumber, message: &ToHost) {
+    fn send_in(&mut self, session: SessionNumber, message: &ToHost) {
         // Callers have checked that there is room.
         self.tx.push(session, message);
     }
@@ -285,9 +285,9 @@ impl<'t, const D: usize> Link<'t, D> {
     /// Answers a point with the loop's record of it.
     fn answer_point(&mut self, record: QueuedTick) {
         let is_open = self.session.is_open();
-        if let Some(seq) = record.answers.filter(|_| is_open) {
+        if let Some(seq) = record.answered_seq.filter(|_| is_open) {
             let sample = record.sample;
-            self.say(&ToHost::PointAnswer { seq, sample });
+            self.send(&ToHost::PointAnswer { seq, sample });
         }
     }
 }

@@ -7,23 +7,23 @@ use hapterra_core::wire::message::{BATCH, Telemetry, ToHost};
 use heapless::Vec;
 
 use super::{Link, log, tiles};
-use crate::monitor::Part;
+use crate::monitor::WatchedPart;
 use crate::queues::LoopReport;
 
 impl<const D: usize> Link<'_, D> {
     /// Does all pending work: reads the loop's records, requests tiles, sends the next point to the
     /// loop, packs telemetry.
     pub fn poll(&mut self) {
-        self.ends.monitor.check_in(Part::Link);
+        self.ends.monitor.check_in(WatchedPart::Link);
         self.reclaim_buffers();
         self.read_records();
         self.report_state();
-        self.watch_host();
-        self.release_forsaken_clutch();
+        self.check_host_timeout();
+        self.release_abandoned_clutch();
         self.start_next_point();
         self.request_tiles();
         self.pack_telemetry();
-        self.say_goodbye();
+        self.send_goodbye();
     }
 
     /// Reads the loop's records since the last poll.
@@ -43,11 +43,11 @@ impl<const D: usize> Link<'_, D> {
                 ));
             }
             self.last_record = record;
-            if record.answers.is_some() {
-                self.replay.under_way = None;
+            if record.answered_seq.is_some() {
+                self.replay.current = None;
                 self.replay.last = Some(record);
                 self.answer_point(record);
-            } else if self.renders_arm()
+            } else if self.is_arm_scene()
                 && self.session.is_open()
                 && self.samples.push_back(record.sample).is_err()
             {
@@ -60,8 +60,8 @@ impl<const D: usize> Link<'_, D> {
     fn report_state(&mut self) {
         // Later reports are after every command, if the loop had taken all commands before the
         // reports up to now were read.
-        let follows = self.commands_taken;
-        self.commands_taken = self.ends.commands.is_empty();
+        let follows = self.commands_drained;
+        self.commands_drained = self.ends.commands.is_empty();
         while let Some(report) = self.ends.health.dequeue() {
             let LoopReport {
                 health,
@@ -69,7 +69,7 @@ impl<const D: usize> Link<'_, D> {
                 marked,
             } = report;
             self.device.request.marked(marked);
-            self.device.take_health(health, self.ends.monitor.ticks());
+            self.device.on_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
             let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);
             // A scene that the link accepted and the loop refused is dropped.
@@ -84,16 +84,16 @@ impl<const D: usize> Link<'_, D> {
             let Some(message) = self.device.next_message() else {
                 return;
             };
-            self.say(&message);
+            self.send(&message);
         }
     }
 
     /// Sends the close when nothing is driven and everything else was sent.
-    fn say_goodbye(&mut self) {
-        let leaves = self.session.is_leaving();
-        let stated = self.samples.is_empty() && self.tx.wants_telemetry();
-        if leaves && stated && !self.device.may_drive && self.tx.has_room() {
-            self.say(&ToHost::Goodbye(self.sample_count()));
+    fn send_goodbye(&mut self) {
+        let is_closing = self.session.is_closing();
+        let is_flushed = self.samples.is_empty() && self.tx.is_telemetry_sent();
+        if is_closing && is_flushed && !self.device.may_drive && self.tx.has_room() {
+            self.send(&ToHost::Goodbye(self.sample_count()));
             self.session.answer_goodbye();
             log::ended();
         }
@@ -101,20 +101,20 @@ impl<const D: usize> Link<'_, D> {
 
     /// Sends the next point to the loop, which stores only one.
     fn start_next_point(&mut self) {
-        if self.replay.under_way.is_none()
+        if self.replay.current.is_none()
             && let Some(room) = self.room_for_command()
             && let Some(point) = self.points.pop_front()
         {
-            self.replay.under_way = Some(point.seq);
+            self.replay.current = Some(point.seq);
             self.command(room, Command::Hip(point));
         }
     }
 
     /// Packs the next telemetry message when the last one was sent.
     fn pack_telemetry(&mut self) {
-        let leaves = self.session.is_leaving();
-        let enough = self.samples.len() >= BATCH || leaves;
-        if !enough || self.samples.is_empty() || !self.tx.wants_telemetry() {
+        let is_closing = self.session.is_closing();
+        let is_batch_due = self.samples.len() >= BATCH || is_closing;
+        if !is_batch_due || self.samples.is_empty() || !self.tx.is_telemetry_sent() {
             return;
         }
         let mut samples = Vec::new();
@@ -139,11 +139,11 @@ impl<const D: usize> Link<'_, D> {
     pub fn transmit(&mut self, into: &mut [u8]) -> usize {
         let mut n = 0;
         while let Some(rest) = into.get_mut(n..).filter(|rest| !rest.is_empty()) {
-            let taken = self.tx.take(rest);
-            n += taken;
-            if taken == 0 {
+            let copied = self.tx.take(rest);
+            n += copied;
+            if copied == 0 {
                 self.pack_telemetry();
-                self.say_goodbye();
+                self.send_goodbye();
                 if self.tx.is_empty() {
                     break;
                 }

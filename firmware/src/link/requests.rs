@@ -55,27 +55,27 @@ impl LatestRequest {
         number.wrapping_sub(latest) < 128
     }
 
-    fn began(&mut self, number: u8, progress: Progress) {
+    fn set_progress(&mut self, number: u8, progress: Progress) {
         self.answer_is_due = progress.is_over();
         self.latest = Some((number, progress));
     }
 
     /// Records the end of a request; does nothing if the latest request is another.
-    fn ended(&mut self, was: Progress, result: Result<(), Refusal>) {
+    fn finish(&mut self, was: Progress, result: Result<(), Refusal>) {
         if let Some((number, progress)) = self.latest.filter(|(_, progress)| *progress == was) {
             debug_assert!(!progress.is_over());
-            self.began(number, Progress::Done(result));
+            self.set_progress(number, Progress::Done(result));
         }
     }
 
     /// Records the loop's decision on the arm command.
     pub(super) fn arm_decided(&mut self, result: Result<(), Refusal>) {
-        self.ended(Progress::Arming, result);
+        self.finish(Progress::Arming, result);
     }
 
     /// Records the result of storing the calibration.
     pub(super) fn stored(&mut self, result: Result<(), Refusal>) {
-        self.ended(Progress::Storing, result);
+        self.finish(Progress::Storing, result);
     }
 
     /// Records a mark of the loop.
@@ -83,7 +83,7 @@ impl LatestRequest {
         if let Some((number, progress)) = self.latest
             && progress == Progress::Marking(mark.number)
         {
-            self.began(number, Progress::Marked(mark.tick));
+            self.set_progress(number, Progress::Marked(mark.tick));
         }
     }
 
@@ -101,21 +101,21 @@ impl LatestRequest {
 
 impl<const D: usize> Link<'_, D> {
     /// Handles a request. A repeated request is answered again and not done again.
-    pub(super) fn take_request(&mut self, number: u8, request: &Request, room: CommandRoom) {
+    pub(super) fn on_request(&mut self, number: u8, request: &Request, room: CommandRoom) {
         if self.device.request.is_new(number) {
             let progress = self.begin(request, room);
-            self.device.request.began(number, progress);
+            self.device.request.set_progress(number, progress);
         }
         // There is room: this message has no other answer.
         if let Some(answer) = self.device.request.take_answer() {
-            self.say(&answer);
+            self.send(&answer);
         }
     }
 
     fn begin(&mut self, request: &Request, room: CommandRoom) -> Progress {
         Progress::Done(match *request {
-            Request::EnterLoader => self.want_loader(room),
-            _ if self.is_leaving() => Err(Refusal::Busy),
+            Request::EnterLoader => self.request_loader(room),
+            _ if self.is_entering_loader() => Err(Refusal::Busy),
             // While the board stores, this link is not polled.
             Request::Arm | Request::Jog(_) if self.to_store().is_some() => Err(Refusal::Busy),
             Request::Arm => {
@@ -130,13 +130,13 @@ impl<const D: usize> Link<'_, D> {
             Request::HoldOutputs(shares) => self
                 .device
                 .may_hold_outputs()
-                .and_then(|()| self.obey(room, Command::HoldOutputs(shares))),
+                .and_then(|()| self.send_command(room, Command::HoldOutputs(shares))),
             Request::StoreCalibration => match self.device.begin_storing(self.ends.monitor.ticks())
             {
                 Ok(()) => return Progress::Storing,
                 refused => refused,
             },
-            Request::Disarm => self.obey(room, Command::Disarm),
+            Request::Disarm => self.send_command(room, Command::Disarm),
             Request::Clutch { hold } => {
                 self.set_clutch(hold, room);
                 Ok(())
@@ -146,14 +146,14 @@ impl<const D: usize> Link<'_, D> {
                 self.command(room, Command::Mark(number));
                 return Progress::Marking(number);
             }
-            Request::ClearFault { seen } => self
+            Request::ClearFault { fault } => self
                 .device
-                .may_clear(seen)
-                .and_then(|()| self.obey(room, Command::ClearFault(seen))),
+                .may_clear(fault)
+                .and_then(|()| self.send_command(room, Command::ClearFault(fault))),
             Request::Zero { counts } => self
                 .device
                 .may_change_settings()
-                .and_then(|()| self.obey(room, Command::Zero(counts))),
+                .and_then(|()| self.send_command(room, Command::Zero(counts))),
             Request::SetCalibration { calibration } => self.set_calibration(&calibration),
             Request::DropScene => {
                 self.drop_scene(room);
@@ -164,7 +164,11 @@ impl<const D: usize> Link<'_, D> {
 
     /// Sends a command to the loop.
     #[allow(clippy::unnecessary_wraps)] // Returned as the request's result.
-    fn obey(&mut self, room: CommandRoom, command: Command<'static>) -> Result<(), Refusal> {
+    fn send_command(
+        &mut self,
+        room: CommandRoom,
+        command: Command<'static>,
+    ) -> Result<(), Refusal> {
         self.command(room, command);
         Ok(())
     }
@@ -176,7 +180,7 @@ impl<const D: usize> Link<'_, D> {
         if !jog.is_valid(record.ok_or(Refusal::NoCalibration)?) {
             return Err(Refusal::NoSuchJog);
         }
-        self.forget_scene();
+        self.clear_scene();
         self.device.arming = Some(self.device.health.report.decision.count);
         self.command(room, Command::Jog(jog));
         Ok(())

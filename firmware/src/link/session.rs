@@ -8,7 +8,7 @@ use heapless::HistoryBuf;
 
 /// Number of ended sessions that are stored: a late open message of one of them, from a buffer or a
 /// host without an answer, does not open a session.
-const KNOWN: usize = 8;
+const MAX_ENDED_SESSIONS: usize = 8;
 
 /// A host that waits for a press sends something every half second. A host that is silent for this
 /// time, ms, cannot see the result of the press.
@@ -19,11 +19,11 @@ const ABSENT_MS: u32 = 2_000;
 /// | from | to | by |
 /// | --- | --- | --- |
 /// | any | open | [`Session::open`] |
-/// | open, detached, ended by silence | leaving | [`Session::leave`] |
+/// | open, detached, ended by silence | closing | [`Session::begin_close`] |
 /// | open | detached | [`Session::detach`] |
-/// | leaving | ended by goodbye | [`Session::answer_goodbye`] |
+/// | closing | ended by goodbye | [`Session::answer_goodbye`] |
 /// | open, detached | ended by silence | [`Session::end_silent`] |
-/// | ended by goodbye | gone | [`Session::close`] |
+/// | ended by goodbye | acknowledged | [`Session::close`] |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SessionState {
     /// No host has sent an open message.
@@ -31,24 +31,24 @@ pub(super) enum SessionState {
     /// A host has sent an open message.
     Open,
     /// The host has sent a close without an answer yet.
-    Leaving,
+    Closing,
     /// The close was answered, or the host was silent for too long.
     Ended(SessionEnd),
     /// The host has only read the state and detached; the arm is unchanged.
     Detached,
     /// The host has received the answer.
-    Gone,
+    Acknowledged,
 }
 
 /// Meaning of an open message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Greeting {
+pub(super) enum OpenKind {
     /// A session begins.
-    Opens,
+    New,
     /// The session is open already: the host has missed the answer.
-    Again,
+    Repeated,
     /// The session was ended without a request of its host.
-    Over(SessionEnd),
+    Ended(SessionEnd),
     /// The host has closed the session, and receives the answer.
     Stale,
 }
@@ -63,7 +63,7 @@ pub(super) struct Session {
     pub(super) opened_by: u8,
     last: LastSession,
     /// The last sessions that have ended, the oldest first.
-    over: HistoryBuf<SessionNumber, KNOWN>,
+    ended_sessions: HistoryBuf<SessionNumber, MAX_ENDED_SESSIONS>,
     /// Maximum silence of the host, ticks.
     silence_ticks: u32,
     /// The tick of the last frame of this session.
@@ -91,7 +91,7 @@ impl Session {
                     dropped: 0,
                 },
             },
-            over: HistoryBuf::new(),
+            ended_sessions: HistoryBuf::new(),
             silence_ticks: 0,
             received_at: 0,
             reported_absent: false,
@@ -114,8 +114,8 @@ impl Session {
     }
 
     /// Records that the host has closed the session.
-    pub(super) const fn leave(&mut self) {
-        self.state = SessionState::Leaving;
+    pub(super) const fn begin_close(&mut self) {
+        self.state = SessionState::Closing;
     }
 
     /// Records that the close was answered.
@@ -135,11 +135,11 @@ impl Session {
 
     /// Records that the host has received the answer to its close.
     pub(super) const fn close(&mut self) {
-        self.state = SessionState::Gone;
+        self.state = SessionState::Acknowledged;
     }
 
-    pub(super) fn is_leaving(&self) -> bool {
-        self.state == SessionState::Leaving
+    pub(super) fn is_closing(&self) -> bool {
+        self.state == SessionState::Closing
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -151,13 +151,15 @@ impl Session {
         self.state != SessionState::Closed && self.number == session
     }
 
-    pub(super) fn greeting(&self, session: SessionNumber) -> Greeting {
+    pub(super) fn classify_open(&self, session: SessionNumber) -> OpenKind {
         match self.state {
-            _ if self.over.as_slice().contains(&session) => Greeting::Over(SessionEnd::Replaced),
-            _ if !self.is_of(session) => Greeting::Opens,
-            SessionState::Open => Greeting::Again,
-            SessionState::Ended(end @ SessionEnd::HostSilent) => Greeting::Over(end),
-            _ => Greeting::Stale,
+            _ if self.ended_sessions.as_slice().contains(&session) => {
+                OpenKind::Ended(SessionEnd::Replaced)
+            }
+            _ if !self.is_of(session) => OpenKind::New,
+            SessionState::Open => OpenKind::Repeated,
+            SessionState::Ended(end @ SessionEnd::HostSilent) => OpenKind::Ended(end),
+            _ => OpenKind::Stale,
         }
     }
 
@@ -167,9 +169,9 @@ impl Session {
         let end = match self.state {
             // A detached session leaves no trace.
             SessionState::Closed | SessionState::Detached => SessionEnd::None,
-            SessionState::Open | SessionState::Leaving => SessionEnd::Replaced,
+            SessionState::Open | SessionState::Closing => SessionEnd::Replaced,
             SessionState::Ended(end) => end,
-            SessionState::Gone => SessionEnd::Goodbye,
+            SessionState::Acknowledged => SessionEnd::Goodbye,
         };
         if end != SessionEnd::None {
             self.last = LastSession {
@@ -180,7 +182,7 @@ impl Session {
             };
         }
         if self.state != SessionState::Closed {
-            self.over.write(self.number);
+            self.ended_sessions.write(self.number);
         }
         self.state = SessionState::Open;
         self.number = session;
@@ -205,8 +207,8 @@ impl Session {
 
     /// Sets the maximum silence of the host.
     pub(super) fn set_silence(&mut self, seconds: u16, tick_hz: u32) {
-        let (least, most) = SILENCE_S;
-        self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
+        let (min, max) = SILENCE_S;
+        self.silence_ticks = u32::from(seconds.clamp(min, max)).saturating_mul(tick_hz);
     }
 
     /// Returns true if the host of the open session has been silent for [`ABSENT_MS`]; reported
@@ -218,7 +220,7 @@ impl Session {
     }
 
     /// Returns true if the host of the session, open or detached, has been silent for too long.
-    pub(super) fn is_forsaken(&self, tick: u32) -> bool {
+    pub(super) fn is_timed_out(&self, tick: u32) -> bool {
         let has_begun = matches!(self.state, SessionState::Open | SessionState::Detached);
         has_begun && tick.wrapping_sub(self.received_at) >= self.silence_ticks
     }

@@ -53,8 +53,8 @@ pub async fn run<const D: usize>(
                 link.borrow_mut().interrupted();
             }
             while !rest.is_empty() {
-                let taken = link.borrow_mut().receive(rest);
-                rest = rest.get(taken..).unwrap_or(&[]);
+                let consumed = link.borrow_mut().receive(rest);
+                rest = rest.get(consumed..).unwrap_or(&[]);
                 work.signal(());
                 if !rest.is_empty() {
                     room.wait().await;

@@ -20,24 +20,24 @@ impl<'t, const D: usize> Link<'t, D> {
             if let Some(key) = tile.key() {
                 self.requester.lost(key);
             }
-            self.give_back(tile);
+            self.return_buffer(tile);
         }
     }
 
-    fn give_back(&mut self, tile: &'t mut Tile) {
+    fn return_buffer(&mut self, tile: &'t mut Tile) {
         // There is room for all buffers.
         let _ = self.spare.push(tile);
     }
 
     /// Fills a spare buffer with a tile, checks it and sends it to the loop.
-    pub(super) fn take_tile(
+    pub(super) fn on_tile(
         &mut self,
         message: &TileMessage<'_>,
         materials: Option<TileMaterials<'_>>,
         room: CommandRoom,
     ) {
         let ours = self.scene.is_some_and(|s| s.epoch == message.epoch);
-        if !ours || !self.requester.awaits(message.key) {
+        if !ours || !self.requester.is_pending(message.key) {
             return;
         }
         self.reclaim_buffers();
@@ -49,7 +49,7 @@ impl<'t, const D: usize> Link<'t, D> {
         let filled = filled.and_then(|()| self.fill_materials(tile, key, materials));
         if filled.is_err() {
             tile.vacate();
-            self.give_back(tile);
+            self.return_buffer(tile);
             return self.on_bad_frame(FrameError::Content);
         }
         self.requester.received(key);
@@ -81,7 +81,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 return;
             };
             let epoch = scene.epoch;
-            self.say(&ToHost::TileRequest { epoch, key });
+            self.send(&ToHost::TileRequest { epoch, key });
         }
     }
 }

@@ -97,7 +97,7 @@ impl TxQueue {
     }
 
     /// Returns true if the writer has sent all telemetry.
-    pub(super) fn wants_telemetry(&self) -> bool {
+    pub(super) fn is_telemetry_sent(&self) -> bool {
         self.telemetry.is_empty()
     }
 
@@ -121,7 +121,7 @@ impl TxQueue {
     }
 
     /// Returns true if telemetry waits that an urgent frame would overtake.
-    pub(super) fn telemetry_waits(&self) -> bool {
+    pub(super) fn is_telemetry_pending(&self) -> bool {
         !self.telemetry.is_empty() && self.telemetry.sent == 0
     }
 
@@ -157,7 +157,7 @@ mod tests {
 
     const SESSION: SessionNumber = SessionNumber::new(1);
 
-    fn taken(epoch: u32) -> ToHost {
+    fn scene_ack(epoch: u32) -> ToHost {
         ToHost::SceneAck {
             epoch,
             accepted: true,
@@ -181,10 +181,10 @@ mod tests {
         let mut reader = FrameReader::<2048>::new();
         let mut messages = Vec::new();
         while !bytes.is_empty() {
-            let (taken, frame) = reader.push(bytes);
+            let (consumed, frame) = reader.push(bytes);
             let content = frame.and_then(|frame| frame.and_then(decode).ok());
             messages.extend(content.map(|framed: InSession<ToHost>| framed.message));
-            bytes = &bytes[taken..];
+            bytes = &bytes[consumed..];
         }
         messages
     }
@@ -194,41 +194,41 @@ mod tests {
         let telemetry = || ToHost::Telemetry(Telemetry::default());
         let mut queue = TxQueue::new();
         queue.push_telemetry(SESSION, &telemetry());
-        queue.push(SESSION, &taken(1));
+        queue.push(SESSION, &scene_ack(1));
         let all = take(&mut queue, 4096);
-        assert_eq!(understood(&all), [taken(1), telemetry()]);
+        assert_eq!(understood(&all), [scene_ack(1), telemetry()]);
 
         queue.push_telemetry(SESSION, &telemetry());
         let mut all = take(&mut queue, 2);
-        queue.push(SESSION, &taken(1));
+        queue.push(SESSION, &scene_ack(1));
         all.extend(take(&mut queue, 4096));
-        assert_eq!(understood(&all), [telemetry(), taken(1)]);
+        assert_eq!(understood(&all), [telemetry(), scene_ack(1)]);
     }
 
     #[test]
     fn truncated_frame_does_not_corrupt_the_next_frame() {
         let mut queue = TxQueue::new();
-        queue.push(SESSION, &taken(1));
+        queue.push(SESSION, &scene_ack(1));
         let mut all = take(&mut queue, 3);
         queue.clear();
-        queue.push(SESSION, &taken(2));
+        queue.push(SESSION, &scene_ack(2));
         all.extend(take(&mut queue, 4096));
-        assert_eq!(understood(&all), [taken(2)]);
+        assert_eq!(understood(&all), [scene_ack(2)]);
     }
 
     #[test]
-    fn full_is_full_until_something_was_taken() {
+    fn full_queue_has_room_after_bytes_are_taken() {
         let mut queue = TxQueue::new();
         let mut pushed = 0;
         while queue.has_room() {
-            assert!(queue.push(SESSION, &taken(pushed)));
+            assert!(queue.push(SESSION, &scene_ack(pushed)));
             pushed += 1;
         }
         assert!(pushed > 20);
         let first = take(&mut queue, MAX_URGENT);
         assert!(queue.has_room());
         let rest = take(&mut queue, 4096);
-        let all: Vec<_> = (0..pushed).map(taken).collect();
+        let all: Vec<_> = (0..pushed).map(scene_ack).collect();
         assert_eq!(understood(&[first, rest].concat()), all);
     }
 }

@@ -47,7 +47,7 @@ fn reset_resumes_from_newest_temperatures() {
 }
 
 #[test]
-fn a_power_up_and_a_start_without_a_cause_assume_hot() {
+fn power_up_or_unknown_reset_assumes_hot_motors() {
     let copies = after(1_000, |_| WARM);
     for cause in [ResetCause::PowerOn, ResetCause::Unknown] {
         assert_eq!(begun(cause, &copies), Temperatures::HOT);
@@ -56,7 +56,7 @@ fn a_power_up_and_a_start_without_a_cause_assume_hot() {
 
 /// A reset during a write leaves only some of its words.
 #[test]
-fn a_copy_that_is_cut_off_leaves_the_one_before() {
+fn truncated_copy_leaves_the_previous_one_valid() {
     let (old, new) = (after(100, |_| WARM), after(200, |_| WARMER));
     for words in 1..WORDS {
         let mut torn = old;
@@ -119,7 +119,7 @@ fn temperature_copies_from_before_power_on_are_not_reused() {
 }
 
 #[test]
-fn the_newest_is_the_newest_when_the_number_wraps() {
+fn newest_copy_is_found_across_number_wrap() {
     let copies = [encode(0, &WARMER), encode(u32::MAX, &WARM)];
     assert_eq!(newest(&copies), Some(WARMER));
     let copies = [encode(u32::MAX - 1, &WARM), encode(u32::MAX, &WARMER)];
@@ -127,7 +127,7 @@ fn the_newest_is_the_newest_when_the_number_wraps() {
 }
 
 #[test]
-fn ten_copies_a_second_at_every_rate() {
+fn ten_copies_are_made_each_second_at_every_rate() {
     for khz in [1, 4, 10] {
         let rate = TickRate::new(1_000 * khz).expect("in range");
         let mut log = MotorLog::new(rate);

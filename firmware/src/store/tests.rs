@@ -271,7 +271,7 @@ fn power_lost_while_erasing_leaves_the_newest_record() {
 }
 
 #[test]
-fn garbage_is_damaged_not_missing_and_can_be_written_over() {
+fn garbage_is_damaged_and_can_be_overwritten() {
     let mut flash = Flash::<8, 2048>::new(4096);
     flash.bytes.fill(0xA5);
     let mut store = store(flash, 2048);
@@ -282,7 +282,7 @@ fn garbage_is_damaged_not_missing_and_can_be_written_over() {
 }
 
 #[test]
-fn every_flipped_bit_of_the_only_record_is_noticed() {
+fn flipped_bit_in_the_only_record_is_detected() {
     let mut fresh = store(Flash::<8, 2048>::new(4096), 2048);
     fresh.save(&numbered(1)).expect("saved");
     let mut buffer = [0; RECORD_BYTES];

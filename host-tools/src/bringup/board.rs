@@ -232,8 +232,8 @@ impl<'d, 't> Board<'d, 't> {
             _ => return Ok(()),
         }
         let latched = self.control.fresh_status().ok();
-        let seen = latched.and_then(|status| status.health.report.fault);
-        for request in [Request::DropScene, Request::ClearFault { seen }] {
+        let fault = latched.and_then(|status| status.health.report.fault);
+        for request in [Request::DropScene, Request::ClearFault { fault }] {
             // A refusal is no error here: the cause may still be present.
             let _ = self.control.request(&request);
         }

@@ -8,9 +8,10 @@
 //! ```
 //!
 //! The motors are first driven by a *jog*: one at a time, with a quarter of the continuous current,
-//! while no joint may move faster than [`JOG_FAST_RAD_S`](hapterra_core::guard::JOG_FAST_RAD_S) or
-//! farther than [`JOG_FAR_RAD`](hapterra_core::guard::JOG_FAR_RAD). No surface is rendered before
-//! each motor's joint, sign and torque are known.
+//! while no joint may move faster than
+//! [`MAX_JOG_SPEED_RAD_S`](hapterra_core::guard::MAX_JOG_SPEED_RAD_S) or farther than
+//! [`MAX_JOG_ROTATION_RAD`](hapterra_core::guard::MAX_JOG_ROTATION_RAD). No surface is rendered
+//! before each motor's joint, sign and torque are known.
 
 mod attendant;
 mod board;

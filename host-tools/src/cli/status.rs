@@ -53,12 +53,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let status = control.fresh_status()?;
         show(text(&status));
         if args.clear {
-            let seen = status.health.report.fault;
-            let answer = control.request(&Request::ClearFault { seen })?;
+            let fault = status.health.report.fault;
+            let answer = control.request(&Request::ClearFault { fault })?;
             answer.map_err(Failure::new)?;
             let cleared = match control.fresh_status()?.health.report.fault {
                 None => "no fault is latched any more".to_owned(),
-                Some(fault) => format!("but {fault:?} is there again: {}", fault.what_to_do()),
+                Some(fault) => format!("but {fault:?} is there again: {}", fault.remedy()),
             };
             say(format!("cleared        {cleared}"));
         }
@@ -120,7 +120,7 @@ fn boot(boot: &BootReport) -> String {
         ResetCause::BrownOut => "after its supply was too low for a moment: check it",
     };
     let crash = boot.crash.as_ref().map_or(String::new(), crashed);
-    let brown_out = if boot.lacks_brown_out_reset() {
+    let brown_out = if boot.is_brown_out_level_low() {
         format!(
             "supply guard   the chip runs down to {} mV: set its brown-out level (docs/reference/hardware.md, The supply)\n",
             boot.resets_below_mv
@@ -165,7 +165,11 @@ fn crashed(crash: &Crash) -> String {
 /// Describes the guard: its state, blockers, fault and limits.
 fn guard(status: &Status) -> String {
     let report = &status.health.report;
-    let on = if report.mode.drives() { "on" } else { "off" };
+    let on = if report.mode.is_driving() {
+        "on"
+    } else {
+        "off"
+    };
     let mut text = format!("arm            {:?}, amplifiers {on}\n", report.mode);
     for (name, meaning) in report.blockers.meanings() {
         text += &format!("blocked by     {name}: {meaning}\n");
@@ -176,7 +180,7 @@ fn guard(status: &Status) -> String {
             "fault          {} {fault:?}: {}\nwhat to do     {}\n",
             fault.number(),
             fault.meaning(),
-            fault.what_to_do()
+            fault.remedy()
         ),
     };
     for (name, meaning) in report.limits.meanings() {

@@ -8,7 +8,7 @@ use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::{Answer, Refusal, Request};
-use hapterra_core::wire::session::ONLY_LOOKS;
+use hapterra_core::wire::session::READ_ONLY_SILENCE_S;
 use hapterra_core::wire::status::Status;
 
 use super::error::LinkError;
@@ -66,7 +66,7 @@ impl<'t> ControlSession<'t> {
 
     fn with(transport: Box<dyn Transport + 't>, timeouts: Timeouts) -> Result<Self, LinkError> {
         // A read-only session is never opened, so it needs no end.
-        let is_over = timeouts.silence_s == ONLY_LOOKS;
+        let is_over = timeouts.silence_s == READ_ONLY_SILENCE_S;
         let mut exchange = Exchange {
             line: Line::new(transport),
             talk: HostProtocol::new(None, timeouts, fastrand::Rng::new()),

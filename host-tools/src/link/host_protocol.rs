@@ -318,7 +318,7 @@ impl HostProtocol {
             State::Greeting => {
                 // A zero ends any incomplete frame.
                 out.push(0);
-                append(&VersionCheck::Asked { protocol: PROTOCOL }, out);
+                append(&VersionCheck::Query { protocol: PROTOCOL }, out);
                 self.say_hello(out);
             }
             State::SceneSent => {

@@ -230,7 +230,11 @@ impl<C: TickClock> Native<C> {
     fn tick(&mut self) {
         self.drive = self.device.tick(self.sense);
         self.ticks += 1;
-        if let Some(arm) = self.arm.as_mut().filter(|_| self.device.link.drives_arm()) {
+        if let Some(arm) = self
+            .arm
+            .as_mut()
+            .filter(|_| self.device.link.is_arm_in_use())
+        {
             let currents_a = self.drive.currents_a.to_array().map(f64::from);
             arm.step(currents_a, f64::from(C::PERIOD) / f64::from(C::HZ));
         }
@@ -276,7 +280,7 @@ impl<C: TickClock> Transport for Native<C> {
         }
         for _ in 0..self.ticks_a_call {
             let stated = self.device.link.transmit(into);
-            if stated > 0 || (self.device.link.may_stand_still() && !self.restless) {
+            if stated > 0 || (self.device.link.may_stop_clock() && !self.restless) {
                 return Ok(stated);
             }
             self.tick();

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use hapterra_core::wire::plant::{Currents, Sensed};
+use hapterra_core::wire::plant::{Currents, PlantState};
 
 use super::messages::{Inbox, send};
 use super::transport::Transport;
@@ -25,7 +25,7 @@ pub fn serve_plant(
     let mut tick = 0;
     while !stop() {
         let sense = arm.sense();
-        send(transport, &Sensed { tick, sense })?;
+        send(transport, &PlantState { tick, sense })?;
         let currents: Currents = loop {
             if let Some(currents) = inbox.next(transport, Duration::from_millis(100))? {
                 break currents;

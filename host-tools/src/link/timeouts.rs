@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use hapterra_core::wire::request::Request;
-use hapterra_core::wire::session::{DEFAULT_SILENCE_S, ONLY_LOOKS};
-use hapterra_core::wire::status::PRESS_MS;
+use hapterra_core::wire::session::{DEFAULT_SILENCE_S, READ_ONLY_SILENCE_S};
+use hapterra_core::wire::status::PRESS_TIMEOUT_MS;
 
 use super::host_request::HostRequest;
 
@@ -54,7 +54,7 @@ impl Timeouts {
     /// Returns the time-out of an answer: storing a calibration waits for the user's dead-man
     /// press.
     pub(super) fn with(&self, ask: &HostRequest) -> Duration {
-        const PRESS: Duration = Duration::from_millis(PRESS_MS as u64);
+        const PRESS: Duration = Duration::from_millis(PRESS_TIMEOUT_MS as u64);
         match ask {
             HostRequest::Request(Request::StoreCalibration) => self.give_up + PRESS,
             _ => self.give_up,
@@ -65,7 +65,7 @@ impl Timeouts {
     #[must_use]
     pub fn of_a_look(give_up: Duration) -> Self {
         Self {
-            silence_s: ONLY_LOOKS,
+            silence_s: READ_ONLY_SILENCE_S,
             ..Self::of_a_dialogue(give_up)
         }
     }

@@ -235,7 +235,7 @@ fn is_reached(record: &Calibration, out_mm: f64, up_mm: f64) -> bool {
     let tip = Vec3::new(out * cos, out * sin, up_mm as f32);
     let inner = |q: &Vec3| {
         let rest = Vec3::new(0.5 * (limits.min_rad.x + limits.max_rad.x), q.y, q.z);
-        limits.allow(rest, -MARGIN_RAD)
+        limits.contains(rest, -MARGIN_RAD)
     };
     record.joints_at(tip).ok().filter(inner).is_some()
 }
@@ -275,7 +275,7 @@ mod tests {
                     });
                     let tip = home + Vec3::new(-north, east, up);
                     let q = record.joints_at(tip).expect("reached");
-                    assert!(record.limits.allow(q, -0.5 * MARGIN_RAD), "{tip} {q}");
+                    assert!(record.limits.contains(q, -0.5 * MARGIN_RAD), "{tip} {q}");
                 }
             }
         }
@@ -295,7 +295,7 @@ mod tests {
                 let angles = limits.min_rad + Vec3::from(steps) * (limits.max_rad - limits.min_rad);
                 let tip = Pose::from_angles(&record, angles).tip_mm();
                 let out = f64::from(tip.x.hypot(tip.y));
-                if !limits.allow(angles, -MARGIN_RAD) || out < nearest {
+                if !limits.contains(angles, -MARGIN_RAD) || out < nearest {
                     continue;
                 }
                 let from_home = tip - home;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::{SceneChange, Source, TickRecord};
@@ -63,7 +63,7 @@ pub struct Steering<'r> {
     /// The user has held the clutch, and may be far from where the cells were measured.
     measures: bool,
     /// Requested hold of the clutch.
-    asked: ClutchHold,
+    asked: ClutchMode,
     /// Start of the wait for the ground of the new placement.
     awaits: Option<Instant>,
     stage: Stage<'r>,
@@ -85,7 +85,7 @@ impl<'r> Steering<'r> {
             held: false,
             by_input: false,
             measures: false,
-            asked: ClutchHold::LetGo,
+            asked: ClutchMode::Released,
             awaits: None,
             stage: Stage::Idle,
             asks: vec![],
@@ -154,7 +154,7 @@ impl<'r> Steering<'r> {
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
                 self.stage = Stage::Idle;
-                self.asked = ClutchHold::LetGo;
+                self.asked = ClutchMode::Released;
                 if !resumed {
                     self.number = 0;
                 }
@@ -162,7 +162,7 @@ impl<'r> Steering<'r> {
             Event::Answered {
                 request: Request::Clutch { hold },
                 result: Ok(()),
-            } if *hold != ClutchHold::LetGo => {
+            } if *hold != ClutchMode::Released => {
                 if let Stage::Opening { answered, .. } = &mut self.stage {
                     *answered = true;
                 }
@@ -181,7 +181,7 @@ impl<'r> Steering<'r> {
         self.let_go();
     }
 
-    fn clutch(&mut self, hold: ClutchHold) {
+    fn clutch(&mut self, hold: ClutchMode) {
         self.asked = hold;
         self.asks
             .push(HostRequest::Request(Request::Clutch { hold }));
@@ -191,13 +191,13 @@ impl<'r> Steering<'r> {
     /// it stays in its place.
     fn hold(&mut self) {
         self.clutch(match self.held {
-            true => ClutchHold::WithHand,
-            false => ClutchHold::InPlace,
+            true => ClutchMode::WithHand,
+            false => ClutchMode::InPlace,
         });
     }
 
     fn let_go(&mut self) {
-        self.clutch(ClutchHold::LetGo);
+        self.clutch(ClutchMode::Released);
         self.stage = Stage::Closing;
     }
 
@@ -210,7 +210,7 @@ impl<'r> Steering<'r> {
         }
         self.by_input = is_taken;
         // The user has taken the clutch during a change of placement: the terrain follows the hand.
-        if self.held && self.asked == ClutchHold::InPlace {
+        if self.held && self.asked == ClutchMode::InPlace {
             self.hold();
         }
         match &mut self.stage {

@@ -48,14 +48,14 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 }
 
 /// Returns the last request to the clutch.
-fn asked(steering: &mut Steering<'_>) -> Option<ClutchHold> {
+fn asked(steering: &mut Steering<'_>) -> Option<ClutchMode> {
     steering.asks().into_iter().rev().find_map(|ask| match ask {
         HostRequest::Request(Request::Clutch { hold }) => Some(hold),
         _ => None,
     })
 }
 
-fn answer(steering: &mut Steering<'_>, hold: ClutchHold) {
+fn answer(steering: &mut Steering<'_>, hold: ClutchMode) {
     let request = Request::Clutch { hold };
     let (request, result) = (&request, Ok(()));
     steering.on_event(&Event::Answered { request, result });
@@ -65,11 +65,11 @@ fn answer(steering: &mut Steering<'_>, hold: ClutchHold) {
 fn open(steering: &mut Steering<'_>) {
     steering.steer(ZOOM);
     samples(steering, Limits::empty(), 1);
-    assert_eq!(asked(steering), Some(ClutchHold::InPlace));
+    assert_eq!(asked(steering), Some(ClutchMode::InPlace));
     // The board's input holds it open before the answer: the host's hold has not arrived.
     samples(steering, Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT, 3);
     assert!(steering.take_put().is_none());
-    answer(steering, ClutchHold::InPlace);
+    answer(steering, ClutchMode::InPlace);
     samples(steering, Limits::CLUTCH_MOVES, 3);
     assert!(steering.take_put().is_none(), "the clutch still opens");
 }
@@ -93,7 +93,7 @@ fn accepted_placement_is_applied_and_releases_the_clutch() {
         viewed(steering, &view, true);
         assert_eq!(steering.now().view.scale.cell_mm(), 2.0);
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+        assert_eq!(asked(steering), Some(ClutchMode::Released));
         assert!(!steering.is_settled());
         samples(steering, Limits::CLUTCH_MOVES, 1);
         assert!(steering.is_settled());
@@ -108,7 +108,7 @@ fn refused_placement_changes_nothing_and_is_reported() {
         assert_eq!(steering.now().view.scale.cell_mm(), 1.0);
         assert_eq!(steering.lines().len(), 1);
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+        assert_eq!(asked(steering), Some(ClutchMode::Released));
         // The next one has the same number, because the first was refused.
         samples(steering, Limits::empty(), 1);
         assert_eq!(put(steering).number, 1);
@@ -134,7 +134,7 @@ fn unopened_clutch_or_silent_device_is_given_up() {
                 reported.len() == 1 && reported[0].contains("stays as it was"),
                 "{reported:?}"
             );
-            assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+            assert_eq!(asked(steering), Some(ClutchMode::Released));
             samples(steering, Limits::empty(), 2);
             assert!(steering.is_settled() && steering.take_put().is_none());
         });
@@ -184,7 +184,7 @@ fn host_releases_a_clutch_held_by_the_board_input() {
         viewed(steering, &view, true);
         let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
         samples(steering, held, 1);
-        assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+        assert_eq!(asked(steering), Some(ClutchMode::Released));
         samples(steering, held, 1);
         assert!(steering.is_settled());
     });
@@ -233,8 +233,8 @@ fn far_clutch_measures_cells_again() {
             steering.on_event(&Event::Sample(&sample));
             let asked = asked(steering);
             let wanted = match by_input {
-                true => (north_mm > 1.0).then_some(ClutchHold::InPlace),
-                false => Some(ClutchHold::WithHand),
+                true => (north_mm > 1.0).then_some(ClutchMode::InPlace),
+                false => Some(ClutchMode::WithHand),
             };
             assert_eq!(asked, wanted);
             if let Some(hold) = asked {
@@ -261,7 +261,7 @@ fn far_clutch_measures_cells_again() {
             steering.on_event(&Event::Sample(&open));
             assert!(steering.take_put().is_none());
             let rests = match by_input {
-                true => self::asked(steering) == Some(ClutchHold::LetGo),
+                true => self::asked(steering) == Some(ClutchMode::Released),
                 false => steering.is_settled(),
             };
             assert!(rests);

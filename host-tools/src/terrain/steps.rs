@@ -1,6 +1,6 @@
 //! The step of which a file's heights are multiples: it makes their tiles small on the link.
 
-use hapterra_core::terrain::packed::Step;
+use hapterra_core::terrain::packed::HeightStep;
 
 /// Decimal units of heights in files, besides whole ones.
 const DECIMALS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
@@ -31,15 +31,15 @@ impl BinaryUnit {
 
 /// Returns the possible steps of heights with a unit, the largest first, if a vertical unit is
 /// `cells` cells.
-pub(super) fn steps(unit: BinaryUnit, cells: f64) -> impl Iterator<Item = Step> {
+pub(super) fn steps(unit: BinaryUnit, cells: f64) -> impl Iterator<Item = HeightStep> {
     let binary = f64::from(unit.0.min(0)).exp2();
     let decimals = DECIMALS
         .into_iter()
         .filter(move |decimal| *decimal > binary);
     let singles = decimals.clone().take(SINGLES);
-    let decimals = decimals.map(move |unit| Step::Cells(unit * cells));
-    let singles = singles.map(move |unit| Step::Single { unit, cells });
+    let decimals = decimals.map(move |unit| HeightStep::Cells(unit * cells));
+    let singles = singles.map(move |unit| HeightStep::Single { unit, cells });
     let fine = unit.0 < COARSE;
     let decimals = decimals.chain(singles).filter(move |_| fine);
-    decimals.chain([Step::Cells(binary * cells)])
+    decimals.chain([HeightStep::Cells(binary * cells)])
 }

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
-use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::packed::{HeightStep, MAX_PACKED, pack};
 use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, TILE_CELLS, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
@@ -113,16 +113,16 @@ impl Default for TileBuffer {
 impl TileBuffer {
     /// Returns the heights in their shortest form for the link; `low` and `high` are the lowest and
     /// the highest of them.
-    pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
+    pub(super) fn above(&mut self, low: f64, high: f64, steps: &[HeightStep]) -> Heights<'_> {
         let base = tile_heights::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
-            *single = tile_heights::above(base, *height);
+            *single = tile_heights::height_above(base, *height);
         }
         self.packed(base, steps)
     }
 
     /// Returns the tile in its shortest form for the link.
-    fn packed(&mut self, base: i32, steps: &[Step]) -> Heights<'_> {
+    fn packed(&mut self, base: i32, steps: &[HeightStep]) -> Heights<'_> {
         let room = &mut self.bytes[..MAX_PACKED];
         if let Some(length) = pack(&self.singles, base, steps, room).map(<[u8]>::len) {
             let bytes = &self.bytes[..length];
@@ -370,9 +370,9 @@ impl<'r> Terrain<'r> {
             return self.ground_mm(self.level, [east_mm, north_mm], reads);
         };
         let cell_mm = self.scale.cell_mm();
-        let (column, u) = tile_heights::place(east_mm / cell_mm, self.size[0])?;
-        let (row, v) = tile_heights::place(north_mm / cell_mm, self.size[1])?;
-        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH, reads);
+        let (column, u) = tile_heights::patch_at(east_mm / cell_mm, self.size[0])?;
+        let (row, v) = tile_heights::patch_at(north_mm / cell_mm, self.size[1])?;
+        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH_NODES, reads);
         let height = ball.between(&samples, nodes, [u, v])?;
         Some(height * cell_mm)
     }
@@ -411,8 +411,8 @@ impl<'r> Terrain<'r> {
         let size = self
             .size
             .map(|patches| (patches / self.parts as i32) >> coarser.min(31));
-        let (column, u) = tile_heights::place(east_mm / cell_mm, size[0])?;
-        let (row, v) = tile_heights::place(north_mm / cell_mm, size[1])?;
+        let (column, u) = tile_heights::patch_at(east_mm / cell_mm, size[0])?;
+        let (row, v) = tile_heights::patch_at(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
             let height = reads.record(self.grid.read_height(level, column + dx, row + dy));
             height * self.scale.height_mm_per_unit()
@@ -466,11 +466,11 @@ impl<'r> Terrain<'r> {
         };
         if low == high && known == self.samples_in(key) {
             let base = tile_heights::base(low, high);
-            let height = tile_heights::above(base, low);
+            let height = tile_heights::height_above(base, low);
             return Some(Heights::Flat { base, height });
         }
         let steps = match self.step() {
-            Some(step) => vec![Step::Cells(step)],
+            Some(step) => vec![HeightStep::Cells(step)],
             None => steps(unit, self.scale.height_cells(1.0)).collect(),
         };
         Some(buffer.above(low, high, &steps))

@@ -136,7 +136,7 @@ impl<'t> Device<'t> {
         device.run_ms(10);
         // The board may have found a fault when it started.
         let fault = device.guard.and_then(|report| report.fault);
-        device.request(Request::ClearFault { seen: fault });
+        device.request(Request::ClearFault { fault });
         device.request(Request::Zero { counts: [0; 3] });
         device.request(Request::Arm);
         device.run_ms(30);

@@ -355,8 +355,8 @@ impl<'t> Segment<'t> {
             match at {
                 30 => self.host.request(Request::Disarm),
                 40 => {
-                    let seen = self.host.fault;
-                    self.host.request(Request::ClearFault { seen });
+                    let fault = self.host.fault;
+                    self.host.request(Request::ClearFault { fault });
                 }
                 50 => self.send_zero(),
                 ARM_REQUEST_TICK => self.host.request(Request::Arm),

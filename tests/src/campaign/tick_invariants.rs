@@ -210,7 +210,7 @@ impl TickChecks {
         if !force.is_finite() {
             return Err(format!("a force is not a number: {sample:?}"));
         }
-        let off = sample.fault.is_some() || !sample.mode.drives();
+        let off = sample.fault.is_some() || !sample.mode.is_driving();
         if off && force != 0.0 {
             return Err(format!("{force} N with the amplifiers off: {sample:?}"));
         }

@@ -1,7 +1,7 @@
 //! Arbitrary scenes, tiles, points and encoder counts as input of the tick.
 
 use hapterra_core::Vec3;
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::contact::{Friction, WORK_PER_TICK};
 use hapterra_core::force::{
     Controller, Damping, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
@@ -64,7 +64,7 @@ pub fn run(data: &[u8]) {
                 let (reported, mut scene) = (materials::table(&mut bytes), scene(&mut bytes));
                 // As on the link, which refuses a scene that cannot be rendered.
                 if reported.is_valid() && scene.is_valid() {
-                    haptics.take_materials(&reported);
+                    haptics.set_materials(&reported);
                     table = reported;
                 }
                 scene.materials = Some(match kind {
@@ -81,7 +81,11 @@ pub fn run(data: &[u8]) {
                 spare.extend(haptics.accept(Command::ClutchInput(held)).ok().flatten());
             }
             _ if kind >= 248 => {
-                let holds = [ClutchHold::LetGo, ClutchHold::WithHand, ClutchHold::InPlace];
+                let holds = [
+                    ClutchMode::Released,
+                    ClutchMode::WithHand,
+                    ClutchMode::InPlace,
+                ];
                 let hold = holds[usize::from(kind - 248)];
                 spare.extend(haptics.accept(Command::Clutch(hold)).ok().flatten());
             }

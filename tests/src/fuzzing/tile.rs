@@ -1,7 +1,7 @@
 //! Arbitrary bytes as a packed tile, and arbitrary heights as input of the packing.
 
 use hapterra_core::grid::Cell;
-use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::packed::{HeightStep, MAX_PACKED, pack};
 use hapterra_core::terrain::{TILE_SAMPLES, Tile, TileError, TileKey};
 
 use super::bytes::Bytes;
@@ -31,9 +31,9 @@ fn packed(bytes: &mut Bytes<'_>, tile: &mut Tile) {
     let base = bytes.int() >> (2 + bytes.byte() % 30);
     let cells = f64::from(bytes.float());
     let steps = [
-        Step::Cells(cells),
-        Step::Single { unit: 0.01, cells },
-        Step::Cells(1.0 / 32.0),
+        HeightStep::Cells(cells),
+        HeightStep::Single { unit: 0.01, cells },
+        HeightStep::Cells(1.0 / 32.0),
     ];
     let (kind, odd) = (bytes.byte(), bytes.byte());
     let mut last = 0.0;

@@ -75,7 +75,10 @@ impl Wire {
             };
             let drive = self.device.tick(sense);
             assert!(drive.currents_a.is_finite(), "{drive:?}");
-            assert!(self.device.link.drives_arm() || !drive.enabled, "{drive:?}");
+            assert!(
+                self.device.link.is_arm_in_use() || !drive.enabled,
+                "{drive:?}"
+            );
             self.listen();
         }
     }
@@ -100,7 +103,7 @@ impl Wire {
         let first = 2_u8.wrapping_sub(Fault::ALL.len() as u8);
         for (fault, number) in Fault::ALL.into_iter().zip(0..) {
             let number = first.wrapping_add(number);
-            let request = Request::ClearFault { seen: Some(fault) };
+            let request = Request::ClearFault { fault: Some(fault) };
             self.receive(&message(&ToDevice::Request { number, request }));
         }
         let _ = self.device.tick(GuardInputs::default());

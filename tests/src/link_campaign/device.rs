@@ -87,7 +87,7 @@ impl<'t> Board<'t> {
     /// # Errors
     /// The broken invariant.
     pub fn tick(&mut self) -> Result<(), String> {
-        if self.lock_step && self.device.link.may_stand_still() {
+        if self.lock_step && self.device.link.may_stop_clock() {
             // The link's task runs nevertheless.
             self.device.receive(&[]);
             return Ok(());

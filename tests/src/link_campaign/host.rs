@@ -100,8 +100,8 @@ impl<'t> Host<'t> {
     pub fn arm(&mut self) {
         self.requested_arming = true;
         let zero = Request::Zero { counts: [0; 3] };
-        let seen = self.view.and_then(|view| view.fault);
-        let clear = Request::ClearFault { seen };
+        let fault = self.view.and_then(|view| view.fault);
+        let clear = Request::ClearFault { fault };
         for request in [clear, zero, Request::Arm] {
             self.client.ask(HostRequest::Request(request));
         }

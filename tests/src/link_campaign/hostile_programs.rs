@@ -1,6 +1,6 @@
 //! Hostile programs: one that sends to the device, and one that answers a host.
 
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::grid::GridPoint;
@@ -57,7 +57,7 @@ fn noise(random: &mut Random, max_bytes: usize) -> Vec<u8> {
 fn host_frame(random: &mut Random) -> Vec<u8> {
     if random.below(12) == 0 {
         let protocol = random.bits() as u16;
-        return frames::version_check(VersionCheck::Asked { protocol });
+        return frames::version_check(VersionCheck::Query { protocol });
     }
     let session = SessionNumber::new(1_000 * random.below(3) as u32);
     frames::from_host(session, &host_message(random))
@@ -168,15 +168,15 @@ fn host_request(random: &mut Random) -> Request {
         Request::SetCalibration { calibration },
         Request::StoreCalibration,
         Request::DropScene,
-        Request::ClearFault { seen: None },
+        Request::ClearFault { fault: None },
         Request::Clutch {
-            hold: ClutchHold::WithHand,
+            hold: ClutchMode::WithHand,
         },
         Request::Clutch {
-            hold: ClutchHold::InPlace,
+            hold: ClutchMode::InPlace,
         },
         Request::Clutch {
-            hold: ClutchHold::LetGo,
+            hold: ClutchMode::Released,
         },
     ][random.below(8)]
 }

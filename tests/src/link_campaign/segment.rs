@@ -277,7 +277,7 @@ impl<'t> Segment<'t> {
         let is_on = self.board.drive.enabled;
         let is_in_mode = |host: &Host<'_>| {
             let live = host.opened && host.end.is_none();
-            let view = host.view.map(|view| view.mode.drives());
+            let view = host.view.map(|view| view.mode.is_driving());
             live.then_some(view)
         };
         let wrong = match self.host.as_ref().and_then(is_in_mode) {

@@ -25,7 +25,7 @@ pub(super) fn greeting() -> [Vec<u8>; 2] {
     });
     let session = SessionNumber::new(0x0BAD_0000);
     [
-        frame(&VersionCheck::Asked { protocol: OTHER }),
+        frame(&VersionCheck::Query { protocol: OTHER }),
         frame(&InSession {
             session,
             message: hello,

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use hapterra::link::{Event, HostRequest};
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::guard::Jog;
 use hapterra_core::wire::request::Request;
 
@@ -40,11 +40,11 @@ impl RequestSequence {
         let clutch =
             |hold| RequestStep::HostRequest(HostRequest::Request(Request::Clutch { hold }));
         Self::of([
-            clutch(ClutchHold::InPlace),
+            clutch(ClutchMode::InPlace),
             RequestStep::Wait(CLUTCH_TICKS),
             RequestStep::View(1),
             RequestStep::HostRequest(HostRequest::Calibration),
-            clutch(ClutchHold::LetGo),
+            clutch(ClutchMode::Released),
             RequestStep::Wait(CLUTCH_TICKS),
         ])
     }

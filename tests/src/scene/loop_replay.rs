@@ -126,7 +126,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let slots = std::array::from_fn(|_| std::array::from_fn(|_| next()));
         let mut haptics = Haptics::new(slots, TickRate::DEFAULT, None);
         let message = message(scene, materials, replay.shift);
-        haptics.take_materials(&materials.reported());
+        haptics.set_materials(&materials.reported());
         assert!(matches!(haptics.accept(Command::Scene(message)), Ok(None)));
         let mut requester = TileRequester::new();
         requester.reset(0, message.size);
@@ -199,7 +199,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             work = outcome.sample.work.max(work);
             self.now += 1;
             self.supply(&outcome.sample);
-            if outcome.answers == Some(seq) {
+            if outcome.answered_seq == Some(seq) {
                 return Some(TickRecord {
                     work,
                     ..outcome.sample
@@ -222,7 +222,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
             instructions: 0,
             cycles: Cycles::default(),
             state: state as u32,
-            converged: outcome.answers.is_some(),
+            converged: outcome.answered_seq.is_some(),
             work,
             vector: force_n,
             proxy,
@@ -234,13 +234,13 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         let Supply::OnDemand { latency } = self.replay.supply else {
             return;
         };
-        let demand = RequestHint {
+        let hint = RequestHint {
             missing_tile: sample.missing_tile,
             proxy: sample.proxy.column(),
             hip: sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = self.requester.next_request(self.now, &demand) {
+        while let Some(key) = self.requester.next_request(self.now, &hint) {
             self.requested.push((self.now + latency, key));
         }
         let is_here = |(due, _): &(u32, TileKey)| *due <= self.now;

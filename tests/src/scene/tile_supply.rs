@@ -154,7 +154,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
 
     /// As in the loop, a tile does not replace the one under the proxy.
     fn take(&mut self, key: TileKey, contact: &Contact) {
-        let under_proxy = contact.patch().map(|cell| TileKey::holding(0, cell));
+        let under_proxy = contact.patch().map(|cell| TileKey::containing(0, cell));
         let occupant = self.window.occupant(key);
         self.requester.received(key);
         if under_proxy.is_some() && under_proxy != Some(key) && occupant == under_proxy {

@@ -10,7 +10,7 @@ use hapterra::bringup::{
 };
 use hapterra::link::{ControlSession, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
-use hapterra_core::guard::{Blockers, JOG_FAST_RAD_S, Jog};
+use hapterra_core::guard::{Blockers, Jog, MAX_JOG_SPEED_RAD_S};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_firmware::native::StoppedClock;
@@ -36,7 +36,7 @@ fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<
     let ended = walked_unwatched(user, record, log);
     let fastest = user.bench().borrow().fastest_rad_s();
     println!("fastest {fastest:?} rad/s");
-    let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
+    let most = f64::from(MAX_JOG_SPEED_RAD_S) + LATE_RAD_S;
     assert!(fastest.iter().all(|speed| *speed < most), "{fastest:?}");
     ended
 }
@@ -270,7 +270,7 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
         assert!(text.contains("the jog ended with fault 22"), "{text}");
         let fastest = user.user.bench().borrow().fastest_rad_s();
         println!("fastest {fastest:?} rad/s");
-        let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
+        let most = f64::from(MAX_JOG_SPEED_RAD_S) + LATE_RAD_S;
         assert!(fastest[0] < most, "{fastest:?}");
         // The direction of its motion is still reported.
         let inverted = log

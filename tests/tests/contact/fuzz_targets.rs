@@ -8,7 +8,7 @@ use hapterra_core::contact::WORK_PER_TICK;
 use hapterra_core::force::{Material, MaterialTable, SurfaceParams};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{HipCommand, Source};
-use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+use hapterra_core::terrain::packed::{HeightStep, MAX_PACKED, pack};
 use hapterra_core::terrain::{TILE_SAMPLES, TileKey};
 use hapterra_core::tick::Outcome;
 use hapterra_core::wire::materials::{
@@ -195,7 +195,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             }),
             2 => ToDevice::Request {
                 number: seq as u8 + 2,
-                request: Request::ClearFault { seen: None },
+                request: Request::ClearFault { fault: None },
             },
             _ => ToDevice::Hip(HipCommand { seq, hip }),
         };
@@ -226,7 +226,7 @@ fn sensible_tile(random: &mut Random) -> Vec<u8> {
             _ => height.round() as f32 / 32.0,
         }
     });
-    let steps = [Step::Cells(1.0 / 32.0)];
+    let steps = [HeightStep::Cells(1.0 / 32.0)];
     let steps = &steps[..random.below(2)];
     let mut buffer = [0; MAX_PACKED];
     let packed = pack(&heights, 0, steps, &mut buffer);

@@ -257,7 +257,7 @@ fn the_device_refuses_a_host_of_another_version() {
     let mut device = Native::for_replay();
     let mut frame = [0; 64];
     for protocol in [PROTOCOL + 1, PROTOCOL - 1, u16::MAX] {
-        let asked = VersionCheck::Asked { protocol };
+        let asked = VersionCheck::Query { protocol };
         let bytes = encode(&asked, &mut frame).expect("fits");
         let refused = VersionCheck::Refused { protocol: PROTOCOL };
         assert_eq!(refusal(&mut device, bytes), Some(refused), "{protocol}");

@@ -44,17 +44,17 @@ fn is_same(one: &str, other: &str) -> bool {
 
 #[test]
 fn the_picture_of_friction_is_the_examples() {
-    is_kept(stick_slip::drawn(), "stick_slip", "stick-slip.svg");
+    is_kept(stick_slip::picture(), "stick_slip", "stick-slip.svg");
 }
 
 #[test]
 fn the_picture_of_shading_is_the_examples() {
-    is_kept(shaded_force::drawn(), "shaded_force", "shading.svg");
+    is_kept(shaded_force::picture(), "shaded_force", "shading.svg");
 }
 
 #[test]
 fn the_picture_of_texture_is_the_examples() {
-    is_kept(textured_force::drawn(), "textured_force", "texture.svg");
+    is_kept(textured_force::picture(), "textured_force", "texture.svg");
 }
 
 #[test]

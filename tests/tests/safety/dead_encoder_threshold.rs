@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use hapterra::phantom::{HandModel, PhantomModel, Plant, kinematics};
-use hapterra_core::guard::TRAVEL_WHILE_ONE_STANDS;
+use hapterra_core::guard::MAX_OTHERS_TRAVEL;
 
 /// Frequency of the tremor in each axis, Hz.
 const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
@@ -66,7 +66,7 @@ fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds:
 /// Checks that the guard accepts three times the travel of a hand.
 fn assert_passes(what: &str, most: [u32; 3]) {
     eprintln!("{what}: {most:?} counts");
-    let allowed = TRAVEL_WHILE_ONE_STANDS / 3;
+    let allowed = MAX_OTHERS_TRAVEL / 3;
     assert!(most.iter().all(|most| *most <= allowed), "{what}: {most:?}");
 }
 

@@ -20,7 +20,7 @@ const FULL_SCALE_A: f32 = 5.5;
 fn poses(record: &Calibration) -> Vec<Vec3> {
     let step = |i: i32| (6.0 * i as f32).to_radians();
     let all = (-25..=40).flat_map(|i| (-25..=40).map(move |j| Vec3::new(0.0, step(i), step(j))));
-    all.filter(|q| record.limits.allow(*q, LIMIT_MARGIN_RAD))
+    all.filter(|q| record.limits.contains(*q, LIMIT_MARGIN_RAD))
         .collect()
 }
 

@@ -23,7 +23,7 @@ enum Next {
     /// A later row.
     Row(Timed),
     /// A row at which the ticks restart.
-    Anew(Timed),
+    Restart(Timed),
     /// All rows up to now have the same time, which is therefore unused.
     Untimed,
     /// The last row was read.
@@ -42,17 +42,17 @@ where
         loop {
             let next = match self.ahead.take() {
                 Some(row) => Next::Row(row),
-                None => self.follow(&before)?,
+                None => self.read_next(&before)?,
             };
             let mut ahead = match next {
                 Next::Row(ahead) => ahead,
-                Next::Anew(row) => return self.begin(row).map(Some),
+                Next::Restart(row) => return self.begin(row).map(Some),
                 Next::Untimed => return self.next_row(),
                 Next::End => return Ok(None),
             };
-            let late = self.due.late(ahead.t_s);
+            let late = self.due.ticks_late(ahead.t_s);
             if late > ON_TICK {
-                let tick = self.between(&before, &ahead);
+                let tick = self.tick_between(&before, &ahead);
                 (before.is_rendered, ahead.is_rendered) = (true, true);
                 (self.before, self.ahead) = (Some(before), Some(ahead));
                 return Ok(Some(tick));
@@ -76,7 +76,7 @@ where
             None => {
                 self.counts.untimed = Some(Untimed::Missing);
                 self.pace = Pace::RowByRow;
-                self.held.push_back((row, 1));
+                self.queued.push_back((row, 1));
                 self.next_row()
             }
         }
@@ -85,7 +85,7 @@ where
     /// Returns tick 0, at a row.
     fn begin(&mut self, row: Timed) -> Result<Tick, TickError<E>> {
         if self.due.is_coarse_at(row.t_s) {
-            return Err(self.mistimed(TimeFault::TooLarge(row.t_s)));
+            return Err(self.time_error(TimeFault::TooLarge(row.t_s)));
         }
         (self.due.begin_s, self.due.next) = (row.t_s, 0);
         let is_rendered = true;
@@ -94,12 +94,12 @@ where
     }
 
     /// Returns the next tick, on the straight line between two rows.
-    fn between(&mut self, before: &Timed, ahead: &Timed) -> Tick {
-        let t_s = self.due.s();
+    fn tick_between(&mut self, before: &Timed, ahead: &Timed) -> Tick {
+        let t_s = self.due.time_s();
         let share = (t_s - before.t_s) / (ahead.t_s - before.t_s);
-        let ways = before.row.hip_mm.iter().zip(ahead.row.hip_mm);
+        let pairs = before.row.hip_mm.iter().zip(ahead.row.hip_mm);
         let mut hip_mm = [0.0; 3];
-        for (at, (from, to)) in hip_mm.iter_mut().zip(ways) {
+        for (at, (from, to)) in hip_mm.iter_mut().zip(pairs) {
             *at = from + (to - from) * share;
         }
         self.due.next += 1;
@@ -112,7 +112,7 @@ where
     }
 
     /// Reads the next row that is later than `before`.
-    fn follow(&mut self, before: &Timed) -> Result<Next, TickError<E>> {
+    fn read_next(&mut self, before: &Timed) -> Result<Next, TickError<E>> {
         let mut repeated = 0;
         // If all rows have one time, the times may have no meaning.
         let is_begin = self.counts.rows == 1 && self.pace == Pace::ByTime;
@@ -121,20 +121,20 @@ where
             let Some((row, t_s)) = row.and_then(|row| Some((row, row.t_s?))) else {
                 self.counts.passed_over += u64::from(!before.is_rendered);
                 return Ok(match is_begin && repeated > 0 {
-                    true => self.without_times(before, repeated, None),
+                    true => self.switch_to_row_by_row(before, repeated, None),
                     false => Next::End,
                 });
             };
             let is_still = row.hip_mm == before.row.hip_mm;
             if t_s != before.t_s {
                 self.counts.repeated += repeated;
-                return self.later(before, Timed::new(row, t_s), is_still);
+                return self.check_row(before, Timed::new(row, t_s), is_still);
             }
             if !is_still && is_begin {
-                return Ok(self.without_times(before, repeated, Some(row)));
+                return Ok(self.switch_to_row_by_row(before, repeated, Some(row)));
             }
             if !is_still {
-                return Err(self.mistimed(TimeFault::TwoPlaces(t_s)));
+                return Err(self.time_error(TimeFault::TwoPositions(t_s)));
             }
             repeated += 1;
         }
@@ -142,16 +142,21 @@ where
 
     /// Uses rows as ticks from now on: the first row was rendered, and the repeated rows have its
     /// time.
-    fn without_times(&mut self, first: &Timed, repeated: u64, row: Option<Row>) -> Next {
+    fn switch_to_row_by_row(&mut self, first: &Timed, repeated: u64, row: Option<Row>) -> Next {
         self.counts.untimed = Some(Untimed::Same(first.t_s));
         self.pace = Pace::RowByRow;
-        self.held.push_back((first.row, repeated));
-        self.held.extend(row.map(|row| (row, 1)));
+        self.queued.push_back((first.row, repeated));
+        self.queued.extend(row.map(|row| (row, 1)));
         Next::Untimed
     }
 
     /// Checks a row at another time than the one before it.
-    fn later(&mut self, before: &Timed, row: Timed, is_still: bool) -> Result<Next, TickError<E>> {
+    fn check_row(
+        &mut self,
+        before: &Timed,
+        row: Timed,
+        is_still: bool,
+    ) -> Result<Next, TickError<E>> {
         let (from, to) = (before.t_s, row.t_s);
         let step = to - from;
         let fault = match self.pace {
@@ -162,23 +167,23 @@ where
             _ => None,
         };
         if let Some(fault) = fault {
-            return Err(self.mistimed(fault));
+            return Err(self.time_error(fault));
         }
         if self.pace == Pace::Recorded {
             let is_gap = step > MAX_MOVE_S;
             self.counts.gaps += u64::from(is_gap);
             if is_gap || row.row.view != before.row.view {
-                return Ok(Next::Anew(row));
+                return Ok(Next::Restart(row));
             }
         } else if !is_still {
-            self.counts.moves(step);
+            self.counts.count_move(step);
         }
         Ok(Next::Row(row))
     }
 
     /// Returns the fault if a time contradicts the rate of a recording.
     fn off_tick(&self, from: f64, to: f64) -> Option<TimeFault> {
-        let late = self.due.late(to);
+        let late = self.due.ticks_late(to);
         let is_tick = late >= -ON_TICK && (late - libm::round(late)).abs() <= ON_TICK;
         let ticks = libm::round((to - from) * self.due.tick_hz * 1e3) / 1e3;
         let tick_hz = self.due.tick_hz;

@@ -12,7 +12,7 @@ pub enum Untimed {
     /// All times are equal, s.
     Same(f64),
     /// The caller has requested it.
-    Asked,
+    Requested,
 }
 
 /// Counts of a path that is read tick by tick.
@@ -40,7 +40,7 @@ pub struct Counts {
 
 impl Counts {
     /// Counts a move between two rows, s.
-    pub(super) fn moves(&mut self, step_s: f64) {
+    pub(super) fn count_move(&mut self, step_s: f64) {
         self.odd_moves += u64::from(step_s > ODD_MOVE_S);
         self.max_move_s = self.max_move_s.max(step_s);
     }

@@ -32,10 +32,10 @@ pub enum TimeFault {
     },
     /// The time equals that of a row at another position.
     #[error("two places at {0} s: the HIP cannot be at both")]
-    TwoPlaces(f64),
+    TwoPositions(f64),
     /// The first different time after rows that all had the same.
     #[error("time begins at {to} s, and all rows before, at several places, have {from} s")]
-    Begins {
+    TimesStart {
         /// Time of the rows before, s.
         from: f64,
         /// Time of the row, s.

@@ -80,7 +80,7 @@ pub struct Ticks<R> {
     /// The row after it, if it was read already.
     ahead: Option<Timed>,
     /// Rows that were read, and the number of repeats of each: a tick each.
-    held: VecDeque<(Row, u64)>,
+    queued: VecDeque<(Row, u64)>,
     counts: Counts,
 }
 
@@ -88,14 +88,14 @@ impl<R> Ticks<R> {
     /// Creates the ticks of a device with `tick_hz` ticks a second, at least 1.
     #[must_use]
     pub fn new(rows: R, pace: Pace, tick_hz: u32) -> Self {
-        let untimed = (pace == Pace::RowByRow).then_some(Untimed::Asked);
+        let untimed = (pace == Pace::RowByRow).then_some(Untimed::Requested);
         Self {
             rows,
             pace,
             due: Due::new(tick_hz),
             before: None,
             ahead: None,
-            held: VecDeque::new(),
+            queued: VecDeque::new(),
             counts: Counts {
                 untimed,
                 ..Counts::default()
@@ -137,10 +137,10 @@ where
 {
     /// Returns the next row as the next tick.
     fn next_row(&mut self) -> Result<Option<Tick>, TickError<E>> {
-        while self.held.front().is_some_and(|(_, times)| *times == 0) {
-            self.held.pop_front();
+        while self.queued.front().is_some_and(|(_, times)| *times == 0) {
+            self.queued.pop_front();
         }
-        let row = match self.held.front_mut() {
+        let row = match self.queued.front_mut() {
             Some((row, times)) => {
                 *times -= 1;
                 Some(*row)
@@ -153,7 +153,7 @@ where
         if let (Some(Untimed::Same(from)), Some(to)) = (self.counts.untimed, row.t_s)
             && from != to
         {
-            return Err(self.mistimed(TimeFault::Begins { from, to }));
+            return Err(self.time_error(TimeFault::TimesStart { from, to }));
         }
         let t_s = row.t_s.unwrap_or_default();
         if self.due.next == 0 && !self.due.is_coarse_at(t_s) {
@@ -164,8 +164,8 @@ where
 
     /// Returns the next tick, at a row.
     fn tick_at(&mut self, row: &Row) -> Tick {
-        let is_there = |t_s: &f64| self.due.late(*t_s).abs() <= ON_TICK;
-        let t_s = row.t_s.filter(is_there).unwrap_or(self.due.s());
+        let is_on_tick = |t_s: &f64| self.due.ticks_late(*t_s).abs() <= ON_TICK;
+        let t_s = row.t_s.filter(is_on_tick).unwrap_or(self.due.time_s());
         self.due.next += 1;
         Tick {
             t_s,
@@ -181,12 +181,12 @@ where
         self.counts.rows += 1;
         match row.t_s.is_none_or(f64::is_finite) {
             true => Ok(Some(row)),
-            false => Err(self.mistimed(TimeFault::NotFinite)),
+            false => Err(self.time_error(TimeFault::NotFinite)),
         }
     }
 
     /// Returns the error of the latest row, whose time cannot follow the previous one.
-    const fn mistimed(&self, fault: TimeFault) -> TickError<E> {
+    const fn time_error(&self, fault: TimeFault) -> TickError<E> {
         let row = self.counts.rows.saturating_sub(1);
         TickError::Time { row, fault }
     }
@@ -212,13 +212,13 @@ impl Due {
     }
 
     /// Returns the time of the next tick, s.
-    fn s(&self) -> f64 {
+    fn time_s(&self) -> f64 {
         self.begin_s + self.next as f64 / self.tick_hz
     }
 
     /// Returns the ticks by which a time is later than the next tick.
-    fn late(&self, t_s: f64) -> f64 {
-        (t_s - self.s()) * self.tick_hz
+    fn ticks_late(&self, t_s: f64) -> f64 {
+        (t_s - self.time_s()) * self.tick_hz
     }
 
     /// Returns true if numbers near a time are too coarse to distinguish ticks.

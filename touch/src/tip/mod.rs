@@ -24,26 +24,26 @@
 //! distance of a ball's nodes is a fraction of its radius, whatever the samples are: **haptic
 //! cells**, a whole number of which is a cell of the ground. Lengths below are in haptic cells.
 
-mod bearing;
+mod support;
 
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use bearing::{Axis, Bearing};
-pub use bearing::{Nodes, Samples};
+use support::{Axis, Support};
+pub use support::{Nodes, Samples};
 
 /// Maximum radius, cells of the ground.
 pub const MAX_CELLS: f64 = 8.0;
 /// Minimum number of haptic cells in a radius.
-pub const CELLS_IN_RADIUS: f64 = 32.0;
+pub const MIN_CELLS_IN_RADIUS: f64 = 32.0;
 /// Minimum side of a haptic cell, device millimetres: half an encoder's count.
-pub const FINEST_MM: f64 = 1.0 / 64.0;
+pub const MIN_CELL_MM: f64 = 1.0 / 64.0;
 /// Step to which heights of the centre are rounded, haptic cells: slopes have an error of at most a
 /// thousandth, and tiles have half the bytes.
 pub const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
 /// Max error of the ball's height from the distance of its lines, as a part of its radius.
-const SAG: f64 = 5e-3;
+const MAX_SAG: f64 = 5e-3;
 
 /// A radius that a ball over cells of this size cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -76,12 +76,12 @@ pub struct Ball {
 
 /// Returns a height of the centre, haptic cells, as rounded for tiles.
 #[must_use]
-pub fn rounded(centre: f64) -> f64 {
+pub fn round_centre(centre: f64) -> f64 {
     libm::round(centre / CENTRE_STEP) * CENTRE_STEP
 }
 
 /// Nodes along the sides of the square around one patch.
-pub const PATCH: usize = 2;
+pub const PATCH_NODES: usize = 2;
 
 impl Ball {
     /// Creates a ball of a radius in millimetres over cells of the ground; `None` for the radius 0,
@@ -102,8 +102,8 @@ impl Ball {
     }
 
     fn of(cells: f64, cell_mm: f64) -> Self {
-        let most = libm::floor(cell_mm / FINEST_MM).max(1.0);
-        let parts = libm::ceil(CELLS_IN_RADIUS / cells).clamp(1.0, most) as u32;
+        let max_parts = libm::floor(cell_mm / MIN_CELL_MM).max(1.0);
+        let parts = libm::ceil(MIN_CELLS_IN_RADIUS / cells).clamp(1.0, max_parts) as u32;
         let radius = cells * f64::from(parts);
         let reach = radius as i32;
         let cap = |(x, y): (i32, i32)| {
@@ -115,7 +115,7 @@ impl Ball {
             }
         };
         let places = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y)));
-        let lines = 1.0 / (libm::sqrt(4.0 * SAG) * cells);
+        let lines = 1.0 / (libm::sqrt(4.0 * MAX_SAG) * cells);
         Self {
             radius,
             parts,
@@ -147,7 +147,7 @@ impl Ball {
     /// sample, which may be outside the field, the samples along a side, and the position of the
     /// nodes in them.
     #[must_use]
-    pub fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
+    pub fn samples_for(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
         let (parts, halo) = (i64::from(self.parts), self.halo as i64);
         let from = first.map(|node| i64::from(node) / parts - halo);
         let nodes = Nodes {
@@ -163,11 +163,11 @@ impl Ball {
     /// ground without data. Only patches with four samples support the ball.
     #[must_use]
     pub fn centres(&self, block: &Samples, nodes: Nodes) -> Vec<f64> {
-        let bearing = Bearing::of(block);
+        let support = Support::of(block);
         let mut centres = vec![f64::NEG_INFINITY; nodes.side * nodes.side];
-        self.on_samples((block, &bearing), nodes, &mut centres);
+        self.on_samples((block, &support), nodes, &mut centres);
         for axis in [Axis::North, Axis::East] {
-            self.on_lines((block, &bearing), axis, nodes, &mut centres);
+            self.on_lines((block, &support), axis, nodes, &mut centres);
         }
         for (at, centre) in centres.iter_mut().enumerate() {
             let place = [
@@ -192,29 +192,29 @@ impl Ball {
         let corners = self.centres(
             samples,
             Nodes {
-                side: PATCH,
+                side: PATCH_NODES,
                 ..nodes
             },
         );
         let along = |at: usize| corners[at] * (1.0 - u) + corners[at + 1] * u;
-        let height = along(0) * (1.0 - v) + along(PATCH) * v;
+        let height = along(0) * (1.0 - v) + along(PATCH_NODES) * v;
         Some(height).filter(|height| !height.is_nan())
     }
 
     /// Returns the height of the ball on a sample.
     fn on_samples(
         &self,
-        (block, bearing): (&Samples, &Bearing),
+        (block, support): (&Samples, &Support),
         nodes: Nodes,
         centres: &mut [f64],
     ) {
         let (parts, reach) = (self.parts as usize, libm::floor(self.radius));
         let width = 2 * reach as usize + 1;
-        for (at, sample) in bearing.nodes.iter().enumerate() {
-            if *sample == f64::NEG_INFINITY || bearing.is_between_stretches(block, at) {
+        for (at, sample) in support.nodes.iter().enumerate() {
+            if *sample == f64::NEG_INFINITY || support.is_between_segments(block, at) {
                 continue;
             }
-            let place = [at % bearing.columns, at / bearing.columns].map(|sample| sample * parts);
+            let place = [at % support.columns, at / support.columns].map(|sample| sample * parts);
             let near = |axis: usize| nodes.near(axis, place[axis] as f64, reach);
             let ((west, east), (south, north)) = (near(0), near(1));
             let beside =
@@ -236,7 +236,7 @@ impl Ball {
     /// Returns the height of the ball within a segment of a line along an axis.
     fn on_lines(
         &self,
-        (block, bearing): (&Samples, &Bearing),
+        (block, support): (&Samples, &Support),
         axis: Axis,
         nodes: Nodes,
         centres: &mut [f64],
@@ -249,7 +249,7 @@ impl Ball {
                 let place = (line as f64 + off) * parts;
                 let (first, end) = nodes.near(axis.across(), place, self.radius);
                 for start in 0..along - 1 {
-                    if first >= end || !bearing.bears(axis, line, start, part > 0) {
+                    if first >= end || !support.supports(axis, line, start, part > 0) {
                         continue;
                     }
                     let at = |step: usize| {

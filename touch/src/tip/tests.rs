@@ -91,7 +91,7 @@ fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
 }
 
 /// A ball over heights by column and row, rendered from the node on the sample at zero.
-struct Rest {
+struct BallOnHeights {
     /// Haptic cells along the side of a cell.
     parts: usize,
     /// Samples around that node.
@@ -103,13 +103,13 @@ struct Rest {
     centres: Vec<f64>,
 }
 
-impl Rest {
+impl BallOnHeights {
     /// Creates a ball of a radius in cells of a millimetre, over `cells` cells each way.
     fn new(radius: f64, cells: usize, height: impl Fn(i32, i32) -> f64) -> Self {
         let ball = Ball::of(radius, 1.0);
         let parts = ball.parts() as usize;
         let side = cells * parts + 1;
-        let (first, samples, nodes) = ball.around([0, 0], side);
+        let (first, samples, nodes) = ball.samples_for([0, 0], side);
         let place = |at: usize| at as i32 + first[0] as i32;
         let all = (0..samples * samples).map(|at| height(place(at % samples), place(at / samples)));
         let block = |scale: f64, heights: &[f64]| Samples {
@@ -162,15 +162,15 @@ fn noise(column: i32, row: i32) -> f64 {
 }
 
 #[test]
-fn a_ball_on_a_plane_is_its_radius_off_it() {
+fn ball_on_a_plane_is_one_radius_away() {
     for radius in RADII {
         for [east, north] in [[0.0, 0.0], [0.5, 0.0], [0.0, -2.0], [1.0, 1.0], [-3.0, 4.0]] {
             let plane = |x: f64, y: f64| east * x + north * y;
-            let rest = Rest::new(radius, 1, |x, y| plane(f64::from(x), f64::from(y)));
+            let ball_on = BallOnHeights::new(radius, 1, |x, y| plane(f64::from(x), f64::from(y)));
             let steep = (1.0f64 + east * east + north * north).sqrt();
-            for node in rest.nodes() {
-                let [x, y] = rest.place(node);
-                let off = rest.centre(node) - plane(x, y);
+            for node in ball_on.nodes() {
+                let [x, y] = ball_on.place(node);
+                let off = ball_on.centre(node) - plane(x, y);
                 // Normal to the plane.
                 let off = (off / steep - radius) / radius;
                 assert!(
@@ -186,7 +186,7 @@ fn a_ball_on_a_plane_is_its_radius_off_it() {
 type Shape<'s> = &'s dyn Fn(i32, i32) -> f64;
 
 #[test]
-fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
+fn ball_height_agrees_with_a_search_on_poles_walls_and_pits() {
     let shapes: [(&str, Shape<'_>); 9] = [
         ("pole", &|x, y| if (x, y) == (2, 1) { 10.0 } else { 0.0 }),
         ("pit", &|x, y| if (x, y) == (2, 1) { -10.0 } else { 0.0 }),
@@ -200,24 +200,24 @@ fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
     ];
     for radius in [0.3, 1.0, 2.5, 8.0] {
         for (name, shape) in shapes {
-            let rest = Rest::new(radius, 2, shape);
+            let ball_on = BallOnHeights::new(radius, 2, shape);
             // On samples and between them.
             let along = [
                 0,
-                rest.parts / 3,
-                (17 * rest.parts).div_ceil(10),
-                2 * rest.parts,
+                ball_on.parts / 3,
+                (17 * ball_on.parts).div_ceil(10),
+                2 * ball_on.parts,
             ];
             let nodes = along.map(|row| along.map(|column| [column, row]));
             for node in nodes.into_iter().flatten() {
-                let (place, found) = (rest.in_block(node), rest.centre(node));
+                let (place, found) = (ball_on.in_block(node), ball_on.centre(node));
                 // Not higher than the ball, and no ground is nearer than 99 % of the radius.
-                let sought = centre(&rest.block, place, radius);
-                let smaller = centre(&rest.block, place, 0.99 * radius);
-                let is_right = found < sought + 1e-6 * radius && found > smaller;
+                let expected = centre(&ball_on.block, place, radius);
+                let smaller = centre(&ball_on.block, place, 0.99 * radius);
+                let is_right = found < expected + 1e-6 * radius && found > smaller;
                 assert!(
                     is_right,
-                    "{name}, radius {radius}, node {node:?}: {found} between {smaller} and {sought}"
+                    "{name}, radius {radius}, node {node:?}: {found} between {smaller} and {expected}"
                 );
             }
         }
@@ -225,17 +225,17 @@ fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
 }
 
 #[test]
-fn samples_without_data_stay_without_and_bear_nothing() {
+fn no_data_samples_stay_no_data_and_support_nothing() {
     let hole = |x: i32, y: i32| match (x, y) {
         (1, 1) => f64::NAN,
         _ if x > 3 => f64::NAN,
         _ => f64::from(x),
     };
-    let rest = Rest::new(2.0, 5, hole);
-    for node in rest.nodes() {
-        let ([x, y], centre) = (rest.place(node), rest.centre(node));
+    let ball_on = BallOnHeights::new(2.0, 5, hole);
+    for node in ball_on.nodes() {
+        let ([x, y], centre) = (ball_on.place(node), ball_on.centre(node));
         // A patch with such a sample has none; its border with a whole patch has one.
-        let own = surface(&rest.block, rest.in_block(node));
+        let own = surface(&ball_on.block, ball_on.in_block(node));
         let is_border = [x, y].iter().any(|place| place.fract() == 0.0);
         assert!(own.is_none() || !centre.is_nan(), "{x} {y}");
         assert!(own.is_some() || is_border || centre.is_nan(), "{x} {y}");
@@ -254,9 +254,9 @@ fn samples_without_data_stay_without_and_bear_nothing() {
         (0..=2, 0..=2) => f64::NAN,
         _ => 0.0,
     };
-    let rest = Rest::new(3.0, 4, lone);
-    let on = |x: usize, y: usize| rest.centre([x, y].map(|place| place * rest.parts));
+    let ball_on = BallOnHeights::new(3.0, 4, lone);
+    let on = |x: usize, y: usize| ball_on.centre([x, y].map(|place| place * ball_on.parts));
     assert_eq!(on(3, 1), 3.0);
     assert_eq!(on(1, 1), 53.0);
-    assert!(rest.centre([rest.parts + 1, rest.parts]).is_nan());
+    assert!(ball_on.centre([ball_on.parts + 1, ball_on.parts]).is_nan());
 }

@@ -9,26 +9,26 @@ use crate::contact::budget::{Budget, SLOPE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::{
-    BESIDE, COARSEST_RESOLUTION, EQUALLY_STEEP, LEAST_WAY, RESOLUTION, SLOPE_NOISE,
+    BESIDE, COARSEST_RESOLUTION, EQUALLY_STEEP, MIN_DISPLACEMENT, RESOLUTION, SLOPE_NOISE,
 };
 use crate::scalar::{larger, smaller};
 use crate::terrain::{CellContent, Window};
 
 /// Continuation of the descent from the closest point of a patch.
-pub(super) enum Onward {
-    /// Into a neighbouring patch, as [`Asking::best`] has it.
-    Into,
+pub(super) enum Continuation {
+    /// Into a neighbouring patch, as [`NeighbourSearch::best`] has it.
+    Neighbour,
     /// The descent may continue in a missing tile.
-    Missing,
+    MissingTile,
     /// The budget is spent.
     Suspended,
     /// Nowhere: the point is a local minimum of the distance.
-    Nowhere,
+    LocalMinimum,
 }
 
-/// Offer of a neighbouring patch.
+/// Candidate of a neighbouring patch.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Offer {
+pub(super) struct Candidate {
     /// Place where the path enters the neighbour.
     pub(super) entry: SurfacePoint,
     /// The neighbour's closest point.
@@ -47,7 +47,7 @@ pub(super) struct Offer {
     steepness: f32,
 }
 
-impl Offer {
+impl Candidate {
     fn is_better_than(&self, other: &Self) -> bool {
         let (more, noise) = (self.gain - other.gain, self.noise + other.noise);
         more > noise || (more >= -noise && self.toward > other.toward)
@@ -65,73 +65,73 @@ struct Neighbour {
     steepness: f32,
     /// Steepness into the next less steep neighbour.
     runner_up: f32,
-    /// The neighbour's bit in [`Asking::asked`].
+    /// The neighbour's bit in [`NeighbourSearch::searched`].
     bit: u8,
 }
 
 /// Search of a patch's neighbours, steepest descent first, from the patch's closest point, which is
 /// on or beside its border.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asking {
+pub(super) struct NeighbourSearch {
     /// Neighbours searched already, one bit each in the order of [`Side::neighbour`].
-    asked: u8,
+    searched: u8,
     /// Best candidate.
-    pub(super) best: Option<Offer>,
+    pub(super) best: Option<Candidate>,
 }
 
-/// Start of the search: the closest point of a patch.
-pub(super) struct Start<'d> {
+/// ClosestHere of the search: the closest point of a patch.
+pub(super) struct ClosestHere<'d> {
     pub(super) at: &'d SurfacePoint,
     pub(super) here: &'d Nearest,
 }
 
-impl Asking {
+impl NeighbourSearch {
     /// State before any neighbour is searched.
     pub(super) const NONE: Self = Self {
-        asked: 0,
+        searched: 0,
         best: None,
     };
 
     /// Forgets the searched neighbours.
     #[inline]
     pub(super) const fn restart(&mut self) {
-        self.asked = 0;
+        self.searched = 0;
         self.best = None;
     }
 
-    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best offer
-    /// found in this call.
+    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best
+    /// candidate found in this call.
     #[inline]
     pub(super) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        start: &Start<'_>,
+        start: &ClosestHere<'_>,
         patch: &mut Patch,
         budget: &mut Budget,
-    ) -> Onward {
+    ) -> Continuation {
         // On a wall a proxy may be beside the edge without being on it.
         let (p, q) = view.in_patch(start.at.cell);
         let beside = |hip: f32| smaller(BESIDE * finest_resolution(hip), COARSEST_RESOLUTION);
         let border = start.at.border_within([beside(p), beside(q)]);
         if border == Side::NONE {
-            return Onward::Nowhere;
+            return Continuation::LocalMinimum;
         }
-        self.over_border(window, view, start, border, patch, budget)
+        self.search_neighbours(window, view, start, border, patch, budget)
     }
 
     // The arguments are borrowed from several places.
     #[allow(clippy::too_many_arguments)]
     #[inline(never)]
-    fn over_border<const D: usize>(
+    fn search_neighbours<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        start: &Start<'_>,
+        start: &ClosestHere<'_>,
         border: Side,
         patch: &mut Patch,
         budget: &mut Budget,
-    ) -> Onward {
+    ) -> Continuation {
         loop {
             let mut next = Neighbour {
                 side: Side::NONE,
@@ -153,33 +153,33 @@ impl Asking {
             let hip = view.in_patch(next.entry.cell);
             let start_at = (next.entry.u, next.entry.v);
             let Some(closest) = search(&next.patch, hip, start_at, budget) else {
-                return Onward::Suspended;
+                return Continuation::Suspended;
             };
-            self.asked |= next.bit;
-            if let Some(offer) = offer(&next, hip, start.here, closest)
+            self.searched |= next.bit;
+            if let Some(candidate) = candidate(&next, hip, start.here, closest)
                 && self
                     .best
                     .as_ref()
-                    .is_none_or(|best| offer.is_better_than(best))
+                    .is_none_or(|best| candidate.is_better_than(best))
             {
-                self.best = Some(offer);
+                self.best = Some(candidate);
                 *patch = next.patch;
             }
             if self.has_steeper_than(next.runner_up) {
-                break; // the others need not be looked at again
+                break; // the others need not be evaluated again
             }
         }
         if self.best.is_some() {
-            Onward::Into
+            Continuation::Neighbour
         } else {
-            Onward::Nowhere
+            Continuation::LocalMinimum
         }
     }
 
-    /// Returns true if the best offer's descent is steeper than `steepness`.
+    /// Returns true if the best candidate's descent is steeper than `steepness`.
     #[inline]
     fn has_steeper_than(&self, steepness: f32) -> bool {
-        let is_steeper = |best: &Offer| steepness < best.steepness * (1.0 - EQUALLY_STEEP);
+        let is_steeper = |best: &Candidate| steepness < best.steepness * (1.0 - EQUALLY_STEEP);
         self.best.as_ref().is_some_and(is_steeper)
     }
 
@@ -193,18 +193,18 @@ impl Asking {
         &self,
         window: &Window<'_, D>,
         view: &HipView,
-        start: &Start<'_>,
+        start: &ClosestHere<'_>,
         border: Side,
         budget: &mut Budget,
         next: &mut Neighbour,
-    ) -> Result<(), Onward> {
-        for place in 0..3 {
-            let (side, bit) = (border.neighbour(place), 1 << place);
-            if side == Side::NONE || self.asked & bit != 0 {
+    ) -> Result<(), Continuation> {
+        for index in 0..3 {
+            let (side, bit) = (border.neighbour(index), 1 << index);
+            if side == Side::NONE || self.searched & bit != 0 {
                 continue;
             }
             if !budget.has(SLOPE) {
-                return Err(Onward::Suspended);
+                return Err(Continuation::Suspended);
             }
             budget.spend(SLOPE);
             let entry = start.at.across(side);
@@ -212,12 +212,12 @@ impl Asking {
                 CellContent::NoData => continue,
                 // This might be the steepest neighbour: the proxy waits for its tile.
                 CellContent::Missing => {
-                    budget.lacks(entry.cell);
-                    return Err(Onward::Missing);
+                    budget.record_missing(entry.cell);
+                    return Err(Continuation::MissingTile);
                 }
                 CellContent::Patch(corners) => view.patch(&corners),
             };
-            let Some(steepness) = fall_into(&patch, view, &entry, side, start.here) else {
+            let Some(steepness) = steepness_into(&patch, view, &entry, side, start.here) else {
                 continue;
             };
             if steepness > next.steepness {
@@ -243,7 +243,7 @@ impl Asking {
 ///
 /// Along the border the patch on the other side is at its minimum already, so only the direction
 /// across the border counts.
-fn fall_into(
+fn steepness_into(
     patch: &Patch,
     view: &HipView,
     entry: &SurfacePoint,
@@ -268,27 +268,39 @@ fn fall_into(
     // On a wall, the last place of a coordinate is worth much height. Not so across the border,
     // where the place is exact.
     let sizes = patch.with_sizes();
-    let along = |way: i32, slope: f32| if way == 0 { slope.abs() } else { 0.0 };
+    let along = |direction: i32, slope: f32| if direction == 0 { slope.abs() } else { 0.0 };
     let rounding = sizes.height(u, v) + along(side.east, zu) + along(side.north, zv);
     // On a wall, a place beside the edge may have another slope than the edge. For a place on the
     // edge the slope is valid, although the last place of its coordinate is worth much height.
     let is_on_edge = beside == [0.0, 0.0];
     let from_here = is_on_edge || (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
-    let falls = |way: i32, off: f32, slope: f32| {
-        let gradient = way as f32 * (off + z * slope);
+    let steepness_squared = |direction: i32, off: f32, slope: f32| {
+        let gradient = direction as f32 * (off + z * slope);
         let noise = SLOPE_NOISE * (off.abs() + rounding * slope.abs());
         let surely = from_here && gradient < -noise;
-        (way != 0 && gradient <= noise).then_some(if surely { gradient * gradient } else { 0.0 })
+        (direction != 0 && gradient <= noise).then_some(if surely {
+            gradient * gradient
+        } else {
+            0.0
+        })
     };
-    match (falls(side.east, u - p, zu), falls(side.north, v - q, zv)) {
+    match (
+        steepness_squared(side.east, u - p, zu),
+        steepness_squared(side.north, v - q, zv),
+    ) {
         (Some(east), Some(north)) => Some(east + north),
         (east, north) => east.or(north),
     }
 }
 
-/// Returns the neighbour's offer for its closest point `closest`, with the HIP at `hip` in its
+/// Returns the neighbour's candidate for its closest point `closest`, with the HIP at `hip` in its
 /// coordinates; `None` if that is no improvement.
-fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) -> Option<Offer> {
+fn candidate(
+    next: &Neighbour,
+    hip: (f32, f32),
+    here: &Nearest,
+    closest: Nearest,
+) -> Option<Candidate> {
     let Neighbour {
         side,
         entry,
@@ -297,16 +309,17 @@ fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) ->
     } = *next;
     let (mut gain, noise, places) = gain(here, &closest, hip, side);
     let is_surely_nearer = gain > noise && gain > places;
-    let mut least = LEAST_WAY;
+    let mut min_displacement = MIN_DISPLACEMENT;
     if steepness > 0.0 {
-        (gain, least) = (-smaller(-gain, 0.0), 0.0);
+        (gain, min_displacement) = (-smaller(-gain, 0.0), 0.0);
     }
     // Along the shared border the patch on the other side is at its minimum already.
-    let leads_off = |side: i32, from: f32, to: f32| side != 0 && (to - from).abs() > least;
+    let moves_across =
+        |side: i32, from: f32, to: f32| side != 0 && (to - from).abs() > min_displacement;
     let moved =
-        leads_off(side.east, entry.u, closest.u) || leads_off(side.north, entry.v, closest.v);
+        moves_across(side.east, entry.u, closest.u) || moves_across(side.north, entry.v, closest.v);
     let toward = side.east as f32 * (hip.0 - entry.u) + side.north as f32 * (hip.1 - entry.v);
-    ((moved && gain >= -noise) || gain > noise).then_some(Offer {
+    ((moved && gain >= -noise) || gain > noise).then_some(Candidate {
         entry,
         closest,
         gain,
@@ -351,9 +364,9 @@ pub(super) fn to_steepest_patch<const D: usize>(
     budget: &mut Budget,
 ) {
     let before = (*at, *patch);
-    let mut most = larger(steepness_at(patch, view.in_patch(at.cell), at, border), 0.0);
-    for place in 0..3 {
-        let side = border.neighbour(place);
+    let mut max_steepness = larger(steepness_at(patch, view.in_patch(at.cell), at, border), 0.0);
+    for index in 0..3 {
+        let side = border.neighbour(index);
         if side == Side::NONE {
             continue;
         }
@@ -361,7 +374,7 @@ pub(super) fn to_steepest_patch<const D: usize>(
         let its_patch = match window.ground(point.cell) {
             CellContent::NoData => continue,
             CellContent::Missing => {
-                budget.lacks(point.cell);
+                budget.record_missing(point.cell);
                 (*at, *patch) = before;
                 return;
             }
@@ -371,8 +384,8 @@ pub(super) fn to_steepest_patch<const D: usize>(
             let hip = view.in_patch(point.cell);
             steepness_at(&its_patch, hip, &point, border.across(side))
         };
-        if steepness > most * (1.0 + EQUALLY_STEEP) {
-            (*at, *patch, most) = (point, its_patch, steepness);
+        if steepness > max_steepness * (1.0 + EQUALLY_STEEP) {
+            (*at, *patch, max_steepness) = (point, its_patch, steepness);
         }
     }
 }
@@ -385,18 +398,18 @@ fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint, border: Si
     let east = (at.u - p) + z * patch.slope_u(at.v);
     let north = (at.v - q) + z * patch.slope_v(at.u);
     // On a border only the direction back into the patch counts.
-    let falls = |border: i32, slope: f32| {
+    let steepness_squared = |border: i32, slope: f32| {
         let outward = border as f32 * slope < 0.0;
         if outward { 0.0 } else { slope * slope }
     };
-    falls(border.east, east) + falls(border.north, north)
+    steepness_squared(border.east, east) + steepness_squared(border.north, north)
 }
 
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
 
-    use super::{Nearest, Patch, Side, fall_into};
+    use super::{Nearest, Patch, Side, steepness_into};
     use crate::contact::surface::{HipView, SurfacePoint};
     use crate::grid::{Cell, GridPoint};
 
@@ -418,15 +431,15 @@ mod tests {
             z: 0.003_328_164_8,
             evaluations: 1,
         };
-        let falls = |v: f32| fall_into(&patch, &view, &entry, side, &here(v));
+        let steepness_squared = |v: f32| steepness_into(&patch, &view, &entry, side, &here(v));
         // Slope of half the squared distance: height over the HIP times slope northward.
         let slope = 0.003_328_f32 * 0.0479 * (1.0 - entry.u);
-        let steepness = falls(1.0).expect("it falls");
+        let steepness = steepness_squared(1.0).expect("it falls");
         assert!(
             (steepness / (slope * slope) - 1.0).abs() < 0.02,
             "{steepness:e}"
         );
         // Beside the edge its slope is not valid.
-        assert_eq!(falls(1.0 - 2e-7), Some(0.0));
+        assert_eq!(steepness_squared(1.0 - 2e-7), Some(0.0));
     }
 }

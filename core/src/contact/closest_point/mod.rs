@@ -7,7 +7,9 @@ mod on_ruling;
 mod on_surface;
 mod ruling_search;
 
-pub(super) use on_convex_patch::{Convexity, Place};
+pub(super) use on_convex_patch::{Convexity, PatchPoint};
 pub use on_patch::{MAX_PASSES, Nearest, nearest_downhill};
-pub(super) use on_surface::{Descent, Ended, Leave, passes_over, position_on};
+pub(super) use on_surface::{
+    DepartureRule, Descent, DescentEnd, is_above_tangent_plane, position_on,
+};
 pub use ruling_search::MAX_EVALUATIONS;

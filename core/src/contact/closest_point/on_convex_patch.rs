@@ -13,7 +13,7 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{CONVEX, LEVEL, NEWTON_ERROR, SHALLOW, STEEPEST_CONVEX};
 
 /// Maximum number of Newton steps if the first two were not exact enough.
-const STEPS: u32 = 4;
+const MAX_NEWTON_STEPS: u32 = 4;
 
 /// Conditions for Newton's method on a patch. They depend only on the patch's shape, not on its
 /// height above the HIP.
@@ -35,7 +35,7 @@ pub(in crate::contact) struct Convexity {
 
 /// A place in a patch and its height above the HIP, cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::contact) struct Place {
+pub(in crate::contact) struct PatchPoint {
     pub(in crate::contact) u: f32,
     pub(in crate::contact) v: f32,
     pub(in crate::contact) z: f32,
@@ -63,13 +63,13 @@ impl Convexity {
     /// Returns true if the squared distance is convex all over the patch, given one point `z` cells
     /// above the HIP.
     #[inline]
-    fn all_over(&self, z: f32) -> bool {
+    fn is_convex_everywhere(&self, z: f32) -> bool {
         z <= self.convex
     }
 
     /// Returns true if the squared distance is convex between two places, the second `to.z` cells
     /// above the HIP, and everywhere that a path downhill may reach.
-    fn between(&self, (u, v): (f32, f32), to: &Place) -> bool {
+    fn is_convex_between(&self, (u, v): (f32, f32), to: &PatchPoint) -> bool {
         let moved = (to.u - u).abs().max((to.v - v).abs());
         // A sublevel set around a minimum, of a function whose curvature lies
         // between ½ and L, is √(2L) times as wide as it is narrow.
@@ -81,19 +81,19 @@ impl Convexity {
     /// Returns the closest point of the patch, extended beyond its borders, to a shallow HIP at
     /// `hip`, in patch coordinates, and true if it is exact; `None` if the HIP is not shallow.
     #[inline]
-    pub(in crate::contact) fn at_once(
+    pub(in crate::contact) fn closest_if_shallow(
         &self,
         patch: &Patch,
         hip: (f32, f32),
-    ) -> Option<(Place, bool)> {
+    ) -> Option<(PatchPoint, bool)> {
         let height = patch.polynomial(hip.0, hip.1);
         (height <= self.shallow).then(|| self.by_one_hessian(patch, hip, height))
     }
 
     /// Returns true if an exact place inside the patch is the closest point of the whole patch.
     #[inline]
-    pub(in crate::contact) fn is_closest(&self, place: &Place) -> bool {
-        place.z >= 0.0 && self.all_over(place.z)
+    pub(in crate::contact) fn is_closest(&self, place: &PatchPoint) -> bool {
+        place.z >= 0.0 && self.is_convex_everywhere(place.z)
     }
 
     /// Returns the closest point to a HIP at `hip`, in patch coordinates, for a proxy at `from`;
@@ -103,24 +103,24 @@ impl Convexity {
         patch: &Patch,
         hip: (f32, f32),
         from: (f32, f32),
-    ) -> Option<Place> {
-        let begin = self.at_once(patch, hip).unwrap_or_else(|| {
+    ) -> Option<PatchPoint> {
+        let begin = self.closest_if_shallow(patch, hip).unwrap_or_else(|| {
             let z = patch.polynomial(hip.0, hip.1);
             let (u, v) = from;
-            (Place { u, v, z }, false)
+            (PatchPoint { u, v, z }, false)
         });
-        self.closest_after(patch, hip, from, begin)
+        self.closest_from_start(patch, hip, from, begin)
     }
 
-    /// Does the same as [`Self::closest`], with the result of [`Self::at_once`].
+    /// Does the same as [`Self::closest`], with the result of [`Self::closest_if_shallow`].
     #[inline]
-    pub(in crate::contact) fn closest_after(
+    pub(in crate::contact) fn closest_from_start(
         &self,
         patch: &Patch,
         hip: (f32, f32),
         from: (f32, f32),
-        (mut place, mut is_exact): (Place, bool),
-    ) -> Option<Place> {
+        (mut place, mut is_exact): (PatchPoint, bool),
+    ) -> Option<PatchPoint> {
         loop {
             let side = side_beyond(&place);
             if side != Side::NONE {
@@ -129,7 +129,8 @@ impl Convexity {
                     return on_border;
                 }
             } else if is_exact {
-                let convex = self.all_over(place.z) || self.between(from, &place);
+                let convex =
+                    self.is_convex_everywhere(place.z) || self.is_convex_between(from, &place);
                 return (place.z >= 0.0 && convex).then_some(place);
             }
             (place, is_exact) = (self.by_newton(patch, hip, place)?, true);
@@ -139,7 +140,7 @@ impl Convexity {
     /// Returns the closest point of the patch, extended beyond its borders, to the HIP, by two
     /// steps with one Hessian; and true if its error is within [`NEWTON_ERROR`].
     #[inline(always)]
-    fn by_one_hessian(&self, patch: &Patch, (p, q): (f32, f32), height: f32) -> (Place, bool) {
+    fn by_one_hessian(&self, patch: &Patch, (p, q): (f32, f32), height: f32) -> (PatchPoint, bool) {
         let slope = patch.b[0] + patch.a * q;
         let (zu, zv) = (slope, patch.c[0] + patch.a * p);
         // Where the distance is only height, half its gradient is z·(zu, zv).
@@ -156,7 +157,7 @@ impl Convexity {
         // The first step's error, corrected for the change of the Hessian over it.
         let (first, second) = (du * du + dv * dv, eu * eu + ev * ev);
         let is_exact = (self.bend * self.bend) * (first * second) <= NEWTON_ERROR * NEWTON_ERROR;
-        let place = Place {
+        let place = PatchPoint {
             u: p + (du + eu),
             v: q + (dv + ev),
             z: z + (zu * eu + zv * ev),
@@ -164,10 +165,11 @@ impl Convexity {
         (place, is_exact)
     }
 
-    /// Runs Newton's method (eq. 8-11) from a place; returns `None` if [`STEPS`] are not enough.
-    fn by_newton(&self, patch: &Patch, (p, q): (f32, f32), from: Place) -> Option<Place> {
+    /// Runs Newton's method (eq. 8-11) from a place; returns `None` if [`MAX_NEWTON_STEPS`] are not
+    /// enough.
+    fn by_newton(&self, patch: &Patch, (p, q): (f32, f32), from: PatchPoint) -> Option<PatchPoint> {
         let (mut u, mut v) = (from.u, from.v);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_NEWTON_STEPS {
             let (zu, zv) = (patch.b[0] + patch.a * v, patch.c[0] + patch.a * u);
             let z = (patch.corners[0] + patch.b[0] * u) + zv * v;
             // Half the gradient and the Hessian of the squared distance.
@@ -179,7 +181,7 @@ impl Convexity {
             (u, v) = (u + eu, v + ev);
             if self.bend * (eu * eu + ev * ev) <= NEWTON_ERROR {
                 let z = patch.polynomial(u, v);
-                return Some(Place { u, v, z });
+                return Some(PatchPoint { u, v, z });
             }
         }
         None
@@ -189,21 +191,21 @@ impl Convexity {
     ///
     /// The distance is convex. So a point of an edge from which the distance falls out of the patch
     /// is the patch's minimum, and so is a vertex from which it falls out over both edges.
-    fn closest_on_border(&self, patch: &Patch, hip: (f32, f32), side: Side) -> Option<Place> {
+    fn closest_on_border(&self, patch: &Patch, hip: (f32, f32), side: Side) -> Option<PatchPoint> {
         let edges = [Side { north: 0, ..side }, Side { east: 0, ..side }];
         edges
             .into_iter()
             .filter(|edge| *edge != Side::NONE)
             .find_map(|edge| {
                 let (place, side) = closest_on_edge(patch, hip, edge);
-                let is_above = place.z >= 0.0 && self.all_over(place.z);
-                (is_above && falls_out(patch, hip, &place, side)).then_some(place)
+                let is_above = place.z >= 0.0 && self.is_convex_everywhere(place.z);
+                (is_above && falls_outward(patch, hip, &place, side)).then_some(place)
             })
     }
 }
 
 /// Returns the side of its patch on which a place lies beyond or beside the border.
-fn side_beyond(place: &Place) -> Side {
+fn side_beyond(place: &PatchPoint) -> Side {
     let [east, north] = [place.u, place.v].map(|x| match () {
         () if is_well_inside(x) => 0,
         () if x > 0.5 => 1,
@@ -214,20 +216,20 @@ fn side_beyond(place: &Place) -> Side {
 
 /// Returns the point of an edge closest to a HIP, and its side: toward a vertex, if it is one.
 #[inline(always)]
-fn closest_on_edge(patch: &Patch, (p, q): (f32, f32), edge: Side) -> (Place, Side) {
+fn closest_on_edge(patch: &Patch, (p, q): (f32, f32), edge: Side) -> (PatchPoint, Side) {
     let [sw, se, nw, ne] = patch.corners;
     if edge.north == 0 {
         let column = usize::from(edge.east > 0);
         let ends = if column == 0 { [sw, nw] } else { [se, ne] };
         let (v, z, north) = closest_on_line(q, patch.c[column], ends);
         let u = column as f32;
-        (Place { u, v, z }, Side { north, ..edge })
+        (PatchPoint { u, v, z }, Side { north, ..edge })
     } else {
         let row = usize::from(edge.north > 0);
         let ends = if row == 0 { [sw, se] } else { [nw, ne] };
         let (u, z, east) = closest_on_line(p, patch.b[row], ends);
         let v = row as f32;
-        (Place { u, v, z }, Side { east, ..edge })
+        (PatchPoint { u, v, z }, Side { east, ..edge })
     }
 }
 
@@ -246,10 +248,10 @@ fn closest_on_line(hip: f32, slope: f32, [start, end]: [f32; 2]) -> (f32, f32, i
 
 /// Returns true if the distance surely falls out of the patch at a place of its border.
 #[inline(always)]
-fn falls_out(patch: &Patch, (p, q): (f32, f32), place: &Place, side: Side) -> bool {
-    let falls = |toward: i32, slope: f32| toward == 0 || toward as f32 * slope < -LEVEL;
-    falls(side.east, (place.u - p) + place.z * patch.slope_u(place.v))
-        && falls(side.north, (place.v - q) + place.z * patch.slope_v(place.u))
+fn falls_outward(patch: &Patch, (p, q): (f32, f32), place: &PatchPoint, side: Side) -> bool {
+    let is_downhill = |toward: i32, slope: f32| toward == 0 || toward as f32 * slope < -LEVEL;
+    is_downhill(side.east, (place.u - p) + place.z * patch.slope_u(place.v))
+        && is_downhill(side.north, (place.v - q) + place.z * patch.slope_v(place.u))
 }
 
 #[cfg(test)]

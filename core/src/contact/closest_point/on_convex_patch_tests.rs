@@ -17,12 +17,12 @@ fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, 
 /// The closest point by the search by rulings: over v, or over u if that ends at a border.
 fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
     let search = |patch: &Patch, hip, start| {
-        let (looked, most) = (0, u32::MAX);
+        let (evaluated, max_evaluations) = (0, u32::MAX);
         Rulings {
             patch,
             hip,
-            looked,
-            most,
+            evaluated,
+            max_evaluations,
         }
         .closest_to(start)
     };
@@ -30,8 +30,8 @@ fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) 
     if !found.at_end {
         return (found.u, found.v);
     }
-    let turned = search(&patch.transposed(), (hip.1, hip.0), u);
-    (turned.v, turned.u)
+    let transposed = search(&patch.transposed(), (hip.1, hip.0), u);
+    (transposed.v, transposed.u)
 }
 
 const CASES: u32 = cases(20_000, 200);
@@ -40,7 +40,7 @@ const CASES: u32 = cases(20_000, 200);
 /// answer. Returns how many queries fell back to rulings and how many did not.
 fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
     let mut random = Random(41);
-    let mut seen = [0; 2];
+    let mut counts = [0; 2];
     for _ in 0..CASES {
         let depth = random.between(depths[0], depths[1]);
         let heights = core::array::from_fn(|_| (depth + random.between(0.0, slope)) as f32);
@@ -51,17 +51,17 @@ fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
         let moved = |x: f32, random: &mut Random| x + random.between(-0.05, 0.05) as f32;
         let hip = (moved(first.0, &mut random), moved(first.1, &mut random));
         let found = convex(heights, hip, start);
-        seen[usize::from(found.is_some())] += 1;
+        counts[usize::from(found.is_some())] += 1;
         let Some((u, v)) = found else { continue };
         let other = by_rulings(&patch, hip, start);
         let off = (u - other.0).abs().max((v - other.1).abs());
         assert!(off <= bound, "{patch:?} {hip:?} ({u}, {v}) {other:?}");
     }
-    seen
+    counts
 }
 
 #[test]
-fn ends_where_the_search_by_rulings_ends() {
+fn convex_solver_agrees_with_the_ruling_search() {
     for depths in [[0.01, 0.2], [0.2, 1.0]] {
         let [_, gentle] = agree(0.3, depths, 1e-6);
         let [left, steep] = agree(2.0, depths, 2e-6);
@@ -74,14 +74,14 @@ fn ends_where_the_search_by_rulings_ends() {
 }
 
 #[test]
-fn a_flat_patch_is_a_projection() {
+fn flat_patch_gives_the_projection_of_the_hip() {
     let (u, v) = convex([0.1, 0.2, 0.1, 0.2], (0.5, 0.25), (0.4, 0.4)).unwrap();
     let drop = 0.15 / 1.01 * 0.1;
     assert!((u - (0.5 - drop)).abs() < 1e-7 && v == 0.25, "{u} {v}");
 }
 
 #[test]
-fn leaves_what_is_not_plain_to_the_rulings() {
+fn convex_solver_declines_steep_or_saddle_patches() {
     let inside = (0.5, 0.5);
     assert!(convex([0.1; 4], (0.51, 0.5), inside).is_some());
     assert_eq!(
@@ -102,7 +102,7 @@ fn leaves_what_is_not_plain_to_the_rulings() {
 
 /// The search from the edge's line above a HIP 1,170 cells away was off by 7e-3.
 #[test]
-fn a_far_hip_finds_the_closest_point_of_an_edge() {
+fn closest_point_of_an_edge_is_exact_for_a_far_hip() {
     let patch = Patch::new([620.019, 621.900_7, 619.995_4, 621.877_14]);
     let north = Side { east: 0, north: 1 };
     let (place, _) = closest_on_edge(&patch, (1171.0, -13.642_913), north);

@@ -15,7 +15,7 @@
 //!
 //! `docs/explanation/contact.md` has the error analysis.
 
-use super::on_convex_patch::{Convexity, Place};
+use super::on_convex_patch::{Convexity, PatchPoint};
 use super::on_ruling::Ruling;
 use super::ruling_search::{MAX_EVALUATIONS, Rulings};
 use crate::contact::budget::{Budget, CONVEX, RULINGS, rulings};
@@ -46,7 +46,7 @@ pub struct Nearest {
 /// `hip` is the haptic interface point in patch coordinates (u, v); it may lie
 /// outside the unit square. The heights of `patch` count from it. Finite input
 /// gives a finite answer. Up to slope 1 it is within 2·10⁻⁶ cell of the exact point;
-/// above, 4 in 4,000 are not (`within_two_millionths_of_a_cell_on_any_slope`).
+/// above, 4 in 4,000 are not (`search_error_is_below_2e_6_cell_on_any_slope`).
 ///
 /// ```
 /// use hapterra_core::contact::closest_point::nearest_downhill;
@@ -97,39 +97,39 @@ fn by_rulings(
 ) -> Option<Nearest> {
     budget.spend(RULINGS);
     let transposed = patch.transposed();
-    let mut turned = is_steeper_north(patch, hip, start);
-    let most = budget.left_for_rulings().min(MAX_EVALUATIONS);
-    let (mut best, mut looked) = (start, 0);
+    let mut is_transposed = is_steeper_north(patch, hip, start);
+    let max_evaluations = budget.remaining_rulings().min(MAX_EVALUATIONS);
+    let (mut best, mut evaluated) = (start, 0);
     for pass in 1.. {
-        let (seen, from, start) = match turned {
+        let (oriented, from, start) = match is_transposed {
             true => (&transposed, (hip.1, hip.0), best.0),
             false => (patch, hip, best.1),
         };
         let mut search = Rulings {
-            patch: seen,
+            patch: oriented,
             hip: from,
-            looked,
-            most,
+            evaluated,
+            max_evaluations,
         };
         let found = search.closest_to(start);
         let is_spent = search.is_spent();
-        looked = search.looked;
-        if is_spent && most < MAX_EVALUATIONS {
-            budget.spend(rulings(looked));
+        evaluated = search.evaluated;
+        if is_spent && max_evaluations < MAX_EVALUATIONS {
+            budget.spend(rulings(evaluated));
             return None;
         }
-        best = exchanged_if(turned, (found.u, found.v));
-        if is_spent || !wants_turning(&found) || pass == MAX_PASSES {
-            budget.spend(rulings(looked));
+        best = swapped_if(is_transposed, (found.u, found.v));
+        if is_spent || !needs_transposing(&found) || pass == MAX_PASSES {
+            budget.spend(rulings(evaluated));
             let nearest = Nearest {
                 u: best.0,
                 v: best.1,
                 z: found.z,
-                evaluations: looked,
+                evaluations: evaluated,
             };
             return Some(nearest.snapped(patch, hip));
         }
-        turned = !turned;
+        is_transposed = !is_transposed;
     }
     None
 }
@@ -140,8 +140,8 @@ fn closest_if_convex(patch: &Patch, hip: (f32, f32), from: (f32, f32)) -> Option
     Some(Nearest::from_convex(place))
 }
 
-const fn exchanged_if(turned: bool, (u, v): (f32, f32)) -> (f32, f32) {
-    if turned { (v, u) } else { (u, v) }
+const fn swapped_if(is_transposed: bool, (u, v): (f32, f32)) -> (f32, f32) {
+    if is_transposed { (v, u) } else { (u, v) }
 }
 
 /// Returns true if the patch is steeper northward than eastward at a place. If both slopes are
@@ -154,7 +154,7 @@ fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bo
 
 /// Returns true if the eliminated variable ended at a limit and the searched one did not, or if it
 /// is no longer the steeper one: the other search is then better conditioned.
-fn wants_turning(found: &Ruling) -> bool {
+fn needs_transposing(found: &Ruling) -> bool {
     let inside_by = |margin: f32| found.v > margin && 1.0 - found.v > margin;
     let steeper = found.across.abs() > 4.0 * found.along.abs() + 4.0;
     (found.at_end && inside_by(RESOLUTION)) || (steeper && inside_by(0.0))
@@ -196,7 +196,7 @@ impl Nearest {
 
     /// Converts the closest point of a convex patch.
     #[inline]
-    pub(super) const fn from_convex(Place { u, v, z }: Place) -> Self {
+    pub(super) const fn from_convex(PatchPoint { u, v, z }: PatchPoint) -> Self {
         let evaluations = 1;
         Self {
             u,

@@ -29,19 +29,19 @@ fn height64(patch: &Patch, at: &Nearest) -> f64 {
 /// The local minimum of F that lies downhill of `from`, in f64.
 fn minimum64(patch: &Patch, hip: (f64, f64), from: f64) -> (f64, f64) {
     let slope = |v: f64| ruling64(patch, hip, v).1;
-    let way = if slope(from) < 0.0 { 1.0 } else { -1.0 };
+    let direction = if slope(from) < 0.0 { 1.0 } else { -1.0 };
     let (mut low, mut step) = (from, 1e-10);
     let mut high = loop {
-        let next = (low + way * step).clamp(0.0, 1.0);
-        if slope(next) * way >= 0.0 || next == 0.0 || next == 1.0 {
+        let next = (low + direction * step).clamp(0.0, 1.0);
+        if slope(next) * direction >= 0.0 || next == 0.0 || next == 1.0 {
             break next;
         }
         (low, step) = (next, 2.0 * step);
     };
-    if slope(high) * way > 0.0 {
+    if slope(high) * direction > 0.0 {
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
-            if slope(middle) * way < 0.0 {
+            if slope(middle) * direction < 0.0 {
                 low = middle;
             } else {
                 high = middle;
@@ -67,14 +67,14 @@ struct Errors {
     off: u32,
     worst: f64,
     mean_evaluations: f64,
-    most_evaluations: u32,
+    max_evaluations: u32,
 }
 
 /// Random patches of a slope, HIPs at a depth below them, random starts.
 fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
     const QUERIES: u32 = cases(4000, 1);
     let mut random = Random(0x5EED);
-    let (mut wrong, mut worst, mut total, mut most) = (0, 0.0_f64, 0_u64, 0);
+    let (mut wrong, mut worst, mut total, mut max_evaluations) = (0, 0.0_f64, 0_u64, 0);
     for _ in 0..QUERIES {
         let flat = [0, 1, 2].map(|_| slope * random.between(-1.0, 1.0));
         let last = flat[1] + flat[2] - flat[0] + twist * random.between(-1.0, 1.0);
@@ -88,7 +88,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let start = (random.unit() as f32, random.unit() as f32);
         let found = nearest_downhill(&patch, hip, start);
         total += u64::from(found.evaluations);
-        most = most.max(found.evaluations);
+        max_evaluations = max_evaluations.max(found.evaluations);
         let hip = (f64::from(hip.0), f64::from(hip.1));
         let truth = minimum64(&patch, hip, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
@@ -98,7 +98,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let largest = patch
             .corners
             .iter()
-            .fold(0.0_f32, |most, h| most.max(h.abs()));
+            .fold(0.0_f32, |max, h| max.max(h.abs()));
         let rounding = 4.0 * f64::from(f32::EPSILON * largest);
         assert!(
             off < 1e-6 * steepness.hypot(1.0) + rounding,
@@ -111,12 +111,12 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         off: wrong,
         worst,
         mean_evaluations: total as f64 / f64::from(QUERIES),
-        most_evaluations: most,
+        max_evaluations,
     }
 }
 
 #[test]
-fn within_two_millionths_of_a_cell_on_any_slope() {
+fn search_error_is_below_2e_6_cell_on_any_slope() {
     let slopes = [0.0, 0.1, 1.0, 10.0, 100.0, 1e3, 3e3];
     for slope in slopes.into_iter().step_by(cases(1, 3) as usize) {
         for depth in [1e-4, 0.01, 0.1, 1.0] {
@@ -133,14 +133,14 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
                     "{}: {at}",
                     errors.mean_evaluations
                 );
-                assert!(errors.most_evaluations <= MAX_EVALUATIONS, "{at}");
+                assert!(errors.max_evaluations <= MAX_EVALUATIONS, "{at}");
             }
         }
     }
 }
 
 #[test]
-fn a_saddle_is_no_answer() {
+fn search_does_not_end_at_a_saddle() {
     // The HIP is under the middle of a strongly twisted patch: (½, ½) is stationary.
     let patch = Patch::new([4.0, -2.0, -2.0, 4.0].map(|h| h + 1.0));
     let found = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
@@ -154,7 +154,7 @@ fn a_saddle_is_no_answer() {
 }
 
 #[test]
-fn warm_started_it_takes_two_evaluations() {
+fn warm_start_takes_at_most_three_evaluations() {
     let patch = Patch::new([0.3, 0.1, 0.45, 0.35]);
     let first = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
     let next = nearest_downhill(&patch, (0.51, 0.5), (first.u, first.v));
@@ -165,8 +165,8 @@ fn warm_started_it_takes_two_evaluations() {
 /// twist cancellation hides it as well.
 #[test]
 fn search_ends_at_minimum_despite_rounding_of_distances() {
-    type Place = (f32, f32);
-    let cases: [([f32; 4], Place, Place); 3] = [
+    type PatchPoint = (f32, f32);
+    let cases: [([f32; 4], PatchPoint, PatchPoint); 3] = [
         (
             [-14_186.715, 15_225.447, 11_851.875, -12_628.072],
             (0.482_250_2, 0.070_614_815),

@@ -23,7 +23,7 @@ pub(super) struct Ruling {
     /// Height above the HIP, cells.
     pub(super) z: f32,
     /// Displacement from the HIP, east and north, cells.
-    pub(super) off: (f32, f32),
+    pub(super) offset: (f32, f32),
     /// F′(v)/2
     pub(super) slope: f32,
     /// F″(v)/2
@@ -54,7 +54,7 @@ impl Ruling {
         let (start, end, m) = (mix(sw, nw), mix(se, ne), mix(patch.b[0], patch.b[1]));
         let flatness = 1.0 / (1.0 + m * m);
         let free_z = (start + m * p) * flatness;
-        let (mut free_u, mut rest) = if m.abs() <= 1.0 {
+        let (mut free_u, mut complement) = if m.abs() <= 1.0 {
             let u = p - m * free_z;
             (u, 1.0 - u)
         } else {
@@ -62,12 +62,12 @@ impl Ruling {
             ((free_z - start) * run, (end - free_z) * run)
         };
         // The larger one adds no information to the smaller one.
-        if free_u < rest {
-            rest = 1.0 - free_u;
+        if free_u < complement {
+            complement = 1.0 - free_u;
         } else {
-            free_u = 1.0 - rest;
+            free_u = 1.0 - complement;
         }
-        let at_end = !(free_u >= 0.0 && rest >= 0.0);
+        let at_end = !(free_u >= 0.0 && complement >= 0.0);
         let (u, z, across, curvature);
         if at_end {
             (u, z, across) = if free_u > 0.5 {
@@ -78,7 +78,7 @@ impl Ruling {
             curvature = 1.0 + across * across;
         } else {
             (u, z) = (free_u, free_z);
-            across = patch.c[0] * rest + patch.c[1] * u;
+            across = patch.c[0] * complement + patch.c[1] * u;
             let za = patch.a * z;
             curvature = 1.0 + (across * across - za * (za + 2.0 * m * across)) * flatness;
         }
@@ -87,7 +87,7 @@ impl Ruling {
             u,
             v,
             z,
-            off: (du, dv),
+            offset: (du, dv),
             slope: dv + z * across,
             curvature,
             along: m,
@@ -101,7 +101,10 @@ impl Ruling {
     /// The difference of squares is computed from its factors: with a far HIP the squares
     /// themselves would lose it to rounding.
     pub(super) fn gain_on(&self, other: &Self) -> f32 {
-        let (east, north) = (self.off.0 + other.off.0, self.off.1 + other.off.1);
+        let (east, north) = (
+            self.offset.0 + other.offset.0,
+            self.offset.1 + other.offset.1,
+        );
         (other.u - self.u) * east
             + (other.v - self.v) * north
             + (other.z - self.z) * (other.z + self.z)
@@ -132,7 +135,7 @@ impl Ruling {
             )
         };
         let of_across = patch.a.abs() * of_u + across;
-        let (du, dv) = (self.off.0.abs(), self.off.1.abs());
+        let (du, dv) = (self.offset.0.abs(), self.offset.1.abs());
         Noise {
             // Worst case: if this hides which point is nearer, the slope decides.
             f: 4.0 * f32::EPSILON * (du * (0.5 + of_u) + z * of_z),

@@ -1,10 +1,10 @@
 //! The closest point of the surface to the HIP: downhill in the distance, from
 //! patch to patch (paper §4.3.2, made exact at edges and vertices).
 
-use super::beyond_border::{Asking, Onward, Start, to_steepest_patch};
-use super::on_convex_patch::Place;
+use super::beyond_border::{ClosestHere, Continuation, NeighbourSearch, to_steepest_patch};
+use super::on_convex_patch::PatchPoint;
 use super::on_patch::{Nearest, search};
-use crate::contact::budget::{ARRIVAL, Budget, CONVEX, ON_BORDER};
+use crate::contact::budget::{BORDER_ENTRY, Budget, CONVEX, PATCH_ENTRY};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::HEIGHT_NOISE;
@@ -13,18 +13,18 @@ use crate::terrain::{CellContent, Window};
 
 /// Number of patches entered in a row without getting nearer to the HIP after which the descent
 /// ends: on a wall, rounding may send it back and forth.
-const IDLE: u32 = 16;
+const MAX_IDLE_PATCHES: u32 = 16;
 
 /// End of a descent.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::contact) enum Ended {
-    /// No direction on the surface leads closer to the HIP, which is below; or [`IDLE`] patches in
-    /// a row brought the proxy no nearer; or the proxy must not leave.
-    Rests,
+pub(in crate::contact) enum DescentEnd {
+    /// No direction on the surface leads closer to the HIP, which is below; or [`MAX_IDLE_PATCHES`]
+    /// patches in a row brought the proxy no nearer; or the proxy must not leave.
+    AtRest,
     /// From here the straight path to the HIP leads off the surface.
-    Leaves,
+    Departure,
     /// The next patch is in a missing tile.
-    Missing,
+    MissingTile,
     /// The budget is spent.
     Suspended,
     /// The surface under the proxy no longer exists.
@@ -33,23 +33,23 @@ pub(in crate::contact) enum Ended {
 
 /// Places at which a proxy may leave the surface.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::contact) enum Leave {
+pub(in crate::contact) enum DepartureRule {
     /// Anywhere.
     Anywhere,
     /// Anywhere else: a departure from here ended on the surface at once.
-    ButAt(SurfacePoint),
+    ExceptAt(SurfacePoint),
     /// Nowhere: there were too many departures. The proxy last hit the surface here, above the HIP.
-    NoMore(SurfacePoint),
+    Forbidden(SurfacePoint),
 }
 
-impl Leave {
+impl DepartureRule {
     /// Returns true if the proxy may leave at a point.
     #[inline]
     pub(in crate::contact) fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
         match self {
             Self::Anywhere => true,
-            Self::ButAt(place) => !point.is_same_place(place),
-            Self::NoMore(_) => false,
+            Self::ExceptAt(place) => !point.is_same_place(place),
+            Self::Forbidden(_) => false,
         }
     }
 }
@@ -65,7 +65,7 @@ pub(in crate::contact) struct Descent {
     stage: Stage,
     /// The patch's closest point, in the stages after it is computed.
     here: Nearest,
-    asking: Asking,
+    neighbours: NeighbourSearch,
     /// The nearest place until now, and the number of patches entered since then.
     idle: Option<(GridPoint, u32)>,
 }
@@ -75,11 +75,11 @@ pub(in crate::contact) struct Descent {
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     /// The patch was entered.
-    Arrived,
+    Entered,
     /// The patch was entered, and its closest point is known.
-    ArrivedKnowing,
+    EnteredWithClosest,
     /// The neighbours are searched.
-    Asking,
+    SearchingNeighbours,
 }
 
 impl Descent {
@@ -87,9 +87,9 @@ impl Descent {
     pub(in crate::contact) const fn from(at: SurfacePoint) -> Self {
         Self {
             at,
-            stage: Stage::Arrived,
+            stage: Stage::Entered,
             here: Nearest::NONE,
-            asking: Asking::NONE,
+            neighbours: NeighbourSearch::NONE,
             idle: None,
         }
     }
@@ -97,25 +97,25 @@ impl Descent {
     /// Restarts the descent from a point of the surface, for another HIP.
     pub(in crate::contact) const fn restart(&mut self, at: SurfacePoint) {
         self.at = at;
-        self.stage = Stage::Arrived;
+        self.stage = Stage::Entered;
         self.idle = None;
     }
 
     /// Restarts the descent from a point inside a patch at which the proxy surely does not leave
     /// the surface, with the patch's closest point to the other HIP. Counts the work as if it were
     /// done here, so that the budget ends at the same place.
-    pub(in crate::contact) fn restart_knowing(
+    pub(in crate::contact) fn restart_with_closest(
         &mut self,
         at: SurfacePoint,
-        closest: Place,
+        closest: PatchPoint,
         budget: &mut Budget,
     ) {
         #[cfg(test)]
         crate::contact::stats::searched(1);
-        budget.spend(ARRIVAL + CONVEX);
+        budget.spend(PATCH_ENTRY + CONVEX);
         self.restart(at);
         self.here = Nearest::from_convex(closest);
-        self.knows_here();
+        self.start_neighbour_search();
     }
 
     /// Returns the start of the descent, or the last point of entry into a patch.
@@ -136,16 +136,19 @@ impl Descent {
         window: &Window<'_, D>,
         view: &HipView,
     ) -> Option<(SurfacePoint, f32)> {
-        if matches!(self.stage, Stage::Asking | Stage::ArrivedKnowing) {
+        if matches!(
+            self.stage,
+            Stage::SearchingNeighbours | Stage::EnteredWithClosest
+        ) {
             let at = self.at.moved_to(self.here.u, self.here.v);
             return Some((at, self.here.z));
         }
-        self.nearest_so_far(window, view)
+        self.nearest_at_entry(window, view)
     }
 
     /// Does the same as [`Self::nearest`], in the stages before the patch's closest point is known.
     #[inline(never)]
-    fn nearest_so_far<const D: usize>(
+    fn nearest_at_entry<const D: usize>(
         &self,
         window: &Window<'_, D>,
         view: &HipView,
@@ -159,73 +162,78 @@ impl Descent {
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        leave: &Leave,
+        departure_rule: &DepartureRule,
         budget: &mut Budget,
-    ) -> Ended {
+    ) -> DescentEnd {
         // Not by `patch_at`: a call would cost 20 more instructions.
         let cell = self.at.cell;
         let mut patch = match window.ground(cell) {
             CellContent::Patch(corners) => view.patch(&corners),
-            CellContent::NoData => return Ended::Lost,
+            CellContent::NoData => return DescentEnd::Lost,
             CellContent::Missing => {
-                budget.lacks(cell);
-                return Ended::Lost;
+                budget.record_missing(cell);
+                return DescentEnd::Lost;
             }
         };
         loop {
-            if matches!(self.stage, Stage::Arrived | Stage::ArrivedKnowing)
-                && let Some(ended) = self.arrive(window, view, &mut patch, leave, budget)
+            if matches!(self.stage, Stage::Entered | Stage::EnteredWithClosest)
+                && let Some(end) =
+                    self.find_closest(window, view, &mut patch, departure_rule, budget)
             {
-                return ended;
+                return end;
             }
-            let start = Start {
+            let start = ClosestHere {
                 at: &self.at,
                 here: &self.here,
             };
-            let is_resumed = self.asking.best.is_some();
-            match (self.asking).advance(window, view, &start, &mut patch, budget) {
-                Onward::Into => {
-                    if let Some(ended) = self.enter(window, view, leave) {
-                        return ended;
+            let is_resumed = self.neighbours.best.is_some();
+            match (self.neighbours).advance(window, view, &start, &mut patch, budget) {
+                Continuation::Neighbour => {
+                    if let Some(end) = self.enter(window, view, departure_rule) {
+                        return end;
                     }
                     if is_resumed {
                         // The best neighbour may have been found in an earlier tick.
                         patch = match patch_at(window, view, &self.at) {
                             Some(patch) => patch,
-                            None => return Ended::Lost,
+                            None => return DescentEnd::Lost,
                         };
                     }
                 }
-                Onward::Missing => return Ended::Missing,
-                Onward::Suspended => return Ended::Suspended,
-                Onward::Nowhere => return self.ends(window, view, &patch, leave),
+                Continuation::MissingTile => return DescentEnd::MissingTile,
+                Continuation::Suspended => return DescentEnd::Suspended,
+                Continuation::LocalMinimum => {
+                    return self.end_at_minimum(window, view, &patch, departure_rule);
+                }
             }
         }
     }
 
     /// Checks, for an entered patch, whether the path leaves the surface there; if not, finds the
     /// patch's closest point.
-    fn arrive<const D: usize>(
+    fn find_closest<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
         patch: &mut Patch,
-        leave: &Leave,
+        departure_rule: &DepartureRule,
         budget: &mut Budget,
-    ) -> Option<Ended> {
-        let is_known = matches!(self.stage, Stage::ArrivedKnowing);
+    ) -> Option<DescentEnd> {
+        let is_closest_known = matches!(self.stage, Stage::EnteredWithClosest);
         let border = self.at.border();
-        let on_border = !is_known && border != Side::NONE;
-        let units = if on_border { ON_BORDER } else { ARRIVAL };
+        let on_border = !is_closest_known && border != Side::NONE;
+        let units = if on_border { BORDER_ENTRY } else { PATCH_ENTRY };
         if !budget.has(units) {
-            return Some(Ended::Suspended);
+            return Some(DescentEnd::Suspended);
         }
         budget.spend(units);
-        if leave.is_allowed_at(&self.at) && leads_off(window, view, &self.at, border, patch) {
-            return Some(Ended::Leaves);
+        if departure_rule.is_allowed_at(&self.at)
+            && path_leaves_surface(window, view, &self.at, border, patch)
+        {
+            return Some(DescentEnd::Departure);
         }
-        if is_known {
-            self.knows_here();
+        if is_closest_known {
+            self.start_neighbour_search();
             return None;
         }
         if on_border {
@@ -233,19 +241,19 @@ impl Descent {
         }
         let hip = view.in_patch(self.at.cell);
         let Some(here) = search(patch, hip, (self.at.u, self.at.v), budget) else {
-            return Some(Ended::Suspended);
+            return Some(DescentEnd::Suspended);
         };
         self.here = here;
-        self.knows_here();
+        self.start_neighbour_search();
         None
     }
 
     /// Continues with the neighbours once the patch's closest point is known.
     #[inline]
-    const fn knows_here(&mut self) {
+    const fn start_neighbour_search(&mut self) {
         self.at = self.at.moved_to(self.here.u, self.here.v);
-        self.asking.restart();
-        self.stage = Stage::Asking;
+        self.neighbours.restart();
+        self.stage = Stage::SearchingNeighbours;
     }
 
     /// Continues in a neighbouring patch, whose closest point is known.
@@ -253,52 +261,56 @@ impl Descent {
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
-        leave: &Leave,
-    ) -> Option<Ended> {
-        let Some(offer) = &self.asking.best else {
-            return Some(Ended::Rests);
+        departure_rule: &DepartureRule,
+    ) -> Option<DescentEnd> {
+        let Some(candidate) = &self.neighbours.best else {
+            return Some(DescentEnd::AtRest);
         };
         // After one patch was entered without gain, only the nearest place of all counts.
-        if self.idle.is_some() || !offer.is_surely_nearer {
+        if self.idle.is_some() || !candidate.is_surely_nearer {
             let position = position(window, view, &self.at, self.here.z);
-            if count_unless_nearer(&mut self.idle, position, view) >= IDLE {
-                return Some(self.rests(leave));
+            if count_unless_nearer(&mut self.idle, position, view) >= MAX_IDLE_PATCHES {
+                return Some(self.end_at_rest(departure_rule));
             }
         }
-        self.at = offer.entry;
-        self.here = offer.closest;
-        self.stage = Stage::ArrivedKnowing;
+        self.at = candidate.entry;
+        self.here = candidate.closest;
+        self.stage = Stage::EnteredWithClosest;
         None
     }
 
     /// Ends the descent where no neighbour offers a continuation.
-    fn ends<const D: usize>(
+    fn end_at_minimum<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
         patch: &Patch,
-        leave: &Leave,
-    ) -> Ended {
+        departure_rule: &DepartureRule,
+    ) -> DescentEnd {
         let z = self.here.z;
-        if !leave.is_allowed_at(&self.at) {
-            return self.rests(leave);
+        if !departure_rule.is_allowed_at(&self.at) {
+            return self.end_at_rest(departure_rule);
         }
-        let leaves = is_hardly_above(patch, z)
-            && (z < 0.0 || leads_off(window, view, &self.at, self.at.border(), patch));
-        if leaves { Ended::Leaves } else { Ended::Rests }
+        let departs = is_hardly_above(patch, z)
+            && (z < 0.0 || path_leaves_surface(window, view, &self.at, self.at.border(), patch));
+        if departs {
+            DescentEnd::Departure
+        } else {
+            DescentEnd::AtRest
+        }
     }
 
     /// Rests, but not below the HIP if the proxy must not leave any more: there the force would
     /// pull. A patch's closest point may lie there; the place where the proxy last hit the surface
     /// does not.
     #[inline(never)]
-    fn rests(&mut self, leave: &Leave) -> Ended {
-        if let Leave::NoMore(held) = leave
+    fn end_at_rest(&mut self, departure_rule: &DepartureRule) -> DescentEnd {
+        if let DepartureRule::Forbidden(last_hit) = departure_rule
             && self.here.z < 0.0
         {
-            self.restart(*held);
+            self.restart(*last_hit);
         }
-        Ended::Rests
+        DescentEnd::AtRest
     }
 }
 
@@ -324,7 +336,7 @@ fn is_hardly_above(patch: &Patch, z: f32) -> bool {
 /// Returns true if the straight path from a point on this border of its patch to the HIP begins
 /// above the surface, that is, above the one-sided slope of the patch that it enters.
 #[inline(always)]
-fn leads_off<const D: usize>(
+fn path_leaves_surface<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     at: &SurfacePoint,
@@ -335,21 +347,23 @@ fn leads_off<const D: usize>(
     let (east, north) = (p - at.u, q - at.v);
     let side = border.toward((p, q), (at.u, at.v));
     if side == Side::NONE {
-        return passes_over(patch, at, (east, north));
+        return is_above_tangent_plane(patch, at, (east, north));
     }
-    leads_off_beyond(window, view, &at.across(side), (east, north))
+    path_leaves_entered_patch(window, view, &at.across(side), (east, north))
 }
 
 /// Does the same in the patch that the path enters, for a HIP `east` and `north` of the point.
 #[inline(never)]
-fn leads_off_beyond<const D: usize>(
+fn path_leaves_entered_patch<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
     entered: &SurfacePoint,
-    way: (f32, f32),
+    offset: (f32, f32),
 ) -> bool {
     match window.ground(entered.cell) {
-        CellContent::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
+        CellContent::Patch(corners) => {
+            is_above_tangent_plane(&view.patch(&corners), entered, offset)
+        }
         // At the border of the data the proxy does not leave; see `edge_fade`.
         CellContent::NoData | CellContent::Missing => false,
     }
@@ -358,7 +372,7 @@ fn leads_off_beyond<const D: usize>(
 /// Returns true if the HIP, `east` and `north` of a point, lies above the tangent plane of the
 /// patch there.
 #[inline]
-pub(in crate::contact) fn passes_over(
+pub(in crate::contact) fn is_above_tangent_plane(
     patch: &Patch,
     at: &SurfacePoint,
     (east, north): (f32, f32),

@@ -12,36 +12,36 @@
 //! as an angle, even if it is narrow in v.
 
 use super::on_ruling::Ruling;
-use crate::contact::straight_path::StraightWay;
+use crate::contact::straight_path::StraightPath;
 use crate::contact::surface::patch::Patch;
-use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
+use crate::contact::tolerance::{DOUBTFUL_STEP, MIN_STEP, RESOLUTION};
 use crate::scalar::{larger, smaller};
 
 /// Maximum number of evaluated rulings in one patch; the search then ends with the best one. Ten
 /// million random searches never reached it.
 pub const MAX_EVALUATIONS: u32 = 40;
 /// Number of parts of either half of the angle between two rulings that are checked for a crest.
-const HALF: u8 = 4;
+const PARTS_PER_HALF: u8 = 4;
 
 /// A patch with a HIP in its coordinates, and the count of its evaluated rulings.
 pub(super) struct Rulings<'p> {
     pub(super) patch: &'p Patch,
     pub(super) hip: (f32, f32),
     /// Number of evaluated rulings.
-    pub(super) looked: u32,
+    pub(super) evaluated: u32,
     /// Maximum number of evaluated rulings.
-    pub(super) most: u32,
+    pub(super) max_evaluations: u32,
 }
 
 /// The far side of a minimum.
-enum Far {
+enum FarSide {
     /// An end of the patch, not evaluated yet.
     End(f32),
     /// A ruling at which F rises, or is higher than at the near one.
     Ruling(Ruling),
 }
 
-impl Far {
+impl FarSide {
     const fn v(&self) -> f32 {
         match self {
             Self::End(v) => *v,
@@ -54,12 +54,12 @@ impl Rulings<'_> {
     /// Returns the closest ruling that can be reached from the one at `v` over rulings no farther
     /// from the HIP than it.
     pub(super) fn closest_to(&mut self, v: f32) -> Ruling {
-        let first = self.look_at(v);
+        let first = self.evaluate(v);
         let end = if first.slope < 0.0 { 1.0 } else { 0.0 };
-        let mut closest = self.minimum(first, Far::End(end));
+        let mut closest = self.minimum(first, FarSide::End(end));
         while !self.is_plainly_downhill(&first, &closest) {
             match self.crest(&first, &closest) {
-                Some(crest) => closest = self.minimum(first, Far::Ruling(crest)),
+                Some(crest) => closest = self.minimum(first, FarSide::Ruling(crest)),
                 None => break,
             }
         }
@@ -68,42 +68,42 @@ impl Rulings<'_> {
 
     /// Returns true if the maximum number of rulings is evaluated.
     pub(super) const fn is_spent(&self) -> bool {
-        self.looked >= self.most
+        self.evaluated >= self.max_evaluations
     }
 
-    fn look_at(&mut self, v: f32) -> Ruling {
-        self.looked += 1;
+    fn evaluate(&mut self, v: f32) -> Ruling {
+        self.evaluated += 1;
         Ruling::at(self.patch, self.hip, v)
     }
 
     /// Returns the minimum between a ruling, from which F falls, and the far side.
-    fn minimum(&mut self, mut near: Ruling, mut far: Far) -> Ruling {
+    fn minimum(&mut self, mut near: Ruling, mut far: FarSide) -> Ruling {
         let toward = far.v() - near.v;
         let (mut newest, mut steps) = (near, [f32::INFINITY; 2]);
-        while !self.is_settled(&newest) {
+        while !self.is_converged(&newest) {
             let Some(v) = next(&near, &far, steps[1]).filter(|_| !self.is_spent()) else {
                 return match far {
-                    Far::Ruling(far) if far.gain_on(&near) > 0.0 => far,
+                    FarSide::Ruling(far) if far.gain_on(&near) > 0.0 => far,
                     _ => near,
                 };
             };
-            newest = self.look_at(v);
+            newest = self.evaluate(v);
             steps = [(v - near.v).abs(), steps[0]];
             if newest.slope * toward < 0.0 && !self.is_farther(&newest, &near) {
                 near = newest;
             } else {
-                far = Far::Ruling(newest);
+                far = FarSide::Ruling(newest);
             }
         }
         newest
     }
 
     /// Returns true if F has its minimum on a ruling, within rounding.
-    fn is_settled(&self, ruling: &Ruling) -> bool {
+    fn is_converged(&self, ruling: &Ruling) -> bool {
         let step = ruling.slope / ruling.curvature;
         ruling.curvature > 0.0
             && step.abs() < DOUBTFUL_STEP
-            && (step.abs() < LEAST_STEP
+            && (step.abs() < MIN_STEP
                 || ruling.slope.abs() <= ruling.noise(self.patch, self.hip.0).slope)
     }
 
@@ -119,10 +119,10 @@ impl Rulings<'_> {
     /// Returns true if the straight path between the closest points of two rulings is surely
     /// nowhere farther from the HIP than at its start. A patch without twist has no crest.
     fn is_plainly_downhill(&self, from: &Ruling, to: &Ruling) -> bool {
-        let way = (to.u - from.u, to.v - from.v);
+        let offset = (to.u - from.u, to.v - from.v);
         self.patch.a == 0.0
-            || way == (0.0, 0.0)
-            || StraightWay::new(self.patch, self.hip, (from.u, from.v), way)
+            || offset == (0.0, 0.0)
+            || StraightPath::new(self.patch, self.hip, (from.u, from.v), offset)
                 .never_rises_above_start(0.0)
     }
 
@@ -140,12 +140,12 @@ impl Rulings<'_> {
             (from.v, first, between, middle),
             (between, middle, to.v, last),
         ];
-        (1..2 * HALF).find_map(|look| {
-            let (start, first, end, last) = halves[usize::from(look > HALF)];
-            let gone = f32::from(look - HALF * u8::from(look > HALF));
-            let (before, after) = ((f32::from(HALF) - gone) * first, gone * last);
+        (1..2 * PARTS_PER_HALF).find_map(|index| {
+            let (start, first, end, last) = halves[usize::from(index > PARTS_PER_HALF)];
+            let part = f32::from(index - PARTS_PER_HALF * u8::from(index > PARTS_PER_HALF));
+            let (before, after) = ((f32::from(PARTS_PER_HALF) - part) * first, part * last);
             let v = start + (end - start) * (after / (before + after));
-            let ruling = (!self.is_spent()).then(|| self.look_at(v))?;
+            let ruling = (!self.is_spent()).then(|| self.evaluate(v))?;
             self.is_farther(&ruling, from).then_some(ruling)
         })
     }
@@ -154,9 +154,9 @@ impl Rulings<'_> {
 /// Returns the next ruling between two to evaluate; `None` if there is none.
 ///
 /// A Newton step that is not less than half the last step but one is replaced by bisection.
-fn next(near: &Ruling, far: &Far, before: f32) -> Option<f32> {
-    let room = far.v() - near.v;
-    if room.abs() < RESOLUTION {
+fn next(near: &Ruling, far: &FarSide, before: f32) -> Option<f32> {
+    let remaining = far.v() - near.v;
+    if remaining.abs() < RESOLUTION {
         return None;
     }
     let newton = |ruling: &Ruling| match ruling.curvature > 0.0 {
@@ -164,14 +164,14 @@ fn next(near: &Ruling, far: &Far, before: f32) -> Option<f32> {
         false => f32::INFINITY,
     };
     let step = newton(near);
-    if step.abs() < smaller(room.abs(), 0.5 * before) {
+    if step.abs() < smaller(remaining.abs(), 0.5 * before) {
         return Some(near.v + step);
     }
     let far = match far {
-        Far::End(end) => return Some(*end),
-        Far::Ruling(far) => far,
+        FarSide::End(end) => return Some(*end),
+        FarSide::Ruling(far) => far,
     };
-    let middle = near.v + 0.5 * room;
+    let middle = near.v + 0.5 * remaining;
     let back = newton(far);
     let v = far.v + back;
     let is_between = (v - near.v) * (far.v - v) > 0.0 && back.abs() < 0.5 * before;

@@ -15,7 +15,7 @@ use crate::scalar::root;
 
 /// Tolerance for the end of a walk: the pull is less than the friction limit by at most this
 /// fraction.
-const SHORT: f32 = 5e-4;
+const END_TOLERANCE: f32 = 5e-4;
 
 /// The vector from a proxy to the HIP, in two parts at right angles to each other.
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +23,9 @@ pub(in crate::contact) struct Pull {
     /// Component along the surface, cells: zero if every direction leads away from the HIP.
     pub(in crate::contact) along: Vec3,
     /// Squared length of `along`, cells².
-    pub(in crate::contact) pulls: f32,
+    pub(in crate::contact) pull_sq: f32,
     /// Squared length of the rest, cells².
-    pub(in crate::contact) presses: f32,
+    pub(in crate::contact) press_sq: f32,
     /// True if the HIP is above the tangent plane: nothing presses then.
     pub(in crate::contact) is_above: bool,
     /// Rounding error of the pull, cells.
@@ -36,8 +36,8 @@ impl Pull {
     /// No pull and no pressure.
     pub(in crate::contact) const NONE: Self = Self {
         along: Vec3::ZERO,
-        pulls: 0.0,
-        presses: 0.0,
+        pull_sq: 0.0,
+        press_sq: 0.0,
         is_above: false,
         rounding: 0.0,
     };
@@ -52,24 +52,28 @@ impl Pull {
         border: Side,
     ) -> Self {
         let (p, q) = view.in_patch(at.cell);
-        let way = Vec3::new(p - at.u, q - at.v, -patch.height(at.u, at.v));
+        let displacement = Vec3::new(p - at.u, q - at.v, -patch.height(at.u, at.v));
         let (su, sv) = (patch.slope_u(at.v), patch.slope_v(at.u));
-        let along = steepest(su, sv, border, way);
+        let along = steepest(su, sv, border, displacement);
         Self {
             along,
-            pulls: along.length_squared(),
-            presses: (way - along).length_squared(),
-            is_above: su * way.x + sv * way.y - way.z < 0.0,
+            pull_sq: along.length_squared(),
+            press_sq: (displacement - along).length_squared(),
+            is_above: su * displacement.x + sv * displacement.y - displacement.z < 0.0,
             // Rounding of the coordinates, and of the height that their last place is worth; on a
             // border a coordinate is exact.
             rounding: RESOLUTION
-                * (1.0 + way.x.abs() + way.y.abs() + off(su, border.east) + off(sv, border.north)),
+                * (1.0
+                    + displacement.x.abs()
+                    + displacement.y.abs()
+                    + height_error(su, border.east)
+                    + height_error(sv, border.north)),
         }
     }
 }
 
 /// Returns the error of a height per cell of error of the place, on this side of a patch.
-fn off(slope: f32, side: i32) -> f32 {
+fn height_error(slope: f32, side: i32) -> f32 {
     if side == 0 { slope.abs() } else { 0.0 }
 }
 
@@ -94,17 +98,17 @@ impl Cone {
         patch: &Patch,
         at: &SurfacePoint,
     ) -> Excess {
-        let mut held = self.mu * root(pull.presses) + pull.rounding;
+        let mut limit = self.mu * root(pull.press_sq) + pull.rounding;
         if self.drag > 0.0 {
-            let (u, v) = view_from(&self.from, at);
+            let (u, v) = offset_from(&self.from, at);
             let chord = Vec3::new(u, v, view.above(&self.from) + patch.height(at.u, at.v));
-            held += self.drag * root(chord.length_squared());
+            limit += self.drag * root(chord.length_squared());
         }
-        let pulls = root(pull.pulls);
+        let length = root(pull.pull_sq);
         Excess {
-            over: pulls - held * (1.0 - 0.5 * SHORT),
-            pulls,
-            held,
+            over: length - limit * (1.0 - 0.5 * END_TOLERANCE),
+            pull: length,
+            limit,
         }
     }
 }
@@ -115,20 +119,20 @@ pub(in crate::contact) struct Excess {
     /// The pull minus the walk's target, which is slightly less than the friction limit.
     pub(in crate::contact) over: f32,
     /// The pull.
-    pub(in crate::contact) pulls: f32,
+    pub(in crate::contact) pull: f32,
     /// The friction limit.
-    held: f32,
+    limit: f32,
 }
 
 impl Excess {
     /// Returns true if a walk ends here: friction holds, with hardly any reserve.
     pub(in crate::contact) fn is_small(&self) -> bool {
-        self.over.abs() <= 0.5 * SHORT * self.held
+        self.over.abs() <= 0.5 * END_TOLERANCE * self.limit
     }
 
     /// Returns true if friction holds the pull.
-    pub(in crate::contact) fn is_held(&self) -> bool {
-        self.pulls <= self.held
+    pub(in crate::contact) fn is_within_limit(&self) -> bool {
+        self.pull <= self.limit
     }
 
     /// Returns true if the pull is more than a walk may end with.
@@ -137,9 +141,9 @@ impl Excess {
     }
 
     /// Returns the share of the pull that friction holds.
-    pub(in crate::contact) fn held_share(&self) -> f32 {
-        if self.held < self.pulls {
-            self.held / self.pulls
+    pub(in crate::contact) fn friction_share(&self) -> f32 {
+        if self.limit < self.pull {
+            self.limit / self.pull
         } else {
             1.0
         }
@@ -147,7 +151,7 @@ impl Excess {
 }
 
 /// Returns the vector from a place to a point of the surface, eastward and northward, cells.
-fn view_from(from: &GridPoint, to: &SurfacePoint) -> (f32, f32) {
+fn offset_from(from: &GridPoint, to: &SurfacePoint) -> (f32, f32) {
     let from = from.relative_to([to.cell.x, to.cell.y, 0]);
     (to.u - from.x, to.v - from.y)
 }

@@ -10,7 +10,7 @@ pub(super) struct ConeRoot {
     /// The first place where friction held, and the excess there, below zero.
     high: Option<(f32, f32)>,
     /// Decrease of the excess over the whole path on a plane.
-    falls: f32,
+    plane_rate: f32,
     /// Next place to evaluate.
     next: f32,
     /// Evaluations in a row that moved the same end: positive for the lower end.
@@ -21,12 +21,12 @@ impl ConeRoot {
     /// Creates a search from the start of a path, where the pull exceeds friction; on a plane the
     /// foot of the HIP is at 1.
     pub(super) fn new(start: Excess, drag: f32) -> Self {
-        let falls = (1.0 + drag) * start.pulls;
+        let plane_rate = (1.0 + drag) * start.pull;
         Self {
             low: (0.0, start.over),
             high: None,
-            falls,
-            next: start.over / falls,
+            plane_rate,
+            next: start.over / plane_rate,
             stayed: 0,
         }
     }
@@ -39,25 +39,25 @@ impl ConeRoot {
     /// Returns the end of a path after the last evaluation: the farthest place where the pull still
     /// exceeds friction, from which the next path continues. If that is the start, returns the
     /// nearest place where the cone holds.
-    pub(super) fn so_far(&self) -> Option<f32> {
+    pub(super) fn path_end(&self) -> Option<f32> {
         let (low, _) = self.low;
         let high = self.high.map(|(t, _)| t);
         if low > 0.0 { Some(low) } else { high }
     }
 
     /// Updates the search with the evaluation at `t`.
-    pub(super) fn look(&mut self, t: f32, excess: &Excess) {
+    pub(super) fn update(&mut self, t: f32, excess: &Excess) {
         let over = excess.over;
         if over > 0.0 {
-            let fell = (self.low.1 - over) / (t - self.low.0);
+            let measured = (self.low.1 - over) / (t - self.low.0);
             self.low = (t, over);
             let Some((_, at_high)) = &mut self.high else {
                 // The rate comes from the last two evaluations, or from a plane if those differ too
                 // little.
-                let rate = if fell > 0.25 * self.falls {
-                    fell
+                let rate = if measured > 0.25 * self.plane_rate {
+                    measured
                 } else {
-                    self.falls
+                    self.plane_rate
                 };
                 self.next = t + over / rate;
                 return;

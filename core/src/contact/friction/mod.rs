@@ -12,7 +12,7 @@ mod stick_or_slide;
 use serde::{Deserialize, Serialize};
 
 pub(super) use cone::Cone;
-pub(super) use stick_or_slide::{Walk, Walked};
+pub(super) use stick_or_slide::{Walk, WalkEnd};
 
 /// Friction of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

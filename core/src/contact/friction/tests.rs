@@ -23,7 +23,7 @@ fn step(
     path: impl IntoIterator<Item = [f32; 3]>,
 ) -> Vec<([f32; 3], ContactOutput)> {
     let mut tiles = buffers::<2>();
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), height);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), height);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(friction));
     path.into_iter()
         .map(|hip| (hip, *contact.step(&field.window, &at(hip))))
@@ -92,7 +92,7 @@ fn friction_ratio_is_kept_in_ticks_that_cross_an_edge() {
 }
 
 #[test]
-fn stuck_is_stuck_to_the_bit() {
+fn stuck_proxy_keeps_the_same_bits() {
     let twisted = |x: i32, y: i32| 0.1 * ((x * 7 + y * 13) % 5) as f32;
     let path = (0..3_000_u32).map(|tick| {
         let depth = (tick as f32 * 0.01 - 0.8).min(0.6);
@@ -129,12 +129,12 @@ fn static_friction_breaks_away_and_returns_after_a_rest() {
     let lag = |tick: usize| -output[tick].1.displacement.x;
     assert!((lag(178) - 0.78).abs() < 1e-4, "{}", lag(178));
     assert!((lag(190) - 0.3).abs() < 1e-4, "it broke away: {}", lag(190));
-    let most = (355..450).map(lag).fold(0.0, f32::max);
-    assert!((0.75..=0.8).contains(&most), "it holds again: {most}");
+    let max = (355..450).map(lag).fold(0.0, f32::max);
+    assert!((0.75..=0.8).contains(&max), "it holds again: {max}");
 }
 
 #[test]
-fn an_encoder_count_now_and_then_does_not_make_it_stick() {
+fn rare_encoder_counts_do_not_make_the_proxy_stick() {
     let friction = Friction {
         static_mu: 0.8,
         dynamic_mu: 0.3,
@@ -151,7 +151,7 @@ fn an_encoder_count_now_and_then_does_not_make_it_stick() {
 /// On cells of 30 mm, an encoder count of 0.029 mm was less than the speed, in cells a tick, below
 /// which a proxy comes to rest: a steady hand chattered.
 #[test]
-fn a_steady_hand_breaks_away_once_at_every_cell_size() {
+fn steady_hand_breaks_away_once_at_every_cell_size() {
     let friction = Friction {
         static_mu: 0.6,
         ..Friction::coulomb(0.3)
@@ -163,7 +163,7 @@ fn a_steady_hand_breaks_away_once_at_every_cell_size() {
             let rate = TickRate::new(hz).expect("in range");
             let settings = ContactSettings::AT_1_KHZ.at_rate(rate).on_cells_of(cell_mm);
             let mut tiles = buffers::<2>();
-            let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), |_, _| 0.0);
+            let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), |_, _| 0.0);
             let mut contact = Contact::new(settings.with_friction(friction));
             let (mut trailed_mm, mut breaks) = (0.0_f32, 0);
             for tick in 0..hz * 4 {
@@ -186,7 +186,7 @@ fn a_steady_hand_breaks_away_once_at_every_cell_size() {
 }
 
 #[test]
-fn the_viscous_part_grows_with_the_speed() {
+fn viscous_friction_grows_with_speed() {
     let friction = Friction {
         viscous_s: 0.02,
         ..Friction::coulomb(0.2)
@@ -202,7 +202,7 @@ fn the_viscous_part_grows_with_the_speed() {
 }
 
 #[test]
-fn lifting_never_drags() {
+fn friction_never_drags_a_lifted_hip() {
     let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
     let push = (0..100).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
     let lift = (0..100).map(|tick| [1.0, 0.5, -1.0 + 0.02 * tick as f32]);
@@ -213,9 +213,9 @@ fn lifting_never_drags() {
     );
     for (hip, output) in &output[200..] {
         let depth = (-hip[2]).max(0.0);
-        let most = 0.5 * depth + 1e-5;
+        let max = 0.5 * depth + 1e-5;
         assert!(
-            output.displacement.truncate().length() <= most,
+            output.displacement.truncate().length() <= max,
             "{hip:?}: {output:?}"
         );
         assert!(output.displacement.z >= 0.0);
@@ -253,13 +253,13 @@ fn invalid_friction_parameters_are_rejected() {
 /// A hand moves half a cell a tick over rough ground: the budget cut off half of the ticks that
 /// slid twice.
 #[test]
-fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
+fn fast_hand_on_rough_ground_converges_within_its_tick() {
     let mut tiles = buffers::<2>();
     let mut random = Random(7);
     let mut height = || random.between(-0.2, 0.2) as f32;
     let heights: Vec<f32> = (0..61 * 61).map(|_| height()).collect();
     let ground = move |x: i32, y: i32| heights[(y.clamp(0, 60) * 61 + x.clamp(0, 60)) as usize];
-    let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), ground);
+    let field = Field::<2>::filled(&mut tiles, FieldSize::new(60, 60), ground);
     let friction = Friction {
         viscous_s: 0.001,
         ..Friction::coulomb(0.3)

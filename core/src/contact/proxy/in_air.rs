@@ -1,40 +1,40 @@
 //! A tick of a proxy in the air, which moves straight to the HIP until it meets the surface.
 
-use super::departures::{Departures, may_leave};
-use super::{Contact, OnSurface, Phase, Sweeping, Turn};
+use super::departures::{Departures, departure_rule};
+use super::{Contact, OnSurface, Phase, Sweeping, TickProgress};
 use crate::contact::budget::Budget;
 use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::surface::HipView;
-use crate::contact::sweep::{Path, Swept};
+use crate::contact::sweep::{Path, SweepEnd};
 use crate::grid::GridPoint;
 use crate::terrain::{CellContent, Window};
 
 impl Contact {
     /// Ends [`Phase::Unseeded`] when the HIP is above the patch under it, or above everything.
     #[inline(never)]
-    pub(super) fn looks_around<const D: usize>(
+    pub(super) fn try_seed<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         if let Some(onset) = &self.onset {
-            let waits = onset.waits(budget);
-            return self.answers(waits);
+            let pending_output = onset.pending_output(budget);
+            return self.set_output(pending_output);
         }
         let view = HipView::new(hip);
         let (cell, ground) = view.ground(window);
         let is_above = view.altitude().cell() >= window.top()
             || matches!(&ground, CellContent::Patch(corners) if view.is_above(cell, corners));
         if is_above {
-            return self.becomes_free(hip);
+            return self.set_free(hip);
         }
         self.phase = Phase::Unseeded;
         let is_missing = ground == CellContent::Missing;
         if is_missing {
-            budget.lacks(cell);
+            budget.record_missing(cell);
         }
-        self.answers(ContactOutput {
+        self.set_output(ContactOutput {
             proxy: hip,
             converged: !is_missing,
             ..ContactOutput::default()
@@ -42,8 +42,8 @@ impl Contact {
     }
 
     /// Stops a free proxy that has to wait, at the end of the known free part of its path.
-    pub(super) fn waits_at(&mut self, proxy: GridPoint) -> Turn {
-        self.answers(ContactOutput {
+    pub(super) fn stop_at(&mut self, proxy: GridPoint) -> TickProgress {
+        self.set_output(ContactOutput {
             state: ContactState::Free,
             proxy,
             ..ContactOutput::default()
@@ -51,9 +51,9 @@ impl Contact {
     }
 
     /// Ends the tick with the proxy free, at the HIP.
-    pub(super) fn becomes_free(&mut self, hip: GridPoint) -> Turn {
+    pub(super) fn set_free(&mut self, hip: GridPoint) -> TickProgress {
         self.phase = Phase::Free;
-        self.answers(ContactOutput {
+        self.set_output(ContactOutput {
             state: ContactState::Free,
             proxy: hip,
             converged: true,
@@ -65,44 +65,44 @@ impl Contact {
     ///
     /// Most paths end within the tick; those are not worth storing.
     #[inline(never)]
-    pub(super) fn flies<const D: usize>(
+    pub(super) fn start_sweep<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         let mut sweeping = Sweeping {
             path: Path::through_air(self.hip, hip),
             was_late: false,
             fade: 1.0,
             departures: None,
         };
-        let swept = sweeping.path.advance(window, budget);
-        if matches!(swept, Swept::Missing | Swept::Suspended) {
-            sweeping.was_late = matches!(swept, Swept::Missing);
+        let sweep_end = sweeping.path.advance(window, budget);
+        if matches!(sweep_end, SweepEnd::MissingTile | SweepEnd::Suspended) {
+            sweeping.was_late = matches!(sweep_end, SweepEnd::MissingTile);
             let at = sweeping.path.at();
             self.phase = Phase::Sweeping(sweeping);
-            return self.waits_at(at);
+            return self.stop_at(at);
         }
-        self.arrives(window, hip, swept, (Departures::None, 1.0), budget)
+        self.end_sweep(window, hip, sweep_end, (Departures::None, 1.0), budget)
     }
 
     /// Continues a path of an earlier tick, or one off the surface.
     #[inline(never)]
-    pub(super) fn sweeps<const D: usize>(
+    pub(super) fn continue_sweep<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         let Phase::Sweeping(sweeping) = &mut self.phase else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
-        let swept = sweeping.path.advance(window, budget);
-        if matches!(swept, Swept::Missing | Swept::Suspended) {
-            sweeping.was_late |= matches!(swept, Swept::Missing);
+        let sweep_end = sweeping.path.advance(window, budget);
+        if matches!(sweep_end, SweepEnd::MissingTile | SweepEnd::Suspended) {
+            sweeping.was_late |= matches!(sweep_end, SweepEnd::MissingTile);
             let at = sweeping.path.at();
-            return self.waits_at(at);
+            return self.stop_at(at);
         }
         let fade = if sweeping.was_late {
             0.0
@@ -110,29 +110,29 @@ impl Contact {
             sweeping.fade
         };
         let departures = sweeping.departures;
-        self.arrives(window, hip, swept, (departures, fade), budget)
+        self.end_sweep(window, hip, sweep_end, (departures, fade), budget)
     }
 
     /// Handles the end of a path; on the surface the tick continues.
-    fn arrives<const D: usize>(
+    fn end_sweep<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        swept: Swept,
+        sweep_end: SweepEnd,
         (departures, fade): (Departures, f32),
         budget: &mut Budget,
-    ) -> Turn {
-        match swept {
-            Swept::Hit(point) => {
+    ) -> TickProgress {
+        match sweep_end {
+            SweepEnd::Hit(point) => {
                 self.phase = Phase::OnSurface(OnSurface {
-                    leave: may_leave(window, &HipView::new(hip), point, &departures),
+                    departure_rule: departure_rule(window, &HipView::new(hip), point, &departures),
                     departures,
                     ..OnSurface::at(point, fade)
                 });
-                Turn::GoesOn
+                TickProgress::Continue
             }
-            Swept::Under => self.loses_contact(window, hip, budget),
-            Swept::Clear | Swept::Missing | Swept::Suspended => self.becomes_free(hip),
+            SweepEnd::Under => self.release(window, hip, budget),
+            SweepEnd::Clear | SweepEnd::MissingTile | SweepEnd::Suspended => self.set_free(hip),
         }
     }
 }

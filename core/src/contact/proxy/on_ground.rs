@@ -3,11 +3,11 @@
 use glam::Vec3;
 
 use super::departures::count_departure;
-use super::{Contact, Phase, Sweeping, Turn};
+use super::{Contact, Phase, Sweeping, TickProgress};
 use crate::contact::budget::Budget;
-use crate::contact::closest_point::{Ended, position_on};
+use crate::contact::closest_point::{DescentEnd, position_on};
 use crate::contact::edge_fade::{self, approach};
-use crate::contact::fast_path::Follow;
+use crate::contact::fast_path::PatchFollower;
 use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::contact::sweep::Path;
@@ -16,13 +16,13 @@ use crate::terrain::Window;
 
 /// Progress of a proxy on the surface in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Came {
+pub(super) enum Completion {
     /// Nothing is left to do.
-    ToRest,
+    Converged,
     /// The proxy is beside a missing tile.
-    ToMissingTile,
+    MissingTile,
     /// The budget is spent.
-    AsFarAsWork,
+    Suspended,
 }
 
 /// The touched point of the surface.
@@ -37,36 +37,39 @@ pub(super) struct SurfaceContact {
 impl Contact {
     /// Moves downhill on the surface to the closest point.
     #[inline]
-    pub(super) fn descends<const D: usize>(
+    pub(super) fn descend<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         let Phase::OnSurface(on) = &mut self.phase else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
         let view = HipView::new(hip);
-        match on.descent.advance(window, &view, &on.leave, budget) {
-            Ended::Rests => self.touches(window, hip, Came::ToRest, budget),
-            Ended::Missing => self.touches(window, hip, Came::ToMissingTile, budget),
-            Ended::Suspended => self.touches(window, hip, Came::AsFarAsWork, budget),
-            Ended::Leaves => self.leaves(window, &view, hip),
-            Ended::Lost => self.loses_contact(window, hip, budget),
+        match on
+            .descent
+            .advance(window, &view, &on.departure_rule, budget)
+        {
+            DescentEnd::AtRest => self.touch(window, hip, Completion::Converged, budget),
+            DescentEnd::MissingTile => self.touch(window, hip, Completion::MissingTile, budget),
+            DescentEnd::Suspended => self.touch(window, hip, Completion::Suspended, budget),
+            DescentEnd::Departure => self.depart(window, &view, hip),
+            DescentEnd::Lost => self.release(window, hip, budget),
         }
     }
 
     /// Leaves the surface for the air, straight to the HIP. The path begins at the nearest known
     /// point: in the entered patch, if the proxy leaves on its border.
     #[inline(never)]
-    pub(super) fn leaves<const D: usize>(
+    pub(super) fn depart<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
         hip: GridPoint,
-    ) -> Turn {
+    ) -> TickProgress {
         let Phase::OnSurface(on) = &mut self.phase else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
         // The descent has just evaluated a patch there.
         let nearest = on.descent.nearest(window, view);
@@ -80,61 +83,61 @@ impl Contact {
             fade: on.fade,
             departures,
         });
-        Turn::GoesOn
+        TickProgress::Continue
     }
 
     /// Sets the output in contact at the nearest known point, faded where the surface ends.
-    pub(super) fn touches<const D: usize>(
+    pub(super) fn touch<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        came: Came,
+        completion: Completion,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         let view = HipView::new(hip);
         let Phase::OnSurface(on) = &self.phase else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
         let Some((point, z)) = on.descent.nearest(window, &view) else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
-        if self.rough.is_some() {
-            return self.is_held_at(window, hip, point, came, budget);
+        if self.friction.is_some() {
+            return self.touch_with_friction(window, hip, point, completion, budget);
         }
         let touched = SurfaceContact {
             point,
             proxy: view.position(&point, z),
             displacement: view.displacement(&point, z),
         };
-        self.touches_at(window, hip, touched, came, budget)
+        self.touch_at(window, hip, touched, completion, budget)
     }
 
     /// Sets the output in contact, faded where the surface ends.
-    pub(super) fn touches_at<const D: usize>(
+    pub(super) fn touch_at<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         touched: SurfaceContact,
-        came: Came,
+        completion: Completion,
         budget: &mut Budget,
-    ) -> Turn {
-        let most = edge_fade::RATE_PER_S * self.settings.rate.tick_s();
+    ) -> TickProgress {
+        let max_change = edge_fade::RATE_PER_S * self.settings.rate.tick_s();
         let Phase::OnSurface(on) = &mut self.phase else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
         let point = touched.point;
         let mut may_follow = self.settings.fast_paths;
         // A suspended tick is not a whole tick, so the fade does not move.
-        if came != Came::AsFarAsWork {
+        if completion != Completion::Suspended {
             let target = edge_fade::target(window, &hip, point.cell, budget);
             may_follow &= target.over_patch;
-            on.fade = approach(on.fade, target.fade, most);
+            on.fade = approach(on.fade, target.fade, max_change);
             if on.fade == 0.0 && target.fade == 0.0 {
                 // The HIP may be above the surface already.
-                return self.looks_around(window, hip, budget);
+                return self.try_seed(window, hip, budget);
             }
         }
-        let converged = came == Came::ToRest;
+        let converged = completion == Completion::Converged;
         let displacement = touched.displacement * on.fade;
         // A proxy that stayed in its patch is likely to stay for another tick.
         let [x, y, _] = self.output.proxy.cell();
@@ -143,51 +146,51 @@ impl Contact {
             && on.fade == 1.0
             && stayed
             && may_follow
-            && let Some(follow) = Follow::from(window, point, hip.column())
+            && let Some(follower) = PatchFollower::new(window, point, hip.column())
         {
-            on.follow = Some(follow);
+            on.follower = Some(follower);
         }
         // Field by field: a whole struct would be built elsewhere and copied.
         self.output.state = ContactState::Touching;
         self.output.proxy = touched.proxy;
         self.output.displacement = displacement;
         self.output.converged = converged;
-        Turn::Ends
+        TickProgress::Done
     }
 
     /// Ends the contact: its last force fades out in place.
-    pub(super) fn loses_contact<const D: usize>(
+    pub(super) fn release<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
-        let Some((proxy, displacement)) = self.touched else {
-            return self.looks_around(window, hip, budget);
+    ) -> TickProgress {
+        let Some((proxy, displacement)) = self.last_touch else {
+            return self.try_seed(window, hip, budget);
         };
         self.phase = Phase::Releasing {
             proxy,
             displacement,
             fade: 1.0,
         };
-        self.fades_out(window, hip, budget)
+        self.fade_out(window, hip, budget)
     }
 
     /// Runs a tick of the fade-out.
-    pub(super) fn fades_out<const D: usize>(
+    pub(super) fn fade_out<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
-        let most = edge_fade::RATE_PER_S * self.settings.rate.tick_s();
+    ) -> TickProgress {
+        let max_change = edge_fade::RATE_PER_S * self.settings.rate.tick_s();
         if let Phase::Releasing {
             proxy,
             displacement,
             fade,
         } = &mut self.phase
         {
-            *fade = approach(*fade, 0.0, most);
+            *fade = approach(*fade, 0.0, max_change);
             if *fade > 0.0 {
                 self.output = ContactOutput {
                     state: ContactState::Releasing,
@@ -196,9 +199,9 @@ impl Contact {
                     converged: true,
                     ..ContactOutput::default()
                 };
-                return Turn::Ends;
+                return TickProgress::Done;
             }
         }
-        self.looks_around(window, hip, budget)
+        self.try_seed(window, hip, budget)
     }
 }

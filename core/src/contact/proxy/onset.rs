@@ -23,7 +23,7 @@ pub(super) struct Onset {
 impl Contact {
     /// Creates a contact whose proxy begins on the surface at the column of a place, with the
     /// vector `displacement` from the HIP to it, cells. No force is rendered before the terrain
-    /// there is known and [`Contact::land`] has placed the HIP.
+    /// there is known and [`Contact::place_on_surface`] has placed the HIP.
     #[must_use]
     pub fn onset(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Contact {
 
     /// Returns true if the contact waits to begin on the surface.
     #[must_use]
-    pub const fn is_onset(&self) -> bool {
+    pub const fn is_onset_pending(&self) -> bool {
         self.onset.is_some()
     }
 
@@ -55,7 +55,10 @@ impl Contact {
     ///
     /// The force fades in as after a late tile.
     #[must_use]
-    pub fn land<const D: usize>(&mut self, window: &Window<'_, D>) -> Option<GridPoint> {
+    pub fn place_on_surface<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+    ) -> Option<GridPoint> {
         let Onset { at, displacement } = self.onset.as_ref()?;
         let (cell, frac) = (at.column(), at.frac());
         let (u, v) = (frac.x, frac.y);
@@ -79,8 +82,8 @@ impl Contact {
 impl Onset {
     /// Returns the output while the terrain at the place is missing.
     #[cold]
-    pub(super) fn waits(&self, budget: &mut Budget) -> ContactOutput {
-        budget.lacks(self.at.column());
+    pub(super) fn pending_output(&self, budget: &mut Budget) -> ContactOutput {
+        budget.record_missing(self.at.column());
         ContactOutput {
             proxy: self.at,
             ..ContactOutput::default()
@@ -104,16 +107,18 @@ mod tests {
     }
 
     #[test]
-    fn it_lands_as_deep_as_before_and_stays_on_its_side_of_a_wall() {
+    fn onset_keeps_depth_and_stays_on_its_side_of_a_wall() {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), wall);
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), wall);
         // Three cells deep in the wall from the west, relative to the proxy.
         let displacement = Vec3::new(-3.0, 0.1, 0.0);
         let mut contact =
             Contact::onset(ContactSettings::AT_1_KHZ, column(10.5, 20.5), displacement);
-        assert!(contact.is_onset());
-        let hip = contact.land(&field.window).expect("the terrain is there");
-        assert!(!contact.is_onset());
+        assert!(contact.is_onset_pending());
+        let hip = contact
+            .place_on_surface(&field.window)
+            .expect("the terrain is there");
+        assert!(!contact.is_onset_pending());
         let expected = GridPoint::new([13, 20, 15], Vec3::new(0.5, 0.4, 0.0));
         assert!(hip.to(&expected).length() < 1e-5, "{hip:?}");
         let mut last = Vec3::ZERO;
@@ -129,15 +134,15 @@ mod tests {
     }
 
     #[test]
-    fn onset_without_terrain_names_missing_tile_and_has_no_force() {
+    fn onset_without_terrain_reports_missing_tile_without_force() {
         let mut tiles = buffers::<2>();
-        let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
+        let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let displacement = Vec3::new(40.0, 0.0, 1.0);
         let mut contact =
             Contact::onset(ContactSettings::AT_1_KHZ, column(60.5, 5.5), displacement);
         let hip = GridPoint::new([20, 5, 1], Vec3::splat(0.5));
         for _ in 0..3 {
-            assert_eq!(contact.land(&field.window), None);
+            assert_eq!(contact.place_on_surface(&field.window), None);
             let output = *contact.step(&field.window, &hip);
             assert_eq!(output.missing_tile, Some(TileIndex::new(1, 0)));
             assert_eq!(output.displacement, Vec3::ZERO);
@@ -148,25 +153,27 @@ mod tests {
             "for another view meanwhile"
         );
         let _ = field.install(TileKey::new(0, 1, 0));
-        let hip = contact.land(&field.window).expect("now it is there");
+        let hip = contact
+            .place_on_surface(&field.window)
+            .expect("now it is there");
         assert_eq!(hip, GridPoint::new([20, 5, 1], Vec3::new(0.5, 0.5, 0.0)));
     }
 
     #[test]
     fn onset_over_no_data_ends_without_contact() {
         let mut tiles = buffers::<2>();
-        let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), |x, _| {
+        let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), |x, _| {
             if x > 20 { f32::NAN } else { 0.0 }
         });
         let displacement = Vec3::new(0.0, 0.0, 1.0);
         let mut contact =
             Contact::onset(ContactSettings::AT_1_KHZ, column(30.5, 5.5), displacement);
-        assert_eq!(contact.land(&field.window), None);
+        assert_eq!(contact.place_on_surface(&field.window), None);
         let output = *contact.step(&field.window, &column(30.5, 5.5));
         assert_eq!(
             (output.state, output.missing_tile),
             (ContactState::Unseeded, None)
         );
-        assert!(!contact.is_onset());
+        assert!(!contact.is_onset_pending());
     }
 }

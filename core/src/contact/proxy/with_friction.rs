@@ -2,11 +2,11 @@
 
 use glam::Vec3;
 
-use super::on_ground::{Came, SurfaceContact};
-use super::{Contact, Phase, Turn};
+use super::on_ground::{Completion, SurfaceContact};
+use super::{Contact, Phase, TickProgress};
 use crate::contact::budget::Budget;
-use crate::contact::closest_point::{Leave, position_on};
-use crate::contact::friction::{Cone, Friction, Walk, Walked};
+use crate::contact::closest_point::{DepartureRule, position_on};
+use crate::contact::friction::{Cone, Friction, Walk, WalkEnd};
 use crate::contact::output::ContactState;
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::GridPoint;
@@ -14,55 +14,55 @@ use crate::terrain::Window;
 
 /// Time without motion after which a sliding proxy sticks again, s: longer than a slow hand needs
 /// for its next encoder count.
-const STICKS_AFTER_S: f32 = 0.02;
+const STICK_AFTER_S: f32 = 0.02;
 
 /// State of a contact with friction.
 #[derive(Clone, Debug)]
-pub(super) struct Rough {
+pub(super) struct FrictionState {
     friction: Friction,
     motion: Motion,
-    stage: Stage,
+    stage: WalkStage,
     /// Position of the proxy at the start of the tick, or where it met the surface during the tick.
     from: GridPoint,
     /// The part of the displacement that friction held when the proxy last moved, cells.
-    held: Vec3,
+    friction_displacement: Vec3,
 }
 
 /// Coefficient that holds the proxy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Motion {
     /// The static one.
-    Sticks,
-    /// The dynamic one: the proxy has moved, and then rested for `still` ticks.
-    Slides { still: u32 },
+    Sticking,
+    /// The dynamic one: the proxy has moved, and then rested for `still_ticks` ticks.
+    Sliding { still_ticks: u32 },
 }
 
 /// Stage of a tick's walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum WalkStage {
     /// The proxy has not moved in this tick: the cone at rest decides.
-    Begins,
-    /// The proxy has moved along `ways` straight segments, the last `inside` of them within one
-    /// patch.
-    GoesOn { ways: u32, inside: u32 },
+    AtStart,
+    /// The proxy has moved along `paths` straight segments, the last `paths_inside` of them within
+    /// one patch.
+    Walking { paths: u32, paths_inside: u32 },
     /// Descent without friction: the proxy moves to the closest point.
-    Descends,
+    Frictionless,
 }
 
-impl Rough {
+impl FrictionState {
     /// Creates the state for a surface with friction; `None` without friction.
     pub(super) fn on(friction: Friction) -> Option<Self> {
         (!friction.is_none()).then(|| Self {
             friction,
-            motion: Motion::Sticks,
-            stage: Stage::Begins,
+            motion: Motion::Sticking,
+            stage: WalkStage::AtStart,
             from: GridPoint::default(),
-            held: Vec3::ZERO,
+            friction_displacement: Vec3::ZERO,
         })
     }
 
     /// Sets the coefficients. Returns true if they have changed.
-    pub(super) fn takes(&mut self, friction: Friction) -> bool {
+    pub(super) fn set_friction(&mut self, friction: Friction) -> bool {
         let is_other = self.friction != friction;
         self.friction = friction;
         is_other
@@ -71,43 +71,43 @@ impl Rough {
     /// Returns the coefficient that holds a proxy before it moves.
     const fn mu_at_rest(&self) -> f32 {
         match self.motion {
-            Motion::Sticks => self.friction.static_mu,
-            Motion::Slides { .. } => self.friction.dynamic_mu,
+            Motion::Sticking => self.friction.static_mu,
+            Motion::Sliding { .. } => self.friction.dynamic_mu,
         }
     }
 }
 
 impl Contact {
     /// Returns the part of the last displacement that friction holds, not the surface, cells.
-    pub(crate) fn held_back(&self) -> Vec3 {
-        match &self.rough {
-            Some(rough) => rough.held * -self.edge_fade(),
+    pub(crate) fn friction_displacement(&self) -> Vec3 {
+        match &self.friction {
+            Some(state) => state.friction_displacement * -self.edge_fade(),
             None => Vec3::ZERO,
         }
     }
 
     /// [`Contact::step`] with friction.
     #[inline(never)]
-    pub(super) fn step_on_rough_ground<const D: usize>(
+    pub(super) fn step_with_friction<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
     ) {
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remember_contact();
-        self.gives_up_beyond_window::<D>(&hip);
+        self.reset_beyond_window::<D>(&hip);
         if self.output.converged || !self.hip.is_same(&hip) {
-            self.begins_to_walk(window, hip, &mut budget);
+            self.start_walk(window, hip, &mut budget);
         }
         // Bounded by the budget, as without friction.
-        while self.walks_on(window, hip, &mut budget) == Turn::GoesOn {}
+        while self.continue_walk(window, hip, &mut budget) == TickProgress::Continue {}
         self.hip = hip;
-        self.ends(&budget);
-        self.counts_stillness();
+        self.end_tick(&budget);
+        self.count_still_ticks();
     }
 
     /// Starts a tick's walk at the proxy.
-    fn begins_to_walk<const D: usize>(
+    fn start_walk<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
@@ -116,116 +116,131 @@ impl Contact {
         match &mut self.phase {
             Phase::OnSurface(on) if self.output.converged => {
                 on.descent.restart(on.descent.entry());
-                (on.leave, on.departures) = (Leave::Anywhere, None);
+                (on.departure_rule, on.departures) = (DepartureRule::Anywhere, None);
             }
             _ => self.redirect(window, hip, None, budget),
         }
         match self.output.state {
-            ContactState::Touching => self.walks_from(self.output.proxy),
-            _ => self.walks_from_here(window),
+            ContactState::Touching => self.walk_from(self.output.proxy),
+            _ => self.walk_from_entry(window),
         }
     }
 
     /// Starts the walk at the entry of the descent; off the surface, at the last proxy.
     #[inline(never)]
-    fn walks_from_here<const D: usize>(&mut self, window: &Window<'_, D>) {
+    fn walk_from_entry<const D: usize>(&mut self, window: &Window<'_, D>) {
         let at = match &self.phase {
             Phase::OnSurface(on) => position_on(window, &on.descent.entry()),
             _ => None,
         };
-        self.walks_from(at.unwrap_or(self.output.proxy));
+        self.walk_from(at.unwrap_or(self.output.proxy));
     }
 
     /// Starts the walk at a point, from which the motion of the tick is measured.
-    fn walks_from(&mut self, at: GridPoint) {
-        let Some(rough) = &mut self.rough else { return };
-        rough.from = at;
-        rough.stage = match rough.friction.is_none() {
+    fn walk_from(&mut self, at: GridPoint) {
+        let Some(state) = &mut self.friction else {
+            return;
+        };
+        state.from = at;
+        state.stage = match state.friction.is_none() {
             // A material without friction, in a scene with other materials.
-            true => Stage::Descends,
-            false => Stage::Begins,
+            true => WalkStage::Frictionless,
+            false => WalkStage::AtStart,
         };
     }
 
     /// Runs one step of the tick.
-    fn walks_on<const D: usize>(
+    fn continue_walk<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         let was_on_surface = matches!(self.phase, Phase::OnSurface(_));
-        match &self.rough {
-            Some(Rough { stage, .. }) if was_on_surface && *stage != Stage::Descends => {
-                self.follows_the_pull(window, hip, budget)
+        match &self.friction {
+            Some(FrictionState { stage, .. })
+                if was_on_surface && *stage != WalkStage::Frictionless =>
+            {
+                self.follow_pull(window, hip, budget)
             }
             _ => {
-                let turn = self.turn(window, hip, budget);
+                let progress = self.advance_phase(window, hip, budget);
                 if !was_on_surface && matches!(self.phase, Phase::OnSurface(_)) {
-                    self.walks_from_here(window);
-                    if let Some(rough) = &mut self.rough {
-                        rough.held = Vec3::ZERO;
+                    self.walk_from_entry(window);
+                    if let Some(state) = &mut self.friction {
+                        state.friction_displacement = Vec3::ZERO;
                     }
                 }
-                turn
+                progress
             }
         }
     }
 
     /// Moves the proxy on the surface as far as friction allows.
     #[inline(never)]
-    fn follows_the_pull<const D: usize>(
+    fn follow_pull<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
-    ) -> Turn {
-        let (Phase::OnSurface(on), Some(rough)) = (&mut self.phase, &mut self.rough) else {
-            return Turn::Ends;
+    ) -> TickProgress {
+        let (Phase::OnSurface(on), Some(state)) = (&mut self.phase, &mut self.friction) else {
+            return TickProgress::Done;
         };
         let cone = Cone {
-            mu: rough.friction.dynamic_mu,
-            drag: rough.friction.viscous_s * self.settings.rate.hz() as f32,
-            from: rough.from,
+            mu: state.friction.dynamic_mu,
+            drag: state.friction.viscous_s * self.settings.rate.hz() as f32,
+            from: state.from,
         };
-        let (at_rest, ways, inside) = match rough.stage {
-            Stage::GoesOn { ways, inside } => (None, ways, inside),
-            _ => (Some(rough.mu_at_rest()), 0, 0),
+        let (at_rest, paths, paths_inside) = match state.stage {
+            WalkStage::Walking {
+                paths,
+                paths_inside,
+            } => (None, paths, paths_inside),
+            _ => (Some(state.mu_at_rest()), 0, 0),
         };
-        let begun_at = on.descent.entry();
+        let start = on.descent.entry();
         let mut walk = Walk {
-            point: begun_at,
+            point: start,
             at_rest,
-            ways,
-            inside,
-            held: rough.held,
+            paths,
+            paths_inside,
+            friction_displacement: state.friction_displacement,
         };
-        let walked = walk.advance(window, &HipView::new(hip), &cone, &on.leave, budget);
+        let walk_end = walk.advance(
+            window,
+            &HipView::new(hip),
+            &cone,
+            &on.departure_rule,
+            budget,
+        );
         if walk.at_rest.is_none() {
-            rough.stage = Stage::GoesOn {
-                ways: walk.ways,
-                inside: walk.inside,
+            state.stage = WalkStage::Walking {
+                paths: walk.paths,
+                paths_inside: walk.paths_inside,
             };
         }
-        rough.held = walk.held;
-        if walk.point != begun_at {
-            if rough.motion == Motion::Sticks {
-                rough.motion = Motion::Slides { still: 0 };
+        state.friction_displacement = walk.friction_displacement;
+        if walk.point != start {
+            if state.motion == Motion::Sticking {
+                state.motion = Motion::Sliding { still_ticks: 0 };
             }
             on.descent.restart(walk.point);
         }
-        match walked {
-            Walked::Rests => self.is_held_at(window, hip, walk.point, Came::ToRest, budget),
-            Walked::Missing => {
-                self.is_held_at(window, hip, walk.point, Came::ToMissingTile, budget)
+        match walk_end {
+            WalkEnd::AtRest => {
+                self.touch_with_friction(window, hip, walk.point, Completion::Converged, budget)
             }
-            Walked::Suspended => {
-                self.is_held_at(window, hip, walk.point, Came::AsFarAsWork, budget)
+            WalkEnd::MissingTile => {
+                self.touch_with_friction(window, hip, walk.point, Completion::MissingTile, budget)
             }
-            Walked::Leaves => self.leaves(window, &HipView::new(hip), hip),
-            Walked::Off => {
-                (rough.stage, rough.held) = (Stage::Descends, Vec3::ZERO);
-                Turn::GoesOn
+            WalkEnd::Suspended => {
+                self.touch_with_friction(window, hip, walk.point, Completion::Suspended, budget)
+            }
+            WalkEnd::Departure => self.depart(window, &HipView::new(hip), hip),
+            WalkEnd::NoSurface => {
+                (state.stage, state.friction_displacement) = (WalkStage::Frictionless, Vec3::ZERO);
+                TickProgress::Continue
             }
         }
     }
@@ -233,50 +248,52 @@ impl Contact {
     /// Sets the output of a proxy on a surface with friction. Its position is computed from the
     /// surface, not from the HIP, so a held proxy has the same bits for every HIP.
     #[inline(never)]
-    pub(super) fn is_held_at<const D: usize>(
+    pub(super) fn touch_with_friction<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         point: SurfacePoint,
-        came: Came,
+        completion: Completion,
         budget: &mut Budget,
-    ) -> Turn {
+    ) -> TickProgress {
         let Some(proxy) = position_on(window, &point) else {
-            return Turn::Ends;
+            return TickProgress::Done;
         };
         let touched = SurfaceContact {
             point,
             proxy,
             displacement: hip.to(&proxy),
         };
-        self.touches_at(window, hip, touched, came, budget)
+        self.touch_at(window, hip, touched, completion, budget)
     }
 
     /// Counts the ticks without motion, by converged outputs, and clears `at_rest` while the proxy
     /// may still move.
-    fn counts_stillness(&mut self) {
-        let before = self.touched.map(|(proxy, _)| proxy);
+    fn count_still_ticks(&mut self) {
+        let before = self.last_touch.map(|(proxy, _)| proxy);
         let tick_s = self.settings.rate.tick_s();
-        let least_way = self.settings.sticks_below * tick_s;
-        let Some(rough) = &mut self.rough else { return };
+        let max_still_cells = self.settings.stick_speed * tick_s;
+        let Some(state) = &mut self.friction else {
+            return;
+        };
         if !self.output.converged {
             return;
         }
         if self.output.state != ContactState::Touching {
-            rough.motion = Motion::Sticks;
+            state.motion = Motion::Sticking;
             return;
         }
-        let way = before.map(|before| before.to(&self.output.proxy).abs().max_element());
-        if let Motion::Slides { still } = &mut rough.motion {
-            let is_still = way.is_some_and(|way| way <= least_way);
-            *still = if is_still { *still + 1 } else { 0 };
-            if (*still as f32) * tick_s >= STICKS_AFTER_S {
-                rough.motion = Motion::Sticks;
+        let moved = before.map(|before| before.to(&self.output.proxy).abs().max_element());
+        if let Motion::Sliding { still_ticks } = &mut state.motion {
+            let is_still = moved.is_some_and(|moved| moved <= max_still_cells);
+            *still_ticks = if is_still { *still_ticks + 1 } else { 0 };
+            if (*still_ticks as f32) * tick_s >= STICK_AFTER_S {
+                state.motion = Motion::Sticking;
             }
         }
         // Viscous friction ends with the motion, so the proxy continues to creep after the HIP
         // rests.
-        let creeps = rough.friction.viscous_s > 0.0 && way != Some(0.0);
-        self.at_rest &= rough.motion == Motion::Sticks && !creeps;
+        let creeps = state.friction.viscous_s > 0.0 && moved != Some(0.0);
+        self.at_rest &= state.motion == Motion::Sticking && !creeps;
     }
 }

@@ -49,10 +49,10 @@ impl HipView {
         let (place, column) = (self.hip.frac(), self.column());
         let shared = Side::sharing(place.x, place.y);
         // A loop around one call: an iterator would add 240 bytes to an image.
-        for place in 0..4 {
-            let side = match place {
+        for index in 0..4 {
+            let side = match index {
                 0 => Side::NONE,
-                _ => shared.neighbour(place - 1),
+                _ => shared.neighbour(index - 1),
             };
             let cell = column.offset(side.east, side.north);
             let ground = window.ground(cell);
@@ -93,8 +93,8 @@ impl HipView {
     // Not inlined: five copies would take a kilobyte.
     #[inline(never)]
     pub(crate) fn is_nearer(&self, this: &GridPoint, other: &GridPoint) -> bool {
-        let (way, left) = (other.to(this), this.to(&self.hip));
-        let noise = 2.0 * RESOLUTION * (way.abs() + left.abs()).element_sum();
-        way.dot(way + 2.0 * left) > noise
+        let (displacement, remaining) = (other.to(this), this.to(&self.hip));
+        let noise = 2.0 * RESOLUTION * (displacement.abs() + remaining.abs()).element_sum();
+        displacement.dot(displacement + 2.0 * remaining) > noise
     }
 }

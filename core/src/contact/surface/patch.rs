@@ -131,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn takes_its_corners() {
+    fn patch_reproduces_its_corner_heights() {
         let p = Patch::new([1.0, 3.0, 7.0, 2.0]);
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
         assert_eq!(corners.map(|(u, v)| p.height(u, v)), [1.0, 3.0, 7.0, 2.0]);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn the_blossom_is_the_middle_bernstein_coefficient() {
+    fn blossom_is_the_middle_bernstein_coefficient() {
         let p = Patch::new([0.5, -0.25, 1.5, 4.0]);
         let (from, to) = ((0.125, 0.875), (0.75, 0.25));
         let (f0, f1, f2) = (
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spike_costs_nothing_elsewhere() {
+    fn spike_costs_no_bit_in_other_corners() {
         let p = Patch::new([0.645_8, 1e6, 0.645_8, -3e7]);
         assert_eq!(p.height(0.0, 0.3), 0.645_8);
         assert_eq!(p.slope_v(0.0), 0.0);

@@ -29,11 +29,11 @@ impl Side {
     }
 
     /// Returns the neighbours over a border toward this side: one over an edge, three around a
-    /// vertex. [`Self::NONE`] if there is none for `place`.
+    /// vertex. [`Self::NONE`] if there is none for `index`.
     #[inline]
-    pub(in crate::contact) const fn neighbour(self, place: u8) -> Self {
+    pub(in crate::contact) const fn neighbour(self, index: u8) -> Self {
         let Self { east, north } = self;
-        match place {
+        match index {
             0 => Self { east, north: 0 },
             1 => Self { east: 0, north },
             _ if east == 0 || north == 0 => Self::NONE,
@@ -62,7 +62,13 @@ impl Side {
     /// Returns, for a point on this border, the side on which a path to `to` crosses it.
     #[inline]
     pub(in crate::contact) fn toward(self, to: (f32, f32), (u, v): (f32, f32)) -> Self {
-        let toward = |border: i32, way: f32| if border as f32 * way > 0.0 { border } else { 0 };
+        let toward = |border: i32, offset: f32| {
+            if border as f32 * offset > 0.0 {
+                border
+            } else {
+                0
+            }
+        };
         Self {
             east: toward(self.east, to.0 - u),
             north: toward(self.north, to.1 - v),

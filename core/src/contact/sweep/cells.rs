@@ -8,7 +8,7 @@ use crate::scalar::larger;
 use crate::terrain::{CellContent, Window};
 
 /// The part of a path over one cell.
-pub(super) struct Step {
+pub(super) struct PathSegment {
     pub(super) cell: Cell,
     /// Start and end of the part in the cell, `[0, 1]`.
     from: (f32, f32),
@@ -18,7 +18,7 @@ pub(super) struct Step {
     z_to: f32,
 }
 
-impl Step {
+impl PathSegment {
     /// Returns true if the part is too short to reach other ground than at its start, and not
     /// downward.
     pub(super) fn is_tiny(&self) -> bool {
@@ -39,7 +39,7 @@ impl Step {
         ]
     }
 
-    /// Returns the direction to the cells in the west and south that share part of this step on
+    /// Returns the direction to the cells in the west and south that share part of this segment on
     /// their border: a patch includes its east and north borders.
     pub(super) fn sharing(&self) -> Side {
         Side::sharing(self.to.0, self.to.1)
@@ -48,17 +48,17 @@ impl Step {
     /// Returns this part relative to the cell on that side, on whose border it is: the whole part,
     /// or only its end.
     pub(super) fn on_border_of(&self, side: Side) -> Self {
-        let runs_along =
+        let is_along_border =
             (side.east == 0 || self.from.0 == 0.0) && (side.north == 0 || self.from.1 == 0.0);
-        let (from, z_from) = match runs_along {
+        let (from, z_from) = match is_along_border {
             true => (self.from, self.z_from),
             false => (self.to, self.z_to),
         };
-        let seen = |(u, v): (f32, f32)| (u - side.east as f32, v - side.north as f32);
+        let relative = |(u, v): (f32, f32)| (u - side.east as f32, v - side.north as f32);
         Self {
             cell: self.cell.offset(side.east, side.north),
-            from: seen(from),
-            to: seen(self.to),
+            from: relative(from),
+            to: relative(self.to),
             z_from,
             z_to: self.z_to,
         }
@@ -80,37 +80,40 @@ impl Step {
     }
 }
 
-/// Returns the content beside a step over no-data: a patch on whose border it is, or no-data.
+/// Returns the content beside a segment over no-data: a patch on whose border it is, or no-data.
 #[inline(never)]
-pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, CellContent) {
-    for place in 0..3 {
-        let side = step.sharing().neighbour(place);
+pub(super) fn beside<const D: usize>(
+    window: &Window<'_, D>,
+    segment: PathSegment,
+) -> (PathSegment, CellContent) {
+    for index in 0..3 {
+        let side = segment.sharing().neighbour(index);
         if side == Side::NONE {
             continue;
         }
-        let other = step.on_border_of(side);
+        let other = segment.on_border_of(side);
         let ground = window.ground(other.cell);
         if ground != CellContent::NoData {
             return (other, ground);
         }
     }
-    (step, CellContent::NoData)
+    (segment, CellContent::NoData)
 }
 
 /// The cells under a straight path, in order; each begins exactly where the one before ended, so
 /// that the path has no gap between them.
-pub(super) struct Steps {
+pub(super) struct PathSegments {
     east: Axis,
     north: Axis,
     from: (f32, f32),
-    /// Heights above the start of the path, cells: where it ends, and where the last step ended.
+    /// Heights above the start of the path, cells: where it ends, and where the last segment ended.
     z_end: f32,
     z_from: f32,
     done: bool,
 }
 
-impl Steps {
-    /// Creates the steps of a path.
+impl PathSegments {
+    /// Creates the segments of a path.
     pub(super) fn between(at: &GridPoint, end: &GridPoint) -> Self {
         let axis = |axis: usize| {
             let (first, last) = (at.cell()[axis], end.cell()[axis]);
@@ -134,7 +137,7 @@ impl Steps {
     }
 
     #[inline]
-    pub(super) fn next(&mut self) -> Option<Step> {
+    pub(super) fn next(&mut self) -> Option<PathSegment> {
         if self.done {
             return None;
         }
@@ -144,20 +147,20 @@ impl Steps {
         let (to, z_to);
         if east.left | north.left == 0 {
             self.done = true;
-            (to, z_to) = ((east.ends(), north.ends()), self.z_end);
+            (to, z_to) = ((east.end_in_square(), north.end_in_square()), self.z_end);
         } else if east.t <= north.t {
             let (t, u, v) = (east.t, east.ahead(), north.at(east.t));
             (to, z_to) = ((u, v), self.z_end * t);
             self.from = (1.0 - u, v);
-            east.crosses();
+            east.cross();
         } else {
             let (t, u, v) = (north.t, east.at(north.t), north.ahead());
             (to, z_to) = ((u, v), self.z_end * t);
             self.from = (u, 1.0 - v);
-            north.crosses();
+            north.cross();
         }
         self.z_from = z_to;
-        Some(Step {
+        Some(PathSegment {
             cell,
             from,
             to,
@@ -172,8 +175,8 @@ impl Steps {
 struct Axis {
     start: f32,
     end: f32,
-    way: f32,
-    per_way: f32,
+    travel: f32,
+    inv_travel: f32,
     /// Current square, its lower border, and the number of squares after it.
     square: i32,
     floor: f32,
@@ -188,36 +191,36 @@ impl Axis {
     /// Creates an axis from the first square to the last; both places are relative to the first.
     #[inline]
     fn new(first: i32, last: i32, [start, end]: [f32; 2]) -> Self {
-        let way = end - start;
+        let travel = end - start;
         let mut axis = Self {
             start,
             end,
-            way,
-            per_way: 1.0 / way,
+            travel,
+            inv_travel: 1.0 / travel,
             square: first,
             floor: 0.0,
             left: first.abs_diff(last),
             toward: if last < first { -1 } else { 1 },
             t: f32::INFINITY,
         };
-        axis.aim();
+        axis.update_crossing();
         axis
     }
 
     /// Crosses the border ahead.
     #[inline]
-    fn crosses(&mut self) {
+    fn cross(&mut self) {
         self.square = self.square.wrapping_add(self.toward);
         self.floor += self.toward as f32;
         self.left -= 1;
-        self.aim();
+        self.update_crossing();
     }
 
     #[inline]
-    fn aim(&mut self) {
+    fn update_crossing(&mut self) {
         self.t = f32::INFINITY;
         if self.left > 0 {
-            let t = (self.floor + self.ahead() - self.start) * self.per_way;
+            let t = (self.floor + self.ahead() - self.start) * self.inv_travel;
             // A path that ends on its border may have nothing left: 0·∞.
             self.t = if t <= 1.0 { larger(t, 0.0) } else { 1.0 };
         }
@@ -232,12 +235,12 @@ impl Axis {
     /// Returns the coordinate in the square after a fraction of the path.
     #[inline]
     fn at(&self, t: f32) -> f32 {
-        (self.start + self.way * t - self.floor).clamp(0.0, 1.0)
+        (self.start + self.travel * t - self.floor).clamp(0.0, 1.0)
     }
 
     /// Returns the coordinate in the last square where the path ends.
     #[inline]
-    fn ends(&self) -> f32 {
+    fn end_in_square(&self) -> f32 {
         (self.end - self.floor).clamp(0.0, 1.0)
     }
 }

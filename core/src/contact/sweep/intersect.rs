@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_a_dense_search_over_all_signs() {
+    fn first_crossing_agrees_with_a_dense_search() {
         const POINTS: u32 = cases(4000, 50);
         let points = f64::from(POINTS);
         let values = [-3.0, -0.7, -1e-3, -1e-20, 0.0, 1e-20, 1e-3, 0.4, 2.0];
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_patches_lose_no_hit() {
+    fn first_crossing_is_exact_on_flat_patches() {
         // Straight descent: the gap is linear, D is a perfect square.
         let s = first_crossing(-0.1, 0.1, 0.3).unwrap();
         assert!((s - 0.25).abs() < 1e-7);

@@ -5,4 +5,4 @@ pub mod intersect;
 mod cells;
 mod path;
 
-pub(super) use path::{Path, Swept, lower};
+pub(super) use path::{Path, SweepEnd, lower};

@@ -8,7 +8,7 @@
 
 use heapless::Vec;
 
-use super::cells::{Steps, beside};
+use super::cells::{PathSegments, beside};
 use super::intersect::{first_crossing, next_crossing};
 use crate::contact::budget::{BOX, Budget, INTERSECTION};
 use crate::contact::surface::{HipView, SurfacePoint};
@@ -17,17 +17,17 @@ use crate::terrain::{CellBox, CellContent, Window};
 
 /// Maximum number of columns, or rows, of a piece that is intersected cell by cell, beyond its
 /// first: it covers nine cells at most, which fit in a tick's budget.
-const WALK_CELLS: u32 = 4;
+const MAX_INTERSECTED_CELLS: u32 = 4;
 /// Maximum height of a piece, in cells, that is intersected.
-const WALK_HEIGHT: u32 = 16;
+const MAX_INTERSECTED_HEIGHT: u32 = 16;
 /// Halvings from a path of 4,096 cells, eight windows, down to an intersected piece, and two more:
 /// the start of the path, and its new end after a motion of the HIP. A longer path is intersected
 /// in longer pieces.
-const DEPTH: usize = 12;
+const MAX_PIECES: usize = 12;
 
 /// End of a sweep.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::contact) enum Swept {
+pub(in crate::contact) enum SweepEnd {
     /// The whole path is free.
     Clear,
     /// The path crosses the surface from above here.
@@ -36,7 +36,7 @@ pub(in crate::contact) enum Swept {
     /// without a crossing from above.
     Under,
     /// A tile on the path is missing.
-    Missing,
+    MissingTile,
     /// The budget is spent.
     Suspended,
 }
@@ -47,7 +47,7 @@ pub(in crate::contact) struct Path {
     /// End of the known free part of the path.
     at: GridPoint,
     /// Ends of the remaining pieces, the last one first.
-    ends: Vec<GridPoint, DEPTH>,
+    ends: Vec<GridPoint, MAX_PIECES>,
     /// True if the path starts on the surface and leaves it.
     on_surface: bool,
     /// True if the last cell passed holds no patch: no-data, or beyond the data.
@@ -69,7 +69,7 @@ impl Path {
 
     fn new(from: GridPoint, to: GridPoint, on_surface: bool) -> Self {
         let mut ends = Vec::new();
-        // Cannot fail: DEPTH > 1.
+        // Cannot fail: MAX_PIECES > 1.
         let _ = ends.push(to);
         Self {
             at: from,
@@ -88,13 +88,13 @@ impl Path {
     /// need it.
     #[inline(never)]
     pub(in crate::contact) fn redirect(&mut self, to: GridPoint) {
-        let leads_on =
+        let leads_nearer =
             |end: &GridPoint| !self.is_missing && HipView::new(to).is_nearer(end, &self.at);
-        let begun = self.ends.last().copied().filter(leads_on);
+        let started = self.ends.last().copied().filter(leads_nearer);
         self.ends.clear();
-        // Cannot fail: DEPTH > 2.
+        // Cannot fail: MAX_PIECES > 2.
         let _ = self.ends.push(to);
-        if let Some(end) = begun {
+        if let Some(end) = started {
             let _ = self.ends.push(end);
         }
     }
@@ -109,11 +109,11 @@ impl Path {
         &mut self,
         window: &Window<'_, D>,
         budget: &mut Budget,
-    ) -> Swept {
+    ) -> SweepEnd {
         self.is_missing = false;
         while let Some(&end) = self.ends.last() {
             if !budget.has(BOX) {
-                return Swept::Suspended;
+                return SweepEnd::Suspended;
             }
             budget.spend(BOX);
             let around = CellBox::around(self.at.column(), end.column());
@@ -123,59 +123,59 @@ impl Path {
                 // The path is above everything around, so only the field's border matters.
                 self.over_no_data = !window.has_cell(end.column());
                 self.on_surface = false;
-            } else if !self.is_walked(&end) {
+            } else if !self.is_intersected(&end) {
                 // If this is full, the piece is intersected instead.
                 let _ = self.ends.push(self.at.midpoint(&end));
                 continue;
-            } else if let Some(ended) = self.walk(window, end, budget) {
-                return ended;
+            } else if let Some(sweep_end) = self.intersect_cells(window, end, budget) {
+                return sweep_end;
             }
             self.at = end;
             self.ends.pop();
         }
-        Swept::Clear
+        SweepEnd::Clear
     }
 
     /// Returns true if the piece up to `end` is intersected cell by cell: it is short, and also in
     /// height, where a long one would cost bits.
-    fn is_walked(&self, end: &GridPoint) -> bool {
+    fn is_intersected(&self, end: &GridPoint) -> bool {
         let span = CellBox::around(self.at.column(), end.column());
-        let is_low = self.at.cell()[2].abs_diff(end.cell()[2]) <= WALK_HEIGHT;
-        (longer_side(span) <= WALK_CELLS && is_low) || self.ends.is_full()
+        let is_low = self.at.cell()[2].abs_diff(end.cell()[2]) <= MAX_INTERSECTED_HEIGHT;
+        (longer_side(span) <= MAX_INTERSECTED_CELLS && is_low) || self.ends.is_full()
     }
 
     /// Intersects the cells of one short piece.
-    fn walk<const D: usize>(
+    fn intersect_cells<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         end: GridPoint,
         budget: &mut Budget,
-    ) -> Option<Swept> {
+    ) -> Option<SweepEnd> {
         let view = HipView::new(self.at);
         let mut over_no_data = self.over_no_data;
         let mut on_surface = self.on_surface;
-        let mut steps = Steps::between(&self.at, &end);
-        while let Some(mut step) = steps.next() {
+        let mut segments = PathSegments::between(&self.at, &end);
+        while let Some(mut segment) = segments.next() {
             if !budget.has(INTERSECTION) {
-                return Some(Swept::Suspended);
+                return Some(SweepEnd::Suspended);
             }
             budget.spend(INTERSECTION);
-            let is_last = steps.is_done() && self.ends.len() == 1;
-            if on_surface && step.is_tiny() && !is_last {
+            let is_last = segments.is_done() && self.ends.len() == 1;
+            if on_surface && segment.is_tiny() && !is_last {
                 // The path leaves an edge and touches a corner of a cell or of no-data.
                 continue;
             }
-            let mut ground = window.ground(step.cell);
+            let mut ground = window.ground(segment.cell);
             if ground == CellContent::NoData {
-                (step, ground) = beside(window, step);
-                over_no_data |= step.is_point();
+                (segment, ground) = beside(window, segment);
+                over_no_data |= segment.is_point();
             }
             let patch = match ground {
                 CellContent::Patch(corners) => view.patch(&corners),
                 CellContent::Missing => {
                     self.is_missing = true;
-                    budget.lacks(step.cell);
-                    return Some(Swept::Missing);
+                    budget.record_missing(segment.cell);
+                    return Some(SweepEnd::MissingTile);
                 }
                 CellContent::NoData => {
                     over_no_data = true;
@@ -183,9 +183,9 @@ impl Path {
                     continue;
                 }
             };
-            let [start, middle, after] = step.gap(&patch);
+            let [start, middle, after] = segment.gap(&patch);
             if over_no_data && start >= 0.0 {
-                return Some(Swept::Under);
+                return Some(SweepEnd::Under);
             }
             let crossing = if on_surface && middle < 0.0 {
                 next_crossing(middle, after)
@@ -193,7 +193,7 @@ impl Path {
                 first_crossing(start, middle, after)
             };
             if let Some(s) = crossing {
-                return Some(Swept::Hit(step.point(s)));
+                return Some(SweepEnd::Hit(segment.point(s)));
             }
             (over_no_data, on_surface) = (false, false);
         }

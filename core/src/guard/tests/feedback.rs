@@ -2,16 +2,16 @@
 
 use super::*;
 
-/// Runs until the fault, with the amplifiers on, for at most `at_most` ticks.
-fn ticks_until(bench: &mut Bench, fault: Fault, at_most: u32) -> u32 {
-    for ticks in 1..=at_most {
+/// Runs until the fault, with the amplifiers on, for at most `max_ticks` ticks.
+fn ticks_until(bench: &mut Bench, fault: Fault, max_ticks: u32) -> u32 {
+    for ticks in 1..=max_ticks {
         bench.tick();
         if let Some(found) = bench.guard.report().fault {
             assert_eq!(found, fault);
             return ticks;
         }
     }
-    panic!("no fault within {at_most} ticks");
+    panic!("no fault within {max_ticks} ticks");
 }
 
 /// Pushes up with 3 N; `measure` maps the command of the tick before the last to each motor's
@@ -19,7 +19,7 @@ fn ticks_until(bench: &mut Bench, fault: Fault, at_most: u32) -> u32 {
 fn compared(measure: impl Fn(Vec3) -> Vec3) -> Option<u32> {
     let mut bench = Bench::armed();
     bench.sense.measured_ma = Some([0; 3]);
-    bench.wanted_n = Vec3::new(2.0, 2.0, 3.0);
+    bench.target_n = Vec3::new(2.0, 2.0, 3.0);
     let mut commands = [Vec3::ZERO; 2];
     for ticks in 1..500 {
         let measured = measure(commands[0]) * 1e3;
@@ -35,7 +35,7 @@ fn compared(measure: impl Fn(Vec3) -> Vec3) -> Option<u32> {
 }
 
 #[test]
-fn an_amplifier_that_is_not_ready_is_a_fault_in_the_third_tick() {
+fn unready_amplifier_is_a_fault_in_the_third_tick() {
     let mut bench = Bench::armed();
     bench.sense.amplifier_not_ready = true;
     assert_eq!(ticks_until(&mut bench, Fault::AmplifierNotReady, 10), 3);
@@ -69,14 +69,14 @@ fn amplifier_may_take_ten_milliseconds_to_become_ready() {
 }
 
 #[test]
-fn currents_that_follow_their_commands_are_no_fault() {
+fn currents_that_follow_commands_are_no_fault() {
     assert_eq!(compared(|a| a), None);
     // A reading with an error of 3 % and 0.2 A.
     assert_eq!(compared(|a| a * 1.03 + 0.2), None);
 }
 
 #[test]
-fn a_current_that_was_not_commanded_is_a_fault() {
+fn uncommanded_current_is_a_fault() {
     let open = compared(|a| Vec3::new(0.0, a.y, a.z));
     assert!(open.is_some_and(|ticks| ticks < 40), "open motor: {open:?}");
     let full = compared(|a| Vec3::new(a.x, 5.5, a.z));
@@ -106,7 +106,7 @@ fn oscillating_amplifier_is_a_fault_at_any_frequency() {
 }
 
 #[test]
-fn a_monitor_that_is_rough_is_no_fault() {
+fn noisy_monitor_is_no_fault() {
     for hz in [333.0, 487.0, 970.0] {
         assert_eq!(compared(oscillating(0.8, hz)), None, "{hz} Hz");
     }
@@ -117,7 +117,7 @@ fn winding_temperature_follows_measured_not_commanded_current() {
     // Armed, and with the amplifiers off.
     for mut bench in [Bench::armed(), Bench::new()] {
         let winding = |bench: &Bench| bench.guard.motors().winding_c();
-        let begun = winding(&bench);
+        let start = winding(&bench);
         let swing = oscillating(1.5, 333.0);
         let mut commands = [Vec3::ZERO; 2];
         bench.ticks(2);
@@ -127,7 +127,7 @@ fn winding_temperature_follows_measured_not_commanded_current() {
             commands = [commands[1], bench.tick().currents_a];
             assert_eq!(bench.guard.report().fault, None);
         }
-        let warmer = winding(&bench) - begun;
+        let warmer = winding(&bench) - start;
         // 1.13 A² · 2.82 Ω · (3.1 K/W · 0.81 + 14 K/W · 0.03).
         assert!((8.0..11.0).contains(&warmer.y), "{warmer}");
         assert!(warmer.x < 1.0 && warmer.z < 1.0, "{warmer}");
@@ -140,12 +140,12 @@ fn implausible_monitor_currents_keep_motor_temperatures_valid() {
     bench.sense.measured_ma = Some([i16::MIN; 3]);
     bench.ticks(200_000);
     assert_eq!(bench.guard.report().fault, Some(Fault::CurrentMismatch));
-    let kept = bench.guard.motors().temperatures();
-    assert!(kept.after_reset().is_some(), "{kept:?}");
+    let before = bench.guard.motors().temperatures();
+    assert!(before.after_reset().is_some(), "{before:?}");
 }
 
 #[test]
-fn a_current_that_flows_with_the_amplifiers_off_is_a_fault() {
+fn current_with_the_amplifiers_off_is_a_fault() {
     let mut bench = Bench::new();
     bench.sense.measured_ma = Some([0, 0, -600]);
     let took = ticks_until(&mut bench, Fault::CurrentMismatch, 100);
@@ -162,7 +162,7 @@ fn fastest_force_change_is_no_mismatch_for_late_amplifier() {
     for ticks in 0..2_000 {
         // 7.65 N back and forth, as fast as the rate limit permits.
         let side = if (ticks / 100) % 2 == 0 { 50.0 } else { -50.0 };
-        bench.wanted_n = Vec3::new(side, 0.0, side);
+        bench.target_n = Vec3::new(side, 0.0, side);
         let late = commands[0] * 1e3;
         bench.sense.measured_ma = Some(late.to_array().map(|ma| ma as i16));
         commands = [commands[1], commands[2], bench.tick().currents_a];
@@ -175,7 +175,7 @@ fn fastest_force_change_is_no_mismatch_for_late_amplifier() {
 fn missing_monitors_disable_current_comparison() {
     let mut bench = Bench::armed();
     bench.sense.measured_ma = None;
-    bench.wanted_n = Vec3::Z * 7.0;
+    bench.target_n = Vec3::Z * 7.0;
     bench.ticks(1_000);
     assert_eq!(bench.guard.report().fault, None);
 }

@@ -1,7 +1,7 @@
 //! Outputs held with the amplifiers off.
 
 use super::*;
-use crate::guard::HOLD_S;
+use crate::guard::MAX_HOLD_S;
 
 const HELD: Vec3 = Vec3::new(0.5, -0.25, 1.0);
 
@@ -9,7 +9,7 @@ fn holding() -> Bench {
     let mut bench = Bench::new();
     bench.guard.hold(Some(HELD.to_array()));
     bench.tick();
-    assert_eq!(bench.guard.held(), HELD);
+    assert_eq!(bench.guard.held_shares(), HELD);
     assert_eq!(bench.guard.mode(), Mode::Disarmed);
     bench
 }
@@ -17,18 +17,18 @@ fn holding() -> Bench {
 #[test]
 fn outputs_are_held_within_full_scale_for_a_minute_at_most() {
     let mut bench = holding();
-    bench.ticks(HOLD_S * 1_000 - 2);
-    assert_eq!(bench.guard.held(), HELD);
+    bench.ticks(MAX_HOLD_S * 1_000 - 2);
+    assert_eq!(bench.guard.held_shares(), HELD);
     bench.tick();
-    assert_eq!(bench.guard.held(), Vec3::ZERO);
+    assert_eq!(bench.guard.held_shares(), Vec3::ZERO);
     bench.guard.hold(Some([7.0, f32::NEG_INFINITY, 0.0]));
-    assert_eq!(bench.guard.held(), Vec3::new(1.0, -1.0, 0.0));
+    assert_eq!(bench.guard.held_shares(), Vec3::new(1.0, -1.0, 0.0));
     bench.guard.hold(Some([0.1, f32::NAN, 0.0]));
-    assert_eq!(bench.guard.held(), Vec3::ZERO);
+    assert_eq!(bench.guard.held_shares(), Vec3::ZERO);
 }
 
 #[test]
-fn whatever_else_begins_ends_the_hold() {
+fn every_other_command_ends_the_hold() {
     let ends: [fn(&mut Bench); 7] = [
         |b| b.guard.hold(None),
         |b| b.guard.arm(),
@@ -42,7 +42,7 @@ fn whatever_else_begins_ends_the_hold() {
         let mut bench = holding();
         end(&mut bench);
         bench.tick();
-        assert_eq!(bench.guard.held(), Vec3::ZERO, "end {i}");
+        assert_eq!(bench.guard.held_shares(), Vec3::ZERO, "end {i}");
     }
 }
 
@@ -55,7 +55,12 @@ fn outputs_are_not_held_while_arming_armed_or_faulted() {
     bench.sense.dead_man = true;
     while bench.guard.mode() != Mode::Disarmed {
         bench.guard.hold(Some(HELD.to_array()));
-        assert_eq!(bench.guard.held(), Vec3::ZERO, "{:?}", bench.guard.mode());
+        assert_eq!(
+            bench.guard.held_shares(),
+            Vec3::ZERO,
+            "{:?}",
+            bench.guard.mode()
+        );
         bench.tick();
         tried += 1;
         if tried == 3_000 {
@@ -66,5 +71,5 @@ fn outputs_are_not_held_while_arming_armed_or_faulted() {
     assert!(tried >= 3_000);
     assert_eq!(bench.guard.report().fault, Some(Fault::EmergencyStop));
     bench.guard.hold(Some(HELD.to_array()));
-    assert_eq!(bench.guard.held(), Vec3::ZERO, "a fault is latched");
+    assert_eq!(bench.guard.held_shares(), Vec3::ZERO, "a fault is latched");
 }

@@ -6,7 +6,7 @@ pub(super) struct BitReader<'b> {
     /// The next bits, from the highest on, with zeros below them.
     ahead: u32,
     /// Number of valid bits in `ahead`.
-    held: u32,
+    available: u32,
     /// Bytes requested after the last one.
     beyond: u32,
 }
@@ -16,7 +16,7 @@ impl<'b> BitReader<'b> {
         Self {
             bytes: bytes.iter(),
             ahead: 0,
-            held: 0,
+            available: 0,
             beyond: 0,
         }
     }
@@ -24,24 +24,24 @@ impl<'b> BitReader<'b> {
     /// Loads at least 25 bits, from at most four bytes.
     #[inline(never)] // once in an image
     fn refill(&mut self) {
-        while self.held <= 24 {
+        while self.available <= 24 {
             let byte = self.bytes.next().copied().unwrap_or_else(|| {
                 self.beyond += 1; // at most four for each of some thousand calls
                 0
             });
-            self.ahead |= u32::from(byte) << (24 - self.held);
-            self.held += 8;
+            self.ahead |= u32::from(byte) << (24 - self.available);
+            self.available += 8;
         }
     }
 
-    /// Reads the zeros before a one, and the one; after `most` zeros (at most 24) reads no one.
+    /// Reads the zeros before a one, and the one; after `max` zeros (at most 24) reads no one.
     #[inline(never)]
-    pub(super) fn zeros(&mut self, most: u32) -> u32 {
-        if self.held < most {
+    pub(super) fn zeros(&mut self, max: u32) -> u32 {
+        if self.available < max {
             self.refill();
         }
-        let zeros = self.ahead.leading_zeros().min(most);
-        self.skip(zeros + u32::from(zeros < most));
+        let zeros = self.ahead.leading_zeros().min(max);
+        self.skip(zeros + u32::from(zeros < max));
         zeros
     }
 
@@ -51,7 +51,7 @@ impl<'b> BitReader<'b> {
         let (mut number, mut left) = (0, count);
         while left > 0 {
             let few = left.min(16);
-            if self.held < few {
+            if self.available < few {
                 self.refill();
             }
             number = (number << few) | (self.ahead >> (32 - few));
@@ -64,12 +64,12 @@ impl<'b> BitReader<'b> {
     #[inline]
     fn skip(&mut self, count: u32) {
         self.ahead <<= count;
-        self.held -= count;
+        self.available -= count;
     }
 
     /// Returns true if all bytes were used, and the rest of the last one is zeros.
     pub(super) fn is_at_end(&self) -> bool {
-        let unused = self.held as i32 - 8 * self.beyond as i32;
+        let unused = self.available as i32 - 8 * self.beyond as i32;
         self.bytes.len() == 0 && self.ahead == 0 && (0..8).contains(&unused)
     }
 }

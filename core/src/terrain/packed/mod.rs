@@ -47,14 +47,14 @@
 //!   saturating: first the file's own heights in single precision, then these in cells.
 //!
 //! ```
-//! use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
+//! use hapterra_core::terrain::packed::{MAX_PACKED, HeightStep, pack};
 //! use hapterra_core::terrain::{TILE_SAMPLES, Tile, TileKey};
 //!
 //! // Whole metres, 30 of them to a cell, above a base of 12 cells.
 //! let metres = |i: usize| f64::from(400 + (i % TILE_SAMPLES) as i32 / 2);
 //! let heights: [f32; TILE_SAMPLES * TILE_SAMPLES] =
 //!     core::array::from_fn(|i| (metres(i) / 30.0 - 12.0) as f32);
-//! let steps = [Step::Cells(1.0 / 30.0)];
+//! let steps = [HeightStep::Cells(1.0 / 30.0)];
 //! let mut buffer = [0; MAX_PACKED];
 //! let packed = pack(&heights, 12, &steps, &mut buffer).expect("it pays");
 //! assert!(packed.len() < 4 * heights.len() / 15);
@@ -73,7 +73,7 @@ mod unpack;
 #[cfg(test)]
 mod tests;
 
-pub use pack::{MAX_PACKED, Step, pack};
+pub use pack::{HeightStep, MAX_PACKED, pack};
 pub(super) use unpack::Unpacker;
 
 /// Bytes before the lines.

@@ -19,7 +19,7 @@ pub const MAX_PACKED: usize = 4 * SAMPLES - 1;
 
 /// Unit of heights that are whole multiples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
+pub enum HeightStep {
     /// A height is a multiple of this many cells.
     Cells(f64),
     /// A height is a multiple of `unit`, rounded to single precision, times `cells`: for example a
@@ -41,7 +41,7 @@ pub enum Step {
 pub fn pack<'b>(
     heights: &[f32; SAMPLES],
     base: i32,
-    steps: &[Step],
+    steps: &[HeightStep],
     buffer: &'b mut [u8],
 ) -> Option<&'b [u8]> {
     let first = heights.iter().position(|height| !is_no_data(*height))?;
@@ -89,15 +89,15 @@ struct Lines {
 
 impl Lines {
     /// Creates the lines of a step; `height` is the one nearest to the base.
-    fn of(step: &Step, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
+    fn of(step: &HeightStep, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
         let known = || heights.iter().filter(|height| !is_no_data(**height));
         let above = |height: f32| f64::from(height) + base;
         let span = known().fold(0.0, |span: f64, other| {
             span.max((f64::from(*other) - f64::from(height)).abs())
         });
         let (step_cells, unit) = match *step {
-            Step::Cells(cells) => (cells, cells),
-            Step::Single { unit, cells } => (unit * cells, unit),
+            HeightStep::Cells(cells) => (cells, cells),
+            HeightStep::Single { unit, cells } => (unit * cells, unit),
         };
         let from = libm::rint(above(height) / step_cells);
         // A height this near to the base is exact only as it is: the product would be rounded.
@@ -106,21 +106,21 @@ impl Lines {
             _ => libm::fma(number, cells, -base),
         };
         let lines = match *step {
-            Step::Cells(cells) => {
+            HeightStep::Cells(cells) => {
                 let line = Line::through(0, there(from, cells), cells, span / cells)?;
                 [line, Line::NONE]
             }
-            Step::Single { cells, .. } => {
+            HeightStep::Single { cells, .. } => {
                 let in_file = |height: f32| (above(height) / cells).abs();
-                let least = known()
+                let min_height = known()
                     .map(|height| in_file(*height))
                     .filter(|height| *height > 0.5 * unit)
                     .fold(f64::INFINITY, f64::min);
-                if !least.is_finite() {
+                if !min_height.is_finite() {
                     return None;
                 }
                 // The last place of the lowest height in single precision.
-                let place = libm::ldexp(1.0, libm::ilogb(least) - 23);
+                let place = libm::ldexp(1.0, libm::ilogb(min_height) - 23);
                 let single = |number: f64| f64::from((number * unit) as f32) / place;
                 let (middle, step, cell) = (single(from), unit / place, place * cells);
                 let span_file = (span / cells).abs();
@@ -133,8 +133,8 @@ impl Lines {
         Some(Self {
             lines,
             count: match step {
-                Step::Cells(_) => 1,
-                Step::Single { .. } => 2,
+                HeightStep::Cells(_) => 1,
+                HeightStep::Single { .. } => 2,
             },
             up: base,
             per_cell: 1.0 / step_cells,
@@ -172,11 +172,12 @@ fn write<'b>(
     lines: &[Line],
     buffer: &'b mut [u8],
 ) -> Option<&'b [u8]> {
-    let holes = heights.iter().any(|height| is_no_data(*height));
+    let has_no_data = heights.iter().any(|height| is_no_data(*height));
     let parameter = parameter(heights, numbers, predicted);
     let (head, _) = buffer.split_first_chunk_mut::<HEAD>()?;
-    head[0] =
-        lines.len() as u8 | if holes { NO_DATA } else { 0 } | (parameter as u8) << PARAMETER_SHIFT;
+    head[0] = lines.len() as u8
+        | if has_no_data { NO_DATA } else { 0 }
+        | (parameter as u8) << PARAMETER_SHIFT;
     head[1..].copy_from_slice(&predicted.to_le_bytes());
     let mut front = HEAD;
     for line in lines {
@@ -188,23 +189,23 @@ fn write<'b>(
     let mut bits = BitWriter::new(buffer.get_mut(front..)?);
     let mut prediction = Prediction::new(predicted);
     let mut rice = Rice::new(parameter);
-    if holes {
+    if has_no_data {
         bits.number(u32::from(is_no_data(heights[0])), 1)?;
     }
     let mut run = None;
     for (i, height) in heights.iter().enumerate() {
-        let hole = is_no_data(*height);
-        if holes && run != Some(hole) {
-            run = Some(hole);
+        let is_gap = is_no_data(*height);
+        if has_no_data && run != Some(is_gap) {
+            run = Some(is_gap);
             let rest = heights[i..].iter();
             let length = rest
-                .take_while(|height| is_no_data(**height) == hole)
+                .take_while(|height| is_no_data(**height) == is_gap)
                 .count();
             write_run(length as u32, &mut bits)?;
         }
         let mut difference = None;
         prediction.next(i % TILE_SAMPLES, |predicted, west| {
-            if hole {
+            if is_gap {
                 return west;
             }
             difference = Some(numbers[i].wrapping_sub(predicted));

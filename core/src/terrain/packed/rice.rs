@@ -7,7 +7,7 @@ const MAX_ZEROS: u32 = 20;
 /// Maximum parameter.
 pub(super) const MAX_PARAMETER: u32 = 27;
 /// Bits of the mean's divisor: it follows some sixteen numbers.
-const SLOWNESS: u32 = 4;
+const MEAN_SHIFT: u32 = 4;
 /// Maximum bits of a run's length after the first: more than a tile's samples need.
 const MAX_RUN_BITS: u32 = 15;
 
@@ -20,19 +20,19 @@ pub(super) struct Rice {
 impl Rice {
     pub(super) const fn new(parameter: u32) -> Self {
         Self {
-            sum: 1 << (parameter + SLOWNESS),
+            sum: 1 << (parameter + MEAN_SHIFT),
         }
     }
 
     #[inline]
     fn parameter(&self) -> u32 {
-        31 - ((self.sum >> SLOWNESS) | 1).leading_zeros()
+        31 - ((self.sum >> MEAN_SHIFT) | 1).leading_zeros()
     }
 
     #[inline]
-    fn follow(&mut self, u: u32) {
+    fn update_mean(&mut self, u: u32) {
         // At most 2^31 + 2^27.
-        self.sum = self.sum - (self.sum >> SLOWNESS) + u.min(1 << MAX_PARAMETER);
+        self.sum = self.sum - (self.sum >> MEAN_SHIFT) + u.min(1 << MAX_PARAMETER);
     }
 
     /// Reads a difference.
@@ -44,7 +44,7 @@ impl Rice {
             MAX_ZEROS => bits.number(32),
             _ => (zeros << parameter) | bits.number(parameter),
         };
-        self.follow(u);
+        self.update_mean(u);
         (u >> 1) as i32 ^ -((u & 1) as i32)
     }
 
@@ -60,7 +60,7 @@ impl Rice {
             bits.number(0, MAX_ZEROS)?;
             bits.number(u, 32)?;
         }
-        self.follow(u);
+        self.update_mean(u);
         Some(())
     }
 }

@@ -15,7 +15,7 @@ const KEY: TileKey = TileKey::new(0, 2, 5);
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
 /// The bits of all samples of a tile.
-fn held(tile: &Tile) -> Vec<u32> {
+fn sample_bits(tile: &Tile) -> Vec<u32> {
     let sample = |i: usize| {
         let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
         // The samples of the last row and column are corners of the patches before them.
@@ -30,20 +30,23 @@ fn loaded(heights: &[f32; SAMPLES]) -> Vec<u32> {
     for (at, height) in heights.iter().enumerate() {
         tile.set(at % TILE_SAMPLES, at / TILE_SAMPLES, *height);
     }
-    held(&tile)
+    sample_bits(&tile)
 }
 
 /// Packs heights, and checks the tile unpacked from them; `None` if packing saves nothing.
-fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>> {
+fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[HeightStep]) -> Option<Vec<u8>> {
     let mut buffer = [0xAA; MAX_PACKED];
     let bytes = pack(heights, base, steps, &mut buffer)?.to_vec();
     let mut tile = Box::new(Tile::VACANT);
-    let wanted = loaded(heights);
+    let expected = loaded(heights);
     if tile.unpack(KEY, base, &bytes) != Err(TileError::Step) {
         assert_eq!((tile.key(), tile.base()), (Some(KEY), base));
     }
-    assert!(held(&tile) == wanted, "{} bytes", bytes.len());
-    assert!(reference_decoder::heights(&bytes) == wanted, "by the book");
+    assert!(sample_bits(&tile) == expected, "{} bytes", bytes.len());
+    assert!(
+        reference_decoder::heights(&bytes) == expected,
+        "by the book"
+    );
     Some(bytes)
 }
 
@@ -77,10 +80,10 @@ fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
 }
 
 #[test]
-fn whole_metres_take_half_a_byte_a_sample() {
+fn whole_metres_take_half_a_byte_per_sample() {
     for metres in [1.0, 10.0, 29.97, 91.3] {
         let base = (1450.0 / metres) as i32;
-        let steps = [Step::Cells(1.0 / metres)];
+        let steps = [HeightStep::Cells(1.0 / metres)];
         let bytes = packed(&hills(metres, base), base, &steps).unwrap();
         assert_eq!(bytes[0] & 7, 1, "one line, no holes");
         assert!(bytes.len() < 600, "{}", bytes.len());
@@ -95,8 +98,8 @@ fn centimetres_in_single_precision_are_two_lines() {
             (f64::from(file) * cells - f64::from(base)) as f32
         });
         let steps = [
-            Step::Cells(0.01 * cells),
-            Step::Single { unit: 0.01, cells },
+            HeightStep::Cells(0.01 * cells),
+            HeightStep::Single { unit: 0.01, cells },
         ];
         let bytes = packed(&heights, base, &steps).unwrap();
         // The file's single precision is then the tile's, so one line is enough.
@@ -107,29 +110,33 @@ fn centimetres_in_single_precision_are_two_lines() {
 }
 
 #[test]
-fn a_height_of_zero_above_base_zero_is_zero() {
+fn zero_height_over_base_zero_is_packed_exactly() {
     let heights = by_sample(|col, row| (col.min(row) as f64 / 29.99) as f32);
     for steps in [
-        &[Step::Cells(1.0 / 29.99)],
-        &[Step::Cells(1.0 / (8.0 * 29.99))],
+        &[HeightStep::Cells(1.0 / 29.99)],
+        &[HeightStep::Cells(1.0 / (8.0 * 29.99))],
     ] {
         assert_eq!(packed(&heights, 0, steps).unwrap()[0] & 3, 1);
     }
 }
 
 #[test]
-fn a_zero_below_zero_stays_below_zero() {
+fn negative_zero_is_preserved() {
     let mut heights = by_sample(|col, row| col.min(row) as f32);
     heights[40] = -0.0;
-    packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
+    packed(&heights, 0, &[HeightStep::Cells(1.0)]).unwrap();
     heights[40] = 0.0;
-    packed(&heights, 0, &[Step::Cells(1.0)]).unwrap();
+    packed(&heights, 0, &[HeightStep::Cells(1.0)]).unwrap();
 }
 
 #[test]
-fn floats_without_a_step_are_whole_too() {
+fn floats_without_a_step_are_packed_losslessly() {
     let heights = by_sample(|col, row| ((col as f32 / 9.0).sin() + row as f32 / 7.0) * 3.7);
-    for steps in [&[][..], &[Step::Cells(0.1)], &[Step::Cells(f64::NAN)]] {
+    for steps in [
+        &[][..],
+        &[HeightStep::Cells(0.1)],
+        &[HeightStep::Cells(f64::NAN)],
+    ] {
         let bytes = packed(&heights, 0, steps).unwrap();
         assert_eq!(bytes[0] & 7, 0);
     }
@@ -140,7 +147,7 @@ fn packing_keeps_no_data_samples_in_place() {
     let base = 50;
     let hills = hills(30.0, base);
     let mut random = Random(3);
-    let steps = [Step::Cells(1.0 / 30.0)];
+    let steps = [HeightStep::Cells(1.0 / 30.0)];
     let holes: [&mut dyn FnMut(usize, usize) -> bool; 6] = [
         &mut |col, row| (col, row) != (17, 4),
         &mut |col, row| (col, row) == (0, 0),
@@ -163,7 +170,7 @@ fn packing_keeps_no_data_samples_in_place() {
 }
 
 #[test]
-fn odd_numbers_are_whole_too() {
+fn unusual_floats_are_packed_losslessly() {
     let odd = [
         0.0,
         -0.0,
@@ -181,18 +188,18 @@ fn odd_numbers_are_whole_too() {
     ];
     let mut random = Random(5);
     let steps = [
-        Step::Cells(1e-45),
-        Step::Cells(0.0),
-        Step::Cells(-2.0),
-        Step::Single {
+        HeightStep::Cells(1e-45),
+        HeightStep::Cells(0.0),
+        HeightStep::Cells(-2.0),
+        HeightStep::Single {
             unit: 0.1,
             cells: 1e30,
         },
-        Step::Single {
+        HeightStep::Single {
             unit: 1e-300,
             cells: 1e300,
         },
-        Step::Cells(1.0),
+        HeightStep::Cells(1.0),
     ];
     let mut packs = 0;
     for round in 0..300 {
@@ -208,7 +215,7 @@ fn odd_numbers_are_whole_too() {
 }
 
 #[test]
-fn random_bits_do_not_pay_or_are_whole() {
+fn random_bits_are_packed_losslessly_or_not_at_all() {
     let mut random = Random(7);
     let mut packs = 0;
     for bits in 1..=32 {
@@ -223,15 +230,15 @@ fn random_bits_do_not_pay_or_are_whole() {
 }
 
 /// Examples of packed tiles of every kind.
-fn some() -> Vec<Vec<u8>> {
+fn examples() -> Vec<Vec<u8>> {
     let mut hollow = hills(30.0, 50);
     for i in (0..SAMPLES).filter(|i| i % 37 < 9) {
         hollow[i] = f32::NAN;
     }
-    let step = [Step::Cells(1.0 / 30.0)];
+    let step = [HeightStep::Cells(1.0 / 30.0)];
     let rough = by_sample(|col, row| (col * row % 11) as f32 * 0.37);
     let single = by_sample(|col, row| (6000 + col * 3 + row) as f32 / 100.0);
-    let steps = [Step::Single {
+    let steps = [HeightStep::Single {
         unit: 0.01,
         cells: 1.0,
     }];
@@ -242,7 +249,7 @@ fn some() -> Vec<Vec<u8>> {
         _ => 0.0,
     });
     std::vec![
-        packed(&last, 0, &[Step::Cells(1.0)]).unwrap(),
+        packed(&last, 0, &[HeightStep::Cells(1.0)]).unwrap(),
         packed(&hills(30.0, 50), 50, &step).unwrap(),
         packed(&hollow, 50, &step).unwrap(),
         packed(&rough, 0, &[]).unwrap(),
@@ -251,8 +258,8 @@ fn some() -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
-    for whole in some() {
+fn truncated_or_overlong_bytes_are_refused() {
+    for whole in examples() {
         let mut tile = Box::new(Tile::VACANT);
         for length in 0..whole.len() {
             tile.fill(KEY, 0, |_, _| 0.0).unwrap();
@@ -273,8 +280,8 @@ fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
 
 #[test]
 fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
-    let (mut taken, mut refused) = (0, 0);
-    for whole in some() {
+    let (mut accepted, mut refused) = (0, 0);
+    for whole in examples() {
         let mut tile = Box::new(Tile::VACANT);
         for place in 0..whole.len() {
             for change in [1, 0x10, 0x80, 0xFF] {
@@ -282,8 +289,11 @@ fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
                 bytes[place] ^= change;
                 match tile.unpack(KEY, 0, &bytes) {
                     Ok(()) => {
-                        taken += 1;
-                        assert!(held(&tile) == reference_decoder::heights(&bytes), "{place}");
+                        accepted += 1;
+                        assert!(
+                            sample_bits(&tile) == reference_decoder::heights(&bytes),
+                            "{place}"
+                        );
                     }
                     Err(error) => {
                         refused += 1;
@@ -297,7 +307,7 @@ fn damaged_tile_is_refused_or_decoded_as_by_the_reference() {
             }
         }
     }
-    assert!(taken > 1000 && refused > 1000, "{taken} {refused}");
+    assert!(accepted > 1000 && refused > 1000, "{accepted} {refused}");
 }
 
 #[test]
@@ -317,7 +327,7 @@ fn random_bytes_are_unpacked_or_refused() {
         if let Some(kind) = bytes.first_mut() {
             *kind = *kind & 0x7C | random.below(3) as u8;
         }
-        let taken = tile.unpack(KEY, 0, &bytes).is_ok();
-        assert_eq!(tile.key().is_some(), taken);
+        let accepted = tile.unpack(KEY, 0, &bytes).is_ok();
+        assert_eq!(tile.key().is_some(), accepted);
     }
 }

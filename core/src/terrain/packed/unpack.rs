@@ -60,13 +60,13 @@ impl<'b> Unpacker<'b> {
 
     /// Returns true if the bytes end exactly after the samples decoded until now.
     pub(in crate::terrain) fn is_at_end(&self) -> bool {
-        self.bits.is_at_end() && self.runs.as_ref().is_none_or(|runs| runs.left == 0)
+        self.bits.is_at_end() && self.runs.as_ref().is_none_or(|runs| runs.remaining == 0)
     }
 }
 
 /// Reads a line before the codes, if there is one.
-fn line(there_is: bool, bytes: &[u8]) -> Option<(Line, &[u8])> {
-    if !there_is {
+fn line(is_present: bool, bytes: &[u8]) -> Option<(Line, &[u8])> {
+    if !is_present {
         return Some((Line::NONE, bytes));
     }
     let (line, rest) = bytes.split_first_chunk::<LINE>()?;
@@ -76,27 +76,27 @@ fn line(there_is: bool, bytes: &[u8]) -> Option<(Line, &[u8])> {
 /// Runs of samples with and without a height, alternating.
 struct Runs {
     /// Samples left in this run.
-    left: u32,
-    holes: bool,
+    remaining: u32,
+    in_no_data: bool,
 }
 
 impl Runs {
     /// Reads the first bit, which defines the kind of the first run.
     fn new(bits: &mut BitReader<'_>) -> Self {
         Self {
-            left: 0,
-            holes: bits.number(1) == 0,
+            remaining: 0,
+            in_no_data: bits.number(1) == 0,
         }
     }
 
     /// Returns true if the next sample is no-data.
     #[inline]
     fn is_no_data(&mut self, bits: &mut BitReader<'_>) -> bool {
-        if self.left == 0 {
-            self.holes = !self.holes;
-            self.left = read_run(bits);
+        if self.remaining == 0 {
+            self.in_no_data = !self.in_no_data;
+            self.remaining = read_run(bits);
         }
-        self.left -= 1; // a run is at least one
-        self.holes
+        self.remaining -= 1; // a run is at least one
+        self.in_no_data
     }
 }

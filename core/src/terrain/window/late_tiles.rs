@@ -19,16 +19,16 @@ struct BlendedHeight {
 impl<'t, const D: usize> Window<'t, D> {
     /// Sets the field's fallback, or none; the stored tiles are rendered unchanged. The buffers of
     /// the previous fallback are kept for this one ([`Self::take_spare`]).
-    pub fn lay(&mut self, fallback: Option<Fallback>) {
-        self.fallback.lay(fallback);
-        self.tile_blend = TileBlend::NOTHING;
+    pub fn set_fallback(&mut self, fallback: Option<Fallback>) {
+        self.fallback.set_place(fallback);
+        self.tile_blend = TileBlend::NONE;
         for row in 0..D {
             for col in 0..D {
-                self.slots[row][col].become_surface();
+                self.slots[row][col].mark_as_surface();
                 let key = self.slots[row][col].key();
                 if let (Some(key), true) = (key, fallback.is_some()) {
                     let top = self.slots[row][col].top();
-                    self.renew_maxima(key.index, top);
+                    self.update_maxima(key.index, top);
                 }
             }
         }
@@ -48,7 +48,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// rendered unchanged. Any other tile is rendered unchanged at once, as with [`Self::install`].
     #[must_use]
     pub fn take(&mut self, tile: &'t mut Tile, blended: [Cell; 2]) -> Option<&'t mut Tile> {
-        if !self.fallback.is_wanted() {
+        if !self.fallback.is_set() {
             return Some(self.install(tile));
         }
         if let Some(part) = self.fallback.part(tile.key(), self.level()) {
@@ -56,95 +56,95 @@ impl<'t, const D: usize> Window<'t, D> {
             return self.fallback.put(part, tile);
         }
         let depends = |cell: Cell, index: TileIndex| {
-            let at = TileIndex::holding(cell);
+            let at = TileIndex::containing(cell);
             let apart = at.col.abs_diff(index.col).max(at.row.abs_diff(index.row));
-            apart == 0 || (apart == 1 && self.held(at).is_none())
+            apart == 0 || (apart == 1 && self.surface_tile(at).is_none())
         };
-        let settles = tile
+        let blends = tile
             .key()
             .is_some_and(|key| blended.into_iter().any(|cell| depends(cell, key.index)));
-        Some(self.put(tile, settles))
+        Some(self.put(tile, blends))
     }
 
     /// Returns true if a patch is rendered from its tile alone, without the fallback.
     #[must_use]
     #[inline]
-    pub fn is_settled(&self, cell: Cell) -> bool {
-        self.held(TileIndex::holding(cell)).is_some()
+    pub fn is_blended(&self, cell: Cell) -> bool {
+        self.surface_tile(TileIndex::containing(cell)).is_some()
     }
 
     /// Blends arrived tiles in by at most `step` cells. Returns true if the surface may have
     /// changed since the last tick.
-    pub fn settle(&mut self, step: f32) -> bool {
+    pub fn blend_tiles(&mut self, step: f32) -> bool {
         let has_changed = core::mem::take(&mut self.tile_blend.has_changed);
         if self.tile_blend.count == 0 {
             return has_changed;
         }
-        self.settle_each(step);
+        self.blend_each(step);
         true
     }
 
     #[inline(never)]
-    fn settle_each(&mut self, step: f32) {
-        let mut left = self.tile_blend.count;
+    fn blend_each(&mut self, step: f32) {
+        let mut remaining = self.tile_blend.count;
         for slot in 0..D * D {
             let (row, col) = (slot / D, slot % D);
-            let Allowance { now, far } = &mut self.tile_blend.slots[row][col];
+            let Allowance { now, end } = &mut self.tile_blend.slots[row][col];
             if *now == f32::INFINITY {
                 continue;
             }
             *now += step;
-            if *now >= *far {
+            if *now >= *end {
                 let tile = &mut self.slots[row][col];
-                tile.become_surface();
+                tile.mark_as_surface();
                 let (key, top) = (tile.key(), tile.top());
                 if let Some(key) = key {
                     self.tile_blend.begin(key.index, None);
-                    self.renew_maxima(key.index, top);
+                    self.update_maxima(key.index, top);
                 }
             }
-            left -= 1;
-            if left == 0 {
+            remaining -= 1;
+            if remaining == 0 {
                 return;
             }
         }
     }
 
-    /// Records a tile that has arrived in the slot of `index`. It blends in if `settles` is true
+    /// Records a tile that has arrived in the slot of `index`. It blends in if `blends` is true
     /// and the fallback was rendered there. If the same tile was there before, its blend continues.
-    pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
+    pub(super) fn record_arrival(&mut self, index: TileIndex, blends: bool, was_here: bool) {
         let (row, col) = TileBlend::<D>::slot(index);
-        self.tile_blend.has_changed = self.fallback.is_wanted();
+        self.tile_blend.has_changed = self.fallback.is_set();
         if was_here && self.tile_blend.allowed(index) < f32::INFINITY {
             return;
         }
-        let far = match settles && !was_here {
-            true => self.far(self.slots[row][col], index),
+        let end = match blends && !was_here {
+            true => self.max_distance(self.slots[row][col], index),
             false => None,
         };
-        self.tile_blend.begin(index, far);
-        if far.is_none() {
-            self.slots[row][col].become_surface();
+        self.tile_blend.begin(index, end);
+        if end.is_none() {
+            self.slots[row][col].mark_as_surface();
         }
     }
 
     /// Returns the maximum distance of a tile's samples from the coarse fallback, cells; `None` if
     /// no fallback is rendered there.
-    fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
+    fn max_distance(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
         let [lowest, highest] = tile.range()?;
         let [low, high] = self.fallback.loaded()?.range_over(index, tile.base())?;
-        let far = larger(highest - low, high - lowest);
-        (far > 0.0).then_some(far)
+        let distance = larger(highest - low, high - lowest);
+        (distance > 0.0).then_some(distance)
     }
 
     /// Returns the content of a cell of the field whose tile is missing or blends in.
     #[cold]
     #[inline(never)]
-    pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
+    pub(super) fn blended_ground(&self, cell: Cell) -> CellContent {
         let Some(under) = self.fallback.loaded() else {
             return CellContent::Missing;
         };
-        let index = TileIndex::holding(cell);
+        let index = TileIndex::containing(cell);
         let own = self.tile_here(index);
         let base = own.map_or(under.base(), Tile::base);
         let coarse = under.corners(cell, base);
@@ -206,22 +206,22 @@ impl<'t, const D: usize> Window<'t, D> {
             height: coarse,
             is_of_tile: false,
         };
-        let mut most = -1.0;
+        let mut max_allowed = -1.0;
         for west in 0..=i32::from(is_on_border(sample.x)) {
             for south in 0..=i32::from(is_on_border(sample.y)) {
-                let index = TileIndex::holding(sample.offset(-west, -south));
+                let index = TileIndex::containing(sample.offset(-west, -south));
                 let allowed = self.tile_blend.allowed(index);
-                if allowed <= most {
+                if allowed <= max_allowed {
                     continue;
                 }
                 let Some(tile) = self.tile_here(index) else {
                     continue;
                 };
-                most = allowed;
+                max_allowed = allowed;
                 let first = index.first_cell();
                 let (col, row) = (sample.x - first.x, sample.y - first.y);
                 let own =
-                    tile.post(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
+                    tile.sample(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
                 blended = BlendedHeight {
                     height: within(own, coarse, allowed),
                     is_of_tile: true,
@@ -247,18 +247,21 @@ impl<'t, const D: usize> Window<'t, D> {
         let [x, y, _] = place.cell();
         let frac = place.frac();
         // The cell of a place on the far border of its patch may be the next one.
-        let is_far = |at: i32, frac: f32, patch: i32| {
+        let is_past_middle = |at: i32, frac: f32, patch: i32| {
             usize::from(at.wrapping_sub(patch) as f32 + frac >= 0.5)
         };
-        let far = [is_far(x, frac.x, patch.x), is_far(y, frac.y, patch.y)];
-        self.tile_here(TileIndex::holding(patch))?
-            .material(patch, far)
+        let sample = [
+            is_past_middle(x, frac.x, patch.x),
+            is_past_middle(y, frac.y, patch.y),
+        ];
+        self.tile_here(TileIndex::containing(patch))?
+            .material(patch, sample)
     }
 
     /// Returns true if the surface rendered in place of a tile lies below `low`, all over the tile.
     #[cold]
     #[inline(never)]
-    pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
+    pub(super) fn blended_is_below(&self, index: TileIndex, low: Altitude) -> bool {
         let Some(under) = self.fallback.loaded() else {
             return false;
         };

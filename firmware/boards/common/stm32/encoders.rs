@@ -93,9 +93,9 @@ impl<A: Timer, B: Timer, C: Timer, S: Stop> Encoders for TimerEncoders<A, B, C, 
         let measured = self.feedback.measure_ma();
         GuardInputs {
             counts: [
-                x.follow(a.count()),
-                y.follow(b.count()),
-                z.follow(c.count()),
+                x.update(a.count()),
+                y.update(b.count()),
+                z.update(c.count()),
             ],
             dead_man: self.inputs.dead_man.is_low(),
             emergency_stop: self.inputs.emergency_stop.is_pressed(),

@@ -138,8 +138,8 @@ fn stop() {
 /// full one may fail again.
 fn end(kind: CrashKind, record: impl FnOnce() -> CrashRecord) -> ! {
     if !HAS_ENDED.swap(true, Ordering::Relaxed) {
-        keep(CrashRecord::bare(kind));
-        keep(record());
+        store_record(CrashRecord::bare(kind));
+        store_record(record());
     }
     SCB::sys_reset()
 }
@@ -148,7 +148,7 @@ fn ticks() -> u32 {
     TICKS.load(Ordering::Relaxed)
 }
 
-fn keep(record: CrashRecord) {
+fn store_record(record: CrashRecord) {
     let place = &raw mut RECORD;
     // SAFETY: written here only: by `main` before any interrupt is enabled, and by a failed
     // program, which runs no other code afterwards.
@@ -161,7 +161,7 @@ pub(crate) fn take_record() -> Option<Crash> {
     // SAFETY: nothing writes it now, and any bits are valid bytes. Its checksum shows if they are a
     // record.
     let bytes = unsafe { ptr::read_volatile((&raw const RECORD).cast::<Bytes>()) };
-    keep(CrashRecord::NONE);
+    store_record(CrashRecord::NONE);
     CrashRecord::read(&bytes)
 }
 

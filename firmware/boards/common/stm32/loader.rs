@@ -20,7 +20,7 @@ use crate::usb::{LOADER, USB_OSCILLATOR};
 /// Mark that requests the loader; its complement follows it. After a power-up, RAM contains both by
 /// chance once in 2⁶⁴ starts; the loader would then wait, with the amplifiers off, for the next
 /// reset.
-const WANTED: u32 = 0x6F4C_6164;
+const LOADER_REQUEST: u32 = 0x6F4C_6164;
 
 /// Start-up code does not initialise this section.
 #[unsafe(link_section = ".uninit.loader")]
@@ -32,7 +32,7 @@ pub(crate) fn enter() -> ! {
     amplifiers_off();
     let mark = (&raw mut MARK).cast::<[u32; 2]>();
     // SAFETY: nothing else reads or writes it before the reset that follows.
-    unsafe { ptr::write_volatile(mark, [WANTED, !WANTED]) };
+    unsafe { ptr::write_volatile(mark, [LOADER_REQUEST, !LOADER_REQUEST]) };
     // A reset discards data that is only in the data cache.
     write_back(mark as usize, size_of::<[u32; 2]>());
     SCB::sys_reset()
@@ -53,7 +53,7 @@ global_asm!(
     "movs r3, #0",
     "str r3, [r0]",
     "str r3, [r0, #4]",
-    "ldr r3, ={wanted}",
+    "ldr r3, ={request}",
     "cmp r1, r3",
     "bne 1f",
     "mvns r3, r3",
@@ -84,7 +84,7 @@ global_asm!(
     ".ltorg",
     mark = sym MARK,
     fill = sym fill_memories,
-    wanted = const WANTED,
+    request = const LOADER_REQUEST,
     loader = const LOADER,
     oscillator = const USB_OSCILLATOR.0,
     is_on = const USB_OSCILLATOR.1,

@@ -11,7 +11,7 @@ pub(crate) fn set_up(pin: Output<'static>) {
 }
 
 /// Sets the pin's level if it changes after a tick.
-pub(crate) fn follow(haptic_loop: &Loop) {
+pub(crate) fn update(haptic_loop: &Loop) {
     if let Some(is_high) = haptic_loop.mark_edge() {
         chip::set_mark(is_high);
     }

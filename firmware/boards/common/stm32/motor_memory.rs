@@ -28,7 +28,7 @@ pub(crate) fn begin(cause: ResetCause) -> Temperatures {
 }
 
 /// Stores a copy. Called by [`begin`], and then by the haptic interrupt only.
-pub(crate) fn keep((copy, words): (usize, Words)) {
+pub(crate) fn store_copy((copy, words): (usize, Words)) {
     // There are two copies.
     let place = (&raw mut COPIES).cast::<Words>().wrapping_add(copy & 1);
     // SAFETY: the place is one of the two copies. `begin` ends before the interrupt is enabled, and

@@ -35,9 +35,9 @@ static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
 pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
     if let Some((haptic_loop, drive)) = application::tick(slot) {
         heartbeat::beat(&drive);
-        mark_pin::follow(haptic_loop);
-        if let Some(copy) = haptic_loop.motors_to_keep() {
-            motor_memory::keep(copy);
+        mark_pin::update(haptic_loop);
+        if let Some(copy) = haptic_loop.due_motor_copy() {
+            motor_memory::store_copy(copy);
         }
         // Waking a task needs a critical section, so an interrupt of lower priority does it.
         cortex_m::peripheral::NVIC::pend(Interrupt::TIM6_DAC);
@@ -68,7 +68,7 @@ async fn main(spawner: Spawner) {
     };
     failure::log(boot.crash.as_ref());
     let mut led = parts.led;
-    supply::wait_and_watch(&mut led);
+    supply::wait_and_monitor(&mut led);
     heartbeat::set_up(parts.heartbeat);
     mark_pin::set_up(parts.mark);
     let (memory, calibration) = CalibrationMemory::open(parts.flash);

@@ -7,7 +7,7 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::{Duration, Ticker};
 use hapterra_firmware::led::LedPattern;
-use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::monitor::{Monitor, WatchedPart};
 
 use super::{stack, usb_clock};
 use crate::chip::{self, WatchdogTimer};
@@ -33,8 +33,8 @@ pub(crate) async fn supervise(
     let mut ms = 0_u32;
     loop {
         ticker.next().await;
-        chip::let_a_halt_stop_the_arm();
-        if monitor.may_feed_watchdog(&[Part::Tick, Part::Link, Part::Usb]) {
+        chip::set_debug_freeze();
+        if monitor.may_feed_watchdog(&[WatchedPart::Tick, WatchedPart::Link, WatchedPart::Usb]) {
             watchdog.pet();
         }
         if ms.is_multiple_of(MEASURE_MS) {

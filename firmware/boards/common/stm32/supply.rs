@@ -24,7 +24,7 @@ const FLICKER_CYCLES: u32 = Clock::HZ / 20;
 /// Waits until the supply is high enough by the comparator, which is on already, and monitors it
 /// from then on. Meanwhile the LED flickers, the amplifiers are off, and the watchdog does not run
 /// yet.
-pub(crate) fn wait_and_watch(led: &mut Output<'_>) {
+pub(crate) fn wait_and_monitor(led: &mut Output<'_>) {
     cortex_m::asm::delay(SETTLE_CYCLES);
     while supply_is_low() {
         let is_lit = (DWT::cycle_count() / FLICKER_CYCLES).is_multiple_of(2);

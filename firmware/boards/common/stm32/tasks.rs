@@ -10,7 +10,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::Refusal;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
-use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::monitor::{Monitor, WatchedPart};
 use hapterra_firmware::usb::{BulkStream, EndpointFilter};
 
 use super::calibration_memory::CalibrationMemory;
@@ -21,7 +21,7 @@ use crate::chip::{UsbDriver, WINDOW};
 use crate::usb::EndpointHalts;
 
 /// Time for the host to fetch the answer before the board enters its loader.
-const FAREWELL: Duration = Duration::from_millis(50);
+const LOADER_DELAY: Duration = Duration::from_millis(50);
 
 /// Board for the link's task. A real board continues to tick independently of the link.
 struct Board {
@@ -37,10 +37,10 @@ impl LinkBoard for Board {
 
     fn after_poll<const D: usize>(&self, link: &Link<'_, D>) {
         LED.lock(|led| led.set(link.led_pattern()));
-        if link.enters_loader() {
+        if link.is_loader_due() {
             let since = self.leaving.get().unwrap_or_else(Instant::now);
             self.leaving.set(Some(since));
-            if since.elapsed() >= FAREWELL {
+            if since.elapsed() >= LOADER_DELAY {
                 loader::enter();
             }
         }
@@ -75,7 +75,7 @@ pub(crate) async fn serve_usb(
     let checking_in = async {
         let mut ticker = Ticker::every(Duration::from_millis(CHECK_MS.into()));
         loop {
-            monitor.check_in(Part::Usb);
+            monitor.check_in(WatchedPart::Usb);
             ticker.next().await;
         }
     };

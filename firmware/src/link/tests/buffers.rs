@@ -14,7 +14,7 @@ use hapterra_core::wire::status::{BootReport, CalibrationSource};
 
 use super::rig::{D, HELLO, frame, scene, tile};
 use crate::app::{TileBuffers, WorkingMemory};
-use crate::link::{DeviceState, KnownArm, Link};
+use crate::link::{ArmConfig, DeviceState, Link};
 use crate::native::{FULL_SCALE_A, StoppedClock};
 use crate::queues::{LoopEnds, QueuedTick, SPARES};
 
@@ -23,7 +23,7 @@ pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
     let tiles = Box::leak(Box::new(TileBuffers::<D>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));
     let (loop_ends, link_ends) = memory.queues.split();
-    let arm = KnownArm {
+    let arm = ArmConfig {
         calibration: None,
         source: CalibrationSource::None,
         full_scale_a: FULL_SCALE_A,
@@ -46,7 +46,7 @@ pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
 }
 
 /// Polls the link and returns the tiles that it requests.
-fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
+fn requested_tiles(link: &mut Link<'static, D>) -> Vec<TileKey> {
     link.poll();
     let mut reader = FrameReader::<2048>::new();
     let mut bytes = [0; 4096];
@@ -54,7 +54,7 @@ fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
     let mut rest = &bytes[..n];
     let mut keys = Vec::new();
     while !rest.is_empty() {
-        let (taken, frame) = reader.push(rest);
+        let (consumed, frame) = reader.push(rest);
         let content = frame.map(|f| f.and_then(decode));
         if let Some(Ok(InSession {
             message: ToHost::TileRequest { key, .. },
@@ -63,7 +63,7 @@ fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
         {
             keys.push(key);
         }
-        rest = &rest[taken..];
+        rest = &rest[consumed..];
     }
     keys
 }
@@ -99,7 +99,7 @@ fn tile_requests_never_exceed_free_buffers() {
     // The loop sleeps: no buffer returns, wherever the HIP moves.
     for column in 0..12 {
         assert!(loop_ends.records.enqueue(at(column)).is_ok());
-        for key in asked(&mut link) {
+        for key in requested_tiles(&mut link) {
             total += 1;
             answer(&mut link, key);
         }
@@ -112,17 +112,20 @@ fn tile_requests_never_exceed_free_buffers() {
         tile.vacate();
         assert!(loop_ends.spent.enqueue(tile).is_ok());
     }
-    assert!(!asked(&mut link).is_empty());
+    assert!(!requested_tiles(&mut link).is_empty());
 }
 
 #[test]
 fn rejected_tile_is_requested_again() {
     let (mut link, mut loop_ends) = link();
-    let first = asked(&mut link);
+    let first = requested_tiles(&mut link);
     answer(&mut link, first[0]);
-    assert!(!asked(&mut link).contains(&first[0]), "it is thought held");
+    assert!(
+        !requested_tiles(&mut link).contains(&first[0]),
+        "it is thought held"
+    );
     for tile in tiles_handed_over(&mut loop_ends) {
         assert!(loop_ends.spent.enqueue(tile).is_ok());
     }
-    assert!(asked(&mut link).contains(&first[0]));
+    assert!(requested_tiles(&mut link).contains(&first[0]));
 }

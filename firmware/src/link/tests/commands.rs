@@ -18,13 +18,13 @@ fn jog_is_answered_while_fourteen_commands_wait() {
         hold_ms: 10,
     };
     let mut rig = Rig::new();
-    rig.say(&ToDevice::Hello(HELLO));
+    rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(1);
     // All of it arrives before the loop takes a command.
     for _ in 0..14 {
-        rig.ask(Request::Disarm);
+        rig.request(Request::Disarm);
     }
-    rig.ask(Request::Jog(jog));
+    rig.request(Request::Jog(jog));
     rig.run(2_000);
     let answers = rig.answers(|request| matches!(request, Request::Jog(_)));
     assert_eq!(answers.len(), 1, "{answers:?}");
@@ -34,8 +34,8 @@ fn jog_is_answered_while_fourteen_commands_wait() {
 fn scene_that_the_loop_refuses_is_dropped_by_the_link() {
     let (mut link, mut loop_ends) = link();
     let mut report = |link: &mut crate::link::Link<'static, _>, epoch| {
-        let taken = core::iter::from_fn(|| loop_ends.commands.dequeue());
-        let dropped = taken
+        let accepted = core::iter::from_fn(|| loop_ends.commands.dequeue());
+        let dropped = accepted
             .filter(|command| matches!(command, Command::DropScene))
             .count();
         link.poll();

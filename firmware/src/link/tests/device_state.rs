@@ -37,29 +37,29 @@ fn arming_reports_each_mode_from_disarmed_to_armed() {
     };
     let mut modes: std::vec::Vec<Mode> = rig.received.iter().filter_map(guard).collect();
     modes.dedup();
-    let way = [
+    let modes_seen = [
         Mode::Disarmed,
         Mode::Requested,
         Mode::Confirming,
         Mode::Ramping,
         Mode::Armed,
     ];
-    assert_eq!(modes, way);
+    assert_eq!(modes, modes_seen);
     assert_eq!(rig.report().map(|r| r.blockers), Some(Blockers::empty()));
     assert!(rig.device.tick(rig.sense).enabled);
 }
 
 #[test]
-fn an_arm_command_that_cannot_be_obeyed_is_refused_by_name() {
+fn impossible_arm_request_is_refused_with_its_reason() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(10);
-    rig.ask(Request::Arm);
+    rig.request(Request::Arm);
     rig.run(100);
     let refused = Err(Refusal::Blocked(Blockers::NOT_ZEROED));
     assert_eq!(rig.answers(TO_ARM), [refused]);
-    rig.ask(Request::DropScene);
-    rig.ask(Request::Zero { counts: [0; 3] });
-    rig.ask(Request::Arm);
+    rig.request(Request::DropScene);
+    rig.request(Request::Zero { counts: [0; 3] });
+    rig.request(Request::Arm);
     rig.run(100);
     let refused = Err(Refusal::Blocked(Blockers::NO_SCENE));
     assert_eq!(rig.answers(TO_ARM)[1..], [refused]);
@@ -67,7 +67,7 @@ fn an_arm_command_that_cannot_be_obeyed_is_refused_by_name() {
 }
 
 #[test]
-fn a_fault_is_latched_reported_and_cleared_on_request() {
+fn fault_is_latched_reported_and_cleared_on_request() {
     let mut rig = Rig::armed();
     rig.sense.counts = [5000, 0, 0];
     rig.run(20);
@@ -77,13 +77,17 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
     // Another fault, or none, was seen: this one stays.
-    for seen in [None, Some(Fault::Hardware)] {
-        rig.ask(Request::ClearFault { seen });
+    for acknowledged in [None, Some(Fault::Hardware)] {
+        rig.request(Request::ClearFault {
+            fault: acknowledged,
+        });
         rig.run(30);
         assert_eq!(fault(&rig), Some(Fault::EncoderJump));
     }
-    let seen = Some(Fault::EncoderJump);
-    rig.ask(Request::ClearFault { seen });
+    let acknowledged = Some(Fault::EncoderJump);
+    rig.request(Request::ClearFault {
+        fault: acknowledged,
+    });
     rig.run(30);
     assert_eq!(fault(&rig), None);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
@@ -96,9 +100,9 @@ fn a_fault_is_latched_reported_and_cleared_on_request() {
 #[test]
 fn settings_do_not_change_while_armed() {
     let mut rig = Rig::armed();
-    rig.ask(set(Calibration::PREMIUM_3_0));
-    rig.ask(Request::StoreCalibration);
-    rig.ask(Request::Zero { counts: [5; 3] });
+    rig.request(set(Calibration::PREMIUM_3_0));
+    rig.request(Request::StoreCalibration);
+    rig.request(Request::Zero { counts: [5; 3] });
     rig.run(5);
     let refused = Err(Refusal::NotWhileArmed);
     assert_eq!(rig.answers(TO_SET), [refused]);
@@ -109,7 +113,7 @@ fn settings_do_not_change_while_armed() {
 }
 
 #[test]
-fn a_calibration_is_checked_put_in_force_and_stored() {
+fn calibration_is_checked_applied_and_stored() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(5);
     assert_eq!(rig.status().calibration, CalibrationSource::Stored);
@@ -117,7 +121,7 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
         l1_mm: -1.0,
         ..Calibration::PREMIUM_3_0
     };
-    rig.ask(set(bad));
+    rig.request(set(bad));
     rig.run(5);
     let [Err(Refusal::Calibration(why))] = rig.answers(TO_SET)[..] else {
         panic!("{:?}", rig.answers(TO_SET));
@@ -125,7 +129,7 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
     assert_eq!(why.field, CalibrationField::L1);
     assert_eq!(rig.status().model, Some(Model::Premium15), "as before");
 
-    rig.ask(set(Calibration::PREMIUM_3_0));
+    rig.request(set(Calibration::PREMIUM_3_0));
     rig.run(5);
     let status = rig.status();
     assert_eq!(status.calibration, CalibrationSource::Session);
@@ -133,14 +137,14 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
     let stored = Stored::Found(Calibration::PREMIUM_1_5);
     assert_eq!(*rig.device.memory(), stored);
 
-    rig.ask(Request::StoreCalibration);
+    rig.request(Request::StoreCalibration);
     rig.press();
     assert_eq!(rig.answers(TO_STORE), [Ok(())]);
     assert_eq!(rig.status().calibration, CalibrationSource::Stored);
     let stored = Stored::Found(Calibration::PREMIUM_3_0);
     assert_eq!(*rig.device.memory(), stored);
     for number in [7, 255, 0] {
-        rig.say(&ToDevice::GetCalibration { number });
+        rig.send_message(&ToDevice::GetCalibration { number });
         rig.run(1);
         let got = ToHost::Calibration {
             number,
@@ -154,11 +158,11 @@ fn a_calibration_is_checked_put_in_force_and_stored() {
 fn calibration_store_times_out_without_deadman_press() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     let before = Stored::Found(Calibration::PREMIUM_1_5);
-    rig.ask(set(Calibration::PREMIUM_3_0));
-    rig.ask(Request::StoreCalibration);
+    rig.request(set(Calibration::PREMIUM_3_0));
+    rig.request(Request::StoreCalibration);
     for _ in 0..9 {
         rig.run(1_100);
-        rig.say(&ToDevice::Heartbeat);
+        rig.send_message(&ToDevice::Heartbeat);
     }
     assert_eq!(rig.answers(TO_STORE), [], "it may take its time");
     rig.run(400);
@@ -172,25 +176,25 @@ fn calibration_store_times_out_without_deadman_press() {
 #[test]
 fn calibration_change_is_refused_while_store_awaits_press() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
-    rig.ask(Request::StoreCalibration);
-    rig.ask(set(Calibration::PREMIUM_1_0));
+    rig.request(Request::StoreCalibration);
+    rig.request(set(Calibration::PREMIUM_1_0));
     rig.run(5);
     assert_eq!(rig.answers(TO_SET), [Err(Refusal::Busy)]);
 }
 
 #[test]
-fn a_press_for_another_host_or_to_arm_stores_nothing() {
+fn press_for_another_host_or_to_arm_stores_nothing() {
     let before = Stored::Found(Calibration::PREMIUM_1_5);
     let others: [fn(&mut Rig); 3] = [
-        Rig::greet_anew,
-        |rig| rig.say(&ToDevice::Bye),
-        |rig| rig.ask(Request::Arm),
+        Rig::open_new_session,
+        |rig| rig.send_message(&ToDevice::Bye),
+        |rig| rig.request(Request::Arm),
     ];
     for (index, other) in others.into_iter().enumerate() {
         let mut rig = Rig::in_scene(scene(Source::Encoders));
-        rig.ask(Request::Zero { counts: [0; 3] });
-        rig.ask(set(Calibration::PREMIUM_3_0));
-        rig.ask(Request::StoreCalibration);
+        rig.request(Request::Zero { counts: [0; 3] });
+        rig.request(set(Calibration::PREMIUM_3_0));
+        rig.request(Request::StoreCalibration);
         rig.run(200);
         other(&mut rig);
         rig.run(20);
@@ -200,15 +204,15 @@ fn a_press_for_another_host_or_to_arm_stores_nothing() {
 }
 
 #[test]
-fn while_something_waits_for_a_press_time_does_not_stand_still() {
+fn clock_does_not_stop_while_a_press_is_awaited() {
     let mut rig = Rig::new();
-    rig.say(&ToDevice::Hello(super::rig::HELLO));
-    rig.ask(set(Calibration::PREMIUM_3_0));
-    rig.ask(Request::StoreCalibration);
+    rig.send_message(&ToDevice::Hello(super::rig::HELLO));
+    rig.request(set(Calibration::PREMIUM_3_0));
+    rig.request(Request::StoreCalibration);
     rig.run(10);
-    assert!(!rig.device.link.may_stand_still());
+    assert!(!rig.device.link.may_stop_clock());
     rig.run(10_200);
-    assert!(rig.device.link.may_stand_still());
+    assert!(rig.device.link.may_stop_clock());
 }
 
 /// A record's limits do not justify its own values: each value is refused by name when the record
@@ -231,8 +235,8 @@ fn record_above_absolute_limit_is_refused_and_raises_fault() {
         let mut record = Calibration::PREMIUM_1_5;
         raise(&mut record);
         let mut rig = Rig::in_scene(scene(Source::Encoders));
-        rig.ask(set(record));
-        rig.ask(Request::StoreCalibration);
+        rig.request(set(record));
+        rig.request(Request::StoreCalibration);
         rig.press();
         let [Err(Refusal::Calibration(why))] = rig.answers(TO_SET)[..] else {
             panic!("{:?}", rig.answers(TO_SET));
@@ -246,8 +250,8 @@ fn record_above_absolute_limit_is_refused_and_raises_fault() {
         // The same, as an older firmware may have stored it.
         for stored in [Stored::Found(record), Stored::Refused(why)] {
             let mut rig = Rig::started(stored, BootReport::default());
-            rig.say(&ToDevice::Hello(super::rig::HELLO));
-            rig.say(&ToDevice::Scene(scene(Source::Encoders)));
+            rig.send_message(&ToDevice::Hello(super::rig::HELLO));
+            rig.send_message(&ToDevice::Scene(scene(Source::Encoders)));
             rig.run(5);
             let status = rig.status();
             assert_eq!(status.calibration, CalibrationSource::Refused(why));
@@ -288,8 +292,8 @@ fn boot_faults_are_reported_and_block_arming() {
     ];
     for (stored, boot, fault) in found {
         let mut rig = Rig::started(stored, boot.clone());
-        rig.say(&ToDevice::Hello(super::rig::HELLO));
-        rig.say(&ToDevice::Scene(scene(Source::Encoders)));
+        rig.send_message(&ToDevice::Hello(super::rig::HELLO));
+        rig.send_message(&ToDevice::Scene(scene(Source::Encoders)));
         rig.run(5);
         let status = rig.status();
         assert_eq!(status.boot, boot);
@@ -309,24 +313,24 @@ fn boot_faults_are_reported_and_block_arming() {
 #[test]
 fn close_is_confirmed_after_force_fade_and_scene_drop() {
     let mut rig = Rig::armed();
-    rig.say(&ToDevice::Bye);
+    rig.send_message(&ToDevice::Bye);
     let answered = |rig: &Rig| rig.received.iter().any(|m| matches!(m, ToHost::Goodbye(_)));
     let (mut ticks, mut on) = (0, 0);
     while !answered(&rig) {
         rig.run(1);
         ticks += 1;
-        on += u32::from(rig.report().is_some_and(|r| r.mode.drives()));
+        on += u32::from(rig.report().is_some_and(|r| r.mode.is_driving()));
         assert!(ticks < 400, "for ever");
     }
     assert!((90..=102).contains(&on), "{on}");
     assert!((on..on + 105).contains(&ticks), "{ticks}");
     assert!(!rig.device.tick(rig.sense).enabled);
     assert!(!rig.device.link.has_ended(), "the host may have missed it");
-    rig.say(&ToDevice::Close);
+    rig.send_message(&ToDevice::Close);
     rig.run(1);
     assert!(rig.device.link.has_ended());
     rig.received.clear();
-    rig.greet_anew();
+    rig.open_new_session();
     rig.run(2);
     let ToHost::Hello(hello) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
@@ -338,11 +342,11 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
 #[test]
 fn clock_keeps_running_while_force_fades_out() {
     let mut rig = Rig::armed();
-    rig.ask(Request::DropScene);
+    rig.request(Request::DropScene);
     let mut ticks = 0;
     loop {
         rig.run(1);
-        if rig.device.link.may_stand_still() {
+        if rig.device.link.may_stop_clock() {
             break;
         }
         ticks += 1;
@@ -365,7 +369,7 @@ fn stalled_link_task_disables_output_within_forty_ms() {
 }
 
 #[test]
-fn the_status_at_its_longest_fits_its_place() {
+fn longest_status_fits_its_buffer() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.sense.counts = [i32::MIN; 3];
     rig.run(200);

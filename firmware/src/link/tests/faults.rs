@@ -10,10 +10,10 @@ use hapterra_core::terrain::RETRY_TICKS;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
-use hapterra_core::wire::session::{ONLY_LOOKS, SessionEnd, SessionNumber};
+use hapterra_core::wire::session::{READ_ONLY_SILENCE_S, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
-use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
+use super::rig::{FIRST, HELLO, Rig, frame, framed, point, scene, tile, version_query};
 
 /// Returns the forces of a descent's points, without ticks and costs.
 fn forces(rendered: &[(u32, TickRecord)]) -> Vec<(u32, hapterra_core::Vec3)> {
@@ -28,31 +28,31 @@ fn undisturbed() -> Vec<(u32, hapterra_core::Vec3)> {
 fn other_protocol_is_refused_with_device_protocol_number() {
     let mut rig = Rig::new();
     // A host of protocol 3 sends its open message and continues in its own protocol.
-    rig.send(&asked(3));
+    rig.send(&version_query(3));
     rig.send(&[1, 7, 0, 0]);
     rig.run(3);
     assert_eq!(rig.received, []);
     let refused = VersionCheck::Refused { protocol: PROTOCOL };
     assert_eq!(rig.refused, [refused]);
     // A later host also sends the query, whatever its open message is.
-    rig.send(&asked(PROTOCOL + 1));
-    rig.say(&ToDevice::Hello(HostHello {
+    rig.send(&version_query(PROTOCOL + 1));
+    rig.send_message(&ToDevice::Hello(HostHello {
         protocol: PROTOCOL + 1,
         ..HELLO
     }));
     rig.run(1);
     assert_eq!((rig.refused.len(), rig.received.len()), (3, 0));
-    rig.send(&asked(PROTOCOL));
-    rig.say(&ToDevice::Hello(HELLO));
+    rig.send(&version_query(PROTOCOL));
+    rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(1);
     assert!(matches!(rig.received[0], ToHost::Hello(_)));
     assert_eq!(rig.refused.len(), 3, "the hello is the answer");
 }
 
 #[test]
-fn a_host_of_another_protocol_does_not_end_a_session() {
+fn host_of_another_protocol_does_not_end_a_session() {
     let mut rig = Rig::in_scene(scene(Source::Points));
-    rig.send(&asked(3));
+    rig.send(&version_query(3));
     assert_eq!(forces(&rig.descend(40)), undisturbed());
     assert_eq!(rig.refused.len(), 1);
 }
@@ -81,15 +81,15 @@ fn messages_of_another_session_are_ignored() {
 }
 
 #[test]
-fn a_hello_that_is_repeated_changes_nothing() {
+fn repeated_hello_changes_nothing() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(100);
     for _ in 0..5 {
-        rig.say(&ToDevice::Hello(HELLO));
+        rig.send_message(&ToDevice::Hello(HELLO));
         rig.run(33);
     }
-    rig.ask(Request::Disarm);
-    rig.say(&ToDevice::Hello(HELLO));
+    rig.request(Request::Disarm);
+    rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(30);
     let mut next = 0;
     for telemetry in rig.telemetry() {
@@ -99,7 +99,7 @@ fn a_hello_that_is_repeated_changes_nothing() {
     assert!(next > 250, "{next}");
     // The request was done once before the open message and is known after it.
     rig.number -= 1;
-    rig.ask(Request::Disarm);
+    rig.request(Request::Disarm);
     rig.run(1);
     assert_eq!(rig.answers(|r| matches!(r, Request::Disarm)), [Ok(()); 2]);
 }
@@ -108,7 +108,7 @@ fn a_hello_that_is_repeated_changes_nothing() {
 fn open_of_previous_session_is_answered_as_replaced() {
     let mut rig = Rig::armed();
     let first = rig.session;
-    rig.greet_anew();
+    rig.open_new_session();
     rig.run(20);
     let received = rig.received.len();
     for number in [7, 7, 8] {
@@ -128,8 +128,8 @@ fn open_of_previous_session_is_answered_as_replaced() {
     }
     rig.run(300);
     let end = SessionEnd::Replaced;
-    let over = [7, 7, 8].map(|number| (first, ToHost::SessionClosed { number, end }));
-    assert_eq!(rig.received_before, over);
+    let closed = [7, 7, 8].map(|number| (first, ToHost::SessionClosed { number, end }));
+    assert_eq!(rig.received_before, closed);
     let telemetry = |m: &&ToHost| matches!(m, ToHost::Telemetry(_) | ToHost::TileRequest { .. });
     let of_the_present = &rig.received[received..];
     assert!(of_the_present.iter().all(|m| telemetry(&m)));
@@ -144,40 +144,40 @@ fn session_closed_answers_silent_host_but_not_departed_host() {
         silence_s: 5,
         ..HELLO
     };
-    rig.say(&ToDevice::Hello(hello));
+    rig.send_message(&ToDevice::Hello(hello));
     rig.run(5_200);
-    let over = |rig: &mut Rig, number| {
+    let closed = |rig: &mut Rig, number| {
         rig.received_before.clear();
-        rig.say(&ToDevice::Hello(HostHello { number, ..HELLO }));
+        rig.send_message(&ToDevice::Hello(HostHello { number, ..HELLO }));
         rig.run(1);
         rig.received_before.clone()
     };
     let end = SessionEnd::HostSilent;
     let reported = (rig.session, ToHost::SessionClosed { number: 3, end });
-    assert_eq!(over(&mut rig, 3), [reported]);
+    assert_eq!(closed(&mut rig, 3), [reported]);
     // A leaving host needs only the answer to its close.
-    rig.say(&ToDevice::Bye);
-    assert_eq!(over(&mut rig, 4), []);
+    rig.send_message(&ToDevice::Bye);
+    assert_eq!(closed(&mut rig, 4), []);
     rig.run(250);
     assert!(matches!(rig.received.last(), Some(ToHost::Goodbye(_))));
-    assert_eq!(over(&mut rig, 5), []);
-    rig.say(&ToDevice::Close);
-    assert_eq!(over(&mut rig, 6), []);
+    assert_eq!(closed(&mut rig, 5), []);
+    rig.send_message(&ToDevice::Close);
+    assert_eq!(closed(&mut rig, 6), []);
     let mut rig = Rig::armed();
-    rig.say(&ToDevice::Detach);
-    assert_eq!(over(&mut rig, 7), []);
+    rig.send_message(&ToDevice::Detach);
+    assert_eq!(closed(&mut rig, 7), []);
 }
 
 #[test]
 fn duplicate_request_is_executed_once() {
     let mut rig = Rig::armed();
-    rig.ask(Request::Disarm);
+    rig.request(Request::Disarm);
     let disarm = rig.number;
     rig.run(200);
     rig.arm();
     // A duplicate of an earlier request arrives late.
     let request = Request::Disarm;
-    rig.say(&ToDevice::Request {
+    rig.send_message(&ToDevice::Request {
         number: disarm,
         request,
     });
@@ -187,7 +187,7 @@ fn duplicate_request_is_executed_once() {
     let arms = |rig: &Rig| rig.answers(|r| matches!(r, Request::Arm)).len();
     let before = arms(&rig);
     let (number, request) = (rig.number, Request::Arm);
-    rig.say(&ToDevice::Request { number, request });
+    rig.send_message(&ToDevice::Request { number, request });
     rig.run(1);
     assert_eq!(arms(&rig), before + 1);
 }
@@ -196,7 +196,7 @@ fn duplicate_request_is_executed_once() {
 fn numbers_of_requests_wrap_around() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     for _ in 0..600 {
-        rig.ask(Request::ClearFault { seen: None });
+        rig.request(Request::ClearFault { fault: None });
         rig.run(1);
     }
     let answers = |m: &&ToHost| matches!(m, ToHost::Answer(_));
@@ -210,13 +210,13 @@ fn host_silence_disarms_after_host_time_out() {
         silence_s: 7,
         ..HELLO
     };
-    rig.say(&ToDevice::Hello(hello));
+    rig.send_message(&ToDevice::Hello(hello));
     rig.run(1);
     for _ in 0..6_900 {
         assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
     }
     // A frame of this session restarts the host's time-out.
-    rig.say(&ToDevice::Heartbeat);
+    rig.send_message(&ToDevice::Heartbeat);
     rig.run(1);
     let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
     let on = on.count();
@@ -225,7 +225,7 @@ fn host_silence_disarms_after_host_time_out() {
         "{on}: seven seconds, and to fade out"
     );
     rig.received.clear();
-    rig.greet_anew();
+    rig.open_new_session();
     rig.run(5);
     let ToHost::Hello(device) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
@@ -238,31 +238,34 @@ fn host_silence_disarms_after_host_time_out() {
 #[test]
 fn read_only_host_opens_no_session_and_keeps_none_armed() {
     let mut rig = Rig::armed();
-    rig.say(&ToDevice::Hello(HostHello {
+    rig.send_message(&ToDevice::Hello(HostHello {
         silence_s: 5,
         ..HELLO
     }));
     rig.run(1);
-    let looker = SessionNumber::new(99 << 8);
-    (rig.looker, rig.answers_tiles) = (Some(looker), false);
-    let looks = HostHello {
-        silence_s: ONLY_LOOKS,
+    let read_only_session = SessionNumber::new(99 << 8);
+    (rig.read_only_session, rig.answers_tiles) = (Some(read_only_session), false);
+    let read_only_hello = HostHello {
+        silence_s: READ_ONLY_SILENCE_S,
         ..HELLO
     };
     for second in 0..6 {
-        rig.send(&framed(looker, &ToDevice::Hello(looks)));
+        rig.send(&framed(
+            read_only_session,
+            &ToDevice::Hello(read_only_hello),
+        ));
         for message in [
             ToDevice::Status { number: 0 },
             ToDevice::GetCalibration { number: 0 },
             ToDevice::Heartbeat,
         ] {
-            rig.send(&framed(looker, &message));
+            rig.send(&framed(read_only_session, &message));
         }
         rig.run(999);
         let on = rig.device.tick(rig.sense).enabled;
         assert_eq!(on, second < 5, "second {second}");
     }
-    let answers = rig.looked_at.iter().map(|message| match message {
+    let answers = rig.read_only_answers.iter().map(|message| match message {
         ToHost::Hello(_) => 'h',
         ToHost::Status { .. } => 's',
         ToHost::Calibration { .. } => 'c',
@@ -270,9 +273,9 @@ fn read_only_host_opens_no_session_and_keeps_none_armed() {
     });
     assert_eq!(answers.collect::<std::string::String>(), "hsc".repeat(6));
     // It requests nothing, and the session before is the one that was left.
-    rig.send(&framed(looker, &ToDevice::Bye));
+    rig.send(&framed(read_only_session, &ToDevice::Bye));
     rig.received.clear();
-    rig.greet_anew();
+    rig.open_new_session();
     rig.run(5);
     let ToHost::Hello(device) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
@@ -282,29 +285,29 @@ fn read_only_host_opens_no_session_and_keeps_none_armed() {
 }
 
 #[test]
-fn the_time_for_silence_has_bounds() {
-    for (named, least, most) in [(0, 5_000, 5_110), (1, 5_000, 5_110)] {
+fn host_silence_time_is_clamped() {
+    for (named, min, max) in [(0, 5_000, 5_110), (1, 5_000, 5_110)] {
         let mut rig = Rig::armed();
-        rig.say(&ToDevice::Hello(HostHello {
+        rig.send_message(&ToDevice::Hello(HostHello {
             silence_s: named,
             ..HELLO
         }));
         rig.run(1);
         let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
         let on = on.count();
-        assert!((least..most).contains(&on), "{on}");
+        assert!((min..max).contains(&on), "{on}");
     }
 }
 
 #[test]
 fn heartbeats_keep_session_armed() {
     let mut rig = Rig::armed();
-    rig.say(&ToDevice::Hello(HostHello {
+    rig.send_message(&ToDevice::Hello(HostHello {
         silence_s: 5,
         ..HELLO
     }));
     for _ in 0..40 {
-        rig.say(&ToDevice::Heartbeat);
+        rig.send_message(&ToDevice::Heartbeat);
         rig.run(500);
     }
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
@@ -313,7 +316,7 @@ fn heartbeats_keep_session_armed() {
 /// Returns the answer that a new host receives to its open message.
 fn greeted(rig: &mut Rig) -> DeviceHello {
     rig.received.clear();
-    rig.greet_anew();
+    rig.open_new_session();
     rig.run(5);
     match &rig.received[0] {
         ToHost::Hello(device) => device.clone(),
@@ -322,13 +325,13 @@ fn greeted(rig: &mut Rig) -> DeviceHello {
 }
 
 /// Opens and detaches a session without any request.
-fn look(rig: &mut Rig, silence_s: u16) {
-    rig.greet_anew();
-    rig.say(&ToDevice::Hello(HostHello { silence_s, ..HELLO }));
+fn open_and_detach(rig: &mut Rig, silence_s: u16) {
+    rig.open_new_session();
+    rig.send_message(&ToDevice::Hello(HostHello { silence_s, ..HELLO }));
     rig.run(1);
     for _ in 0..2 {
         rig.received.clear();
-        rig.say(&ToDevice::Detach);
+        rig.send_message(&ToDevice::Detach);
         rig.run(1);
         assert!(
             rig.received.contains(&ToHost::Detached),
@@ -342,9 +345,9 @@ fn look(rig: &mut Rig, silence_s: u16) {
 fn detached_sessions_keep_arm_armed_and_last_report_intact() {
     let mut rig = Rig::armed();
     let first = rig.session;
-    look(&mut rig, 60);
+    open_and_detach(&mut rig, 60);
     let second = rig.session;
-    look(&mut rig, 60);
+    open_and_detach(&mut rig, 60);
     rig.run(500);
     assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
     // Its own late open message does not open it again, and neither does that of the previous
@@ -371,7 +374,7 @@ fn detached_sessions_keep_arm_armed_and_last_report_intact() {
 #[test]
 fn silence_after_detach_disarms_after_time_out() {
     let mut rig = Rig::armed();
-    look(&mut rig, 7);
+    open_and_detach(&mut rig, 7);
     let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
     let on = on.count();
     assert!((6_990..7_110).contains(&on), "{on}");
@@ -382,19 +385,19 @@ fn silence_after_detach_disarms_after_time_out() {
 #[test]
 fn detached_host_arms_nothing_and_later_close_disarms() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
-    rig.ask(Request::Zero { counts: [0; 3] });
-    rig.ask(Request::Arm);
+    rig.request(Request::Zero { counts: [0; 3] });
+    rig.request(Request::Arm);
     rig.run(10);
-    rig.say(&ToDevice::Detach);
+    rig.send_message(&ToDevice::Detach);
     rig.run(10);
     rig.sense.dead_man = true;
     for _ in 0..3_000 {
         assert!(!rig.device.tick(rig.sense).enabled);
     }
     let mut rig = Rig::armed();
-    rig.say(&ToDevice::Detach);
+    rig.send_message(&ToDevice::Detach);
     rig.run(10);
-    rig.say(&ToDevice::Bye);
+    rig.send_message(&ToDevice::Bye);
     rig.run(250);
     assert!(matches!(rig.received.last(), Some(ToHost::Goodbye(_))));
     assert!(!rig.device.tick(rig.sense).enabled);
@@ -404,12 +407,12 @@ fn detached_host_arms_nothing_and_later_close_disarms() {
 #[test]
 fn pending_arm_request_ends_with_its_session() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
-    rig.ask(Request::Zero { counts: [0; 3] });
-    rig.ask(Request::Arm);
+    rig.request(Request::Zero { counts: [0; 3] });
+    rig.request(Request::Arm);
     rig.run(10);
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Requested));
-    rig.greet_anew();
-    rig.say(&ToDevice::Scene(scene(Source::Encoders)));
+    rig.open_new_session();
+    rig.send_message(&ToDevice::Scene(scene(Source::Encoders)));
     rig.run(5);
     rig.sense.dead_man = true;
     rig.run(3_000);
@@ -422,7 +425,7 @@ fn heartbeat_answer_counts_samples_sent_before() {
     rig.run(100);
     for ticks in 1..40 {
         rig.run(ticks % 7);
-        rig.say(&ToDevice::Heartbeat);
+        rig.send_message(&ToDevice::Heartbeat);
     }
     rig.run(20);
     let (mut sent, mut answers) = (0, 0);
@@ -444,7 +447,7 @@ fn heartbeat_answer_counts_samples_sent_before() {
 fn repeated_close_gets_same_answer_and_ends_requests() {
     let mut rig = Rig::armed();
     for _ in 0..3 {
-        rig.say(&ToDevice::Bye);
+        rig.send_message(&ToDevice::Bye);
         rig.run(250);
     }
     let goodbyes: Vec<_> = rig
@@ -455,22 +458,22 @@ fn repeated_close_gets_same_answer_and_ends_requests() {
     assert_eq!(goodbyes.len(), 3);
     assert!(goodbyes.windows(2).all(|pair| pair[0] == pair[1]));
     // After that, no message of the session is handled.
-    rig.ask(Request::Arm);
+    rig.request(Request::Arm);
     rig.run(100);
     assert_eq!(rig.answers(|r| matches!(r, Request::Arm)).len(), 1);
 }
 
 #[test]
 fn damaged_frames_trigger_no_repeated_tile_requests() {
-    let mut rig = Rig::asking(scene(Source::Encoders));
+    let mut rig = Rig::with_unanswered_tiles(scene(Source::Encoders));
     rig.run(5);
-    let asked = rig.needs().len();
-    assert!(asked > 0);
+    let requested = rig.tile_requests().len();
+    assert!(requested > 0);
     for _ in 0..50 {
         rig.send(&[5, 5, 5, 0]);
         rig.run(1);
     }
-    assert_eq!(rig.needs().len(), asked);
+    assert_eq!(rig.tile_requests().len(), requested);
     assert_eq!(rig.status().bad_frames, 50);
 }
 
@@ -487,8 +490,8 @@ fn messages_before_open_are_ignored() {
 fn damaged_tile_is_requested_again_and_forces_are_unchanged() {
     // One damaged bit in each rig; all bits would be 35,000 rigs.
     for bit in (0..8 * 4370).step_by(997) {
-        let mut rig = Rig::asking(scene(Source::Points));
-        let mut bytes = tile(7, rig.needs()[0]);
+        let mut rig = Rig::with_unanswered_tiles(scene(Source::Points));
+        let mut bytes = tile(7, rig.tile_requests()[0]);
         if let Some(byte) = bytes.get_mut(bit / 8) {
             *byte ^= 1 << (bit % 8);
         }
@@ -501,10 +504,10 @@ fn damaged_tile_is_requested_again_and_forces_are_unchanged() {
 }
 
 #[test]
-fn a_dropped_byte_costs_a_retry_and_nothing_else() {
+fn dropped_byte_costs_one_retry() {
     for at in [0, 1, 5, 100, 4000, 4369] {
-        let mut rig = Rig::asking(scene(Source::Points));
-        let mut bytes = tile(7, rig.needs()[0]);
+        let mut rig = Rig::with_unanswered_tiles(scene(Source::Points));
+        let mut bytes = tile(7, rig.tile_requests()[0]);
         bytes.remove(at);
         rig.send(&bytes);
         rig.answers_tiles = true;
@@ -541,23 +544,23 @@ fn lost_answer_is_repeated_without_another_step() {
 
 #[test]
 fn point_repeated_before_its_answer_is_rendered_once() {
-    let mut rig = Rig::asking(scene(Source::Points));
+    let mut rig = Rig::with_unanswered_tiles(scene(Source::Points));
     for _ in 0..3 {
         rig.send(&point(0, 0.0, 2.0));
         rig.run(5);
     }
     assert_eq!(rig.rendered(), [], "its tile is not there yet");
-    rig.send(&tile(7, rig.needs()[0]));
+    rig.send(&tile(7, rig.tile_requests()[0]));
     rig.answers_tiles = true;
     rig.run(1000);
     assert_eq!(rig.rendered().len(), 1);
 }
 
 #[test]
-fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
+fn late_duplicate_does_not_replace_a_received_tile() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     rig.descend(1);
-    for key in rig.needs() {
+    for key in rig.tile_requests() {
         let heights = Heights::Flat {
             base: 2,
             height: 0.9,
@@ -571,13 +574,13 @@ fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
     }
     // The first point is answered twice.
     let rendered = rig.descend(40);
-    let asked = rig.needs();
-    let unique: HashSet<_> = asked
+    let requested = rig.tile_requests();
+    let unique: HashSet<_> = requested
         .iter()
         .map(|key| (key.index.col, key.index.row))
         .collect();
     assert_eq!(
-        asked.len(),
+        requested.len(),
         unique.len(),
         "nothing had to be asked for twice"
     );
@@ -585,31 +588,31 @@ fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
 }
 
 #[test]
-fn joined_in_the_middle_of_a_frame() {
+fn session_opens_in_the_middle_of_a_frame() {
     for cut in [1, 2, 100, 4000] {
         let mut rig = Rig::new();
         let key = hapterra_core::terrain::TileKey::new(0, 0, 0);
         rig.send(&tile(7, key)[cut..]);
-        rig.say(&ToDevice::Hello(HELLO));
+        rig.send_message(&ToDevice::Hello(HELLO));
         rig.run(1);
         assert!(matches!(rig.received[0], ToHost::Hello(_)), "cut {cut}");
     }
 }
 
 #[test]
-fn a_zero_before_hello_ends_what_the_last_host_left_unfinished() {
+fn zero_byte_before_hello_ends_an_unfinished_frame() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     rig.run(3);
     rig.received.clear();
     rig.send(&point(0, 0.0, 2.0)[..4]);
     rig.send(&[0]);
-    rig.greet_anew();
+    rig.open_new_session();
     rig.run(1);
     assert!(matches!(rig.received[0], ToHost::Hello(_)));
 }
 
 #[test]
-fn a_storm_of_garbage_passes() {
+fn session_continues_after_garbage() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     let mut noise = 1u32;
     let storm: Vec<u8> = (0..200_000)
@@ -621,14 +624,14 @@ fn a_storm_of_garbage_passes() {
     rig.send(&storm);
     rig.send(&[0]);
     rig.run(2);
-    assert!(rig.on_the_way.is_empty(), "all was taken");
+    assert!(rig.in_transit.is_empty(), "all was taken");
     assert_eq!(forces(&rig.descend(40)), undisturbed());
 }
 
 #[test]
 fn force_stays_when_the_host_dies_and_the_session_resumes() {
     let mut rig = Rig::armed();
-    let asked = rig.needs().len();
+    let requested = rig.tile_requests().len();
     // Gone: nothing is read, nothing is sent.
     rig.writer = 0;
     for _ in 0..1000 {
@@ -637,15 +640,15 @@ fn force_stays_when_the_host_dies_and_the_session_resumes() {
     rig.device.link.interrupted();
     rig.writer = usize::MAX;
     rig.received.clear();
-    rig.greet_anew();
-    rig.say(&ToDevice::Scene(scene(Source::Encoders)));
+    rig.open_new_session();
+    rig.send_message(&ToDevice::Scene(scene(Source::Encoders)));
     rig.run(300);
     let ToHost::Hello(device) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
     };
     assert_eq!(device.epoch, Some(7), "it says what it still holds");
     assert!(
-        asked > 0 && rig.needs().is_empty(),
+        requested > 0 && rig.tile_requests().is_empty(),
         "and asks for none of it"
     );
     let first = &rig.telemetry()[0];
@@ -654,46 +657,49 @@ fn force_stays_when_the_host_dies_and_the_session_resumes() {
 }
 
 #[test]
-fn a_host_that_returns_with_another_scene_starts_afresh() {
+fn host_with_another_scene_requests_all_tiles_again() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     rig.descend(5);
     rig.received.clear();
-    rig.greet_anew();
+    rig.open_new_session();
     let other = Scene {
         epoch: 8,
         ..scene(Source::Points)
     };
-    rig.say(&ToDevice::Scene(other));
+    rig.send_message(&ToDevice::Scene(other));
     rig.run(5);
-    assert!(!rig.needs().is_empty(), "what it held is of another scene");
+    assert!(
+        !rig.tile_requests().is_empty(),
+        "what it held is of another scene"
+    );
     assert_eq!(forces(&rig.descend(40)), undisturbed());
 }
 
 #[test]
 fn tiles_of_another_scene_or_unrequested_tiles_are_dropped() {
-    let mut rig = Rig::asking(scene(Source::Points));
-    let asked = rig.needs()[0];
-    let unasked = hapterra_core::terrain::TileKey::new(asked.level, 9, asked.index.row);
-    rig.send(&tile(6, asked));
-    rig.send(&tile(7, unasked));
+    let mut rig = Rig::with_unanswered_tiles(scene(Source::Points));
+    let requested = rig.tile_requests()[0];
+    let unrequested = hapterra_core::terrain::TileKey::new(requested.level, 9, requested.index.row);
+    rig.send(&tile(6, requested));
+    rig.send(&tile(7, unrequested));
     rig.send(&point(0, 0.0, 2.0));
     rig.run(20);
     assert_eq!(rig.rendered(), [], "the point still waits for its tile");
-    rig.send(&tile(7, asked));
+    rig.send(&tile(7, requested));
     rig.answers_tiles = true;
     rig.run(20);
     assert_eq!(rig.rendered().len(), 1);
 }
 
 #[test]
-fn a_slow_link_drops_telemetry_and_counts_it_and_nothing_else() {
+fn slow_link_drops_and_counts_only_telemetry() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     // A sample takes about 60 bytes a tick.
     rig.writer = 20;
     rig.run(3000);
     let dropped = rig.telemetry().last().unwrap().dropped;
     assert!(dropped > 1000, "{dropped}");
-    let needs = rig.needs();
+    let tile_requests = rig.tile_requests();
     // Caught up, every sample was either delivered or counted.
     rig.writer = usize::MAX;
     rig.run(100);
@@ -707,17 +713,17 @@ fn a_slow_link_drops_telemetry_and_counts_it_and_nothing_else() {
     let fast = {
         let mut rig = Rig::in_scene(scene(Source::Encoders));
         rig.run(3000);
-        rig.needs()
+        rig.tile_requests()
     };
-    assert_eq!(needs, fast, "every tile was asked for once");
+    assert_eq!(tile_requests, fast, "every tile was asked for once");
 }
 
 #[test]
 fn missing_tile_is_requested_again_every_retry_period() {
-    let mut rig = Rig::asking(scene(Source::Encoders));
-    let first = rig.needs()[0];
+    let mut rig = Rig::with_unanswered_tiles(scene(Source::Encoders));
+    let first = rig.tile_requests()[0];
     rig.run(4 * RETRY_TICKS + 1);
-    let again = rig.needs();
+    let again = rig.tile_requests();
     assert_eq!(again.iter().filter(|key| **key == first).count(), 5);
 }
 
@@ -727,63 +733,63 @@ fn missing_tile_is_requested_again_after_two_heartbeats() {
         hold_clock: true,
         ..scene(Source::Encoders)
     };
-    let mut rig = Rig::asking(held);
-    assert!(rig.device.link.may_stand_still());
-    let asked = rig.needs().len();
-    let mut bytes = tile(7, rig.needs()[0]);
+    let mut rig = Rig::with_unanswered_tiles(held);
+    assert!(rig.device.link.may_stop_clock());
+    let requested = rig.tile_requests().len();
+    let mut bytes = tile(7, rig.tile_requests()[0]);
     bytes[9] ^= 1;
     rig.send(&bytes);
     rig.run(20);
     assert_eq!(
-        rig.needs().len(),
-        asked,
+        rig.tile_requests().len(),
+        requested,
         "damage alone is no reason to ask again"
     );
-    rig.say(&ToDevice::Heartbeat);
+    rig.send_message(&ToDevice::Heartbeat);
     rig.run(20);
-    assert_eq!(rig.needs().len(), asked, "it may be on its way");
+    assert_eq!(rig.tile_requests().len(), requested, "it may be on its way");
     rig.answers_tiles = true;
-    rig.say(&ToDevice::Heartbeat);
+    rig.send_message(&ToDevice::Heartbeat);
     rig.run(20);
-    assert!(!rig.device.link.may_stand_still(), "time goes on");
+    assert!(!rig.device.link.may_stop_clock(), "time goes on");
 }
 
 #[test]
-fn a_host_that_floods_is_held_back_not_obeyed() {
+fn flooding_host_is_throttled_without_loss() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(100);
     rig.writer = 0;
     let same = frame(&ToDevice::Scene(scene(Source::Encoders)));
     rig.send(&vec![&*same; 500].concat());
     rig.run(50);
-    assert!(!rig.on_the_way.is_empty(), "answers have nowhere to go");
+    assert!(!rig.in_transit.is_empty(), "answers have nowhere to go");
     rig.writer = usize::MAX;
     rig.run(600);
-    assert!(rig.on_the_way.is_empty());
-    let taken = |m: &&ToHost| matches!(m, ToHost::SceneAck { accepted: true, .. });
-    assert_eq!(rig.received.iter().filter(taken).count(), 501);
+    assert!(rig.in_transit.is_empty());
+    let accepted = |m: &&ToHost| matches!(m, ToHost::SceneAck { accepted: true, .. });
+    assert_eq!(rig.received.iter().filter(accepted).count(), 501);
 }
 
 #[test]
 fn dead_man_press_without_live_host_neither_arms_nor_stores() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
-    rig.ask(Request::Zero { counts: [0; 3] });
-    rig.ask(Request::Arm);
+    rig.request(Request::Zero { counts: [0; 3] });
+    rig.request(Request::Arm);
     rig.run(3_000);
     rig.sense.dead_man = true;
     for _ in 0..3_000 {
         assert!(!rig.device.tick(rig.sense).enabled);
     }
     rig.sense.dead_man = false;
-    rig.ask(Request::StoreCalibration);
+    rig.request(Request::StoreCalibration);
     rig.run(3_000);
     rig.press();
     assert_eq!(rig.device.link.to_store(), None);
     // A host that is present may take its time.
-    rig.ask(Request::Arm);
+    rig.request(Request::Arm);
     for _ in 0..10 {
         rig.run(1_000);
-        rig.say(&ToDevice::Heartbeat);
+        rig.send_message(&ToDevice::Heartbeat);
     }
     rig.sense.dead_man = true;
     rig.run(300);
@@ -793,12 +799,12 @@ fn dead_man_press_without_live_host_neither_arms_nor_stores() {
 #[test]
 fn opens_of_recent_sessions_do_not_reopen_them() {
     let mut rig = Rig::new();
-    rig.say(&ToDevice::Hello(HELLO));
+    rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(1);
     let sessions: Vec<_> = (0..8)
         .map(|_| {
             let of = rig.session;
-            rig.greet_anew();
+            rig.open_new_session();
             rig.run(1);
             of
         })
@@ -816,8 +822,8 @@ fn opens_of_recent_sessions_do_not_reopen_them() {
 #[test]
 fn arm_is_refused_as_busy_during_calibration_store() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
-    rig.ask(Request::Zero { counts: [0; 3] });
-    rig.ask(Request::StoreCalibration);
+    rig.request(Request::Zero { counts: [0; 3] });
+    rig.request(Request::StoreCalibration);
     rig.run(150);
     rig.sense.dead_man = true;
     // The loop reports the press, and the board has not stored the calibration yet.

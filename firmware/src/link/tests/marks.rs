@@ -25,15 +25,15 @@ fn latest_tick(rig: &Rig) -> u32 {
 }
 
 #[test]
-fn a_mark_is_answered_with_its_tick_when_its_pulse_is_over() {
+fn mark_is_answered_with_its_tick_after_its_pulse() {
     let mut rig = Rig::armed();
     rig.run(16);
     let before = latest_tick(&rig);
-    let number = rig.asked.last().map_or(0, |(number, _)| number + 1);
+    let number = rig.requests.last().map_or(0, |(number, _)| number + 1);
     let request = Request::Mark;
     // Repeated, as by a host that receives no answer.
     for _ in 0..4 {
-        rig.say(&ToDevice::Request { number, request });
+        rig.send_message(&ToDevice::Request { number, request });
         rig.run(1);
     }
     rig.run(MARK_PULSE_MS + MARK_GAP_MS - 8);
@@ -45,7 +45,7 @@ fn a_mark_is_answered_with_its_tick_when_its_pulse_is_over() {
     assert_eq!(answered, number);
     assert!((before..before + 20).contains(&tick), "{before} {tick}");
     // Repeated once more, it is answered again and marks no other tick.
-    rig.say(&ToDevice::Request { number, request });
+    rig.send_message(&ToDevice::Request { number, request });
     rig.run(40);
     assert_eq!(marked(&rig), [(number, tick); 2]);
 }

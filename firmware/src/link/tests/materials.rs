@@ -33,16 +33,16 @@ fn scene_of(table: &MaterialTable, epoch: u32) -> Scene {
 }
 
 /// Sends a scene with its table and returns true if it was accepted.
-fn sends(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
-    let mut room = [0; MAX_TABLE_BYTES];
-    let table = table_bytes(table, &mut room);
-    rig.say(&ToDevice::MaterialScene(MaterialScene { scene, table }));
+fn send_scene(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
+    let mut buffer = [0; MAX_TABLE_BYTES];
+    let table = table_bytes(table, &mut buffer);
+    rig.send_message(&ToDevice::MaterialScene(MaterialScene { scene, table }));
     rig.run(1);
-    is_taken(rig, scene.epoch)
+    is_accepted(rig, scene.epoch)
 }
 
 /// Returns true if the last answer, which is to scene `epoch`, accepts it.
-fn is_taken(rig: &Rig, epoch: u32) -> bool {
+fn is_accepted(rig: &Rig, epoch: u32) -> bool {
     let answer = |message: &ToHost| match message {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
         _ => None,
@@ -55,7 +55,7 @@ fn is_taken(rig: &Rig, epoch: u32) -> bool {
 fn greeted() -> Rig {
     let mut rig = Rig::new();
     rig.answers_tiles = false;
-    rig.say(&ToDevice::Hello(HELLO));
+    rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(1);
     rig
 }
@@ -72,10 +72,10 @@ fn flat<'t>(epoch: u32, key: TileKey) -> TileMessage<'t> {
     }
 }
 
-fn answers(rig: &mut Rig, epoch: u32, materials: TileMaterials<'_>) {
-    for key in rig.needs() {
+fn answer_tiles(rig: &mut Rig, epoch: u32, materials: TileMaterials<'_>) {
+    for key in rig.tile_requests() {
         let tile = flat(epoch, key);
-        rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
+        rig.send_message(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
     }
     rig.run(4);
 }
@@ -85,7 +85,7 @@ fn rendered(rig: &mut Rig) -> f32 {
     let from = rig.rendered().last().map_or(0, |(seq, _)| seq + 1);
     for (seq, z) in [(from, 2.0), (from + 1, 1.0)] {
         let hip = GridPoint::new([100, 100, 0], Vec3::new(0.5, 0.5, z));
-        rig.say(&ToDevice::Hip(HipCommand { seq, hip }));
+        rig.send_message(&ToDevice::Hip(HipCommand { seq, hip }));
         rig.run(4);
     }
     let rendered = rig.rendered();
@@ -98,46 +98,46 @@ fn rendered(rig: &mut Rig) -> f32 {
 fn tile_is_rendered_with_its_own_material() {
     let mut rig = greeted();
     let table = table(&[0.4, 1.0, 0.8]);
-    assert!(sends(&mut rig, scene_of(&table, 9), &table));
-    answers(&mut rig, 9, TileMaterials::One(2));
+    assert!(send_scene(&mut rig, scene_of(&table, 9), &table));
+    answer_tiles(&mut rig, 9, TileMaterials::One(2));
     assert_eq!(rig.status().bad_frames, 0);
     // The scene is a quarter stiffer than the table's default, and so are all materials.
     let force = rendered(&mut rig);
     assert!((force - 0.5 * 0.8 * 0.5 / 0.4).abs() < 1e-6, "{force}");
     // Repeated, because the answer was lost: the stored table stays.
     rig.received.clear();
-    assert!(sends(&mut rig, scene_of(&table, 9), &table));
+    assert!(send_scene(&mut rig, scene_of(&table, 9), &table));
     rig.run(300);
-    assert_eq!(rig.needs(), []);
+    assert_eq!(rig.tile_requests(), []);
 }
 
 #[test]
 fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
     let mut rig = greeted();
     let table = table(&[0.5, 1.0]);
-    assert!(sends(&mut rig, scene_of(&table, 9), &table));
-    let key = rig.needs()[0];
-    rig.say(&ToDevice::Tile(flat(9, key)));
+    assert!(send_scene(&mut rig, scene_of(&table, 9), &table));
+    let key = rig.tile_requests()[0];
+    rig.send_message(&ToDevice::Tile(flat(9, key)));
     for materials in [
         TileMaterials::One(2),
         TileMaterials::Runs(&[0, 255]),
         TileMaterials::Each(&[0; 7]),
     ] {
         let tile = flat(9, key);
-        rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
+        rig.send_message(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
     }
     rig.run(4);
     assert_eq!(rig.status().bad_frames, 4);
     // All buffers are available again.
-    answers(&mut rig, 9, TileMaterials::One(1));
+    answer_tiles(&mut rig, 9, TileMaterials::One(1));
     assert_eq!(rendered(&mut rig), 0.5);
     // Without materials in the scene, a tile has none.
     let plain = scene(Source::Points);
     rig.received.clear();
-    rig.say(&ToDevice::Scene(plain));
+    rig.send_message(&ToDevice::Scene(plain));
     rig.run(4);
-    assert!(is_taken(&rig, plain.epoch));
-    answers(&mut rig, plain.epoch, TileMaterials::One(0));
+    assert!(is_accepted(&rig, plain.epoch));
+    answer_tiles(&mut rig, plain.epoch, TileMaterials::One(0));
     assert!(rig.status().bad_frames > 4);
 }
 
@@ -146,28 +146,28 @@ fn scene_with_missing_or_invalid_material_table_is_refused() {
     let mut rig = greeted();
     let (known, other) = (table(&[0.5, 1.0]), table(&[0.5, 2.0]));
     let alone = scene_of(&known, 9);
-    rig.say(&ToDevice::Scene(alone));
+    rig.send_message(&ToDevice::Scene(alone));
     rig.run(1);
-    assert!(!is_taken(&rig, 9), "without a table");
-    assert!(!sends(&mut rig, alone, &other), "with another table");
+    assert!(!is_accepted(&rig, 9), "without a table");
+    assert!(!send_scene(&mut rig, alone, &other), "with another table");
     let broken = table(&[0.0, 1.0]);
-    assert!(!sends(&mut rig, scene_of(&broken, 9), &broken));
+    assert!(!send_scene(&mut rig, scene_of(&broken, 9), &broken));
     let broken = table(&[0.5, f32::NAN]);
-    assert!(!sends(&mut rig, scene_of(&broken, 9), &broken));
+    assert!(!send_scene(&mut rig, scene_of(&broken, 9), &broken));
     for bytes in [&[][..], &[1], &[200; 600]] {
-        rig.say(&ToDevice::MaterialScene(MaterialScene {
+        rig.send_message(&ToDevice::MaterialScene(MaterialScene {
             scene: alone,
             table: bytes,
         }));
         rig.run(1);
-        assert!(!is_taken(&rig, 9));
+        assert!(!is_accepted(&rig, 9));
     }
     assert_eq!(rig.status().device.epoch, None);
-    assert!(sends(&mut rig, alone, &known));
+    assert!(send_scene(&mut rig, alone, &known));
     // Its table has arrived by now.
-    rig.say(&ToDevice::Scene(scene_of(&known, 10)));
+    rig.send_message(&ToDevice::Scene(scene_of(&known, 10)));
     rig.run(1);
-    assert!(is_taken(&rig, 10));
+    assert!(is_accepted(&rig, 10));
     assert_eq!(rig.status().device.epoch, Some(10));
 }
 
@@ -175,7 +175,7 @@ fn scene_with_missing_or_invalid_material_table_is_refused() {
 fn consecutive_scenes_use_their_own_material_tables() {
     let mut rig = greeted();
     let (soft, hard) = (table(&[0.5]), table(&[1.0]));
-    let mut room = [0; MAX_TABLE_BYTES];
+    let mut buffer = [0; MAX_TABLE_BYTES];
     for (epoch, table) in [(1, &soft), (2, &hard), (3, &soft), (4, &soft), (5, &hard)] {
         let scene = Scene {
             params: SurfaceParams {
@@ -184,13 +184,13 @@ fn consecutive_scenes_use_their_own_material_tables() {
             },
             ..scene_of(table, epoch)
         };
-        let table = table_bytes(table, &mut room);
-        rig.say(&ToDevice::MaterialScene(MaterialScene { scene, table }));
-        rig.say(&ToDevice::Scene(scene));
+        let table = table_bytes(table, &mut buffer);
+        rig.send_message(&ToDevice::MaterialScene(MaterialScene { scene, table }));
+        rig.send_message(&ToDevice::Scene(scene));
     }
     rig.run(20);
-    assert!(is_taken(&rig, 5));
-    answers(&mut rig, 5, TileMaterials::One(0));
+    assert!(is_accepted(&rig, 5));
+    answer_tiles(&mut rig, 5, TileMaterials::One(0));
     assert_eq!(rendered(&mut rig), 0.5);
 }
 
@@ -208,14 +208,14 @@ fn fallback_tile_with_materials_is_a_bad_frame() {
         source: Source::Encoders,
         ..scene_of(&table, 9)
     };
-    assert!(sends(&mut rig, scene, &table));
+    assert!(send_scene(&mut rig, scene, &table));
     let key = wide.key(0);
-    assert!(rig.needs().contains(&key));
+    assert!(rig.tile_requests().contains(&key));
     let (tile, materials) = (flat(9, key), TileMaterials::One(0));
-    rig.say(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
+    rig.send_message(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
     rig.run(2);
     assert_eq!(rig.status().bad_frames, 1);
-    rig.say(&ToDevice::Tile(tile));
+    rig.send_message(&ToDevice::Tile(tile));
     rig.run(2);
     assert_eq!(rig.status().bad_frames, 1);
 }

@@ -75,9 +75,9 @@ pub(super) fn frame(message: &ToDevice<'_>) -> Vec<u8> {
 }
 
 /// Returns a host's query for the device's protocol.
-pub(super) fn asked(protocol: u16) -> Vec<u8> {
-    let asked = VersionCheck::Asked { protocol };
-    encode(&asked, &mut [0; 16]).unwrap().to_vec()
+pub(super) fn version_query(protocol: u16) -> Vec<u8> {
+    let query = VersionCheck::Query { protocol };
+    encode(&query, &mut [0; 16]).unwrap().to_vec()
 }
 
 /// Returns a tile of the plane at height 1.5, with every sample sent, in the first session.
@@ -114,20 +114,20 @@ pub(super) struct Rig {
     pub(super) device: Device<StoppedClock, D>,
     reader: Box<FrameReader<8192>>,
     /// Bytes to the device that it has not read yet.
-    pub(super) on_the_way: VecDeque<u8>,
+    pub(super) in_transit: VecDeque<u8>,
     /// Bytes that the writer takes in a step; `usize::MAX` for a fast one.
     pub(super) writer: usize,
     pub(super) received: Vec<ToHost>,
     /// The session of a host that only reads, if there is one.
-    pub(super) looker: Option<SessionNumber>,
-    pub(super) looked_at: Vec<ToHost>,
+    pub(super) read_only_session: Option<SessionNumber>,
+    pub(super) read_only_answers: Vec<ToHost>,
     /// Messages to the hosts of earlier sessions.
     pub(super) received_before: Vec<(SessionNumber, ToHost)>,
     /// The current session, and the number of its last request.
     pub(super) session: SessionNumber,
     pub(super) number: u8,
     /// Requests with their numbers.
-    pub(super) asked: Vec<(u8, Request)>,
+    pub(super) requests: Vec<(u8, Request)>,
     /// Refusals received.
     pub(super) refused: Vec<VersionCheck>,
     /// True if requests for tiles are answered.
@@ -149,15 +149,15 @@ impl Rig {
         Self {
             device: device(stored, boot),
             reader: Box::new(FrameReader::new()),
-            on_the_way: VecDeque::new(),
+            in_transit: VecDeque::new(),
             writer: usize::MAX,
             received: Vec::new(),
-            looker: None,
-            looked_at: Vec::new(),
+            read_only_session: None,
+            read_only_answers: Vec::new(),
             received_before: Vec::new(),
             session: FIRST,
             number: 0,
-            asked: Vec::new(),
+            requests: Vec::new(),
             refused: Vec::new(),
             answers_tiles: true,
             damage: |_| {},
@@ -167,20 +167,20 @@ impl Rig {
 
     /// Opens a session in this scene.
     pub(super) fn in_scene(scene: Scene) -> Self {
-        let mut rig = Self::asking(scene);
+        let mut rig = Self::with_unanswered_tiles(scene);
         rig.answers_tiles = true;
-        for key in rig.needs() {
+        for key in rig.tile_requests() {
             rig.send(&tile(scene.epoch, key));
         }
         rig
     }
 
     /// Opens a session in this scene whose first tiles are requested but not answered.
-    pub(super) fn asking(scene: Scene) -> Self {
+    pub(super) fn with_unanswered_tiles(scene: Scene) -> Self {
         let mut rig = Self::new();
         rig.answers_tiles = false;
-        rig.say(&ToDevice::Hello(HELLO));
-        rig.say(&ToDevice::Scene(scene));
+        rig.send_message(&ToDevice::Hello(HELLO));
+        rig.send_message(&ToDevice::Scene(scene));
         rig.run(1);
         assert!(
             matches!(rig.received[0], ToHost::Hello(_)),
@@ -200,8 +200,8 @@ impl Rig {
     /// Arms as a user does.
     pub(super) fn arm(&mut self) {
         self.sense.dead_man = false;
-        self.ask(Request::Zero { counts: [0; 3] });
-        self.ask(Request::Arm);
+        self.request(Request::Zero { counts: [0; 3] });
+        self.request(Request::Arm);
         self.run(10);
         self.sense.dead_man = true;
         self.run(2_300);
@@ -216,27 +216,27 @@ impl Rig {
         }
     }
 
-    pub(super) fn say(&mut self, message: &ToDevice<'_>) {
+    pub(super) fn send_message(&mut self, message: &ToDevice<'_>) {
         self.send(&framed(self.session, message));
     }
 
     /// Opens another session.
-    pub(super) fn greet_anew(&mut self) {
+    pub(super) fn open_new_session(&mut self) {
         self.session = SessionNumber::new(self.session.get() + (1 << 8));
         self.number = 0;
-        self.say(&ToDevice::Hello(HELLO));
+        self.send_message(&ToDevice::Hello(HELLO));
     }
 
     /// Makes a request.
-    pub(super) fn ask(&mut self, request: Request) {
+    pub(super) fn request(&mut self, request: Request) {
         self.number = self.number.wrapping_add(1);
         let number = self.number;
-        self.asked.push((number, request));
-        self.say(&ToDevice::Request { number, request });
+        self.requests.push((number, request));
+        self.send_message(&ToDevice::Request { number, request });
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) {
-        self.on_the_way.extend(bytes);
+        self.in_transit.extend(bytes);
     }
 
     /// Runs `ticks` ticks, in lock-step if the device requires it.
@@ -245,7 +245,7 @@ impl Rig {
             self.deliver();
             self.listen();
             self.deliver();
-            if !self.device.link.may_stand_still() {
+            if !self.device.link.may_stop_clock() {
                 self.device.tick(self.sense);
             }
         }
@@ -253,8 +253,8 @@ impl Rig {
 
     /// Closes the session and reads while there are messages. No more ticks: the program may be
     /// about to end.
-    pub(super) fn say_goodbye(&mut self) {
-        self.say(&ToDevice::Bye);
+    pub(super) fn send_goodbye(&mut self) {
+        self.send_message(&ToDevice::Bye);
         self.deliver();
         assert!(!self.device.link.has_ended());
         self.writer = usize::MAX;
@@ -262,9 +262,9 @@ impl Rig {
     }
 
     fn deliver(&mut self) {
-        let bytes = self.on_the_way.make_contiguous();
-        let taken = self.device.receive(bytes);
-        self.on_the_way.drain(..taken);
+        let bytes = self.in_transit.make_contiguous();
+        let consumed = self.device.receive(bytes);
+        self.in_transit.drain(..consumed);
     }
 
     /// Reads the device's messages and answers requests for tiles.
@@ -278,14 +278,14 @@ impl Rig {
                 return;
             }
             left -= n;
-            self.hear(&chunk[..n]);
+            self.on_bytes(&chunk[..n]);
         }
     }
 
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn on_bytes(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
-            let (taken, frame) = self.reader.push(bytes);
-            bytes = &bytes[taken..];
+            let (consumed, frame) = self.reader.push(bytes);
+            bytes = &bytes[consumed..];
             let Some(content) = frame else {
                 continue;
             };
@@ -295,8 +295,8 @@ impl Rig {
                 continue;
             }
             let framed: InSession<ToHost> = decode(content).expect("a message");
-            if self.looker == Some(framed.session) {
-                self.looked_at.push(framed.message);
+            if self.read_only_session == Some(framed.session) {
+                self.read_only_answers.push(framed.message);
                 continue;
             }
             if let ToHost::SessionClosed { .. } = framed.message {
@@ -308,13 +308,13 @@ impl Rig {
             if let (ToHost::TileRequest { epoch, key }, true) = (&message, self.answers_tiles) {
                 let mut answer = tile_in(self.session, *epoch, *key);
                 (self.damage)(&mut answer);
-                self.on_the_way.extend(answer);
+                self.in_transit.extend(answer);
             }
             self.received.push(message);
         }
     }
 
-    pub(super) fn needs(&self) -> Vec<TileKey> {
+    pub(super) fn tile_requests(&self) -> Vec<TileKey> {
         let need = |m: &ToHost| match m {
             ToHost::TileRequest { key, .. } => Some(*key),
             _ => None,
@@ -351,8 +351,8 @@ impl Rig {
     pub(super) fn answers(&self, to: fn(&Request) -> bool) -> Vec<Result<(), Refusal>> {
         let answer = |m: &ToHost| match m {
             ToHost::Answer(Answer { number, result }) => {
-                let asked = self.asked.iter().find(|(asked, _)| asked == number);
-                asked.filter(|(_, request)| to(request)).map(|_| *result)
+                let request = self.requests.iter().find(|(sent, _)| sent == number);
+                request.filter(|(_, request)| to(request)).map(|_| *result)
             }
             _ => None,
         };
@@ -361,7 +361,7 @@ impl Rig {
 
     /// Requests the status.
     pub(super) fn status(&mut self) -> Status {
-        self.say(&ToDevice::Status { number: 0 });
+        self.send_message(&ToDevice::Status { number: 0 });
         self.run(1);
         let status = |m: &ToHost| match m {
             ToHost::Status { status, .. } => Some(status.clone()),

@@ -12,9 +12,9 @@ use crate::link::tx_queue::{MAX_URGENT, TxQueue};
 use hapterra_core::terrain::TileIndex;
 
 #[test]
-fn introduces_itself() {
+fn device_answers_hello_with_its_properties() {
     let mut rig = Rig::new();
-    rig.say(&ToDevice::Hello(HELLO));
+    rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(1);
     let [ToHost::Hello(device), ToHost::Guard(_)] = &rig.received[..] else {
         panic!("{:?}", rig.received);
@@ -50,7 +50,7 @@ fn points_sent_ahead_equal_points_sent_singly() {
 }
 
 #[test]
-fn an_invalid_scene_is_refused_and_the_one_before_stays() {
+fn invalid_scene_is_refused_and_the_previous_one_stays() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     let bad = Scene {
         epoch: 8,
@@ -86,22 +86,22 @@ fn clock_waits_for_a_missing_tile_only_with_hold_clock() {
     for hold_clock in [false, true] {
         let mut rig = Rig::new();
         rig.answers_tiles = false;
-        assert!(rig.device.link.may_stand_still(), "without a scene");
-        rig.say(&ToDevice::Hello(HELLO));
+        assert!(rig.device.link.may_stop_clock(), "without a scene");
+        rig.send_message(&ToDevice::Hello(HELLO));
         rig.send(&frame(&ToDevice::Scene(Scene {
             hold_clock,
             ..scene(Source::Encoders)
         })));
         rig.run(10);
-        assert!(!rig.needs().is_empty());
-        assert_eq!(rig.device.link.may_stand_still(), hold_clock);
-        let key = rig.needs()[0];
-        for key in rig.needs() {
+        assert!(!rig.tile_requests().is_empty());
+        assert_eq!(rig.device.link.may_stop_clock(), hold_clock);
+        let key = rig.tile_requests()[0];
+        for key in rig.tile_requests() {
             rig.send(&super::rig::tile(7, key));
         }
         rig.answers_tiles = true;
         rig.run(10);
-        assert!(!rig.device.link.may_stand_still(), "{key:?} was sent");
+        assert!(!rig.device.link.may_stop_clock(), "{key:?} was sent");
     }
 }
 
@@ -112,7 +112,7 @@ fn close_is_confirmed_after_all_samples_are_sent() {
     // The writer stops for a while: more than one message is waiting.
     rig.writer = 0;
     rig.run(20);
-    rig.say_goodbye();
+    rig.send_goodbye();
     let Some(ToHost::Goodbye(count)) = rig.received.last() else {
         panic!("{:?}", rig.received.last());
     };
@@ -123,7 +123,7 @@ fn close_is_confirmed_after_all_samples_are_sent() {
 }
 
 #[test]
-fn the_longest_messages_fit_their_places() {
+fn longest_messages_fit_their_buffers() {
     let sample = TickRecord {
         tick: u32::MAX,
         missing_tile: Some(TileIndex::new(i32::MIN, i32::MIN)),

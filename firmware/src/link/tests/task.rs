@@ -56,7 +56,7 @@ impl Write for Stuck {
 #[derive(Default)]
 struct Board {
     ticks: Cell<u32>,
-    looks: Cell<u32>,
+    polls: Cell<u32>,
 }
 
 impl LinkBoard for Board {
@@ -72,7 +72,7 @@ impl LinkBoard for Board {
     }
 
     fn after_poll<const D: usize>(&self, _: &Link<'_, D>) {
-        self.looks.set(self.looks.get() + 1);
+        self.polls.set(self.polls.get() + 1);
     }
 }
 
@@ -85,9 +85,9 @@ fn board_polls_the_link_while_the_host_does_not_read() {
     let mut running = pin!(run(&mut device.link, sent, Stuck, &board));
     let mut context = Context::from_waker(Waker::noop());
     for tick in 0..10 {
-        let before = board.looks.get();
+        let before = board.polls.get();
         board.ticks.set(1);
         assert!(running.as_mut().poll(&mut context).is_pending());
-        assert!(board.looks.get() > before, "tick {tick}");
+        assert!(board.polls.get() > before, "tick {tick}");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::vec::Vec;
 
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::{Scene, SceneChange, Source, TickRecord};
@@ -36,7 +36,7 @@ fn latest(rig: &Rig) -> TickRecord {
 }
 
 /// Returns the outcomes of scene changes, in the order of the answers, from the first.
-fn taken(rig: &Rig) -> Vec<(u32, bool)> {
+fn scene_answers(rig: &Rig) -> Vec<(u32, bool)> {
     let answer = |message: &ToHost| match message {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
         _ => None,
@@ -46,8 +46,8 @@ fn taken(rig: &Rig) -> Vec<(u32, bool)> {
 
 fn with_an_open_clutch() -> Rig {
     let mut rig = Rig::armed();
-    rig.ask(Request::Clutch {
-        hold: ClutchHold::WithHand,
+    rig.request(Request::Clutch {
+        hold: ClutchMode::WithHand,
     });
     rig.run(150);
     assert_eq!(rig.answers(TO_CLUTCH), [Ok(())]);
@@ -61,17 +61,20 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     let wanted = view(1, latest(&rig).hip);
     rig.received
         .retain(|message| !matches!(message, ToHost::TileRequest { .. }));
-    rig.say(&ToDevice::SceneChange(wanted));
+    rig.send_message(&ToDevice::SceneChange(wanted));
     rig.run(40);
-    assert_eq!(taken(&rig), [(1_001, true)]);
-    assert!(!rig.needs().is_empty(), "its own tiles are asked for");
+    assert_eq!(scene_answers(&rig), [(1_001, true)]);
+    assert!(
+        !rig.tile_requests().is_empty(),
+        "its own tiles are asked for"
+    );
     assert_eq!((latest(&rig).view, latest(&rig).mode), (1, Mode::Armed));
     // Repeated, because the answer was lost.
-    rig.say(&ToDevice::SceneChange(wanted));
+    rig.send_message(&ToDevice::SceneChange(wanted));
     rig.run(10);
-    assert_eq!(taken(&rig), [(1_001, true); 2]);
-    rig.ask(Request::Clutch {
-        hold: ClutchHold::LetGo,
+    assert_eq!(scene_answers(&rig), [(1_001, true); 2]);
+    rig.request(Request::Clutch {
+        hold: ClutchMode::Released,
     });
     rig.run(600);
     let sample = latest(&rig);
@@ -79,15 +82,19 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     assert_eq!(sample.limits, Limits::empty());
     assert_eq!(rig.status().device.epoch, Some(1_001));
     // Repeated once more, late: it is already active, and nothing is done.
-    rig.say(&ToDevice::SceneChange(wanted));
+    rig.send_message(&ToDevice::SceneChange(wanted));
     rig.run(10);
-    assert_eq!(taken(&rig), [(1_001, true); 3]);
+    assert_eq!(scene_answers(&rig), [(1_001, true); 3]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
     // An earlier one, late.
-    rig.say(&ToDevice::SceneChange(view(0, sample.hip)));
-    rig.say(&ToDevice::SceneChange(view(200, sample.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(0, sample.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(200, sample.hip)));
     rig.run(10);
-    assert_eq!(taken(&rig).len(), 3, "nobody waits for an answer to that");
+    assert_eq!(
+        scene_answers(&rig).len(),
+        3,
+        "nobody waits for an answer to that"
+    );
 }
 
 #[test]
@@ -95,42 +102,42 @@ fn placement_during_contact_is_refused() {
     let mut rig = Rig::armed();
     rig.run(20);
     let before = latest(&rig);
-    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
-    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!(scene_answers(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
     // The clutch was held and then released: this is no better.
     let mut rig = with_an_open_clutch();
-    rig.ask(Request::Clutch {
-        hold: ClutchHold::LetGo,
+    rig.request(Request::Clutch {
+        hold: ClutchMode::Released,
     });
-    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
-    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!(scene_answers(&rig), [(1_001, false)]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
     // It is held, and has not opened yet.
     let mut rig = Rig::armed();
-    rig.ask(Request::Clutch {
-        hold: ClutchHold::InPlace,
+    rig.request(Request::Clutch {
+        hold: ClutchMode::InPlace,
     });
     rig.run(20);
-    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
-    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!(scene_answers(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
     // It is open, but the loop's last report is from the previous placement.
     let mut rig = with_an_open_clutch();
-    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
-    rig.say(&ToDevice::SceneChange(view(2, before.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
+    rig.send_message(&ToDevice::SceneChange(view(2, before.hip)));
     rig.run(20);
-    assert_eq!(taken(&rig), [(1_001, true), (1_002, false)]);
+    assert_eq!(scene_answers(&rig), [(1_001, true), (1_002, false)]);
     // Nor can a replay be changed like this.
     let mut rig = with_an_open_clutch();
     let mut points = view(1, before.hip);
     points.scene.source = Source::Points;
-    rig.say(&ToDevice::SceneChange(points));
+    rig.send_message(&ToDevice::SceneChange(points));
     rig.run(20);
-    assert_eq!(taken(&rig), [(1_001, false)]);
+    assert_eq!(scene_answers(&rig), [(1_001, false)]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
 }
 
@@ -142,12 +149,12 @@ fn clutch_hold_ends_with_the_session_of_its_host() {
     };
     let mut rig = with_an_open_clutch();
     assert!(!closed(&mut rig), "the host is there");
-    rig.greet_anew();
+    rig.open_new_session();
     assert!(closed(&mut rig), "another session");
     let mut rig = with_an_open_clutch();
-    rig.say(&ToDevice::Detach);
+    rig.send_message(&ToDevice::Detach);
     rig.run(1_000);
-    rig.greet_anew();
+    rig.open_new_session();
     assert!(closed(&mut rig), "a host that detached");
     assert_eq!(latest(&rig).mode, Mode::Armed);
 }

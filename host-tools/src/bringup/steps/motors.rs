@@ -87,11 +87,11 @@ fn jog(
     let angles = |status: &Status| status.health.angles_rad.as_dvec3();
     let began = |status: &Status| {
         let report = &status.health.report;
-        report.mode.drives() || report.fault.is_some()
+        report.mode.is_driving() || report.fault.is_some()
     };
     let first = board.see(attendant, Task::PressDeadMan, began)?;
     let (from, mut driven, mut now, mut reported) = (angles(&first), first.clone(), first, false);
-    while now.health.report.mode.drives() {
+    while now.health.report.mode.is_driving() {
         let full = now.health.currents_a.abs().max_element() > 0.99 * current_a.abs();
         if on_scale && full && !reported {
             attendant.begin(Task::LookAtScale);
@@ -115,7 +115,7 @@ fn jog(
         Some(fault) => return Err(Finding::Fault(fault).into()),
     };
     if fault.is_some() {
-        board.ask(&Request::ClearFault { seen: fault })?;
+        board.ask(&Request::ClearFault { fault })?;
     }
     Ok((angles(&at) - from, fault))
 }

@@ -11,7 +11,7 @@ use clap::ValueHint;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hapterra_core::phantom::{Calibration, Model};
 use hapterra_core::wire::request::Request;
-use hapterra_core::wire::status::PRESS_MS;
+use hapterra_core::wire::status::PRESS_TIMEOUT_MS;
 
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
@@ -148,7 +148,7 @@ fn calibrate(
             "measure them, too; or accept guesses: --measure zero,gravity,guessed-ratios",
         );
     }
-    if control.status()?.health.report.mode.drives() {
+    if control.status()?.health.report.mode.is_driving() {
         return Err("the amplifiers are on").or_hint("disarm first: hapterra status --disarm");
     }
     let (mut record, mut zero) = (begin, None);
@@ -219,7 +219,7 @@ fn hand_over(
         false => {
             say(format!(
                 "to store it    press the dead-man switch within {} s",
-                PRESS_MS / 1_000
+                PRESS_TIMEOUT_MS / 1_000
             ));
             (control.store(calibration)?, "and stored there")
         }

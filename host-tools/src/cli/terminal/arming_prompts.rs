@@ -179,7 +179,7 @@ impl ArmingPrompts {
     /// Reports the state of the guard if it changed.
     fn on_guard_report(&mut self, report: &Report) {
         let before = self.report.replace(*report);
-        let is_settled = report.mode == Mode::Disarmed || report.mode.drives();
+        let is_settled = report.mode == Mode::Disarmed || report.mode.is_driving();
         if self.is_back && is_settled {
             self.is_back = false;
             if report.mode == Mode::Disarmed && report.fault.is_none() {
@@ -195,7 +195,7 @@ impl ArmingPrompts {
         if let Some(fault) = report.fault.filter(|_| was != report.fault) {
             let (number, meaning) = (fault.number(), fault.meaning());
             self.tell(format!("FAULT {number} {fault:?}: {meaning}"));
-            self.tell(format!("  {}", fault.what_to_do()));
+            self.tell(format!("  {}", fault.remedy()));
             return self.ask_for_enter(report.blockers);
         }
         match report.mode {
@@ -211,7 +211,7 @@ impl ArmingPrompts {
             }
             Mode::Ramping => self.tell("amplifiers on; force comes in"),
             Mode::Armed => self.tell("armed"),
-            Mode::Disarmed if before.is_some_and(|before| before.mode.drives()) => {
+            Mode::Disarmed if before.is_some_and(|before| before.mode.is_driving()) => {
                 self.tell("disarmed; amplifiers off");
             }
             _ => {}
@@ -281,7 +281,7 @@ impl ArmingPrompts {
         }
         if fault.is_some() {
             self.say
-                .push(HostRequest::Request(Request::ClearFault { seen: fault }));
+                .push(HostRequest::Request(Request::ClearFault { fault }));
         }
         self.zeroing = question.zeroes;
         self.say.push(match question.zeroes {
@@ -396,8 +396,8 @@ mod tests {
         assert_eq!(prompts.messages(), []);
         assert!(prompts.lines().join("\n").contains("EncoderJump"));
         press.send(()).expect("listening");
-        let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
+        let fault = report.fault;
+        let wanted = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 
@@ -516,8 +516,8 @@ mod tests {
         prompts.on_event(&Event::Guard(&report));
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
-        let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
+        let fault = report.fault;
+        let wanted = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 }

@@ -12,7 +12,7 @@ pub(super) fn pace(counts: &Counts, hz: u32) -> Option<String> {
         Some(Untimed::Same(t_s)) => {
             format!("one row of the path a tick, {hz} ticks a second: t_s is {t_s} in all of them")
         }
-        Some(Untimed::Asked) => format!("one row of the path a tick, {hz} ticks a second"),
+        Some(Untimed::Requested) => format!("one row of the path a tick, {hz} ticks a second"),
         None if rows == counts.ticks && counts.filled_in == 0 => return None,
         None => format!(
             "{hz} ticks a second by t_s, on straight lines between the {rows} rows of the path"

@@ -65,7 +65,7 @@ impl Terrain<'_> {
         side: usize,
         reads: &ReadTracker,
     ) -> (Samples, Nodes) {
-        let ([west, south], along, nodes) = ball.around(first, side);
+        let ([west, south], along, nodes) = ball.samples_for(first, side);
         let mut heights = vec![f64::NAN; along * along];
         // West of the raster there are no columns to read.
         let beside = west.min(0).unsigned_abs() as usize;

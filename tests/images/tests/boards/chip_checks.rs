@@ -84,7 +84,7 @@ fn probe_that_stops_reading_the_log_blocks_no_task() {
         let mut device = Device::arm(machine, terrain, scene);
         device.machine.borrow_mut().stop_reading_log();
         // A host of another protocol is logged.
-        let hello = VersionCheck::Asked { protocol: 3 };
+        let hello = VersionCheck::Query { protocol: 3 };
         device.send(encode(&hello, &mut [0; 32]).expect("it fits"));
         device.run_ms(100);
         let reported = device.latest.and_then(|sample| sample.fault);

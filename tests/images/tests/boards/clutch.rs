@@ -1,6 +1,6 @@
 //! The boards' clutch input, in the boards' own images.
 
-use hapterra_core::clutch::ClutchHold;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::Request;
@@ -44,12 +44,12 @@ fn clutch_switch_removes_force_and_its_release_restores_it() {
         assert!(device.query_status().health.sense.clutch);
         // The host holds it as well: both must release it.
         let hold = |hold| Request::Clutch { hold };
-        device.request(hold(ClutchHold::WithHand));
+        device.request(hold(ClutchMode::WithHand));
         device.run_ms(20);
         switch(device, false);
         device.run_ms(60);
         assert_eq!(limits(device), Limits::CLUTCH_OPEN);
-        device.request(hold(ClutchHold::LetGo));
+        device.request(hold(ClutchMode::Released));
         device.run_ms(600);
         assert_eq!(limits(device), Limits::empty());
         let back = latest(device).force_n;

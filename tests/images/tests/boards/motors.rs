@@ -4,7 +4,7 @@
 use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
 use hapterra_core::guard::GuardInputs;
-use hapterra_core::guard::thermal::{CONTINUOUS_C, UNSEEN_K};
+use hapterra_core::guard::thermal::{CONTINUOUS_C, RESET_MARGIN_K};
 use hapterra_core::scene::Scene;
 use hapterra_core::wire::status::{BootReport, ResetCause, Status};
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
@@ -93,7 +93,7 @@ fn motor_temperatures_survive_a_reset_under_load() {
         let mut device = Device::arm(machine, terrain, scene);
         let initial_c = device.query_status().health.winding_c;
         assert!(
-            initial_c.max_element() < 25.0 + UNSEEN_K + 0.1,
+            initial_c.max_element() < 25.0 + RESET_MARGIN_K + 0.1,
             "{board}: {initial_c}"
         );
         device.move_to(plane.counts_at([100.0, 100.0], -3.0));
@@ -120,7 +120,7 @@ fn motor_temperatures_survive_a_reset_under_load() {
             "{board}: {before} {after}"
         );
         assert!(
-            recorded.cmplt(Vec3::splat(UNSEEN_K + 1.0)).all(),
+            recorded.cmplt(Vec3::splat(RESET_MARGIN_K + 1.0)).all(),
             "{board}: {before} {after}"
         );
         // Each axis has its own temperature: the one that pushed is the warmest.

@@ -136,13 +136,13 @@ fn missing_brown_out_level_in_option_bytes_is_reported() {
         let board = machine.chip.board;
         let mut device = Device::open(machine, terrain, scene);
         let set = device.query_status().boot;
-        assert!(!set.lacks_brown_out_reset(), "{board}: {set:?}");
+        assert!(!set.is_brown_out_level_low(), "{board}: {set:?}");
         assert!(set.resets_below_mv >= 2_700, "{board}: {set:?}");
         let machine = device.reset();
         machine.bus().set_brown_out_level(0);
         let mut device = Device::open(machine, terrain, scene);
         let as_sold = device.query_status().boot;
-        assert!(as_sold.lacks_brown_out_reset(), "{board}: {as_sold:?}");
+        assert!(as_sold.is_brown_out_level_low(), "{board}: {as_sold:?}");
     });
 }
 
@@ -359,7 +359,7 @@ fn hard_fault_during_logging_is_reported_as_hard_fault() {
         };
         at.set(release.address);
         // A host of another protocol is logged.
-        let hello = VersionCheck::Asked { protocol: 3 };
+        let hello = VersionCheck::Query { protocol: 3 };
         device.send(encode(&hello, &mut [0; 32]).expect("it fits"));
         let mut machine = device.machine.borrow_mut();
         let stop = machine.run_until(200, |m| {

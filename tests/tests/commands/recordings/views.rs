@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use hapterra::replay::settings::PlacementSettings;
 use hapterra::replay::{Settings, Trajectory};
-use hapterra_core::contact::{MAX_PIECE, WORK_PER_TICK};
+use hapterra_core::contact::{MAX_ATOMIC_WORK, WORK_PER_TICK};
 use hapterra_tests::{UNCONTROLLED, hapterra_binary};
 
 use super::test_folder::{Folder, output_text, rows};
@@ -378,7 +378,7 @@ fn replay_of_a_steep_saw_equals_the_live_forces() {
                 (live.expect("a number") - again.expect("a number")).abs()
             };
             let work: u32 = live["work"].parse().expect("units");
-            assert!(work <= WORK_PER_TICK - MAX_PIECE, "{work} units");
+            assert!(work <= WORK_PER_TICK - MAX_ATOMIC_WORK, "{work} units");
             let proxy_mm = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"].map(apart);
             let off = proxy_mm.into_iter().fold(0.0, f64::max);
             assert!(off <= ROUNDING_MM, "{off} mm off at {} s", live["t_s"]);

@@ -116,8 +116,8 @@ fn rearming_after_fault_needs_clear_command_and_new_press() {
     bed = bed.run(PRESSED + 900);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
     assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
-    let seen = Some(Fault::DeadManReleased);
-    bed.ask(Request::ClearFault { seen });
+    let fault = Some(Fault::DeadManReleased);
+    bed.ask(Request::ClearFault { fault });
     bed.ask(Request::Arm);
     bed = bed.run(5_890);
     let report = bed.reports.last().expect("told");
@@ -253,8 +253,8 @@ fn boot_fault_must_be_cleared_before_arming() {
     assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::WatchdogReset));
-    let seen = Some(Fault::WatchdogReset);
-    bed.ask(Request::ClearFault { seen });
+    let fault = Some(Fault::WatchdogReset);
+    bed.ask(Request::ClearFault { fault });
     bed.ask(Request::Arm);
     bed = bed.run(3_300);
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
@@ -266,8 +266,8 @@ fn boot_fault_must_be_cleared_before_arming() {
     let mut bed = Bed::started(&terrain, script(), pressed_twice, damaged).run(500);
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::CalibrationCorrupt));
-    let seen = Some(Fault::CalibrationCorrupt);
-    bed.ask(Request::ClearFault { seen });
+    let fault = Some(Fault::CalibrationCorrupt);
+    bed.ask(Request::ClearFault { fault });
     bed.ask(Request::Arm);
     bed = bed.run(700);
     let refused = Err(Refusal::Blocked(Blockers::NO_CALIBRATION));

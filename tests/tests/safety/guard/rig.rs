@@ -143,7 +143,7 @@ impl<'t> Bed<'t> {
         }
         for sample in &self.samples {
             assert!(sample.force_n.length() <= 8.5 * WORKING_SHARE);
-            let driven = sample.mode.drives();
+            let driven = sample.mode.is_driving();
             assert!(driven || sample.force_n.length() == 0.0, "{}", sample.tick);
         }
     }

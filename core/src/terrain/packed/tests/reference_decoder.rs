@@ -17,9 +17,9 @@ impl Bits {
         (0..count).fold(0, |number, _| 2 * number + u64::from(self.bit()))
     }
 
-    fn zeros(&mut self, most: u32) -> u32 {
+    fn zeros(&mut self, max: u32) -> u32 {
         let mut zeros = 0;
-        while zeros < most && !self.bit() {
+        while zeros < max && !self.bit() {
             zeros += 1;
         }
         zeros
@@ -50,19 +50,19 @@ pub(super) fn heights(bytes: &[u8]) -> Vec<u32> {
         .flat_map(|byte| (0..8).rev().map(move |i| byte >> i & 1 == 1));
     let mut bits = Bits(bits.collect(), 0);
 
-    let mut hole = kind & 4 != 0 && !bits.bit();
-    let mut left = if kind & 4 == 0 { 1089 } else { 0 };
+    let mut is_gap = kind & 4 != 0 && !bits.bit();
+    let mut remaining = if kind & 4 == 0 { 1089 } else { 0 };
     let mut mean = 16_u64 << (kind >> 3);
     let mut numbers = [[0_i32; 33]; 33];
     let mut heights = Vec::new();
     for row in 0..33 {
         for col in 0..33 {
-            if left == 0 {
-                hole = !hole;
+            if remaining == 0 {
+                is_gap = !is_gap;
                 let zeros = bits.zeros(15);
-                left = (1 << zeros) + bits.number(zeros);
+                remaining = (1 << zeros) + bits.number(zeros);
             }
-            left -= 1;
+            remaining -= 1;
             let predicted = match (row, col) {
                 (0, 0) => int(&bytes[1..5]) as i32,
                 (0, _) => numbers[0][col - 1],
@@ -71,7 +71,7 @@ pub(super) fn heights(bytes: &[u8]) -> Vec<u32> {
                     .wrapping_add(numbers[row - 1][col])
                     .wrapping_sub(numbers[row - 1][col - 1]),
             };
-            if hole {
+            if is_gap {
                 numbers[row][col] = match (row, col) {
                     (0, 0) => predicted,
                     (_, 0) => numbers[row - 1][0],
@@ -93,12 +93,12 @@ pub(super) fn heights(bytes: &[u8]) -> Vec<u32> {
             let number = predicted.wrapping_add(difference as i32);
             numbers[row][col] = number;
             let height = height(number, &lines);
-            let held = if height.abs() <= MAX {
+            let stored = if height.abs() <= MAX {
                 height
             } else {
                 f32::NAN
             };
-            heights.push(held.to_bits());
+            heights.push(stored.to_bits());
         }
     }
     heights

@@ -107,7 +107,7 @@ impl Samples {
 }
 
 /// Part of a block that supports a ball.
-pub(super) struct Bearing {
+pub(super) struct Support {
     pub(super) columns: usize,
     /// True if the patch north-east of a sample has four samples.
     patches: Vec<bool>,
@@ -115,9 +115,9 @@ pub(super) struct Bearing {
     pub(super) nodes: Vec<f64>,
 }
 
-impl Bearing {
+impl Support {
     pub(super) fn of(block: &Samples) -> Self {
-        let mut bearing = Self {
+        let mut support = Self {
             columns: block.columns,
             patches: vec![false; block.heights.len()],
             nodes: vec![f64::NEG_INFINITY; block.heights.len()],
@@ -129,27 +129,27 @@ impl Bearing {
                 if corners.iter().any(|at| block.heights[*at].is_nan()) {
                     continue;
                 }
-                bearing.patches[corners[0]] = true;
+                support.patches[corners[0]] = true;
                 for at in corners {
-                    bearing.nodes[at] = block.heights[at];
+                    support.nodes[at] = block.heights[at];
                 }
             }
         }
-        bearing
+        support
     }
 
     /// Returns true if a ball that touches a sample also touches the ground beside it: along an
     /// axis the ground rises there, or is straight.
-    pub(super) fn is_between_stretches(&self, block: &Samples, at: usize) -> bool {
+    pub(super) fn is_between_segments(&self, block: &Samples, at: usize) -> bool {
         let (column, row) = (at % block.columns, at / block.columns);
         [Axis::East, Axis::North].into_iter().any(|axis| {
             let (line, place) = match axis {
                 Axis::East => (row, column),
                 Axis::North => (column, row),
             };
-            let bears = |start: usize| self.bears(axis, line, start, false);
+            let supports = |start: usize| self.supports(axis, line, start, false);
             let last = axis.sizes(block).1 - 1;
-            if place == 0 || place == last || !bears(place - 1) || !bears(place) {
+            if place == 0 || place == last || !supports(place - 1) || !supports(place) {
                 return false;
             }
             let height = |place: usize| block.heights[axis.at(block, line, place)];
@@ -158,7 +158,7 @@ impl Bearing {
     }
 
     /// Returns true if a stretch of a line is in a patch with four samples, or on its edge.
-    pub(super) fn bears(&self, axis: Axis, line: usize, start: usize, within: bool) -> bool {
+    pub(super) fn supports(&self, axis: Axis, line: usize, start: usize, within: bool) -> bool {
         let patch = |line: usize| match axis {
             Axis::North => self.patches[start * self.columns + line],
             Axis::East => self.patches[line * self.columns + start],
