@@ -93,7 +93,7 @@ impl VirtualArm {
             .placement
             .joints_at(&model, *first_mm)
             .map_err(refused)?;
-        Ok(Some(Plant::new(model, q).held_by(self.hand)))
+        Ok(Some(Plant::new(model, q).with_hand(self.hand)))
     }
 
     /// Runs ticks at the first of these targets, up to the next check for Ctrl-C.

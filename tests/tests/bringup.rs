@@ -6,7 +6,7 @@ use std::path::Path;
 
 use hapterra::bringup::{
     Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, Step,
-    Stopped, Task, VirtualBench, VirtualUser, Walked, walk,
+    Stopped, Task, VirtualBench, VirtualUser, SequenceEnd, run_sequence,
 };
 use hapterra::link::{ControlSession, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
@@ -34,7 +34,7 @@ fn say(line: &str) {
 /// Runs the walk with a user, and checks the speeds of the joints.
 fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
     let ended = walked_unwatched(user, record, log);
-    let fastest = user.bench().borrow().fastest_rad_s();
+    let fastest = user.bench().borrow().max_rate_rad_s();
     println!("fastest {fastest:?} rad/s");
     let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
     assert!(fastest.iter().all(|speed| *speed < most), "{fastest:?}");
@@ -52,8 +52,8 @@ fn walked_unwatched(
     loop {
         let device = user.device(record);
         match walked_once(user, device, log) {
-            Ok(Walked::BoardWasOff) => {}
-            Ok(Walked::ToTheEnd) => return Ok(()),
+            Ok(SequenceEnd::BoardPoweredOff) => {}
+            Ok(SequenceEnd::Complete) => return Ok(()),
             Err(error) => return Err(error),
         }
     }
@@ -63,9 +63,9 @@ fn walked_once(
     user: &mut dyn Attendant,
     device: Native<StoppedClock>,
     log: &mut Log,
-) -> Result<Walked, BringupError> {
+) -> Result<SequenceEnd, BringupError> {
     let opened = ControlSession::open(Box::new(device), HANG);
-    walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
+    run_sequence(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
 /// Returns the transcript for a user without mistakes, as in the documentation.
@@ -82,11 +82,11 @@ fn found(bench: VirtualBench, record: Calibration) -> (Step, Finding) {
 /// Same as `found`, with all steps before this one passed earlier.
 fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
     let mut user = VirtualUser::at(bench);
-    user.says = say;
+    user.print = say;
     let mut log = Log::default();
     let opened = ControlSession::open(Box::new(user.device(record)), HANG);
     let opened = opened.expect("it answers");
-    _ = log.meet(Identity::of(opened.device(), Some(&record)));
+    _ = log.update_identity(Identity::of(opened.device(), Some(&record)));
     for step in Step::ALL.into_iter().filter(|step| *step < from) {
         log.take(step, true, String::new());
     }
@@ -99,7 +99,7 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     let last = log.entries.last().expect("an entry");
     assert_eq!((last.step, last.passed), (step, false));
     assert_eq!(last.result, finding.to_string());
-    assert!(!finding.what_to_do().is_empty());
+    assert!(!finding.remedy().is_empty());
     (step, finding)
 }
 
@@ -110,7 +110,7 @@ fn wired(wiring: Wiring) -> VirtualBench {
 #[test]
 fn correct_arm_completes_every_step() {
     let mut user = VirtualUser::new(Wiring::RIGHT);
-    user.says = say;
+    user.print = say;
     let mut log = Log::default();
     walked(&mut user, RECORD, &mut log).expect("to the end");
     assert_eq!(log.next(), None);
@@ -121,7 +121,7 @@ fn correct_arm_completes_every_step() {
 #[test]
 fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     let mut user = VirtualUser::new(Wiring::RIGHT.with_gain(1, -1.0));
-    user.says = say;
+    user.print = say;
     let mut log = Log::default();
     walked(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
     assert_eq!(log.next(), Some(Step::Motor2));
@@ -166,7 +166,7 @@ impl Another {
     fn careless(user: VirtualUser) -> Self {
         Self {
             does: |task| match task {
-                Task::HoldLoosely => Task::LetGoOfTip,
+                Task::HoldLoosely => Task::ReleaseTip,
                 task => task,
             },
             ..Self::than(user)
@@ -183,8 +183,8 @@ impl Another {
 }
 
 impl Attendant for Another {
-    fn hear(&mut self, line: &str) {
-        self.user.hear(line);
+    fn notify(&mut self, line: &str) {
+        self.user.notify(line);
     }
 
     fn begin(&mut self, task: Task) {
@@ -199,10 +199,10 @@ impl Attendant for Another {
         self.user.read(reading)
     }
 
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+    fn confirm(&mut self, question: Question) -> Result<bool, Stopped> {
         match (self.answers)(question) {
             Some(answer) => Ok(answer),
-            None => self.user.confirms(question),
+            None => self.user.confirm(question),
         }
     }
 
@@ -233,7 +233,7 @@ fn wrong_tick_rate_of_the_board_is_named() {
     // The chips' own oscillators may be off by one per cent.
     let slow = BenchMistakes {
         clock_slow_by: 0.01,
-        output_off_v: [1.0; 3],
+        output_offset_v: [1.0; 3],
         ..BenchMistakes::default()
     };
     let (step, _) = found_of_the_board(slow);
@@ -258,17 +258,17 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     for gain in [1.0, -1.0] {
         let wiring = Wiring::RIGHT.with_gain(0, gain);
         let mut user = Another::careless(VirtualUser::at(VirtualBench::new(model, wiring)));
-        user.user.says = say;
+        user.user.print = say;
         STATED.take();
         let mut log = Log::default();
-        let mut ended = Ok(Walked::BoardWasOff);
-        while let Ok(Walked::BoardWasOff) = ended {
+        let mut ended = Ok(SequenceEnd::BoardPoweredOff);
+        while let Ok(SequenceEnd::BoardPoweredOff) = ended {
             let device = user.user.device(RECORD);
             ended = walked_once(&mut user, device, &mut log);
         }
         let text = STATED.take();
         assert!(text.contains("the jog ended with fault 22"), "{text}");
-        let fastest = user.user.bench().borrow().fastest_rad_s();
+        let fastest = user.user.bench().borrow().max_rate_rad_s();
         println!("fastest {fastest:?} rad/s");
         let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
         assert!(fastest[0] < most, "{fastest:?}");
@@ -334,7 +334,7 @@ fn an_inverted_sign_is_named() {
         let motor = axis + 1;
         assert_eq!(finding, Finding::InvertedMotor { motor, right: -1 });
         let hint = format!("--set motor-sign-{motor}=-1");
-        assert!(finding.what_to_do().contains(&hint));
+        assert!(finding.remedy().contains(&hint));
     }
 }
 
@@ -378,7 +378,7 @@ fn miswired_emergency_stop_is_named() {
     };
     let (step, finding) = found_at(Step::Board, normally_open);
     assert_eq!(step, Step::Switches);
-    assert_eq!(finding, Finding::NotSeen(Task::ReleaseStop));
+    assert_eq!(finding, Finding::NotDetected(Task::ReleaseStop));
     let for_the_board_alone = BenchMistakes {
         stop_leaves_power: true,
         ..BenchMistakes::default()
@@ -410,8 +410,8 @@ fn a_ready_input_that_no_amplifier_drives_is_named() {
         mistakes.ready_grounded[axis] = true;
         let (step, finding) = found_at(Step::Board, mistakes);
         assert_eq!(step, Step::EnableLine);
-        assert_eq!(finding, Finding::NotSeen(Task::PullReadyWire(axis)));
-        assert!(finding.what_to_do().contains("tied to ground"), "{finding}");
+        assert_eq!(finding, Finding::NotDetected(Task::PullReadyWire(axis)));
+        assert!(finding.remedy().contains("tied to ground"), "{finding}");
     }
 }
 
@@ -420,7 +420,7 @@ fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
     for axis in 0..3 {
         let off = |volts| {
             let mut mistakes = BenchMistakes::default();
-            mistakes.output_off_v[axis] = volts;
+            mistakes.output_offset_v[axis] = volts;
             mistakes
         };
         let (step, finding) = found_at(Step::Board, off(0.5));
@@ -466,7 +466,7 @@ fn amplifiers_without_ready_lines_are_noted() {
     let mut log = Log::default();
     let device = user.user.device(RECORD);
     let ended = walked_once(&mut user, device, &mut log).expect("to the enable line");
-    assert_eq!(ended, Walked::BoardWasOff);
+    assert_eq!(ended, SequenceEnd::BoardPoweredOff);
     let last = log.entries.last().expect("an entry");
     assert_eq!(last.step, Step::EnableLine);
     assert!(

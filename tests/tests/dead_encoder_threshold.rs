@@ -38,7 +38,7 @@ impl Stands {
 /// Moves the tip along `way` (joint angles by time) with a tremor.
 fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds: f64) -> [u32; 3] {
     let model = PhantomModel::premium_1_5();
-    let mut plant = Plant::new(model, way(0.0)).held_by(HandModel::default());
+    let mut plant = Plant::new(model, way(0.0)).with_hand(HandModel::default());
     let target = |t: f64| {
         let tip = kinematics::tip(&model, way(t));
         std::array::from_fn(|i| tip[i] + 1e-3 * tremor_mm * (TAU * TREMOR_HZ[i] * t).sin())

@@ -231,13 +231,13 @@ fn assert_rendered(sample: &TickRecord, what: &str) {
 /// Returns the ratio of the forces of a press with two springs, N/mm. The hand is a spring as well,
 /// with a fixed end.
 fn in_series(with: f32, of: f32) -> f32 {
-    let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
+    let give = 1_000.0 * HandModel::default().compliance_m_per_n() as f32;
     (give + 1.0 / of) / (give + 1.0 / with)
 }
 
 /// Returns the share of a press that remains when the ground has moved to the hand's target.
 fn all_the_way() -> f32 {
-    let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
+    let give = 1_000.0 * HandModel::default().compliance_m_per_n() as f32;
     (1.0 / STIFFNESS) / (give + 1.0 / STIFFNESS)
 }
 

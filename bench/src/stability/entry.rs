@@ -73,7 +73,7 @@ impl Setting {
     pub fn enters(self, entry: Entry) -> Result<Option<Entered>, OutOfReach> {
         let [east, north, _] = HOME.home_mm;
         let wall_mm = PRESS_N / self.stiffness_n_per_mm;
-        let give_mm = 1e3 * PRESS_N * self.grasp.hand().give_m_per_n();
+        let give_mm = 1e3 * PRESS_N * self.grasp.hand().compliance_m_per_n();
         let pressed = PLANE_MM - wall_mm - give_mm;
         let begin = Script::start([east, north, PLANE_MM + ABOVE_MM]);
         let press = |script: Script, up_mm: f64| script.go([east, north, up_mm], BEGIN_MM_S);

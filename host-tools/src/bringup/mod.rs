@@ -17,18 +17,19 @@ mod board;
 mod finding;
 mod halt;
 mod log;
+mod sequence;
 mod step;
 mod steps;
 mod utc;
 mod virtual_bench;
 mod virtual_user;
-mod walk;
 
-pub use attendant::{Attendant, BoardIs, Question, Reading, Stopped, Task};
+
+pub use attendant::{Attendant, BoardState, Question, Reading, Stopped, Task};
 pub use finding::Finding;
 pub use halt::Halt;
 pub use log::{Entry, Identity, Log, LogError};
 pub use step::Step;
 pub use virtual_bench::{BenchMistakes, VirtualBench};
 pub use virtual_user::VirtualUser;
-pub use walk::{BringupError, Walked, walk};
+pub use sequence::{BringupError, SequenceEnd, run_sequence};

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The motors stay off throughout, so that an error in a record cannot hurt the user during the
-//! measurement. [`walk`] runs the steps; the [`Attendant`] that answers is a terminal or a
+//! measurement. [`run_procedure`] runs the steps; the [`Attendant`] that answers is a terminal or a
 //! [`VirtualUser`].
 
 mod arm;
@@ -19,12 +19,12 @@ mod gravity;
 mod ratios;
 mod review;
 mod virtual_user;
-mod walk;
+mod procedure;
 
 pub use arm::Arm;
 pub use fit_error::FitError;
-pub use gravity::{GravityFit, N_PER_GRAM, Still, fit_gravity};
-pub use ratios::{Check, Direction, RatioFit, fit_ratios};
+pub use gravity::{GravityFit, N_PER_GRAM, StaticPose, fit_gravity};
+pub use ratios::{RulerMove, Direction, RatioFit, fit_ratios};
 pub use review::Review;
 pub use virtual_user::VirtualUser;
-pub use walk::{Attendant, Plan, Stopped, WalkError, walk};
+pub use procedure::{Attendant, Plan, ProcedureError, Stopped, run_procedure};

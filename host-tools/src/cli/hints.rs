@@ -9,7 +9,7 @@ use super::options::surface::table::TableError;
 use crate::board::ImageError;
 use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::file::FileError;
-use crate::calibrate::{FitError, WalkError};
+use crate::calibrate::{FitError, ProcedureError};
 use crate::link::{EmulatorError, LinkError};
 use crate::materials::GroundError;
 use crate::phantom::PlacingError;
@@ -214,7 +214,7 @@ impl Hint for EmulatorError {
     }
 }
 
-impl Hint for WalkError<LinkError> {
+impl Hint for ProcedureError<LinkError> {
     fn hint(&self) -> String {
         let hint = match self {
             Self::Counts(error) => return error.hint(),

@@ -46,7 +46,7 @@ impl HandModel {
     /// Returns the compliance of arm and grip, m/N: the tip's lag behind the target for each
     /// newton.
     #[must_use]
-    pub fn give_m_per_n(&self) -> f64 {
+    pub fn compliance_m_per_n(&self) -> f64 {
         1.0 / self.arm_n_per_m + 1.0 / self.grip_n_per_m
     }
 }

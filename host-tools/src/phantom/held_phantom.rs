@@ -41,7 +41,7 @@ impl HeldPhantom {
         let start_mm = script.target(0.0).position_mm;
         let q = placement.joints_at(&model, start_mm)?;
         Ok(Self {
-            plant: Plant::new(model, q).held_by(hand),
+            plant: Plant::new(model, q).with_hand(hand),
             placement,
             script,
             begin_s: 0.0,

@@ -58,7 +58,7 @@ fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
     // Friction carries at most 0.01 N·m on an arm of 0.21 m, against the springs of wall and hand
     // together; the encoder's error is half a count.
     let friction_n = 0.01 / arm.plant().model().l1_m;
-    let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
+    let hand_n_per_mm = 1e-3 / HandModel::default().compliance_m_per_n();
     let bound_mm = friction_n / (WALL_N_PER_MM + hand_n_per_mm) + 0.015;
     for (height, force) in settled {
         assert!((height + 4.0).abs() < bound_mm, "{height} ± {bound_mm} mm");

@@ -9,7 +9,7 @@ use crate::terrain::Terrain;
 /// Force of the hand's slide, N; presses and taps are 1.5 times as strong.
 const PUSH_N: f64 = 1.0;
 /// Distance between the points of the plan, mm: a hand cannot follow finer detail.
-const PLANNED_APART_MM: f64 = 0.5;
+const PLAN_SPACING_MM: f64 = 0.5;
 /// Rest after the tour, s.
 const REST_S: f64 = 0.25;
 
@@ -70,7 +70,7 @@ impl<'t> PlacedTerrain<'t> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
         // After an interrupt the surface has no heights: the plan ends quickly and is dropped.
         let surface = |east: f64, north: f64| {
-            let height = || terrain.planned_mm(east, north, PLANNED_APART_MM);
+            let height = || terrain.planned_mm(east, north, PLAN_SPACING_MM);
             goes_on().then(height).flatten()
         };
         let plan = TourPlan {

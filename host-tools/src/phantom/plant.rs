@@ -53,7 +53,7 @@ impl Plant {
 
     /// Adds a hand at rest on the tip.
     #[must_use]
-    pub fn held_by(mut self, hand: HandModel) -> Self {
+    pub fn with_hand(mut self, hand: HandModel) -> Self {
         self.hand = Some(Hand::new(hand, self.tip_m()));
         self
     }

@@ -139,7 +139,7 @@ fn the_stops_catch_a_thrown_arm() {
 
 /// Moves the arm by a hand, with friction and with the current steps of a wall.
 fn dragged(substep_s: f64) -> DVec3 {
-    let mut plant = Plant::new(premium(), [0.0; 3]).held_by(HandModel::default());
+    let mut plant = Plant::new(premium(), [0.0; 3]).with_hand(HandModel::default());
     plant.substep_s = substep_s;
     let home = DVec3::from(plant.tip_m());
     for tick in 0..500 {
@@ -176,7 +176,7 @@ fn the_same_inputs_give_the_same_bits() {
 #[test]
 fn hand_force_balances_motor_force_at_rest() {
     let mut plant =
-        Plant::new(premium().weightless().frictionless(), [0.0; 3]).held_by(HandModel::default());
+        Plant::new(premium().weightless().frictionless(), [0.0; 3]).with_hand(HandModel::default());
     for _ in 0..3000 {
         plant.step([0.5, 0.3, -0.4], 1e-3);
     }

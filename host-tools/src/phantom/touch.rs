@@ -16,14 +16,14 @@ const SLIDE_STEP_MM: f64 = 0.5;
 /// cliff.
 const SLIDE_SMOOTHING: usize = 4;
 /// Height of the hand above the rim of no-data while it crosses, mm.
-const OVER_HOLE_MM: f64 = 3.0;
+const NO_DATA_CLEARANCE_MM: f64 = 3.0;
 /// Speed of approach and tapping, mm/s.
 const APPROACH_MM_S: f64 = 60.0;
 
 /// Builds a [`Script`] that touches a surface.
 pub struct Touch<'a> {
     surface: Surface<'a>,
-    give_mm_per_n: f64,
+    compliance_mm_per_n: f64,
     script: Script,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Touch<'a> {
         let ground = nearest_ground(surface, x, y).unwrap_or(0.0);
         Self {
             surface,
-            give_mm_per_n: 1.0 / wall_n_per_mm + 1e3 * hand.give_m_per_n(),
+            compliance_mm_per_n: 1.0 / wall_n_per_mm + 1e3 * hand.compliance_m_per_n(),
             script: Script::start([x, y, ground + above_mm]),
         }
     }
@@ -113,7 +113,7 @@ impl<'a> Touch<'a> {
     fn below(&self, newtons: f64) -> [f64; 3] {
         let [x, y, z] = self.script.end_mm();
         match (self.surface)(x, y) {
-            Some(ground) => [x, y, ground - newtons * self.give_mm_per_n],
+            Some(ground) => [x, y, ground - newtons * self.compliance_mm_per_n],
             None => [x, y, z],
         }
     }
@@ -130,11 +130,11 @@ impl<'a> Touch<'a> {
             let known: Vec<f64> = near.iter().flatten().copied().collect();
             let z = if known.len() == near.len() {
                 let mean = known.iter().sum::<f64>() / known.len() as f64;
-                mean - newtons * self.give_mm_per_n
+                mean - newtons * self.compliance_mm_per_n
             } else {
                 let highest = known.iter().copied().reduce(f64::max);
                 rim = highest.or(rim);
-                rim.unwrap_or(0.0) + OVER_HOLE_MM
+                rim.unwrap_or(0.0) + NO_DATA_CLEARANCE_MM
             };
             points.push([*x, *y, z]);
         }

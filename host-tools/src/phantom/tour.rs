@@ -16,7 +16,7 @@ const INSIDE: f64 = 0.84;
 /// Factors tried in order until the arm reaches all of the plan and there is hardly any no-data.
 const SHRINK: [f64; 5] = [1.0, 0.6, 0.35, 0.2, 0.1];
 /// Share of known ground at which no smaller place is searched.
-const HARDLY_ANY_HOLES: f64 = 0.97;
+const ENOUGH_KNOWN_SHARE: f64 = 0.97;
 /// Places tried in each direction.
 const PLACES: u32 = 11;
 /// Relief above which a place gets no higher score, mm.
@@ -26,7 +26,7 @@ const ENOUGH_RELIEF_MM: f64 = 25.0;
 const STRONG: f64 = 1.5;
 /// Max distance of a plan's middle from a fixed home position along each axis, mm: about the
 /// sideways reach of a Premium 1.5.
-const FAR_MM: f64 = 250.0;
+const MAX_HOME_DISTANCE_MM: f64 = 250.0;
 /// Min and max speed of the slide, mm/s, and its intended duration, s.
 const SLIDE_MM_S: (f64, f64) = (45.0, 120.0);
 const SLIDE_S: f64 = 7.0;
@@ -82,7 +82,7 @@ impl TourPlan<'_> {
                 Ok(()) => {}
                 Err(far) => first_failure = first_failure.or(Some(far)),
             }
-            if best.as_ref().is_some_and(|best| best.0 >= HARDLY_ANY_HOLES) {
+            if best.as_ref().is_some_and(|best| best.0 >= ENOUGH_KNOWN_SHARE) {
                 break;
             }
         }
@@ -126,7 +126,7 @@ impl TourPlan<'_> {
     }
 
     /// Returns the range for the middle of a plan along an axis: on the terrain and, if the home
-    /// position is fixed, within [`FAR_MM`] of it.
+    /// position is fixed, within [`MAX_HOME_DISTANCE_MM`] of it.
     fn room(&self, axis: usize, half: f64) -> [f64; 2] {
         let (middle, room) = (0.5 * self.size_mm[axis], half / INSIDE);
         let room = (middle - room).max(0.0);
@@ -134,7 +134,7 @@ impl TourPlan<'_> {
         match self.home_mm {
             None => on_terrain,
             Some(home) => {
-                [-FAR_MM, FAR_MM].map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1]))
+                [-MAX_HOME_DISTANCE_MM, MAX_HOME_DISTANCE_MM].map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1]))
             }
         }
     }

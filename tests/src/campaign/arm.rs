@@ -65,7 +65,7 @@ impl<'t> Arm<'t> {
         let wave = |random: &mut Random| (random.between(0.05, 0.45), random.between(0.0, TAU));
         Self {
             terrain,
-            plant: Plant::new(model, q.expect("within reach")).held_by(HandModel::default()),
+            plant: Plant::new(model, q.expect("within reach")).with_hand(HandModel::default()),
             placement,
             waves: std::array::from_fn(|_| wave(random)),
             t_s: 0.0,

@@ -6,25 +6,25 @@ use crate::bringup::finding::Finding;
 use crate::calibrate::Direction;
 
 /// Distance of the move, mm.
-const ABOUT_MM: u16 = 80;
+const MOVE_MM: u16 = 80;
 /// Counts that a working encoder exceeds in this move.
 const ALIVE_COUNTS: u32 = 400;
 /// Largest relative difference of forth and back: a hand returns to the zero pose no better.
-const LOST_SHARE: f64 = 0.1;
+const MAX_LOSS_SHARE: f64 = 0.1;
 
 /// Checks the encoders while the tip is moved right, up and towards the user, and back.
-pub(super) fn by_hand(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
     attendant.finish(Task::ZeroPose)?;
-    let mut from = board.still(attendant)?;
+    let mut from = board.wait_for_rest(attendant)?;
     let mut reported = Vec::new();
     for (joint, direction) in Direction::ALL.into_iter().enumerate() {
-        attendant.finish(Task::MoveAlong(direction, ABOUT_MM))?;
-        let to = board.still(attendant)?;
+        attendant.finish(Task::MoveAlong(direction, MOVE_MM))?;
+        let to = board.wait_for_rest(attendant)?;
         attendant.finish(Task::ZeroPose)?;
-        let again = board.still(attendant)?;
+        let again = board.wait_for_rest(attendant)?;
         let (there, back) = (moved(from, to), moved(to, again));
         judge(joint, there, back)?;
         reported.push(format!("joint {}: {:+} counts", joint + 1, there[joint]));
@@ -56,8 +56,8 @@ fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
             counts,
         });
     }
-    let off = (f64::from(counts) + f64::from(back[joint])).abs();
-    if off > LOST_SHARE * f64::from(counts).abs() {
+    let error = (f64::from(counts) + f64::from(back[joint])).abs();
+    if error > MAX_LOSS_SHARE * f64::from(counts).abs() {
         return Err(Finding::CountsLost {
             joint: joint + 1,
             there: counts,

@@ -13,7 +13,7 @@ use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
 use super::terminal::writer::{say, tell};
 use crate::bringup::{
-    Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
+    Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, SequenceEnd, run_sequence,
 };
 use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native, Transport};
 use crate::phantom::Wiring;
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.device == DeviceAddress::Native {
         say("a virtual user brings a virtual Phantom up");
         let mut user = VirtualUser::new(Wiring::RIGHT);
-        user.says = |line| say(line);
+        user.print = |line| say(line);
         return bring_up(args, &mut user, VIRTUAL_PATIENCE, |user| {
             Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
         });
@@ -88,14 +88,14 @@ fn bring_up<A: Attendant>(
             log.entries.retain(|entry| entry.step < step);
         }
         let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
-        let walked = walk(&mut control, user, &mut log, &mut keep);
+        let walked = run_sequence(&mut control, user, &mut log, &mut keep);
         if let Some(path) = &path {
             say(format!("log            {}", path.display()));
         }
         match (walked, control) {
             // The session ended with the board's power, so there is none to close.
-            (Ok(Walked::BoardWasOff), _) => kept = Some(log),
-            (Ok(Walked::ToTheEnd), control) => {
+            (Ok(SequenceEnd::BoardPoweredOff), _) => kept = Some(log),
+            (Ok(SequenceEnd::Complete), control) => {
                 control.end()?;
                 break;
             }
@@ -128,7 +128,7 @@ impl Hint for BringupError {
     fn hint(&self) -> String {
         match self {
             Self::Found { finding, .. } => {
-                format!("{}; then go on with hapterra bringup", finding.what_to_do())
+                format!("{}; then go on with hapterra bringup", finding.remedy())
             }
             Self::Halt(Halt::Link(error)) => error.hint(),
             Self::Halt(_) => "go on with hapterra bringup when you are ready".into(),

@@ -62,7 +62,7 @@ fn is_real(board: &str) -> bool {
 
 /// Returns the first step missing in the log, for the device's current identity and record.
 fn missing(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
-    log.meet(Identity::of(device, record));
+    log.update_identity(Identity::of(device, record));
     log.next()
 }
 
@@ -90,7 +90,7 @@ mod tests {
             missing(&device, Some(&record), log.clone()),
             Some(Step::Board)
         );
-        log.meet(Identity::of(&device, Some(&record)));
+        log.update_identity(Identity::of(&device, Some(&record)));
         for step in Step::ALL {
             assert_eq!(missing(&device, Some(&record), log.clone()), Some(step));
             log.take(step, true, String::new());

@@ -17,7 +17,7 @@ pub(super) struct UserAtTerminal {
 }
 
 impl Attendant for UserAtTerminal {
-    fn hear(&mut self, line: &str) {
+    fn notify(&mut self, line: &str) {
         say(line);
     }
 
@@ -40,12 +40,12 @@ impl Attendant for UserAtTerminal {
         }
     }
 
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+    fn confirm(&mut self, question: Question) -> Result<bool, Stopped> {
         let answer = ask(&format!("  ? {question} [y/N]")).ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 
-    fn stops(&self) -> fn() -> bool {
+    fn stop_check(&self) -> fn() -> bool {
         interrupt::requested
     }
 

@@ -18,7 +18,7 @@ use super::options::device::{Device, DeviceChoice};
 use super::report::put;
 use super::terminal::partial_files;
 use super::terminal::writer::say;
-use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
+use crate::calibrate::{Attendant, Plan, VirtualUser, file, run_procedure};
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 use crate::output::keep_apart;
 use measure::Measure;
@@ -116,8 +116,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .talk(|control| calibrate(args, control, &mut user));
     }
     // A virtual user demonstrates the steps on an in-memory device.
-    let mut user = VirtualUser::with_a_stylus();
-    user.says = |line| say(line);
+    let mut user = VirtualUser::with_stylus();
+    user.print = |line| say(line);
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
@@ -159,7 +159,7 @@ fn calibrate(
             gravity: measure.gravity,
         };
         let mut counts = || Ok(control.fresh_status()?.health.sense.counts);
-        let review = walk(&begin, plan, attendant, &mut counts)?;
+        let review = run_procedure(&begin, plan, attendant, &mut counts)?;
         (record, zero) = (review.after, Some(review.zero));
     }
     if let Some(path) = &args.out {

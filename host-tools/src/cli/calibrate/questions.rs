@@ -17,7 +17,7 @@ impl UserAtTerminal {
 }
 
 impl Attendant for UserAtTerminal {
-    fn hear(&mut self, line: &str) {
+    fn notify(&mut self, line: &str) {
         say(format!("  {line}"));
     }
 
@@ -56,7 +56,7 @@ impl Attendant for UserAtTerminal {
         ))
     }
 
-    fn agrees(&mut self, review: &Review) -> Result<bool, Stopped> {
+    fn confirm_record(&mut self, review: &Review) -> Result<bool, Stopped> {
         show(review);
         if self.yes {
             return Ok(true);
