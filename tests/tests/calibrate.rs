@@ -12,8 +12,8 @@ const FRICTION_NM: f64 = 0.01;
 
 fn calibrated(user: &mut VirtualUser) -> Review {
     let device = Native::new(HostClock::default(), None)
-        .meddled_with(user.hands())
-        .restless();
+        .with_fault_injector(user.hands())
+        .free_running();
     let opened = ControlSession::open(Box::new(device), HANG);
     let mut control = opened.expect("it answers");
     let plan = Plan {

@@ -47,7 +47,7 @@ fn device() -> Native<StoppedClock> {
         Stored::Found(Calibration::PREMIUM_1_5),
         boot,
     )
-    .restless()
+    .free_running()
 }
 
 fn rename(hello: &mut DeviceHello) {

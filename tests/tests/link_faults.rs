@@ -29,9 +29,9 @@ use heightfield::Raster;
 
 /// A device in memory answers at once: an answer that has not arrived after a moment is lost.
 const AT_ONCE: Timeouts = Timeouts {
-    again: Duration::from_millis(2),
-    alive: Duration::from_millis(2),
-    greet_again: Duration::from_millis(10),
+    retry: Duration::from_millis(2),
+    heartbeat: Duration::from_millis(2),
+    hello_retry: Duration::from_millis(10),
     give_up: HANG,
     goodbye: HANG,
     ..Timeouts::REAL_TIME
@@ -153,7 +153,7 @@ fn telemetry_that_is_lost_is_counted() {
             })
             .expect("goes on");
     }
-    session.say_goodbye(&mut |_| {}).expect("confirmed");
+    session.close(&mut |_| {}).expect("confirmed");
     let stats = session.stats();
     // Losses before the first and after the last sample received are counted as well.
     eprintln!("{last} ticks, {stats:?}");
@@ -195,7 +195,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     drop(session);
     // It dies in the middle of a frame, and is away for half a second.
     device.borrow_mut().send(&[7; 30]).expect("sent");
-    device.borrow_mut().pass(500);
+    device.borrow_mut().run_ticks(500);
     let (mut session, hello) =
         Session::open(&terrain, placed.scene(), None, link(), AT_ONCE).expect("opened again");
     assert_eq!(

@@ -442,6 +442,6 @@ fn replay_with_materials_is_bit_identical_on_emulated_board() {
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);
     }
-    board.say_goodbye().expect("sent");
+    board.close().expect("sent");
     emulator.finish().expect("the board ended well");
 }

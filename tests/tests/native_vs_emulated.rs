@@ -101,7 +101,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
             .filter(|rendered| rendered.5 == ContactState::Touching)
             .count();
         assert!(touched > 50, "{name}: the walk hardly touches");
-        board.say_goodbye().expect("said");
+        board.close().expect("said");
         emulator.finish().expect("the board ended well");
     }
 }

@@ -94,7 +94,7 @@ fn pressed_at<T>(
     let pedal = Rc::new(Cell::new(false));
     let foot = Rc::clone(&pedal);
     let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
-        .meddled_with(Box::new(move |_, sense, _| sense.clutch = foot.get()));
+        .with_fault_injector(Box::new(move |_, sense, _| sense.clutch = foot.get()));
     let (arming, timeout) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), timeout);
     let bounds = Bounds {
@@ -117,7 +117,7 @@ fn pressed_at<T>(
     assert_eq!(stats.lost + stats.dropped, 0);
     touching
         .session
-        .say_goodbye(&mut |_| {})
+        .close(&mut |_| {})
         .expect("confirmed");
     played
 }
@@ -135,7 +135,7 @@ impl Touching<'_> {
             .poll(Duration::ZERO, &mut take)
             .expect("goes on");
         for ask in self.steering.asks() {
-            self.session.ask(ask);
+            self.session.enqueue(ask);
         }
         if let Some(put) = self.steering.take_put() {
             self.session.put_view(put.view, put.terrain).expect("said");

@@ -248,7 +248,7 @@ fn lost_device_is_waited_for_and_the_other_continues() {
                 std::panic::resume_unwind(Box::new(()));
             }
         };
-        (Native::for_replay().restless(), die)
+        (Native::for_replay().free_running(), die)
     });
     let pair = Pair::of(mortal);
     let mut child = pair.start();
@@ -322,7 +322,7 @@ fn fault_is_reported_only_for_the_affected_device() {
         let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
             sense.measured_ma = Some([2_000, 0, 0]);
         });
-        let device = Native::for_replay().restless().meddled_with(current);
+        let device = Native::for_replay().free_running().with_fault_injector(current);
         (device, || {})
     });
     let pair = Pair::of(conducts);

@@ -58,11 +58,11 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
                 })
                 .expect("goes on");
             if !asked && samples.last().is_some_and(|last| last.tick >= ticks) {
-                session.ask(HostRequest::Status);
+                session.enqueue(HostRequest::Status);
                 asked = true;
             }
         }
-        session.say_goodbye(&mut |_| {}).expect("confirmed");
+        session.close(&mut |_| {}).expect("confirmed");
         emulator.finish().expect("the board ended well");
         (samples, status.expect("told"))
     });

@@ -276,7 +276,7 @@ fn tiles_and_samples_transfer_without_loss() {
         let gaps = ticks.windows(2).filter(|w| w[1] != w[0] + 1).count();
         assert!(ticks.len() > 100 && gaps == 0, "{} {gaps}", ticks.len());
         let stats = session.stats();
-        assert_eq!((stats.bad_frames, stats.lost, stats.again), (0, 0, 0));
+        assert_eq!((stats.bad_frames, stats.lost, stats.repeated), (0, 0, 0));
         // Each needs many packets, even when packed.
         assert!(
             stats.tiles >= 4 && stats.tile_bytes > 4 * 16 * PACKET as u64,

@@ -73,7 +73,7 @@ impl<'d, 't> Board<'d, 't> {
         let check_done = || done.get();
         let passed = self
             .control
-            .pass(STATUS_INTERVAL_MS, &check_done, &mut |message| match message {
+            .run_for(STATUS_INTERVAL_MS, &check_done, &mut |message| match message {
                 ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
                     epoch: *epoch,
                     key: *key,
@@ -244,7 +244,7 @@ impl<'d, 't> Board<'d, 't> {
     fn disarm(&mut self) -> Result<bool, LinkError> {
         let answer = self.control.request(&Request::Disarm)?;
         for _ in 0..MAX_POLLS_TO_DISARM {
-            let status = self.control.pass(STATUS_INTERVAL_MS, &|| false, &mut |_| None)?;
+            let status = self.control.run_for(STATUS_INTERVAL_MS, &|| false, &mut |_| None)?;
             if status.health.report.mode == Mode::Disarmed {
                 return Ok(answer.is_ok());
             }

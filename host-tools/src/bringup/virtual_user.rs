@@ -67,11 +67,11 @@ impl VirtualUser {
         let bench = self.bench();
         let stored = Stored::Found(record);
         Native::started(StoppedClock, None, stored, BootReport::default())
-            .meddled_with(Box::new(move |_, sense, drive| {
+            .with_fault_injector(Box::new(move |_, sense, drive| {
                 *sense = bench.borrow_mut().tick(drive);
             }))
-            .restless()
-            .in_steps_of(HOST_INTERVAL_MS)
+            .free_running()
+            .with_ticks_per_call(HOST_INTERVAL_MS)
             .with_usb_clock(self.bench.borrow().usb_clock())
     }
 

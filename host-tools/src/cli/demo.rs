@@ -399,7 +399,7 @@ impl<'t> Tour<'_, 't> {
                 marks.push(mark);
             }
             for ask in control.asks() {
-                session.ask(ask);
+                session.enqueue(ask);
             }
             if let Some(put) = control.put(log.views()) {
                 toured = toured.and(session.put_view(put.view, put.terrain));
@@ -414,7 +414,7 @@ impl<'t> Tour<'_, 't> {
         let figures = log.figures();
         let ticks = log.ticks();
         // The device is always notified of the end; its samples after the tour are not shown.
-        let left = session.say_goodbye(&mut |_| {});
+        let left = session.close(&mut |_| {});
         if let Some(events) = &events {
             let disarmed = left.is_ok();
             events.say(&Reported::End { disarmed });

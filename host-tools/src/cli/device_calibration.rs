@@ -17,7 +17,7 @@ pub(super) fn calibration_of(
     tell: &dyn Fn(String),
 ) -> Result<Calibration, Failure> {
     let transport = address.connect(|| Native::new(HostClock::default(), None))?;
-    let mut control = ControlSession::look(transport, TIMEOUT)?;
+    let mut control = ControlSession::open_read_only(transport, TIMEOUT)?;
     let calibration = match control.calibration()? {
         Some(calibration) => calibration,
         None => {

@@ -173,12 +173,12 @@ impl Hint for OtherTerrain {
 impl Hint for LinkError {
     fn hint(&self) -> String {
         let hint = match self {
-            Self::Absent { looked_for, .. } if looked_for.contains("USB") => {
+            Self::Absent { searched_for, .. } if searched_for.contains("USB") => {
                 "plug the board in, check its cable and that you may open it (on Linux the udev rule host-tools/udev/70-hapterra.rules); or try --device native"
             }
             Self::Absent { .. } => "start the emulated board there, or try --device native",
             Self::Several(_) => "name one: --device usb:SERIAL",
-            Self::Gone(_) | Self::Silent(_) | Self::LetGo | Self::Restarted => {
+            Self::Disconnected(_) | Self::Silent(_) | Self::HostSilent | Self::Restarted => {
                 "check the device and its cable, then start again"
             }
             Self::Version { ours, theirs } if theirs < ours => {
@@ -284,7 +284,7 @@ impl Hint for UpdateError {
             Self::Calibrations { .. } | Self::NoVectors(_) => {
                 "nothing was touched: `cargo xtask image BOARD` builds an image that fits"
             }
-            Self::Gone { .. } | Self::Refused { .. } | Self::Endless(_) | Self::Differs(_) => {
+            Self::Disconnected { .. } | Self::Refused { .. } | Self::Endless(_) | Self::Differs(_) => {
                 "press the board's reset button and try again"
             }
         };

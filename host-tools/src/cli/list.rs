@@ -46,7 +46,7 @@ fn list_usb() {
     if found.is_empty() {
         println!(
             "  none: looked for {} among {looked_at} USB devices",
-            Usb::looked_for()
+            Usb::searched_for()
         );
         println!("  check that the board's own USB connector is plugged in, not only its ST-LINK,");
         println!("  that the cable carries data, and that the board runs hapterra's firmware");
@@ -110,7 +110,7 @@ fn list_emulated(args: &Args) {
 
 /// Returns a description of the device behind a link.
 fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
-    let control = ControlSession::look(link, TIMEOUT)?;
+    let control = ControlSession::open_read_only(link, TIMEOUT)?;
     Ok(session_summary::device(control.device()))
 }
 

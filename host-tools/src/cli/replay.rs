@@ -323,7 +323,7 @@ fn emulated(
     let link: Box<dyn Transport> = Box::new(lines.link);
     let mut replayer = OfflineDevice::open(replayed.terrain, params, link, Timeouts::EMULATED)?;
     let replayed = replay(args, replayed, trajectory, &mut replayer)?;
-    replayer.say_goodbye()?;
+    replayer.close()?;
     if let Err(why) = emulator.finish() {
         tracing::info!("the emulated board did not end well: {why}");
     }

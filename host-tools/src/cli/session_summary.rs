@@ -46,7 +46,7 @@ impl SessionSummary {
             figures.late,
             stats.tiles,
             stats.tile_bytes,
-            stats.again,
+            stats.repeated,
             stats.samples,
             stats.lost,
             stats.dropped,

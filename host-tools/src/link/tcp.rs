@@ -29,7 +29,7 @@ impl Tcp {
     /// [`LinkError::Absent`] names the searched address.
     pub fn connect(address: &str) -> Result<Self, LinkError> {
         let absent = |why: io::Error| LinkError::Absent {
-            looked_for: format!("a device at {address} (TCP)"),
+            searched_for: format!("a device at {address} (TCP)"),
             why: why.to_string(),
         };
         let mut failure = io::Error::other("the name has no address");

@@ -75,7 +75,7 @@ impl Usb {
 
     /// Returns the description of the searched USB devices.
     #[must_use]
-    pub fn looked_for() -> String {
+    pub fn searched_for() -> String {
         format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")
     }
 
@@ -152,7 +152,7 @@ pub(crate) fn is_board(info: &nusb::DeviceInfo) -> bool {
 
 fn absent(why: String) -> LinkError {
     LinkError::Absent {
-        looked_for: Usb::looked_for(),
+        searched_for: Usb::searched_for(),
         why,
     }
 }

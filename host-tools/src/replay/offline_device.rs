@@ -101,8 +101,8 @@ impl<'t> OfflineDevice<'t> {
         while Instant::now() < deadline {
             let (mut answer, wait) = (None, Duration::from_millis(100));
             self.session.poll(wait, &mut |event| {
-                if let Event::Viewed { taken, .. } = event {
-                    answer = Some(taken);
+                if let Event::SceneChangeResult { accepted, .. } = event {
+                    answer = Some(accepted);
                 }
             })?;
             match answer {
@@ -182,8 +182,8 @@ impl<'t> OfflineDevice<'t> {
     ///
     /// # Errors
     /// [`LinkError::NotConfirmed`].
-    pub fn say_goodbye(&mut self) -> Result<(), LinkError> {
-        self.session.say_goodbye(&mut |_| {})
+    pub fn close(&mut self) -> Result<(), LinkError> {
+        self.session.close(&mut |_| {})
     }
 }
 
@@ -213,7 +213,7 @@ mod tests {
         for view in 0..300_u32 {
             if view > 0 {
                 let again = terrain.clone();
-                replayer.put_view(again, params, hip).expect("taken");
+                replayer.put_view(again, params, hip).expect("accepted");
             }
             let sample = replayer.step(hip).expect("rendered");
             assert_eq!(u32::from(sample.view), view % 256);

@@ -84,7 +84,7 @@ impl<'s, 't> Service<'s, 't> {
         let (scene, arming) = (self.scene, Some(self.arming));
         let session = Session::new(self.terrain, scene, arming, line, self.timeouts);
         let mut served = Served {
-            session: session.heeding(self.goes_on),
+            session: session.continuing_while(self.goes_on),
             connect: self.connect,
             device: self.device,
             retry: self.retry,
@@ -126,7 +126,7 @@ impl<'t> Served<'_, 't> {
         while (self.goes_on)() && !handler.is_over() {
             let polled = self.session.poll(POLL, &mut |event| handler.take(event));
             for ask in handler.asks() {
-                self.session.ask(ask);
+                self.session.enqueue(ask);
             }
             // The next poll reports any error of the line.
             let put = handler
@@ -135,7 +135,7 @@ impl<'t> Served<'_, 't> {
             let polled = polled.and(put.unwrap_or(Ok(())));
             handler.show(self.session.stats());
             match polled {
-                Err(error) if error.is_passing() => self.wait_for_device(handler, &error)?,
+                Err(error) if error.is_transient() => self.wait_for_device(handler, &error)?,
                 other => other?,
             }
         }
@@ -153,7 +153,7 @@ impl<'t> Served<'_, 't> {
         let began = Instant::now();
         while (self.goes_on)() {
             // The old line may still have a claim on a silent device.
-            self.session.hang_up();
+            self.session.close_line();
             match self.resume(handler) {
                 Ok(device) => {
                     let again = match device.epoch == Some(self.session.scene().epoch) {
@@ -168,7 +168,7 @@ impl<'t> Served<'_, 't> {
                     return Ok(());
                 }
                 Err(LinkError::Interrupted) => return Ok(()),
-                Err(error) if !error.is_passing() => return Err(error),
+                Err(error) if !error.is_transient() => return Err(error),
                 Err(_) => std::thread::sleep(self.retry),
             }
         }
@@ -201,8 +201,8 @@ impl<'t> Served<'_, 't> {
             self.session.go_over(line);
         }
         match self.has_greeted {
-            true => self.session.say_goodbye(on),
-            false => self.session.say_hello_and_goodbye(on),
+            true => self.session.close(on),
+            false => self.session.open_and_close(on),
         }
     }
 
@@ -229,7 +229,7 @@ pub fn told_of_last_end(device: &DeviceHello) -> Option<&'static str> {
 
 fn described(error: &LinkError) -> String {
     match error {
-        LinkError::Gone(why) => format!("{error}: {why}"),
+        LinkError::Disconnected(why) => format!("{error}: {why}"),
         _ => error.to_string(),
     }
 }

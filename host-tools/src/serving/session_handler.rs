@@ -18,7 +18,7 @@ pub trait SessionHandler<'t> {
     fn asks(&mut self) -> Vec<HostRequest>;
 
     /// Returns a scene change that is due, with its terrain; called after each poll of the line. An
-    /// [`Event::Viewed`] reports its result.
+    /// [`Event::SceneChangeResult`] reports its result.
     fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
         None
     }

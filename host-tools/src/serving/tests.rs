@@ -24,9 +24,9 @@ const fn ms(ms: u64) -> Duration {
 
 /// Short, because the device answers at once.
 const TIMEOUTS: Timeouts = Timeouts {
-    again: ms(10),
-    alive: ms(20),
-    greet_again: ms(40),
+    retry: ms(10),
+    heartbeat: ms(20),
+    hello_retry: ms(40),
     give_up: ms(400),
     goodbye: ms(200),
     silence_s: DEFAULT_SILENCE_S,
@@ -93,7 +93,7 @@ impl Drop for Line {
 
 impl Bench {
     fn new() -> Self {
-        let device = Native::for_replay().restless().in_steps_of(20);
+        let device = Native::for_replay().free_running().with_ticks_per_call(20);
         Self {
             device: Rc::new(RefCell::new(device)),
             lines: Rc::default(),
@@ -140,7 +140,7 @@ impl Bench {
 
 fn absent() -> LinkError {
     LinkError::Absent {
-        looked_for: "a line".into(),
+        searched_for: "a line".into(),
         why: "it is in use".into(),
     }
 }

@@ -149,7 +149,7 @@ impl<'r> Steering<'r> {
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Sample(sample) => self.on_sample(sample),
-            Event::Viewed { view, taken } => self.on_viewed(view, *taken),
+            Event::SceneChangeResult { view, accepted } => self.on_viewed(view, *accepted),
             Event::Opened { resumed, .. } => {
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
@@ -318,11 +318,11 @@ impl<'r> Steering<'r> {
         }))
     }
 
-    fn on_viewed(&mut self, view: &SceneChange, taken: bool) {
+    fn on_viewed(&mut self, view: &SceneChange, accepted: bool) {
         let Stage::Putting(put) = &self.stage else {
             return;
         };
-        if taken {
+        if accepted {
             self.number = view.number;
             (self.now, self.terrain) = (**put).clone();
         } else {

@@ -81,8 +81,8 @@ fn put(steering: &mut Steering<'_>) -> SceneChange {
     steering.take_put().expect("a view").view
 }
 
-fn viewed(steering: &mut Steering<'_>, view: &SceneChange, taken: bool) {
-    steering.on_event(&Event::Viewed { view, taken });
+fn viewed(steering: &mut Steering<'_>, view: &SceneChange, accepted: bool) {
+    steering.on_event(&Event::SceneChangeResult { view, accepted });
 }
 
 #[test]

@@ -46,7 +46,7 @@ impl<'t> Placements<'t> {
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             // A placement that was not accepted has no samples.
-            Event::Viewed { taken: false, .. } if self.views.len() > 1 => {
+            Event::SceneChangeResult { accepted: false, .. } if self.views.len() > 1 => {
                 self.views.pop();
             }
             // A restarted device begins with the latest placement as its scene.
@@ -133,8 +133,8 @@ mod tests {
                 hip,
                 keeps_tiles: true,
             };
-            let (view, taken) = (&view, false);
-            views.on_event(&Event::Viewed { view, taken });
+            let (view, accepted) = (&view, false);
+            views.on_event(&Event::SceneChangeResult { view, accepted });
             assert_eq!(views.count(), 1);
         });
     }

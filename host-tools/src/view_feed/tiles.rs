@@ -49,7 +49,7 @@ impl Tiles {
     /// Processes an event about the device's window.
     pub(super) fn on_event(&mut self, event: &Event<'_>) {
         match (event, &mut self.coming) {
-            (Event::Viewed { taken: true, .. }, _) => self.coming = Some(vec![]),
+            (Event::SceneChangeResult { accepted: true, .. }, _) => self.coming = Some(vec![]),
             // More tiles than a window holds are not sent within a few samples.
             (Event::TileSent(key), Some(coming)) if coming.len() < MAX_COMING => coming.push(*key),
             (Event::TileSent(key), None) => self.sent(*key),

@@ -98,12 +98,12 @@ impl<'t> Host<'t> {
 
     /// Queries the status.
     pub fn ask_status(&mut self) {
-        self.client.ask(HostRequest::Status);
+        self.client.enqueue(HostRequest::Status);
     }
 
     /// Sends a request.
     pub fn request(&mut self, request: Request) {
-        self.client.ask(HostRequest::Request(request));
+        self.client.enqueue(HostRequest::Request(request));
     }
 
     /// Sends a message that the real client would not send.

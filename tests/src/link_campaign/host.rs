@@ -103,7 +103,7 @@ impl<'t> Host<'t> {
         let seen = self.view.and_then(|view| view.fault);
         let clear = Request::ClearFault { seen };
         for request in [clear, zero, Request::Arm] {
-            self.client.ask(HostRequest::Request(request));
+            self.client.enqueue(HostRequest::Request(request));
         }
     }
 

@@ -106,8 +106,8 @@ impl RequestSequence {
                 RequestStep::HostRequest(HostRequest::Request(asked)),
             ) if **request == asked => usize::from(result.is_err()),
             (Event::Calibration(_), RequestStep::HostRequest(HostRequest::Calibration)) => 0,
-            (Event::Viewed { view, taken }, RequestStep::View(number)) if view.number == number => {
-                usize::from(!*taken)
+            (Event::SceneChangeResult { view, accepted }, RequestStep::View(number)) if view.number == number => {
+                usize::from(!*accepted)
             }
             (Event::Unanswered(given_up), RequestStep::HostRequest(asked))
                 if **given_up == asked =>

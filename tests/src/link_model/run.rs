@@ -379,7 +379,7 @@ impl<'t> World<'t> {
             && is_at_leisure
             && let Some(ask) = self.questions.ask(self.device_ticks)
         {
-            self.client.ask(ask);
+            self.client.enqueue(ask);
         }
     }
 
@@ -394,7 +394,7 @@ impl<'t> World<'t> {
                 self.run_errands(0);
             }
             Step::Feeling if self.ramp_samples >= RAMP_SAMPLES => {
-                self.client.ask(HostRequest::Request(Request::Disarm));
+                self.client.enqueue(HostRequest::Request(Request::Disarm));
                 self.step = Step::Disarming(None);
             }
             Step::Disarming(Some(answered)) => {
@@ -436,7 +436,7 @@ impl<'t> World<'t> {
                     }
                     _ => {}
                 }
-                self.client.ask(ask);
+                self.client.enqueue(ask);
             }
             RequestStep::View(number) => self.put_view(number),
             // A remaining force has faded.
@@ -482,7 +482,7 @@ impl<'t> World<'t> {
             (LinkError::Version { .. }, _) if self.other_device => {
                 self.step = Step::Over(End::Reported);
             }
-            (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < RESUMPTIONS => {
+            (LinkError::Silent(_) | LinkError::HostSilent, _) if self.resumptions < RESUMPTIONS => {
                 self.resumptions += 1;
                 if let Step::Disarming(_) | Step::Asking = self.step {
                     self.leave();
@@ -490,7 +490,7 @@ impl<'t> World<'t> {
                     self.greet();
                 }
             }
-            (LinkError::Silent(_) | LinkError::LetGo, _) => self.leave(),
+            (LinkError::Silent(_) | LinkError::HostSilent, _) => self.leave(),
             (error, _) => return Err(Wrong::Error(error.to_string())),
         }
         Ok(())

@@ -61,7 +61,7 @@ impl<'t> Bed<'t> {
         let rig = rig.expect("in reach").arming();
         let log = Log::default();
         let seen = Rc::clone(&log);
-        let device = Native::started(StoppedClock, Some(Box::new(rig)), stored, boot).meddled_with(
+        let device = Native::started(StoppedClock, Some(Box::new(rig)), stored, boot).with_fault_injector(
             Box::new(move |tick, sense, drive| {
                 if let Some(last) = seen.borrow_mut().last_mut() {
                     last.1 = *drive;

@@ -45,7 +45,7 @@ pub fn choose<'p>(plugged: &'p [Plugged], serial: Option<&str>) -> Result<Choice
         }),
         (Some(device), None) => Ok(Choice::Board(device)),
         (None, _) => Err(UpdateError::Nothing {
-            looked_for: match serial {
+            searched_for: match serial {
                 Some(serial) => format!("the serial number {serial:?}"),
                 None => "a hapterra board, or an STM32 in its loader".into(),
             },

@@ -7,10 +7,10 @@ use std::{fmt, io};
 #[derive(Debug, thiserror::Error)]
 pub enum UpdateError {
     /// No board or loader is connected.
-    #[error("no board to update: looked for {looked_for} on USB")]
+    #[error("no board to update: looked for {searched_for} on USB")]
     Nothing {
         /// The device sought.
-        looked_for: String,
+        searched_for: String,
     },
     /// Several devices match.
     #[error("several boards could be updated: {}", .0.join(", "))]
@@ -51,7 +51,7 @@ pub enum UpdateError {
     NoVectors(u64),
     /// The loader was disconnected or does not respond.
     #[error("the loader is gone, while it was to {doing}")]
-    Gone {
+    Disconnected {
         /// Step that failed.
         doing: &'static str,
         /// The reason.

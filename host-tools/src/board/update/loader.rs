@@ -186,7 +186,7 @@ impl<P: ControlPipe> Loader<P> {
         const DOING: &str = "start the program";
         self.command(SET_ADDRESS, address, DOING)?;
         let given = self.pipe.write(request::DNLOAD, 0, &[]);
-        given.map_err(|source| UpdateError::Gone {
+        given.map_err(|source| UpdateError::Disconnected {
             doing: DOING,
             source,
         })?;
@@ -233,7 +233,7 @@ impl<P: ControlPipe> Loader<P> {
     fn failed(&mut self, doing: &'static str, source: io::Error) -> UpdateError {
         match self.status(doing) {
             Ok(status) if status.state == ERROR => refused(doing, status),
-            _ => UpdateError::Gone { doing, source },
+            _ => UpdateError::Disconnected { doing, source },
         }
     }
 
@@ -251,14 +251,14 @@ impl<P: ControlPipe> Loader<P> {
                 _ => request::ABORT,
             };
             let done = self.pipe.write(number, 0, &[]);
-            done.map_err(|source| UpdateError::Gone { doing, source })?;
+            done.map_err(|source| UpdateError::Disconnected { doing, source })?;
         }
         Err(UpdateError::Endless(doing))
     }
 
     fn status(&mut self, doing: &'static str) -> Result<Status, UpdateError> {
         let answer = self.pipe.read(request::GETSTATUS, 0, 6);
-        let answer = answer.map_err(|source| UpdateError::Gone { doing, source })?;
+        let answer = answer.map_err(|source| UpdateError::Disconnected { doing, source })?;
         let [status, low, middle, high, state, _] = answer[..] else {
             return Err(UpdateError::Cannot("say how it is"));
         };

@@ -119,7 +119,7 @@ pub fn open_loader(place: &str) -> Result<Option<Loader<SystemPipe>>, UpdateErro
 const ENGLISH: u16 = 0x0409;
 
 fn gone(error: impl std::error::Error + Send + Sync + 'static) -> UpdateError {
-    UpdateError::Gone {
+    UpdateError::Disconnected {
         doing: "begin",
         source: io::Error::other(error),
     }

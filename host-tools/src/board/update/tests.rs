@@ -191,7 +191,7 @@ fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
         assert!(gone_after + 1 == all, "{at}");
         return;
     };
-    let gone = matches!(failure.error, UpdateError::Gone { .. });
+    let gone = matches!(failure.error, UpdateError::Disconnected { .. });
     assert!(gone, "{at}: {failure:?}");
     let erased = !device.deeds.is_empty();
     assert!(failure.erased || !erased, "{at}: it was touched");

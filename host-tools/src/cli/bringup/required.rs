@@ -18,7 +18,7 @@ use heightfield::printable_text::printable;
 /// # Errors
 /// The board was not brought up; no reply.
 pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let mut control = ControlSession::look(Box::new(transport), TIMEOUT)?;
+    let mut control = ControlSession::open_read_only(Box::new(transport), TIMEOUT)?;
     if is_real(&control.device().board) {
         let record = control.calibration()?;
         let device = control.device();
@@ -40,7 +40,7 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
 /// # Errors
 /// It may drive an arm; no reply.
 pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let control = ControlSession::look(Box::new(transport), EMULATED_TIMEOUT)?;
+    let control = ControlSession::open_read_only(Box::new(transport), EMULATED_TIMEOUT)?;
     let board = &control.device().board;
     if is_real(board) {
         let board = printable(board);
@@ -73,7 +73,7 @@ mod tests {
     use hapterra_core::wire::hello::SerialNumber;
 
     fn device() -> DeviceHello {
-        let native = Box::new(Native::for_replay().restless());
+        let native = Box::new(Native::for_replay().free_running());
         let control = ControlSession::open(native, TIMEOUT).expect("it answers");
         DeviceHello {
             board: "nucleo-g474re".try_into().expect("fits"),
@@ -119,7 +119,7 @@ mod tests {
         ] {
             assert_eq!(is_real(board), real, "{board}");
         }
-        let mut native = Native::for_replay().restless();
+        let mut native = Native::for_replay().free_running();
         assert!(brought_up(&mut native).is_ok());
     }
 }

@@ -119,8 +119,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut user = VirtualUser::with_stylus();
     user.print = |line| say(line);
     let device = Native::new(HostClock::default(), None)
-        .meddled_with(user.hands())
-        .restless();
+        .with_fault_injector(user.hands())
+        .free_running();
     if args.measure.zero {
         say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }

@@ -109,7 +109,7 @@ fn wait_for<T>(
     let began = Instant::now();
     loop {
         match look() {
-            Ok(None) | Err(UpdateError::Gone { .. }) if began.elapsed() < REAPPEARS => {
+            Ok(None) | Err(UpdateError::Disconnected { .. }) if began.elapsed() < REAPPEARS => {
                 std::thread::sleep(LOOK);
             }
             other => return other,

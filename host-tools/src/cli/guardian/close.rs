@@ -33,7 +33,7 @@ fn until_confirmed(address: &str) -> Result<(), LinkError> {
 
 fn close(address: &str) -> Result<(), LinkError> {
     let absent = |why| LinkError::Absent {
-        looked_for: address.to_owned(),
+        searched_for: address.to_owned(),
         why,
     };
     let address: DeviceAddress = address.parse().map_err(absent)?;

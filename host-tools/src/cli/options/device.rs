@@ -150,7 +150,7 @@ impl Device {
         let mut arm = resting()?;
         match &self.device {
             DeviceChoice::There(address) => {
-                let native = || Native::new(HostClock::default(), Some(Box::new(arm))).restless();
+                let native = || Native::new(HostClock::default(), Some(Box::new(arm))).free_running();
                 converse(open(address.connect(native)?, TIMEOUT)?, talk)
             }
             DeviceChoice::Emulated(board) => {
@@ -184,7 +184,7 @@ fn looked_at<'t>(
     line: Box<dyn Transport + 't>,
     timeout: Duration,
 ) -> Result<ControlSession<'t>, LinkError> {
-    ControlSession::look(line, timeout)
+    ControlSession::open_read_only(line, timeout)
 }
 
 /// Returns a virtual Phantom at rest in its zero pose.

@@ -192,7 +192,7 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
     while done.get().is_none() {
         let ended = Tcp::connect(address)
-            .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Gone));
+            .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Disconnected));
         if let Err(why) = ended {
             tracing::info!("the plant's line at {address}: {why:?}");
             std::thread::sleep(RETRY);
