@@ -8,7 +8,7 @@ use std::time::Duration;
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::place::{
-    Bounds, Coordinates, Laid, Placement, PlacementChange, PlacementOptions, Reach, Sizing,
+    Bounds, Coordinates, PlacedSurface, Placement, PlacementChange, PlacementOptions, Reach, Sizing,
     SurfaceChange, Target,
 };
 use hapterra::steering::{Steer, Steering};
@@ -98,7 +98,7 @@ fn pressed_at<T>(
     let (arming, timeout) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), timeout);
     let bounds = Bounds {
-        first: Laid { view, params },
+        first: PlacedSurface { view, params },
         resolution_mm: RESOLUTION_MM,
         level: None,
         tip_mm: 0.0,
@@ -134,7 +134,7 @@ impl Touching<'_> {
         self.session
             .poll(Duration::ZERO, &mut take)
             .expect("goes on");
-        for ask in self.steering.asks() {
+        for ask in self.steering.requests() {
             self.session.enqueue(ask);
         }
         if let Some(put) = self.steering.take_put() {

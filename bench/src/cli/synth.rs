@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rows,
         cell_m: args.cell,
     };
-    partial_files::tell([args.out.as_path()]);
+    partial_files::report([args.out.as_path()]);
     let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
     let written = write(&args.out, &synth, &grid, &mut || {

@@ -162,7 +162,7 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
                     error.remove(ContextKind::Suggested);
                     error.remove(ContextKind::SuggestedArg);
                 }
-                writer::put(std::io::stderr(), &format!("{}{moved}", error.render()));
+                writer::write_text(std::io::stderr(), &format!("{}{moved}", error.render()));
             }
             // A closed pipe while help is printed is no error.
             false => _ = error.print(),

@@ -97,7 +97,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     inputs.extend(of_surface);
     inputs.extend(args.settings.file());
     keep_apart(&[&args.out], &inputs).or_hint("name another file with -o")?;
-    partial_files::tell([args.out.as_path()]);
+    partial_files::report([args.out.as_path()]);
     let viewer = args.viewing.program()?;
     let trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
     let recorded = trajectory

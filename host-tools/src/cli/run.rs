@@ -35,7 +35,7 @@ use super::options::terrain_file::TerrainFile;
 use super::settings::SettingsOption;
 use super::terminal::device_console::DeviceConsole;
 use super::terminal::shared_keyboard::{self, DeviceKeys};
-use super::terminal::writer::tell;
+use super::terminal::writer::notify;
 use super::terminal::{interrupt, partial_files};
 use super::viewing::{ToBeShown, Viewing};
 use crate::output::keep_apart;
@@ -153,7 +153,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     inputs.extend(args.rendering.surface.inputs());
     inputs.extend(args.settings.file());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
-    partial_files::tell(outputs.iter().map(PathBuf::as_path));
+    partial_files::report(outputs.iter().map(PathBuf::as_path));
     let events = args.events.listen()?;
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
@@ -164,19 +164,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     check_stiffness(params.stiffness_n_per_mm)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
     let cells = reading.cells();
-    let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
-    asked.grid = asked.grid.with_materials(materials.as_ref());
-    asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
+    let mut request = args.placing.of((&args.rendering, cells), &raster)?;
+    request.grid = request.grid.with_materials(materials.as_ref());
+    request.grid = request.grid.with_tip(args.rendering.tip_of_hand_mm());
     // Errors of recordings are found before any device is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
     interrupt::listen();
     let (arms, met): (Vec<_>, Vec<_>) = devices.iter().map(OneDevice::meet).unzip();
-    let laid = of_each(devices.iter().zip(arms), |(device, arm)| {
-        InReach::of(&asked, arm).map_err(|failure| failure.about(device.device_console.name()))
+    let placed_surface = of_each(devices.iter().zip(arms), |(device, arm)| {
+        InReach::of(&request, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
-    let placed = of_each(devices.iter().zip(&laid), |(device, laid)| {
-        Placed::new(device, (&name, laid), params)
+    let placed = of_each(devices.iter().zip(&placed_surface), |(device, placed_surface)| {
+        Placed::new(device, (&name, placed_surface), params)
             .map_err(|failure| failure.about(device.device_console.name()))
     })?;
     // The coarse levels are read before any device is armed. A viewer shows one device.
@@ -250,10 +250,10 @@ fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
         .first()
         .is_some_and(|device_keys| device_keys.has_keys())
     {
-        true => tell(format!(
+        true => notify(format!(
             "keys           1 to {last} choose the device that keys go to, and come before each Enter: {KEYS}"
         )),
-        false => tell(format!(
+        false => notify(format!(
             "Enter          goes to the device whose number, 1 to {last}, is right before it"
         )),
     }

@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::options::device::{Device, DeviceChoice};
 use super::report::put;
 use super::session_summary;
-use super::terminal::writer::{say, show};
+use super::terminal::writer::{print_line, show};
 use crate::calibrate::file::model_name;
 use crate::link::{DeviceAddress, EMULATED};
 use heightfield::printable_text::printable;
@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let status = args.device.look(|control| Ok(control.fresh_status()?))?;
         put(&text(&status))?;
         if args.device.device == DeviceChoice::There(DeviceAddress::Native) {
-            say(
+            print_line(
                 "note           each command starts a new native device, without a calibrated zero pose",
             );
         }
@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 None => "no fault is latched any more".to_owned(),
                 Some(fault) => format!("but {fault:?} is there again: {}", fault.what_to_do()),
             };
-            say(format!("cleared        {cleared}"));
+            print_line(format!("cleared        {cleared}"));
         }
         Ok(())
     })

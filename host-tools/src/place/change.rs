@@ -102,7 +102,7 @@ pub enum ChangeError {
 
 /// A placement and its surface parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Laid {
+pub struct PlacedSurface {
     /// Place, scale, level and heights.
     pub view: Placement,
     /// Stiffness, friction, damping, texture and shading.
@@ -113,7 +113,7 @@ pub struct Laid {
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// The initial placement.
-    pub first: Laid,
+    pub first: PlacedSurface,
     /// Resolution of the encoders at the tip, mm.
     pub resolution_mm: f64,
     /// Level of detail, if the user has stated one.
@@ -141,7 +141,7 @@ impl Hand {
     /// Returns true if the terrain's cells at this place differ from the rendered ones
     /// ([`HapticGrid::measured_anew`]).
     #[must_use]
-    pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
+    pub fn has_other_cell_size(&self, terrain: &Terrain<'_>) -> bool {
         let cell_mm = terrain.scale_of_level_0().cell_mm();
         let [east, north, _] = self.at_mm();
         let anew = terrain
@@ -155,7 +155,7 @@ impl Hand {
 #[derive(Clone)]
 pub struct Changed<'r> {
     /// The new placement and its surface parameters.
-    pub laid: Laid,
+    pub placed_surface: PlacedSurface,
     /// Its terrain.
     pub terrain: Terrain<'r>,
     /// The HIP, device millimetres of the new placement. Its height over the place under the hand
@@ -174,35 +174,35 @@ impl Bounds {
     pub fn apply<'r>(
         &self,
         terrain: &Terrain<'r>,
-        before: &Laid,
+        before: &PlacedSurface,
         changes: &[PlacementChange],
         hand: &Hand,
     ) -> Result<Changed<'r>, ChangeError> {
         let at_mm = hand.at_mm();
         let cell_mm = before.view.scale.cell_mm();
-        let mut laid = *before;
+        let mut placed_surface = *before;
         let mut at = [at_mm[0] / cell_mm, at_mm[1] / cell_mm];
         let mut grid = *terrain.grid();
         for change in changes {
-            (laid, at) = self.step(&mut grid, laid, at, change)?;
+            (placed_surface, at) = self.step(&mut grid, placed_surface, at, change)?;
         }
         if let Some(anew) = grid.measured_anew(at) {
             at = anew.of_ground(grid.to_ground(at));
-            laid.view = laid.view.measured_as(&anew)?;
+            placed_surface.view = placed_surface.view.measured_as(&anew)?;
             grid = anew;
         }
-        laid.view.level = match self.level {
+        placed_surface.view.level = match self.level {
             Some(level) => level,
-            None => finest_level(&grid, self.resolution_mm, &laid.view.scale),
+            None => finest_level(&grid, self.resolution_mm, &placed_surface.view.scale),
         };
-        let terrain_after = terrain.relaid(grid, laid.view.scale, laid.view.level)?;
+        let terrain_after = terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
         let (hip_mm, ground_is_known) = hip_after((terrain, &terrain_after), hand, at_mm, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];
         let was = (before.view.scale, terrain.grid());
-        laid.view = laid.view.moved_to(&grid, home_mm, was);
+        placed_surface.view = placed_surface.view.moved_to(&grid, home_mm, was);
         Ok(Changed {
-            laid,
+            placed_surface,
             ground_is_known,
             terrain: terrain_after,
             hip_mm,
@@ -213,11 +213,11 @@ impl Bounds {
     fn step(
         &self,
         grid: &mut HapticGrid<'_>,
-        mut laid: Laid,
+        mut placed_surface: PlacedSurface,
         mut at: [f64; 2],
         change: &PlacementChange,
-    ) -> Result<(Laid, [f64; 2]), ChangeError> {
-        let Laid { view, params } = &mut laid;
+    ) -> Result<(PlacedSurface, [f64; 2]), ChangeError> {
+        let PlacedSurface { view, params } = &mut placed_surface;
         let scale = view.scale;
         let (cell_mm, height) = (scale.cell_mm(), scale.height_mm_per_unit());
         match *change {
@@ -274,7 +274,7 @@ impl Bounds {
                 *grid = grid.with_tip(self.tip_mm);
             }
         }
-        Ok((laid, at))
+        Ok((placed_surface, at))
     }
 }
 

@@ -17,7 +17,7 @@ mod surface_change;
 mod target;
 
 pub use change::{
-    Bounds, ChangeError, Changed, Hand, Laid, PlacementChange, STIFFEST_N_PER_MM, TIPS_MM,
+    Bounds, ChangeError, Changed, Hand, PlacedSurface, PlacementChange, STIFFEST_N_PER_MM, TIPS_MM,
 };
 pub use coordinates::Coordinates;
 pub use error::PlaceError;

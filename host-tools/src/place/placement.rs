@@ -93,7 +93,7 @@ pub struct Placement {
     pub exaggeration: Option<f64>,
     /// The part in front of the arm: west, south, east, north, device millimetres; the whole
     /// terrain if only place and scale are stated.
-    pub laid_mm: [f64; 4],
+    pub extent_mm: [f64; 4],
     /// Lowest and highest point of that part, device millimetres.
     pub heights_mm: [f64; 2],
     /// The arm's workspace ([`Reach::sides_mm`]).
@@ -212,14 +212,14 @@ impl Placement {
         home_mm: [f64; 3],
         (before, grid_before): (Scale, &HapticGrid<'_>),
     ) -> Self {
-        let laid = self.laid_mm.map(|mm| mm / before.cell_mm());
+        let laid = self.extent_mm.map(|mm| mm / before.cell_mm());
         let laid = grid.around_sides_of(grid_before, laid);
         let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
         let haptic = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
         Self {
             home_mm,
             home_ground: grid.to_ground(haptic),
-            laid_mm: laid.map(|cells| cells * self.scale.cell_mm()),
+            extent_mm: laid.map(|cells| cells * self.scale.cell_mm()),
             heights_mm: match higher.is_finite() {
                 true => self.heights_mm.map(|mm| mm * higher),
                 false => self.heights_mm,
@@ -379,7 +379,7 @@ impl<'g> Wanted<'g> {
                 .unwrap_or_else(|| finest_level(self.grid, reach.resolution_mm(), &scale)),
             side_m: self.grid.side_m(),
             exaggeration: true_height.map(|cells| scale.height_cells(1.0) / cells),
-            laid_mm: cells.map(|cells| cells * scale.cell_mm()),
+            extent_mm: cells.map(|cells| cells * scale.cell_mm()),
             heights_mm: sorted(heights.map(|height| height * scale.height_mm_per_unit())),
             reach_mm: reach.sides_mm(),
         }

@@ -188,7 +188,7 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
                 };
                 let view = Placement::new(&grid, &reach, &options).expect(name);
                 let around_home = |spare: f64| {
-                    let (laid, heights) = (view.laid_mm, view.heights_mm);
+                    let (laid, heights) = (view.extent_mm, view.heights_mm);
                     let low = [laid[0], laid[1], heights[0] - spare];
                     let high = [laid[2], laid[3], heights[1] + spare];
                     ReachBox {
@@ -208,8 +208,8 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
                     assert!(record.joints_at(at).is_ok(), "{name}: {at}");
                 }
                 let size = [
-                    view.laid_mm[2] - view.laid_mm[0],
-                    view.laid_mm[3] - view.laid_mm[1],
+                    view.extent_mm[2] - view.extent_mm[0],
+                    view.extent_mm[3] - view.extent_mm[1],
                     view.heights_mm[1] - view.heights_mm[0],
                 ];
                 let larger = size.map(|side| 1.05 * side + 26.0);
@@ -315,7 +315,7 @@ fn box_is_centred_and_no_finer_than_the_encoders() {
     let sides = [501_000.0, 4_000_010.0, 501_060.0, 4_000_050.0];
     let (grid, view) = seen(&raster, &boxed(sides, OWN)).expect("there");
     assert_eq!(view.level, 0);
-    let [west, south, east, north] = view.laid_mm.map(|mm| mm / view.scale.cell_mm());
+    let [west, south, east, north] = view.extent_mm.map(|mm| mm / view.scale.cell_mm());
     let corners = [grid.to_ground([west, south]), grid.to_ground([east, north])];
     for (found, wanted) in corners.as_flattened().iter().zip(sides) {
         assert!((found - wanted).abs() < 1e-3, "{corners:?}");
@@ -330,7 +330,7 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
     let grids = made();
     let degrees = &grids[0].1;
     let by = |raster: &Raster, sides, coordinates| {
-        seen(raster, &boxed(sides, coordinates)).map(|(_, view)| view.laid_mm)
+        seen(raster, &boxed(sides, coordinates)).map(|(_, view)| view.extent_mm)
     };
     let sides = [10.005, 60.005, 10.025, 60.02];
     let own = by(degrees, sides, OWN).expect("there");
@@ -434,7 +434,7 @@ fn box_across_globe_seam_is_refused_with_its_two_parts() {
         }
         assert!(seen(&globe, &boxed([20.0, -20.0, 40.0, -10.0], LONLAT)).is_ok());
         let (_, whole) = seen(&globe, &boxed([-180.0, -30.0, 180.0, 30.0], LONLAT)).expect("all");
-        let columns = (whole.laid_mm[2] - whole.laid_mm[0]) / whole.scale.cell_mm();
+        let columns = (whole.extent_mm[2] - whole.extent_mm[0]) / whole.scale.cell_mm();
         assert!(columns > 358.0, "{columns} columns");
     }
     // A raster that extends farther beyond 180° than the box contains it in one part.
@@ -598,7 +598,7 @@ fn place_in_another_reference_system_is_the_same_place() {
     let sides = [386_100.0, 3_790_050.0, 386_300.0, 3_790_200.0];
     let laid = |coordinates| {
         let (_, view) = seen(utm, &boxed(sides, coordinates)).expect("there");
-        view.laid_mm
+        view.extent_mm
     };
     let (own, other) = (laid(OWN), laid(Coordinates::Epsg(32611)));
     for side in 0..4 {

@@ -162,7 +162,7 @@ pub fn terrain_of<'t>(
     let number = view.number;
     let cannot = |why| ReplayError::Placement { number, why };
     let scale = view.scale().map_err(|why| cannot(why.into()))?;
-    first.relaid(grid, scale, view.level).map_err(cannot)
+    first.with_grid(grid, scale, view.level).map_err(cannot)
 }
 
 /// Changes to the placement of a row, as in the recorded session.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::marks::Mark;
 use crate::materials::{Looks, Materials};
-use crate::place::Laid;
+use crate::place::PlacedSurface;
 use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
 use heightfield::printable_text::printable;
@@ -112,7 +112,7 @@ struct Views<'v> {
 impl PlacementSettings {
     /// Creates the settings of a placement from its number and terrain.
     #[must_use]
-    pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
+    pub fn new(number: u32, terrain: &Terrain<'_>, placed_surface: &PlacedSurface) -> Self {
         let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
         Self {
             number,
@@ -123,13 +123,13 @@ impl PlacementSettings {
             height_mm_per_unit: scale.height_mm_per_unit(),
             tip_mm: Some(grid.tip_mm()),
             exaggeration: grid.exaggeration(&scale),
-            home_mm: laid.view.home_mm,
-            stiffness_n_per_mm: laid.params.stiffness_n_per_mm,
-            max_force_n: laid.params.max_force_n,
-            shading: laid.params.shading,
-            texture: laid.params.texture,
-            friction: laid.params.friction,
-            damping: laid.params.damping,
+            home_mm: placed_surface.view.home_mm,
+            stiffness_n_per_mm: placed_surface.params.stiffness_n_per_mm,
+            max_force_n: placed_surface.params.max_force_n,
+            shading: placed_surface.params.shading,
+            texture: placed_surface.params.texture,
+            friction: placed_surface.params.friction,
+            damping: placed_surface.params.damping,
         }
     }
 
@@ -587,11 +587,11 @@ mod tests {
             level: 1,
             side_m: grid.side_m(),
             exaggeration: None,
-            laid_mm: [0.0; 4],
+            extent_mm: [0.0; 4],
             heights_mm: [0.0; 2],
             reach_mm: [0.0; 4],
         };
-        let view = PlacementSettings::new(1, &terrain, &Laid { view, params });
+        let view = PlacementSettings::new(1, &terrain, &PlacedSurface { view, params });
         assert_eq!(view.params(), params);
         settings.views = vec![view];
         let text = settings.to_toml();

@@ -18,5 +18,5 @@ mod session_handler;
 #[cfg(test)]
 mod tests;
 
-pub use service::{Connect, End, Served, Service, told_of_last_end};
+pub use service::{Connect, End, ServedSession, Service, last_end_remark};
 pub use session_handler::SessionHandler;

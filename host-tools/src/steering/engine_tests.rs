@@ -30,7 +30,7 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
     let terrain = view.terrain(grid).expect("a terrain");
     let params = SurfaceParams::PREMIUM;
     let bounds = Bounds {
-        first: Laid { view, params },
+        first: PlacedSurface { view, params },
         resolution_mm: reach.resolution_mm(),
         level: None,
         tip_mm: 0.0,
@@ -48,8 +48,8 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 }
 
 /// Returns the last request to the clutch.
-fn asked(steering: &mut Steering<'_>) -> Option<ClutchHold> {
-    steering.asks().into_iter().rev().find_map(|ask| match ask {
+fn requested_hold(steering: &mut Steering<'_>) -> Option<ClutchHold> {
+    steering.requests().into_iter().rev().find_map(|ask| match ask {
         HostRequest::Request(Request::Clutch { hold }) => Some(hold),
         _ => None,
     })
@@ -65,20 +65,20 @@ fn answer(steering: &mut Steering<'_>, hold: ClutchHold) {
 fn open(steering: &mut Steering<'_>) {
     steering.steer(ZOOM);
     samples(steering, Limits::empty(), 1);
-    assert_eq!(asked(steering), Some(ClutchHold::InPlace));
+    assert_eq!(requested_hold(steering), Some(ClutchHold::InPlace));
     // The board's input holds it open before the answer: the host's hold has not arrived.
     samples(steering, Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT, 3);
-    assert!(steering.take_put().is_none());
+    assert!(steering.take_update().is_none());
     answer(steering, ClutchHold::InPlace);
     samples(steering, Limits::CLUTCH_MOVES, 3);
-    assert!(steering.take_put().is_none(), "the clutch still opens");
+    assert!(steering.take_update().is_none(), "the clutch still opens");
 }
 
 /// Opens the clutch, and returns the change that is sent.
 fn put(steering: &mut Steering<'_>) -> SceneChange {
     open(steering);
     samples(steering, Limits::CLUTCH_OPEN, 1);
-    steering.take_put().expect("a view").view
+    steering.take_update().expect("a view").view
 }
 
 fn viewed(steering: &mut Steering<'_>, view: &SceneChange, accepted: bool) {
@@ -88,12 +88,12 @@ fn viewed(steering: &mut Steering<'_>, view: &SceneChange, accepted: bool) {
 #[test]
 fn accepted_placement_is_applied_and_releases_the_clutch() {
     with(|steering| {
-        let view = put(steering);
+        let view = update(steering);
         assert_eq!((view.number, steering.now().view.scale.cell_mm()), (1, 1.0));
         viewed(steering, &view, true);
         assert_eq!(steering.now().view.scale.cell_mm(), 2.0);
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+        assert_eq!(requested_hold(steering), Some(ClutchHold::LetGo));
         assert!(!steering.is_settled());
         samples(steering, Limits::CLUTCH_MOVES, 1);
         assert!(steering.is_settled());
@@ -103,15 +103,15 @@ fn accepted_placement_is_applied_and_releases_the_clutch() {
 #[test]
 fn refused_placement_changes_nothing_and_is_reported() {
     with(|steering| {
-        let view = put(steering);
+        let view = update(steering);
         viewed(steering, &view, false);
         assert_eq!(steering.now().view.scale.cell_mm(), 1.0);
         assert_eq!(steering.lines().len(), 1);
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+        assert_eq!(requested_hold(steering), Some(ClutchHold::LetGo));
         // The next one has the same number, because the first was refused.
         samples(steering, Limits::empty(), 1);
-        assert_eq!(put(steering).number, 1);
+        assert_eq!(update(steering).number, 1);
     });
 }
 
@@ -121,10 +121,10 @@ fn unopened_clutch_or_silent_device_is_given_up() {
         with(|steering| {
             steering.steer(ZOOM);
             samples(steering, Limits::empty(), 1);
-            let hold = asked(steering).expect("asked");
+            let hold = requested_hold(steering).expect("asked");
             if answers {
                 answer(steering, hold);
-                samples(steering, Limits::CLUTCH_MOVES, SAMPLES_TO_OPEN as usize + 1);
+                samples(steering, Limits::CLUTCH_MOVES, MAX_SAMPLES_TO_OPEN as usize + 1);
             } else {
                 let ask = HostRequest::Request(Request::Clutch { hold });
                 steering.on_event(&Event::Unanswered(&ask));
@@ -134,9 +134,9 @@ fn unopened_clutch_or_silent_device_is_given_up() {
                 reported.len() == 1 && reported[0].contains("stays as it was"),
                 "{reported:?}"
             );
-            assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+            assert_eq!(requested_hold(steering), Some(ClutchHold::LetGo));
             samples(steering, Limits::empty(), 2);
-            assert!(steering.is_settled() && steering.take_put().is_none());
+            assert!(steering.is_settled() && steering.take_update().is_none());
         });
     }
 }
@@ -153,10 +153,10 @@ fn a_view_waits_for_the_tile_under_the_proxy() {
         };
         for _ in 0..3 {
             steering.on_event(&Event::Sample(&waits));
-            assert!(steering.take_put().is_none());
+            assert!(steering.take_update().is_none());
         }
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert!(steering.take_put().is_some());
+        assert!(steering.take_update().is_some());
     });
 }
 
@@ -165,12 +165,12 @@ fn a_view_waits_for_the_tile_under_the_proxy() {
 fn restarted_device_counts_placements_from_zero() {
     for (resumed, number) in [(false, 1), (true, 2)] {
         with(|steering| {
-            let view = put(steering);
+            let view = update(steering);
             viewed(steering, &view, true);
             let device = hello();
             let device = &device;
             steering.on_event(&Event::Opened { device, resumed });
-            assert_eq!(put(steering).number, number, "resumed: {resumed}");
+            assert_eq!(update(steering).number, number, "resumed: {resumed}");
             assert_eq!(steering.now().view.scale.cell_mm(), 2.0);
         });
     }
@@ -180,11 +180,11 @@ fn restarted_device_counts_placements_from_zero() {
 #[test]
 fn host_releases_a_clutch_held_by_the_board_input() {
     with(|steering| {
-        let view = put(steering);
+        let view = update(steering);
         viewed(steering, &view, true);
         let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
         samples(steering, held, 1);
-        assert_eq!(asked(steering), Some(ClutchHold::LetGo));
+        assert_eq!(requested_hold(steering), Some(ClutchHold::LetGo));
         samples(steering, held, 1);
         assert!(steering.is_settled());
     });
@@ -231,40 +231,40 @@ fn far_clutch_measures_cells_again() {
             }
             let sample = sample_at(steering, north_mm, limits);
             steering.on_event(&Event::Sample(&sample));
-            let asked = asked(steering);
+            let requested_hold = requested_hold(steering);
             let wanted = match by_input {
                 true => (north_mm > 1.0).then_some(ClutchHold::InPlace),
                 false => Some(ClutchHold::WithHand),
             };
-            assert_eq!(asked, wanted);
-            if let Some(hold) = asked {
+            assert_eq!(requested_hold, wanted);
+            if let Some(hold) = requested_hold {
                 answer(steering, hold);
             }
             let open = sample_at(steering, north_mm, limits | Limits::CLUTCH_OPEN);
             steering.on_event(&Event::Sample(&open));
-            let put = steering.take_put();
-            assert_eq!(put.is_some(), north_mm > 1.0);
-            let Some(put) = put else {
+            let update = steering.take_update();
+            assert_eq!(update.is_some(), north_mm > 1.0);
+            let Some(update) = update else {
                 return;
             };
-            let [_, latitude] = put.terrain.grid().measured_at().expect("a place");
+            let [_, latitude] = update.terrain.grid().measured_at().expect("a place");
             assert!((57.0..58.0).contains(&latitude), "{latitude}");
-            assert!(!put.view.keeps_tiles);
-            viewed(steering, &put.view, true);
+            assert!(!update.view.keeps_tiles);
+            viewed(steering, &update.view, true);
             assert!((metres(steering).expect("known") / before - 1.0).abs() < 1e-12);
             // The cells are measured once; the clutch is released when the user releases it.
             let open = TickRecord {
                 view: 1,
-                hip: put.view.hip,
+                hip: update.view.hip,
                 ..open
             };
             steering.on_event(&Event::Sample(&open));
-            assert!(steering.take_put().is_none());
-            let rests = match by_input {
-                true => self::asked(steering) == Some(ClutchHold::LetGo),
+            assert!(steering.take_update().is_none());
+            let is_at_rest = match by_input {
+                true => self::requested_hold(steering) == Some(ClutchHold::LetGo),
                 false => steering.is_settled(),
             };
-            assert!(rests);
+            assert!(is_at_rest);
         });
     }
 }

@@ -223,7 +223,7 @@ impl<'r> Terrain<'r> {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn relaid(
+    pub fn with_grid(
         &self,
         grid: HapticGrid<'r>,
         scale: Scale,

@@ -26,7 +26,7 @@ impl<'t> ToFirstPlacement<'t> {
         let scale = Scale::new(cell_mm, scale.height_mm_per_unit()).ok()?;
         Some(Self {
             view: view.clone(),
-            stands: first.relaid(*grid, scale, view.level()).ok()?,
+            stands: first.with_grid(*grid, scale, view.level()).ok()?,
         })
     }
 

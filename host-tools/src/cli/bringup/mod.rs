@@ -11,7 +11,7 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
-use super::terminal::writer::{say, tell};
+use super::terminal::writer::{print_line, notify};
 use crate::bringup::{
     Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, SequenceEnd, run_sequence,
 };
@@ -49,9 +49,9 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     interrupt::listen();
     if args.device == DeviceAddress::Native {
-        say("a virtual user brings a virtual Phantom up");
+        print_line("a virtual user brings a virtual Phantom up");
         let mut user = VirtualUser::new(Wiring::RIGHT);
-        user.print = |line| say(line);
+        user.print = |line| print_line(line);
         return bring_up(args, &mut user, VIRTUAL_PATIENCE, |user| {
             Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
         });
@@ -90,7 +90,7 @@ fn bring_up<A: Attendant>(
         let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
         let walked = run_sequence(&mut control, user, &mut log, &mut keep);
         if let Some(path) = &path {
-            say(format!("log            {}", path.display()));
+            print_line(format!("log            {}", path.display()));
         }
         match (walked, control) {
             // The session ended with the board's power, so there is none to close.
@@ -102,13 +102,13 @@ fn bring_up<A: Attendant>(
             (Err(error), control) => {
                 let ended = control.end();
                 if let Err(reported @ (LinkError::NotConfirmed | LinkError::Taken)) = ended {
-                    tell(reported);
+                    notify(reported);
                 }
                 return Err(error.into());
             }
         }
     }
-    say(
+    print_line(
         "complete       every step is passed: do \"After the eleven steps\" of \
          docs/how-to/bring-up.md before any larger force",
     );

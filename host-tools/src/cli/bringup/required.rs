@@ -17,7 +17,7 @@ use heightfield::printable_text::printable;
 ///
 /// # Errors
 /// The board was not brought up; no reply.
-pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
+pub(in crate::cli) fn check_brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
     let mut control = ControlSession::open_read_only(Box::new(transport), TIMEOUT)?;
     if is_real(&control.device().board) {
         let record = control.calibration()?;
@@ -39,7 +39,7 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
 ///
 /// # Errors
 /// It may drive an arm; no reply.
-pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
+pub(in crate::cli) fn check_drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
     let control = ControlSession::open_read_only(Box::new(transport), EMULATED_TIMEOUT)?;
     let board = &control.device().board;
     if is_real(board) {
@@ -120,6 +120,6 @@ mod tests {
             assert_eq!(is_real(board), real, "{board}");
         }
         let mut native = Native::for_replay().free_running();
-        assert!(brought_up(&mut native).is_ok());
+        assert!(check_brought_up(&mut native).is_ok());
     }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::questions::{ask, number};
-use crate::cli::terminal::writer::say;
+use crate::cli::terminal::writer::print_line;
 use crate::link::DeviceAddress;
 
 /// A user at a terminal.
@@ -18,15 +18,15 @@ pub(super) struct UserAtTerminal {
 
 impl Attendant for UserAtTerminal {
     fn notify(&mut self, line: &str) {
-        say(line);
+        print_line(line);
     }
 
     fn begin(&mut self, task: Task) {
-        say(format!("  > {task}"));
+        print_line(format!("  > {task}"));
     }
 
     fn finish(&mut self, task: Task) -> Result<(), Stopped> {
-        say(format!("  > {task}"));
+        print_line(format!("  > {task}"));
         ask("    press Enter when that is done (q stops)")
             .map(drop)
             .ok_or(Stopped)

@@ -17,7 +17,7 @@ use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
 use super::report::put;
 use super::terminal::partial_files;
-use super::terminal::writer::say;
+use super::terminal::writer::print_line;
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, run_procedure};
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 use crate::output::keep_apart;
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
         None => {}
     }
-    partial_files::tell(args.out.as_deref());
+    partial_files::report(args.out.as_deref());
     if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
         return args
@@ -117,12 +117,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     // A virtual user demonstrates the steps on an in-memory device.
     let mut user = VirtualUser::with_stylus();
-    user.print = |line| say(line);
+    user.print = |line| print_line(line);
     let device = Native::new(HostClock::default(), None)
         .with_fault_injector(user.hands())
         .free_running();
     if args.measure.zero {
-        say("a virtual user calibrates a virtual Phantom that differs from its preset");
+        print_line("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
     let mut control = ControlSession::open(Box::new(device), TIMEOUT)?;
     calibrate(args, &mut control, &mut user)
@@ -142,7 +142,7 @@ fn calibrate(
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
     let (begin, whence) = begin(args, control)?;
-    say(format!("begins with    {whence}"));
+    print_line(format!("begins with    {whence}"));
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
@@ -164,13 +164,13 @@ fn calibrate(
     }
     if let Some(path) = &args.out {
         file::write(path, &record).or_hint(OTHER_FILE)?;
-        say(format!("written        {}", path.display()));
+        print_line(format!("written        {}", path.display()));
     }
     hand_over(args, control, record)?;
     if let Some(counts) = zero {
         let zeroed = control.request(&Request::Zero { counts })?;
         zeroed.map_err(Failure::new)?;
-        say("zeroed         the arm, until the device is switched off");
+        print_line("zeroed         the arm, until the device is switched off");
     }
     Ok(())
 }
@@ -218,7 +218,7 @@ fn hand_over(
             (control.request(&request)?, "until it is switched off")
         }
         false => {
-            say(format!(
+            print_line(format!(
                 "to store it    press the dead-man switch within {} s",
                 PRESS_MS / 1_000
             ));
@@ -226,6 +226,6 @@ fn hand_over(
         }
     };
     answer.or_hint("see hapterra status; the record can be kept in a file with -o FILE")?;
-    say(format!("in force       on the device, {until}"));
+    print_line(format!("in force       on the device, {until}"));
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
 use crate::cli::terminal::questions::{ask, number};
-use crate::cli::terminal::writer::{say, show};
+use crate::cli::terminal::writer::{print_line, show};
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {
@@ -18,11 +18,11 @@ impl UserAtTerminal {
 
 impl Attendant for UserAtTerminal {
     fn notify(&mut self, line: &str) {
-        say(format!("  {line}"));
+        print_line(format!("  {line}"));
     }
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
-        say(
+        print_line(
             "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down",
         );
         ask("  press Enter when it is there (q stops)")
@@ -31,7 +31,7 @@ impl Attendant for UserAtTerminal {
     }
 
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped> {
-        say(format!(
+        print_line(format!(
             "lay a ruler at the tip, {}; move the tip along it by about {about_mm} mm and hold it",
             direction.words()
         ));
@@ -41,7 +41,7 @@ impl Attendant for UserAtTerminal {
 
     fn hold_still(&mut self, pose: usize) -> Result<Option<[f64; 2]>, Stopped> {
         if pose == 1 {
-            say(
+            print_line(
                 "gravity: hold the tip by a thread on a spring or kitchen scale, everything still, in poses that differ;\n  \
                  tell what the scale reads upwards and towards you (negative: down, away from you)",
             );

@@ -14,7 +14,7 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::questions::ask;
-use crate::cli::terminal::writer::{self, say};
+use crate::cli::terminal::writer::{self, print_line};
 use crate::link::{ControlSession, DeviceAddress, Usb};
 
 /// Time limit for the board's reply.
@@ -23,7 +23,7 @@ const TIMEOUT: Duration = Duration::from_secs(4);
 /// seconds.
 const REAPPEARS: Duration = Duration::from_secs(15);
 /// Interval of checks for connected devices.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     let serial = match &args.device {
@@ -33,7 +33,7 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     let plugged = plugged();
     let place = match choose(&plugged, serial)? {
         Choice::Loader(device) => {
-            say(format!("loader         {}", device.place));
+            print_line(format!("loader         {}", device.place));
             &device.place
         }
         Choice::UnnamedLoader(device) => {
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
         return Err(error.into());
     }
     let bytes = write(args, image, &mut loader)?;
-    say(format!(
+    print_line(format!(
         "written        {bytes} bytes to {}, read back and equal",
         args.board.name
     ));
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
 fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     let serial = device.serial.as_deref().unwrap_or("without a number");
     let (place, board) = (&device.place, args.board.name);
-    say(format!(
+    print_line(format!(
         "loader         {serial} at {place}, as it was found"
     ));
     let question = format!("is this the {board} to write? [y/N]");
@@ -93,7 +93,7 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
         }
         .into());
     }
-    say(format!(
+    print_line(format!(
         "board          {}",
         session_summary::device(control.device())
     ));
@@ -110,7 +110,7 @@ fn wait_for<T>(
     loop {
         match look() {
             Ok(None) | Err(UpdateError::Disconnected { .. }) if began.elapsed() < REAPPEARS => {
-                std::thread::sleep(LOOK);
+                std::thread::sleep(POLL_INTERVAL);
             }
             other => return other,
         }
@@ -148,7 +148,7 @@ fn greet(place: &str) -> Result<(), Failure> {
     };
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
     let control = ControlSession::open(transport, TIMEOUT)?;
-    say(format!(
+    print_line(format!(
         "started        {}",
         session_summary::device(control.device())
     ));

@@ -23,7 +23,7 @@ use crate::cli::failure::Failure;
 use crate::cli::terminal::interrupt::{self, ASK_FOR_AN_END, INTERRUPTED};
 
 /// Interval of checks.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time after which a serving thread that does not react to a press counts as blocked. Together
 /// with the board's time to confirm, it stays below 3 s.
 pub(super) const DEAF: Duration = Duration::from_secs(2);
@@ -113,7 +113,7 @@ impl Watch {
             if !was_killed && self.is_stuck() {
                 was_killed = self.child.kill().is_ok();
             }
-            sleep(LOOK);
+            sleep(POLL_INTERVAL);
         };
         if status.signal().is_some() || !self.may_be_armed.is_empty() {
             self.clean_up(status, was_killed);
@@ -188,7 +188,7 @@ impl Watch {
         drop(done);
         self.put_terminal_back();
         if let Some(signal) = status.signal() {
-            interrupt::say(match was_killed {
+            interrupt::print_line(match was_killed {
                 true => "the program did not react to Ctrl-C and was killed\n".into(),
                 false => {
                     let name = signal_name(signal).unwrap_or("a signal");
@@ -198,7 +198,7 @@ impl Watch {
         }
         let _ = self.signals.pending().count();
         while !self.may_be_armed.is_empty() && self.signals.pending().next().is_none() {
-            let line = match closed.recv_timeout(LOOK) {
+            let line = match closed.recv_timeout(POLL_INTERVAL) {
                 Ok((address, Ok(()))) => {
                     self.may_be_armed.remove(&address);
                     format!("{address}: the board has confirmed that it is disarmed\n")
@@ -206,10 +206,10 @@ impl Watch {
                 Ok((_, Err(_))) | Err(RecvTimeoutError::Timeout) => continue,
                 Err(RecvTimeoutError::Disconnected) => break,
             };
-            interrupt::say(line);
+            interrupt::print_line(line);
         }
         if let Some(line) = interrupt::not_confirmed(&self.may_be_armed) {
-            interrupt::say(line);
+            interrupt::print_line(line);
         }
     }
 
@@ -218,7 +218,7 @@ impl Watch {
         for path in &self.recordings {
             if let Ok(file) = fs::metadata(path) {
                 let (path, bytes) = (path.display(), file.len());
-                interrupt::say(format!(
+                interrupt::print_line(format!(
                     "recording      {path} ({bytes} bytes) is what was written of it (its last line may be cut); it stays until you delete it\n"
                 ));
             }
@@ -229,7 +229,7 @@ impl Watch {
     fn put_terminal_back(&self) {
         if let Some(before) = &self.terminal {
             let _ = tcsetattr(io::stdin(), OptionalActions::Now, before);
-            interrupt::say("\n".into());
+            interrupt::print_line("\n".into());
         }
     }
 }

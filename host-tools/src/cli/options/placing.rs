@@ -41,7 +41,7 @@ pub struct Placing {
 }
 
 /// A grid and its requested placement.
-pub(in crate::cli) struct Asked<'r> {
+pub(in crate::cli) struct TerrainRequest<'r> {
     pub(in crate::cli) grid: HapticGrid<'r>,
     options: PlacementOptions,
 }
@@ -55,12 +55,12 @@ impl Placing {
         &self,
         (rendering, cells): (&Rendering, HapticCells),
         raster: &'r Raster,
-    ) -> Result<Asked<'r>, Failure> {
+    ) -> Result<TerrainRequest<'r>, Failure> {
         let options = self.options(rendering);
         let grid = options.target.grid(raster, cells)?;
         // Any arm will do here: only the workspace depends on it.
         placement(&grid, &Calibration::PREMIUM_3_0, &options)?;
-        Ok(Asked { grid, options })
+        Ok(TerrainRequest { grid, options })
     }
 
     fn options(&self, rendering: &Rendering) -> PlacementOptions {
@@ -79,7 +79,7 @@ impl Placing {
     }
 }
 
-impl Asked<'_> {
+impl TerrainRequest<'_> {
     /// Returns the placement in front of an arm with a calibration.
     ///
     /// # Errors

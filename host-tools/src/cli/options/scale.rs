@@ -69,7 +69,7 @@ impl FromStr for MapScale {
 impl fmt::Display for MapScale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::GroundMPerMm(metres) => f.write_str(&GROUND_SCALE.say(metres)),
+            Self::GroundMPerMm(metres) => f.write_str(&GROUND_SCALE.format(metres)),
             Self::CellMm(cell_mm) => write!(f, "{cell_mm}{MM_PER_CELL}"),
         }
     }

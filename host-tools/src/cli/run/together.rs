@@ -28,7 +28,7 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
                     let _named =
                         tracing::error_span!("device", name = device_console.name()).entered();
                     let ended = serving.serve();
-                    ended.inspect_err(|failure| device_console.tell(failure.text()))
+                    ended.inspect_err(|failure| device_console.notify(failure.text()))
                 });
                 (name, thread)
             })

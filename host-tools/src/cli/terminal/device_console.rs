@@ -58,8 +58,8 @@ impl DeviceConsole {
     }
 
     /// Writes a line to standard output.
-    pub(in crate::cli) fn say(&self, line: impl Display) {
-        writer::say(self.named(&line.to_string()));
+    pub(in crate::cli) fn print_line(&self, line: impl Display) {
+        writer::print_line(self.named(&line.to_string()));
     }
 
     /// Writes whole lines to standard output.
@@ -72,8 +72,8 @@ impl DeviceConsole {
     }
 
     /// Writes lines to standard error.
-    pub(in crate::cli) fn tell(&self, line: impl Display) {
-        writer::tell(self.named(&line.to_string()));
+    pub(in crate::cli) fn notify(&self, line: impl Display) {
+        writer::notify(self.named(&line.to_string()));
     }
 
     /// Replaces or removes this device's status line.

@@ -94,7 +94,7 @@ pub(in crate::cli) fn end_without_guardian() {
     if !IS_LISTENING.load(Ordering::Relaxed) {
         exit(INTERRUPTED);
     }
-    super::writer::tell("the process that watches this one is gone: it ends");
+    super::writer::notify("the process that watches this one is gone: it ends");
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
@@ -118,7 +118,7 @@ fn press() {
     if PRESSED.swap(true, Ordering::Relaxed) {
         raw_mode::put_back();
         if let Some(line) = not_confirmed(&may_be_armed()) {
-            say(line);
+            print_line(line);
         }
         exit(INTERRUPTED);
     }
@@ -139,7 +139,7 @@ pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String>
 }
 
 /// Writes to a terminal; one without a reader does not delay the end.
-pub(in crate::cli) fn say(line: String) {
+pub(in crate::cli) fn print_line(line: String) {
     let (done, is_done) = channel();
     let write = move || {
         put(io::stderr(), &line);

@@ -18,7 +18,7 @@ use crate::steering::keys::Key;
 /// Maximum pending lines.
 const WAITING: usize = 64;
 /// Interval of checks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Standard input, line by line.
 pub(in crate::cli) struct Keyboard {
@@ -107,7 +107,7 @@ impl Keyboard {
     /// Waits for the next line; returns `None` if the input ends or an end is requested.
     pub(in crate::cli) fn line(&self) -> Option<String> {
         while !interrupt::requested() {
-            match self.lines.recv_timeout(LOOK) {
+            match self.lines.recv_timeout(POLL_INTERVAL) {
                 Ok(line) => return Some(line),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return None,

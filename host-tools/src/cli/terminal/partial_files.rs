@@ -6,7 +6,7 @@ use crate::output::partial_files;
 
 /// Reports on standard error the partial files of killed commands, and how to keep them. No other
 /// part of the program touches these.
-pub fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
+pub fn report<'p>(files: impl IntoIterator<Item = &'p Path>) {
     for line in files.into_iter().flat_map(lines) {
         eprintln!("{line}");
     }

@@ -1,7 +1,7 @@
 //! Questions at a terminal, or from a pipe whose lines are the answers.
 
 use super::keyboard::keyboard;
-use super::writer::{say, show};
+use super::writer::{print_line, show};
 
 /// Prints a question and returns the trimmed answer; `None` if the input ends, an end is requested,
 /// or the answer is `q`. Earlier input is discarded.
@@ -11,7 +11,7 @@ pub(in crate::cli) fn ask(question: &str) -> Option<String> {
     show(format!("{question} "));
     match keyboard.line() {
         None => {
-            say("");
+            print_line("");
             None
         }
         Some(line) if line.trim() == "q" => None,
@@ -26,7 +26,7 @@ pub(in crate::cli) fn number(question: &str) -> Option<Option<f64>> {
         match answer.parse::<f64>() {
             _ if answer.is_empty() => return Some(None),
             Ok(number) if number.is_finite() => return Some(Some(number)),
-            _ => say(format!("  {answer} is no number (q stops)")),
+            _ => print_line(format!("  {answer} is no number (q stops)")),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::device_console::DeviceConsole;
 use super::keyboard::keyboard;
 use super::raw_keys::Pressed;
 use super::raw_mode::RawMode;
-use super::writer::tell;
+use super::writer::notify;
 use crate::steering::keys::Key;
 
 /// Maximum number of devices, each selected by one digit.
@@ -92,7 +92,7 @@ impl SharedKeyboard {
         let mut state = self.state();
         for pressed in keyboard().pressed() {
             if let Some(line) = self.take(&mut state, pressed) {
-                tell(line);
+                notify(line);
             }
         }
         state
