@@ -88,7 +88,7 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     let opened = opened.expect("it answers");
     _ = log.update_identity(Identity::of(opened.device(), Some(&record)));
     for step in Step::ALL.into_iter().filter(|step| *step < from) {
-        log.take(step, true, String::new());
+        log.add(step, true, String::new());
     }
     let ended = walked(&mut user, record, &mut log);
     let Err(BringupError::Found { step, finding }) = ended else {

@@ -123,7 +123,7 @@ fn sliding_proxy_stays_on_surface_and_force_in_bounds() {
         let mut figures = Figures::default();
         for sample in &samples {
             let record = Record::of_tick(sample, 1000, &scale);
-            figures.take(sample, &record, &terrain);
+            figures.add(sample, &record, &terrain);
         }
         let mean = figures.height_error_mm.mean();
         eprintln!(

@@ -48,7 +48,7 @@ fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds:
     for tick in 0..ticks {
         let t = f64::from(tick) * TICK_S;
         let (now, next): ([f64; 3], [f64; 3]) = (target(t), target(t + TICK_S));
-        plant.aim(now, std::array::from_fn(|i| (next[i] - now[i]) / TICK_S));
+        plant.set_target(now, std::array::from_fn(|i| (next[i] - now[i]) / TICK_S));
         plant.step([current_a; 3], TICK_S);
         // The first second is for settling.
         if tick == 1_000 {

@@ -87,7 +87,7 @@ impl<'t> Slide<'t> {
         };
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         match has_fallback {
-            true => self.terrain.underlaid(scene, reach.sides_mm()),
+            true => self.terrain.with_fallback(scene, reach.sides_mm()),
             false => scene,
         }
     }

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use hapterra::cli::options::surface::table::TableFile;
 use hapterra::link::{Emulator, Timeouts};
-use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::materials::{ClassMaterial, ClassMaterials, Materials};
 use hapterra::replay::{OfflineDevice, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
@@ -383,12 +383,12 @@ fn patchwork(raster: &Raster) -> Materials {
         name: None,
         material: *material,
     };
-    let looks = Looks {
+    let class_materials = ClassMaterials {
         default: plain,
         class: (1..).zip(&materials).map(class).collect(),
     };
     let classes = ("classes", classes.expect("raster"));
-    Materials::over(("terrain", raster), classes, looks).expect("they overlap")
+    Materials::over(("terrain", raster), classes, class_materials).expect("they overlap")
 }
 
 fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<(ContactState, [u32; 9])> {

@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let error = format!("too small: {columns} × {rows} samples");
         return Err(Failure::new(error).hint("a surface needs at least --size 2x2"));
     }
-    let usual = args.kind.usual_amplitude_cells() * args.cell;
+    let usual = args.kind.default_amplitude_cells() * args.cell;
     let stated = args.amplitude.map(|height| match args.kind {
         // The kind's own amplitude is a slope.
         Kind::Plane => height / Synth::new(Kind::Plane, 0, 1.0).rise(columns, rows),

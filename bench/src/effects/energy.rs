@@ -85,7 +85,7 @@ fn tapped(
     let mut script = Script::start([x, y, ground + ABOVE]);
     for _ in 0..TAPS {
         for above in [-BELOW, ABOVE] {
-            script = script.go([x, y, ground + above], speed_mm_s);
+            script = script.line_to([x, y, ground + above], speed_mm_s);
         }
     }
     let held = HeldPhantom::new(
@@ -104,7 +104,7 @@ fn tapped(
     };
     let (mut before, mut parts) = (([0.0; 3], [0.0; 3]), Vec::with_capacity(2 * ticks));
     for _ in 0..ticks {
-        let outcome = haptics.tick(&held.sense(), true);
+        let outcome = haptics.tick(&held.guard_inputs(), true);
         let wide = |v: hapterra_core::Vec3| v.to_array().map(f64::from);
         let now = (wide(outcome.drive.currents_a), wide(outcome.sample.force_n));
         for ((currents_a, force_n), for_s) in [(before, LATE_S), (now, TICK_S - LATE_S)] {

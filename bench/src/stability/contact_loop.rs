@@ -99,7 +99,7 @@ pub(super) fn run(
                 let _ = haptics.accept(Command::Clutch(hold));
             }
         }
-        let sense = arm.sense();
+        let sense = arm.guard_inputs();
         let read_up_mm = read_up_mm(&arm, sense.counts);
         let outcome = haptics.tick(&sense, true);
         let sample = outcome.sample;

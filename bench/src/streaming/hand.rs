@@ -62,7 +62,7 @@ impl Hand {
             Late::NoData => scene,
             Late::Fallback => {
                 let reach = Reach::of(&Calibration::PREMIUM_1_5);
-                terrain.underlaid(scene, reach.sides_mm())
+                terrain.with_fallback(scene, reach.sides_mm())
             }
         })
     }

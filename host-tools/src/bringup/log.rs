@@ -124,7 +124,7 @@ impl Log {
     ///
     /// # Errors
     /// [`LogError::NoHome`].
-    pub fn place(device: &DeviceHello) -> Result<PathBuf, LogError> {
+    pub fn path_of(device: &DeviceHello) -> Result<PathBuf, LogError> {
         let strategy = choose_app_strategy(AppStrategyArgs {
             app_name: "hapterra".into(),
             ..AppStrategyArgs::default()
@@ -295,7 +295,7 @@ mod tests {
     fn two_boards_of_a_kind_have_a_log_each() {
         let mut device = crate::link::hello();
         device.board = "../evil/board".try_into().expect("fits");
-        let place = |device: &DeviceHello| Log::place(device).expect("a home");
+        let place = |device: &DeviceHello| Log::path_of(device).expect("a home");
         let without = place(&device);
         assert!(
             without.ends_with("bringup/---evil-board.toml"),

@@ -124,7 +124,7 @@ impl VirtualBench {
         let step = left.clamp_length_max(self.speed_m_s * TICK_S);
         self.at_m += step;
         self.plant
-            .aim(self.at_m.to_array(), (step / TICK_S).to_array());
+            .set_target(self.at_m.to_array(), (step / TICK_S).to_array());
         let mut commands_a = match drive.enabled {
             true => drive.currents_a.to_array().map(f64::from),
             false => [0.0; 3],

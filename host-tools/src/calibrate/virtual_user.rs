@@ -92,7 +92,7 @@ impl VirtualUser {
             // The motion ends after a quarter of the time; then the tip is held.
             let share = f64::min(1.0, 4.0 * f64::from(tick) / f64::from(ticks));
             let at = from.lerp(DVec3::from(to_m), share);
-            self.plant.aim(at.to_array(), [0.0; 3]);
+            self.plant.set_target(at.to_array(), [0.0; 3]);
             self.plant.step([0.0; 3], 1e-3);
         }
         self.counts.set(self.plant.counts());

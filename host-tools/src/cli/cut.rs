@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::failure::{Failure, OrHint};
 use super::options::terrain_file::TerrainFile;
-use crate::output::{Output, OutputError, OutputFolder, keep_apart};
+use crate::output::{Output, OutputError, OutputFolder, check_distinct};
 use crate::terrain::HapticGrid;
 
 /// The file of heights and its description.
@@ -56,7 +56,7 @@ struct About {
 /// The terrain cannot be opened, or the folder cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let heights = args.out.join(HEIGHTS);
-    keep_apart(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
+    check_distinct(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
     let raster = args.terrain.open()?;
     let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
     let of = [grid.columns(), grid.rows()];

@@ -24,7 +24,7 @@ use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Session, Timeouts, Transport, move_arm_while,
 };
 use crate::materials::Materials;
-use crate::output::{Output, OutputError, OutputFolder, keep_apart};
+use crate::output::{Output, OutputError, OutputFolder, check_distinct};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{PlacedSurface, Placement};
 use crate::replay::settings::{Device, PlacementSettings};
@@ -104,7 +104,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
-    outputs.keep_apart(args)?;
+    outputs.check_distinct(args)?;
     let options = &args.rendering.surface;
     let surface = options.load()?;
     let params = surface.params;
@@ -163,12 +163,12 @@ impl Outputs {
         }
     }
 
-    fn keep_apart(&self, args: &Args) -> Result<(), Failure> {
+    fn check_distinct(&self, args: &Args) -> Result<(), Failure> {
         let mut inputs = args.file.as_deref().map_or(vec![], files_read_with);
         inputs.extend(args.commands.file());
         inputs.extend(args.rendering.surface.inputs());
         inputs.extend(args.settings.file());
-        keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
+        check_distinct(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
     }
 }
 
@@ -352,7 +352,7 @@ impl<'t> Tour<'_, 't> {
         let line = format!("device         {}\n", session_summary::device(&device));
         writer::write_text(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
-        stability::warn_of(&scene.params, materials.map(Materials::table), &device);
+        stability::warn_for_materials(&scene.params, materials.map(Materials::table), &device);
         let notify = |line: String| writer::write_text(std::io::stderr(), &(line + "\n"));
         let mut viewer = self.viewer.and_then(|viewer| viewer.start(&device, notify));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;
@@ -369,7 +369,7 @@ impl<'t> Tour<'_, 't> {
                     viewer.on_event(&event);
                 }
                 if let Event::Sample(sample) = event {
-                    let record = log.take(sample);
+                    let record = log.add(sample);
                     if let Some(viewer) = &mut viewer {
                         viewer.on_sample(sample, &record, log.view());
                     }

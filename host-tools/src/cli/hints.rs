@@ -54,7 +54,7 @@ impl Hint for GroundError {
             Self::NoSystem { unplaced, .. } => {
                 format!("give it one: gdal_translate -a_srs EPSG:CODE {unplaced} OUT.tif")
             }
-            Self::NoWay { .. } => {
+            Self::NoConversion { .. } => {
                 "bring the classes into the terrain's reference system: gdalwarp -t_srs EPSG:CODE -r near IN OUT.tif"
                     .into()
             }

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// A removed option.
-struct Old {
+struct RemovedOption {
     /// The commands that had the option.
     commands: &'static [&'static str],
     /// The option's name.
@@ -33,8 +33,8 @@ const fn old(
     name: &'static str,
     now: &'static str,
     within: &'static str,
-) -> Old {
-    Old {
+) -> RemovedOption {
+    RemovedOption {
         commands,
         name,
         now,
@@ -43,7 +43,7 @@ const fn old(
 }
 
 /// Options of `hapterra`.
-const OLD: &[Old] = &[
+const OLD: &[RemovedOption] = &[
     old(&["run"], "--record", "-o FILE", ""),
     old(PLACING, "--seconds", "--duration 60s", ""),
     old(&["run"], "--silence-s", "--silence 10s", ""),
@@ -179,7 +179,7 @@ const OLD: &[Old] = &[
 ];
 
 /// Options of `hapterra-lab`.
-const OLD_IN_LAB: &[Old] = &[
+const OLD_IN_LAB: &[RemovedOption] = &[
     old(&["stability"], "--delay-us", "--delay 200us", ""),
     old(&["streaming"], "--latencies", "--latency 20ms,50ms", ""),
     old(&["synth"], "--cell-m", "--cell 10m", ""),
@@ -195,7 +195,7 @@ pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
     };
     let name = argument.split('=').next()?;
     let is_typed = |command: &&str| words.iter().skip(1).any(|word| word == *command);
-    let of_command = |old: &&Old| old.name == name && old.commands.iter().any(is_typed);
+    let of_command = |old: &&RemovedOption| old.name == name && old.commands.iter().any(is_typed);
     let old = OLD.iter().chain(OLD_IN_LAB).find(of_command)?;
     let within = match old.within {
         "" => String::new(),

@@ -38,7 +38,7 @@ use super::terminal::shared_keyboard::{self, DeviceKeys};
 use super::terminal::writer::notify;
 use super::terminal::{interrupt, partial_files};
 use super::viewing::{ToBeShown, Viewing};
-use crate::output::keep_apart;
+use crate::output::check_distinct;
 use crate::steering::keys::KEYS;
 use devices::{OneDevice, ServedDevice};
 use placed::{InReach, Placed};
@@ -152,7 +152,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     inputs.extend(args.commands.file());
     inputs.extend(args.rendering.surface.inputs());
     inputs.extend(args.settings.file());
-    keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
+    check_distinct(&outputs, &inputs).or_hint(OTHER_FILE)?;
     partial_files::report(outputs.iter().map(PathBuf::as_path));
     let events = args.events.listen()?;
     let viewer = args.viewing.program()?;

@@ -37,16 +37,16 @@ pub struct Args {
 /// No device, no reply, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
-        let status = args.device.look(|control| Ok(control.fresh_status()?))?;
+        let status = args.device.with_read_only_session(|control| Ok(control.fresh_status()?))?;
         put(&text(&status))?;
-        if args.device.device == DeviceChoice::There(DeviceAddress::Native) {
+        if args.device.device == DeviceChoice::Connected(DeviceAddress::Native) {
             print_line(
                 "note           each command starts a new native device, without a calibrated zero pose",
             );
         }
         return Ok(());
     }
-    args.device.talk(|control| {
+    args.device.with_session(|control| {
         if args.disarm {
             control.request(&Request::Disarm)?.map_err(Failure::new)?;
         }

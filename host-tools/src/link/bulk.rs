@@ -23,7 +23,7 @@ pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
 
 /// Reason why no board on USB is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotOne {
+pub enum SelectionError {
     /// No board matches.
     None,
     /// Several boards match.
@@ -34,8 +34,8 @@ pub enum NotOne {
 /// chooses between two boards, because each has an arm.
 ///
 /// # Errors
-/// [`NotOne`].
-pub fn the_one(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize, NotOne> {
+/// [`SelectionError`].
+pub fn select(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize, SelectionError> {
     let fits = |serial: &Option<String>| match (serial, wanted) {
         (_, None) => true,
         (Some(serial), Some(wanted)) => serial.eq_ignore_ascii_case(wanted),
@@ -44,8 +44,8 @@ pub fn the_one(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize
     let mut fitting = (0..serials.len()).filter(|i| fits(&serials[*i]));
     match (fitting.next(), fitting.next()) {
         (Some(only), None) => Ok(only),
-        (None, _) => Err(NotOne::None),
-        (Some(_), Some(_)) => Err(NotOne::Several),
+        (None, _) => Err(SelectionError::None),
+        (Some(_), Some(_)) => Err(SelectionError::Several),
     }
 }
 
@@ -148,16 +148,16 @@ mod tests {
     #[test]
     fn selection_among_several_boards_needs_a_unique_serial() {
         let serials = ["0039001A", "0039001B"].map(|serial| Some(serial.to_owned()));
-        assert_eq!(the_one(&serials, None), Err(NotOne::Several));
-        assert_eq!(the_one(&serials, Some("0039001b")), Ok(1));
-        assert_eq!(the_one(&serials, Some("0039001")), Err(NotOne::None));
-        assert_eq!(the_one(&serials[..1], None), Ok(0));
-        assert_eq!(the_one(&serials[..1], Some("0039001B")), Err(NotOne::None));
-        assert_eq!(the_one(&[None], None), Ok(0));
-        assert_eq!(the_one(&[None], Some("")), Err(NotOne::None));
-        assert_eq!(the_one(&[], None), Err(NotOne::None));
+        assert_eq!(select(&serials, None), Err(SelectionError::Several));
+        assert_eq!(select(&serials, Some("0039001b")), Ok(1));
+        assert_eq!(select(&serials, Some("0039001")), Err(SelectionError::None));
+        assert_eq!(select(&serials[..1], None), Ok(0));
+        assert_eq!(select(&serials[..1], Some("0039001B")), Err(SelectionError::None));
+        assert_eq!(select(&[None], None), Ok(0));
+        assert_eq!(select(&[None], Some("")), Err(SelectionError::None));
+        assert_eq!(select(&[], None), Err(SelectionError::None));
         let twins = [&serials[0], &serials[0]].map(Clone::clone);
-        assert_eq!(the_one(&twins, Some("0039001A")), Err(NotOne::Several));
+        assert_eq!(select(&twins, Some("0039001A")), Err(SelectionError::Several));
     }
 
     #[test]

@@ -240,7 +240,7 @@ impl<C: TickClock> Native<C> {
     /// Reads encoders and switches, and applies the fault injector.
     fn read_sensors(&mut self) {
         if let Some(arm) = &self.arm {
-            self.inputs = arm.sense();
+            self.inputs = arm.guard_inputs();
         }
         if let Some(fault_injector) = &mut self.fault_injector {
             fault_injector(self.ticks, &mut self.inputs, &self.outputs);

@@ -76,7 +76,7 @@ impl Hand {
     }
 
     /// Sets the hand's target and its velocity, m and m/s.
-    pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
+    pub fn set_target(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         self.target = DVec3::from(target_m);
         self.target_speed = DVec3::from(speed_m_s);
     }

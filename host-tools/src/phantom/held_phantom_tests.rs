@@ -111,7 +111,7 @@ fn tapped_it_stays_stable() {
 
 #[test]
 fn names_the_point_it_cannot_reach() {
-    let script = Script::start([0.0; 3]).go([0.0, 400.0, 0.0], 50.0);
+    let script = Script::start([0.0; 3]).line_to([0.0, 400.0, 0.0], 50.0);
     let placement = ArmFrame { home_mm: [0.0; 3] };
     let error = HeldPhantom::new(
         PhantomModel::premium_1_5(),

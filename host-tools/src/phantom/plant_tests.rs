@@ -151,7 +151,7 @@ fn dragged(substep_s: f64) -> DVec3 {
                 7.0 * (7.0 * t).cos(),
                 11.0 * (11.0 * t).cos(),
             );
-        plant.aim(at.to_array(), speed.to_array());
+        plant.set_target(at.to_array(), speed.to_array());
         let square = if tick / 50 % 2 == 0 { 0.5 } else { -0.5 };
         plant.step([square, -square, square], 1e-3);
     }

@@ -50,15 +50,15 @@ impl<'a> Touch<'a> {
     /// Presses straight down with a force and holds it for some seconds.
     #[must_use]
     pub fn press(mut self, newtons: f64, seconds: f64) -> Self {
-        let target = self.below(newtons);
-        self.script = self.script.go(target, APPROACH_MM_S).wait(seconds);
+        let target = self.press_target(newtons);
+        self.script = self.script.line_to(target, APPROACH_MM_S).wait(seconds);
         self
     }
 
     /// Slides along a line on the map (mm) while pressing with a force.
     #[must_use]
     pub fn slide(mut self, line_mm: &[[f64; 2]], newtons: f64, speed_mm_s: f64) -> Self {
-        let points = self.follow(&self.course(line_mm), newtons);
+        let points = self.follow(&self.route(line_mm), newtons);
         self.script = self.script.along(&points, speed_mm_s);
         self
     }
@@ -66,14 +66,14 @@ impl<'a> Touch<'a> {
     /// Returns the length of such a slide in three dimensions, mm.
     #[must_use]
     pub fn slide_length_mm(&self, line_mm: &[[f64; 2]], newtons: f64) -> f64 {
-        let points = self.follow(&self.course(line_mm), newtons);
+        let points = self.follow(&self.route(line_mm), newtons);
         let pairs = points.windows(2);
         let step = |a: [f64; 3], b: [f64; 3]| glam::DVec3::from(a).distance(b.into());
         pairs.map(|pair| step(pair[0], pair[1])).sum()
     }
 
     /// Returns closely spaced points from the hand's position along a line.
-    fn course(&self, line_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    fn route(&self, line_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let [x, y, _] = self.script.end_mm();
         let mut line = vec![[x, y]];
         line.extend_from_slice(line_mm);
@@ -94,7 +94,7 @@ impl<'a> Touch<'a> {
     pub fn lift(mut self, above_mm: f64) -> Self {
         let [x, y, z] = self.script.end_mm();
         let ground = nearest_ground(self.surface, x, y).unwrap_or(z);
-        self.script = self.script.go([x, y, ground + above_mm], APPROACH_MM_S);
+        self.script = self.script.line_to([x, y, ground + above_mm], APPROACH_MM_S);
         self
     }
 
@@ -110,7 +110,7 @@ impl<'a> Touch<'a> {
         self.script
     }
 
-    fn below(&self, newtons: f64) -> [f64; 3] {
+    fn press_target(&self, newtons: f64) -> [f64; 3] {
         let [x, y, z] = self.script.end_mm();
         match (self.surface)(x, y) {
             Some(ground) => [x, y, ground - newtons * self.compliance_mm_per_n],

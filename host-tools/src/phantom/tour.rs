@@ -12,7 +12,7 @@ use super::touch::{Surface, Touch};
 /// height.
 const HALF_MM: [f64; 2] = [70.0, 35.0];
 /// Max share of the terrain's half size that is used.
-const INSIDE: f64 = 0.84;
+const MAX_USED_SHARE: f64 = 0.84;
 /// Factors tried in order until the arm reaches all of the plan and there is hardly any no-data.
 const SHRINK: [f64; 5] = [1.0, 0.6, 0.35, 0.2, 0.1];
 /// Share of known ground at which no smaller place is searched.
@@ -23,7 +23,7 @@ const PLACES: u32 = 11;
 const ENOUGH_RELIEF_MM: f64 = 25.0;
 /// Force of presses and taps relative to the slide. With a slide of 1 N, all forces are below the
 /// 1.55 N that a Premium 1.5 can hold upwards continuously (1.24 A).
-const STRONG: f64 = 1.5;
+const PRESS_FACTOR: f64 = 1.5;
 /// Max distance of a plan's middle from a fixed home position along each axis, mm: about the
 /// sideways reach of a Premium 1.5.
 const MAX_HOME_DISTANCE_MM: f64 = 250.0;
@@ -71,7 +71,7 @@ impl TourPlan<'_> {
         let mut best: Option<(f64, Tour)> = None;
         let mut first_failure = None;
         for shrink in SHRINK {
-            let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * INSIDE * self.size_mm[i]);
+            let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * MAX_USED_SHARE * self.size_mm[i]);
             let half = [0, 1].map(|i| shrink * limit(i));
             let line = winding(self.best_place(half), half);
             let (known, tour) = (known(&self.heights(&line)), self.at(&line));
@@ -101,12 +101,12 @@ impl TourPlan<'_> {
 
     fn at(&self, line: &[[f64; 2]]) -> Tour {
         let touch = Touch::start(self.surface, &self.hand, self.wall_n_per_mm, line[0], 12.0)
-            .press(STRONG * self.push_n, 0.6);
+            .press(PRESS_FACTOR * self.push_n, 0.6);
         let length = touch.slide_length_mm(line, self.push_n);
         let speed = (length / SLIDE_S).clamp(SLIDE_MM_S.0, SLIDE_MM_S.1);
         let script = touch
             .slide(line, self.push_n, speed)
-            .tap(3, STRONG * self.push_n)
+            .tap(3, PRESS_FACTOR * self.push_n)
             .lift(12.0)
             .finish();
         let home_mm = self.home_mm.unwrap_or_else(|| middle(&script));
@@ -120,7 +120,7 @@ impl TourPlan<'_> {
             low + (high - low) * f64::from(step) / f64::from(PLACES - 1)
         };
         let places = (0..PLACES * PLACES).map(|i| [along(i % PLACES, 0), along(i / PLACES, 1)]);
-        let scored = places.map(|place| (self.worth(place, half), place));
+        let scored = places.map(|place| (self.score(place, half), place));
         let best = scored.reduce(|best, next| if next.0 > best.0 { next } else { best });
         best.map_or(self.size_mm.map(|side| 0.5 * side), |best| best.1)
     }
@@ -128,7 +128,7 @@ impl TourPlan<'_> {
     /// Returns the range for the middle of a plan along an axis: on the terrain and, if the home
     /// position is fixed, within [`MAX_HOME_DISTANCE_MM`] of it.
     fn room(&self, axis: usize, half: f64) -> [f64; 2] {
-        let (middle, room) = (0.5 * self.size_mm[axis], half / INSIDE);
+        let (middle, room) = (0.5 * self.size_mm[axis], half / MAX_USED_SHARE);
         let room = (middle - room).max(0.0);
         let on_terrain = [middle - room, middle + room];
         match self.home_mm {
@@ -153,7 +153,7 @@ impl TourPlan<'_> {
 
     /// Returns the score of a place: known ground counts most, then relief up to
     /// [`ENOUGH_RELIEF_MM`], then closeness to the centre.
-    fn worth(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
+    fn score(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
         let line = winding(place, half);
         let heights = self.heights(&line);
         let (mut low, mut high) = (f64::MAX, f64::MIN);

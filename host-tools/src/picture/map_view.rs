@@ -18,7 +18,7 @@ const SMALL_CELLS: f64 = 160.0;
 /// Margin around a path, as a share of its extent.
 const MARGIN: f64 = 0.25;
 /// Min number of cells on a map.
-const FEWEST_CELLS: f64 = 24.0;
+const MIN_CELLS: f64 = 24.0;
 
 impl MapView {
     const fn new(west: f64, south: f64, width: f64, height: f64) -> Self {
@@ -64,7 +64,7 @@ impl MapView {
         if small || far {
             return whole.union(path);
         }
-        let room = |extent: f64| (extent * (1.0 + MARGIN)).max(FEWEST_CELLS * cell_mm);
+        let room = |extent: f64| (extent * (1.0 + MARGIN)).max(MIN_CELLS * cell_mm);
         let (width, height) = (room(path.width), room(path.height));
         let aspect = MAP_PX.0 / MAP_PX.1;
         let (width, height) = (width.max(height * aspect), height.max(width / aspect));

@@ -10,12 +10,12 @@ use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 /// Maximum width of a file's sample in the hand, mm: a wider one feels like one flat patch.
 const MAX_CELL_MM: f64 = 50.0;
 /// Minimum longer side of a terrain in the hand, mm: a shorter one shows no detail.
-const SMALLEST_TERRAIN_MM: f64 = 5.0;
+const MIN_TERRAIN_MM: f64 = 5.0;
 /// Maximum stiffness, N/mm: above it an arm most likely buzzes or kicks
 /// (`docs/explanation/stability.md`).
-pub const STIFFEST_N_PER_MM: f32 = 1.0;
+pub const MAX_STIFFNESS_N_PER_MM: f32 = 1.0;
 /// Minimum stiffness, N/mm: a softer surface is not noticeable.
-const SOFTEST_N_PER_MM: f32 = 0.005;
+const MIN_STIFFNESS_N_PER_MM: f32 = 0.005;
 /// Smallest and largest radius of a ball at the tip, device millimetres; 0 is a point.
 pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
 
@@ -90,7 +90,7 @@ pub enum ChangeError {
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     /// A tip radius outside [`TIPS_MM`].
-    #[error("a tip of {0} mm: from {least} to {most} mm can be had", least = TIPS_MM[0], most = TIPS_MM[1])]
+    #[error("a tip of {0} mm: from {min} to {max} mm can be had", min = TIPS_MM[0], max = TIPS_MM[1])]
     Tip(f64),
     /// Numbers with which no terrain can be rendered.
     #[error(transparent)]
@@ -241,8 +241,8 @@ impl Bounds {
             PlacementChange::Stiffness(factor) => {
                 let stiffness = params.stiffness_n_per_mm * factor_of(factor)? as f32;
                 // An initial stiffness above the maximum may be reduced and restored.
-                let most = STIFFEST_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
-                if !(SOFTEST_N_PER_MM..=most).contains(&stiffness) {
+                let max = MAX_STIFFNESS_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
+                if !(MIN_STIFFNESS_N_PER_MM..=max).contains(&stiffness) {
                     return Err(ChangeError::Stiffness(stiffness));
                 }
                 params.stiffness_n_per_mm = stiffness;
@@ -250,7 +250,7 @@ impl Bounds {
                 if let Some(materials) = grid.materials() {
                     let stiffest = |params| materials.table().hardest(params).stiffness_n_per_mm;
                     let (now, first) = (stiffest(params), stiffest(&self.first.params));
-                    if now > STIFFEST_N_PER_MM.max(first) {
+                    if now > MAX_STIFFNESS_N_PER_MM.max(first) {
                         return Err(ChangeError::Material(now));
                     }
                 }
@@ -338,7 +338,7 @@ fn check_size(grid: &HapticGrid<'_>, view: &Placement, factor: f64) -> Result<()
     if factor > 1.0 && cell_mm > MAX_CELL_MM {
         return Err(ChangeError::NoDetail { cell_mm });
     }
-    if factor < 1.0 && size_mm < SMALLEST_TERRAIN_MM {
+    if factor < 1.0 && size_mm < MIN_TERRAIN_MM {
         return Err(ChangeError::TooSmall { size_mm });
     }
     Ok(())

@@ -26,8 +26,8 @@ impl Bench {
         }
     }
 
-    /// Calls `look` with the terrain at 0.05 mm a cell, and its bounds.
-    fn with<T>(&self, look: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
+    /// Calls `check` with the terrain at 0.05 mm a cell, and its bounds.
+    fn with<T>(&self, check: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
         let options = PlacementOptions {
             target: Target::Whole,
             sizing: Sizing::CellMm(0.05),
@@ -48,7 +48,7 @@ impl Bench {
             level: self.level,
             tip_mm: 0.0,
         };
-        look(&terrain, bounds)
+        check(&terrain, bounds)
     }
 }
 

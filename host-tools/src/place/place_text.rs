@@ -34,7 +34,7 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
 /// Returns a place in the file's coordinates and, if known, in longitude and latitude.
 #[must_use]
 pub fn place_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
-    let own = asked_in_words(file, ground, Coordinates::Own);
+    let own = place_as_given(file, ground, Coordinates::Own);
     let kind = kind_in_words(file.lonlat());
     match file.to_lonlat(ground) {
         Some(_) if file.counts_lonlat() => own + &kind,
@@ -73,7 +73,7 @@ pub fn coordinates_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String
 }
 
 /// Returns a place in the user's coordinates.
-pub(super) fn asked_in_words(
+pub(super) fn place_as_given(
     file: &Georeference<'_>,
     [a, b]: [f64; 2],
     coordinates: Coordinates,

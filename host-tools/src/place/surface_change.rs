@@ -32,8 +32,8 @@ pub enum SurfaceChange {
 pub enum SurfaceError {
     /// Coefficients outside their range.
     #[error(
-        "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {most}, and at rest not less than while the tip slides",
-        most = Friction::MAX
+        "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {max}, and at rest not less than while the tip slides",
+        max = Friction::MAX
     )]
     Friction {
         /// While the tip slides.
@@ -42,17 +42,17 @@ pub enum SurfaceError {
         static_mu: f32,
     },
     /// A time outside its range.
-    #[error("a viscous friction of {0} s: from 0 to {most} s can be had", most = Friction::MAX_VISCOUS_S)]
+    #[error("a viscous friction of {0} s: from 0 to {max} s can be had", max = Friction::MAX_VISCOUS_S)]
     ViscousFriction(f32),
     /// Damping outside its range.
-    #[error("a damping of {0} N·s/m: from 0 to {most} N·s/m can be had", most = Damping::MAX_NS_PER_M)]
+    #[error("a damping of {0} N·s/m: from 0 to {max} N·s/m can be had", max = Damping::MAX_NS_PER_M)]
     Damping(f32),
     /// A texture outside its range, or too fine for a tick.
     #[error(
-        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {most} mm can be had",
+        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {max} mm can be had",
         shortest = Texture::WAVELENGTHS_MM.0,
         longest = Texture::WAVELENGTHS_MM.1,
-        most = Texture::MAX_AMPLITUDE_MM
+        max = Texture::MAX_AMPLITUDE_MM
     )]
     Texture {
         /// Height above and below the surface.

@@ -13,7 +13,7 @@ use crate::link::{Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
 /// Time-out of a point, as a multiple of that of an answer, after which the device counts as stuck.
-const ANSWERS_A_POINT: u32 = 8;
+const POINT_TIMEOUT_FACTOR: u32 = 8;
 
 /// A device that renders points in a scene of its own.
 pub struct OfflineDevice<'t> {
@@ -154,7 +154,7 @@ impl<'t> OfflineDevice<'t> {
             });
         }
         self.session.step(HipCommand { seq, hip })?;
-        let deadline = Instant::now() + ANSWERS_A_POINT * self.session.timeouts().give_up;
+        let deadline = Instant::now() + POINT_TIMEOUT_FACTOR * self.session.timeouts().give_up;
         while Instant::now() < deadline {
             if let Some(sample) = self.answer(seq)? {
                 return Ok(sample);

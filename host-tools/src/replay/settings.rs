@@ -9,7 +9,7 @@ use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use super::marks::Mark;
-use crate::materials::{Looks, Materials};
+use crate::materials::{ClassMaterials, Materials};
 use crate::place::PlacedSurface;
 use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
@@ -22,7 +22,7 @@ pub const FORMAT: u32 = 1;
 /// Relative difference of cell sizes on the ground below which they count as equal. Machines may
 /// round the size of a degree differently, and earlier versions computed a map's scale over one
 /// metre, with an error up to 1e-7: their recordings can still be replayed.
-const SAME: f64 = 1e-6;
+const MAX_CELL_DIFFERENCE: f64 = 1e-6;
 
 /// The settings of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -256,7 +256,7 @@ pub struct MaterialSettings {
     pub fingerprint: String,
     /// Surfaces of the classes.
     #[serde(flatten)]
-    pub looks: Looks,
+    pub class_materials: ClassMaterials,
 }
 
 impl MaterialSettings {
@@ -266,7 +266,7 @@ impl MaterialSettings {
         Self {
             file: materials.file().to_owned(),
             fingerprint: format!("{:016x}", materials.fingerprint()),
-            looks: materials.looks().clone(),
+            class_materials: materials.class_materials().clone(),
         }
     }
 }
@@ -477,7 +477,7 @@ impl RenderedTerrain {
             return None;
         }
         let same_size = match (self.cell_m, grid.side_m()) {
-            (Some(recorded), Some(now)) => (recorded - now).abs() <= SAME * recorded.abs(),
+            (Some(recorded), Some(now)) => (recorded - now).abs() <= MAX_CELL_DIFFERENCE * recorded.abs(),
             (recorded, now) => recorded == now,
         };
         let metres = |side: Option<f64>| side.map_or("unknown".into(), |m| format!("{m} m"));

@@ -307,7 +307,7 @@ impl<'r> Steering<'r> {
         let scene = terrain.scene(placed_surface.params, Source::Encoders, home);
         let view = SceneChange {
             number: self.number.wrapping_add(1),
-            scene: terrain.underlaid(scene, placed_surface.view.reach_mm),
+            scene: terrain.with_fallback(scene, placed_surface.view.reach_mm),
             hip,
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
         };

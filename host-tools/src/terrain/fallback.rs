@@ -15,7 +15,7 @@ use super::{Terrain, TileBuffer, identity};
 
 /// Power of two by which the near tile's samples are closer than the wide one's: it reaches a
 /// quarter as far.
-const NEAR_IS_FINER: u8 = 2;
+const NEAR_SHIFT: u8 = 2;
 
 impl Terrain<'_> {
     /// Returns a scene of this terrain with a fallback under the arm's whole reach. `reach_mm` is
@@ -25,7 +25,7 @@ impl Terrain<'_> {
     /// The scene has no fallback if none of the terrain lies in the rectangle, or if all of it fits
     /// into four tiles, which the device stores anyway.
     #[must_use]
-    pub fn underlaid(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
+    pub fn with_fallback(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
         let mut scene = Scene {
             fallback: self.under(&scene, reach_mm),
             ..scene
@@ -174,7 +174,7 @@ impl Terrain<'_> {
 /// Returns the finer tile within a wide one, centred on a cell as far as possible; `None` if it
 /// would not be finer. Its samples include the borders of the wide one's cells.
 fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
-    let shift = wide.shift.saturating_sub(NEAR_IS_FINER);
+    let shift = wide.shift.saturating_sub(NEAR_SHIFT);
     let near = CoarseTile {
         shift: shift.max(CoarseTile::MIN_SHIFT),
         ..*wide

@@ -24,7 +24,7 @@ fn hills() -> Raster {
 fn fallback(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene, Fallback) {
     let home = GridPoint::new([home[0], home[1], 100], hapterra_core::Vec3::ZERO);
     let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
-    let scene = terrain.underlaid(scene, reach_mm);
+    let scene = terrain.with_fallback(scene, reach_mm);
     let fallback = scene.fallback.expect("a fallback");
     (scene, fallback)
 }

@@ -392,12 +392,12 @@ impl<'r> HapticGrid<'r> {
             return (f64::NAN, ReadStatus::Complete);
         };
         // Both are below 2^32, or outside the raster.
-        self.height_seen(level, [column as f64, row as f64])
+        self.height_at_level(level, [column as f64, row as f64])
     }
 
     /// Returns the file's height at a level of detail, at a position in haptic cells; NaN in
     /// no-data and outside the raster. Also returns whether it is known.
-    pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
+    pub(super) fn height_at_level(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
         let [last_column, last_row] = self.last();
         if u > last_column || v > last_row {
             return (f64::NAN, ReadStatus::Complete);

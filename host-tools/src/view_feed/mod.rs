@@ -10,7 +10,7 @@
 
 mod feed;
 mod first_placement;
-mod held_tiles;
+mod device_window;
 mod layers;
 #[cfg(test)]
 mod pipe;

@@ -51,14 +51,14 @@ impl Surroundings {
 
     /// Begins again with the coarsest layer, around a home position (cells), because the cells have
     /// changed.
-    pub(super) fn begin_anew(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
+    pub(super) fn restart(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
         *self = Self::new(terrain, home);
         self.due = self.extents.iter().copied().enumerate().rev().collect();
     }
 
     /// Reads a few rows, and sends a layer that is complete: the caller waits for no more than
     /// these rows.
-    pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
+    pub(super) fn send_pending(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         if let Some(layer) = self.read.take() {
             let message = Message::Layer(layer);
             if let Err(Message::Layer(layer)) = queue.offer_or_return(message) {
@@ -109,7 +109,7 @@ mod tests {
         for (home, looks) in homes {
             surroundings.follow(&terrain, *home);
             for _ in 0..*looks {
-                surroundings.tell(&terrain, &queue);
+                surroundings.send_pending(&terrain, &queue);
             }
         }
         queue.end(HANG);

@@ -108,7 +108,7 @@ impl<'t> Arm<'t> {
         self.target_mm = self.target(mood);
         let speed = std::array::from_fn(|i| 1e-3 * (self.target_mm[i] - before[i]) / TICK_S);
         let at = self.placement.to_device_m(self.plant.model(), before);
-        self.plant.aim(at, ArmFrame::turn_to_device(speed));
+        self.plant.set_target(at, ArmFrame::turn_to_device(speed));
         self.plant.step(currents_a, TICK_S);
     }
 

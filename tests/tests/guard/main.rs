@@ -211,9 +211,9 @@ fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
         let far = [x + 130.0, y, PLANE_MM + 20.0];
         let near = [x - 130.0, y, PLANE_MM + 20.0];
         Script::start([x, y, PLANE_MM + 20.0])
-            .go(near, 100.0)
-            .go(far, speed)
-            .go(near, speed)
+            .line_to(near, 100.0)
+            .line_to(far, speed)
+            .line_to(near, speed)
     };
     let bed = Bed::new(&terrain, sweep(1_300.0), NOTHING).run(BEGIN + 3_000);
     bed.check_bounds();

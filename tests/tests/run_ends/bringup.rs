@@ -41,7 +41,7 @@ fn log(served: &SocketDevice, file: &Path) {
     let mut log = Log::default();
     _ = log.meet(Identity::of(control.device(), Some(&RECORD)));
     for step in Step::ALL.into_iter().filter(|s| *s != Step::FirstTouch) {
-        log.take(step, true, String::new());
+        log.add(step, true, String::new());
     }
     log.write(file).expect("written");
 }

@@ -10,7 +10,7 @@ const MAX_PAGES: u64 = 4096;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// The loader's text, to display: only its printable ASCII.
-    pub stated: String,
+    pub description: String,
     /// First address.
     pub start: u64,
     /// Bytes of a page.
@@ -27,12 +27,12 @@ impl Layout {
     /// and written.
     pub fn read(words: &str) -> Result<Self, UpdateError> {
         let printable = |c: &char| c.is_ascii_graphic() || *c == ' ';
-        let stated: String = words.chars().filter(printable).take(100).collect();
-        Self::parse(&stated).ok_or(UpdateError::Layout(stated))
+        let description: String = words.chars().filter(printable).take(100).collect();
+        Self::parse(&description).ok_or(UpdateError::Layout(description))
     }
 
-    fn parse(stated: &str) -> Option<Self> {
-        let mut fields = stated.strip_prefix('@')?.split('/');
+    fn parse(description: &str) -> Option<Self> {
+        let mut fields = description.strip_prefix('@')?.split('/');
         let (_name, address, runs) = (fields.next()?, fields.next()?, fields.next()?);
         if fields.next().is_some() {
             return None;
@@ -45,7 +45,7 @@ impl Layout {
         let even = runs.iter().all(|(_, bytes)| *bytes == page_bytes);
         let believed = even && page_bytes > 0 && (1..=MAX_PAGES).contains(&pages);
         believed.then(|| Self {
-            stated: stated.to_owned(),
+            description: description.to_owned(),
             start,
             page_bytes,
             pages,
@@ -111,9 +111,9 @@ mod tests {
 
     #[test]
     fn control_characters_from_a_loader_are_removed() {
-        let Err(UpdateError::Layout(stated)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}") else {
+        let Err(UpdateError::Layout(description)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}") else {
             panic!("refused");
         };
-        assert_eq!(stated, "@[2JFlash");
+        assert_eq!(description, "@[2JFlash");
     }
 }

@@ -22,7 +22,7 @@ use terminal::UserAtTerminal;
 /// Time limit for a device's reply.
 pub(super) const TIMEOUT: Duration = Duration::from_secs(4);
 /// Time limit for a reply of a device in this program.
-const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
+const VIRTUAL_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra bringup`.
 #[derive(Debug, clap::Args)]
@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         print_line("a virtual user brings a virtual Phantom up");
         let mut user = VirtualUser::new(Wiring::RIGHT);
         user.print = |line| print_line(line);
-        return bring_up(args, &mut user, VIRTUAL_PATIENCE, |user| {
+        return bring_up(args, &mut user, VIRTUAL_TIMEOUT, |user| {
             Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
         });
     }
@@ -79,7 +79,7 @@ fn bring_up<A: Attendant>(
     let mut kept = None;
     loop {
         let mut control = ControlSession::open(connect(user)?, timeout)?;
-        let path = place(args, &control)?;
+        let path = log_path(args, &control)?;
         let mut log = match (&path, kept.take()) {
             (Some(path), _) => Log::read(path)?,
             (None, kept) => kept.unwrap_or_default(),
@@ -88,11 +88,11 @@ fn bring_up<A: Attendant>(
             log.entries.retain(|entry| entry.step < step);
         }
         let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
-        let walked = run_sequence(&mut control, user, &mut log, &mut keep);
+        let ended = run_sequence(&mut control, user, &mut log, &mut keep);
         if let Some(path) = &path {
             print_line(format!("log            {}", path.display()));
         }
-        match (walked, control) {
+        match (ended, control) {
             // The session ended with the board's power, so there is none to close.
             (Ok(SequenceEnd::BoardPoweredOff), _) => kept = Some(log),
             (Ok(SequenceEnd::Complete), control) => {
@@ -116,11 +116,11 @@ fn bring_up<A: Attendant>(
 }
 
 /// Returns the path of the log.
-fn place(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
+fn log_path(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
     Ok(match (&args.log, &args.device) {
         (Some(path), _) => Some(path.clone()),
         (None, DeviceAddress::Native) => None,
-        (None, _) => Some(Log::place(control.device())?),
+        (None, _) => Some(Log::path_of(control.device())?),
     })
 }
 

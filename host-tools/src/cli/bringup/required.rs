@@ -22,7 +22,7 @@ pub(in crate::cli) fn check_brought_up(transport: &mut dyn Transport) -> Result<
     if is_real(&control.device().board) {
         let record = control.calibration()?;
         let device = control.device();
-        let log = Log::read(&Log::place(device)?)?;
+        let log = Log::read(&Log::path_of(device)?)?;
         if let Some(step) = missing(device, record.as_ref(), log) {
             let (board, number, title) = (printable(&device.board), step.number(), step.title());
             let serial = device.serial;
@@ -93,7 +93,7 @@ mod tests {
         log.update_identity(Identity::of(&device, Some(&record)));
         for step in Step::ALL {
             assert_eq!(missing(&device, Some(&record), log.clone()), Some(step));
-            log.take(step, true, String::new());
+            log.add(step, true, String::new());
         }
         assert_eq!(missing(&device, Some(&record), log.clone()), None);
         let twin = DeviceHello {

@@ -20,7 +20,7 @@ use super::terminal::partial_files;
 use super::terminal::writer::print_line;
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, run_procedure};
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
-use crate::output::keep_apart;
+use crate::output::check_distinct;
 use measure::Measure;
 use questions::UserAtTerminal;
 use set::Setting;
@@ -101,19 +101,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Vec::from_iter(args.out.as_deref()),
         Vec::from_iter(args.from.as_deref()),
     );
-    keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
+    check_distinct(&outputs, &inputs).or_hint(OTHER_FILE)?;
     match &args.show {
         Some(Some(path)) => return put(&file::to_toml(&file::read(path)?)),
         // A read-only query does not take the arm from its host.
-        Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
+        Some(None) => return put(&file::to_toml(&args.device.with_read_only_session(device_record)?)),
         None => {}
     }
     partial_files::report(args.out.as_deref());
-    if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
+    if args.device.device != DeviceChoice::Connected(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
         return args
             .device
-            .talk(|control| calibrate(args, control, &mut user));
+            .with_session(|control| calibrate(args, control, &mut user));
     }
     // A virtual user demonstrates the steps on an in-memory device.
     let mut user = VirtualUser::with_stylus();
@@ -129,7 +129,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 /// Returns the device's record.
-fn held(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
+fn device_record(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
     let held = control
         .calibration()?
         .ok_or("the device holds no calibration");
@@ -141,7 +141,7 @@ fn calibrate(
     control: &mut ControlSession<'_>,
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
-    let (begin, whence) = begin(args, control)?;
+    let (begin, whence) = initial_record(args, control)?;
     print_line(format!("begins with    {whence}"));
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
@@ -166,7 +166,7 @@ fn calibrate(
         file::write(path, &record).or_hint(OTHER_FILE)?;
         print_line(format!("written        {}", path.display()));
     }
-    hand_over(args, control, record)?;
+    activate(args, control, record)?;
     if let Some(counts) = zero {
         let zeroed = control.request(&Request::Zero { counts })?;
         zeroed.map_err(Failure::new)?;
@@ -176,7 +176,7 @@ fn calibrate(
 }
 
 /// Returns the initial record and its source.
-fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
+fn initial_record(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
     let held = control.calibration()?;
     let (mut record, whence) = match (&args.from, args.model, held) {
         (Some(path), _, _) => (file::read(path)?, path.display().to_string()),
@@ -207,7 +207,7 @@ fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, 
 }
 
 /// Activates the record on the device, and stores it there unless `--no-store` is given.
-fn hand_over(
+fn activate(
     args: &Args,
     control: &mut ControlSession<'_>,
     calibration: Calibration,

@@ -111,7 +111,7 @@ impl<'t> Serving<'_, 't> {
         }
         let materials = placed.terrain.grid().materials();
         let table = materials.map(Materials::table);
-        stability::warn_of(&placed.scene.params, table, &hello);
+        stability::warn_for_materials(&placed.scene.params, table, &hello);
         let recording = with_settings(self.recording, args, placed, &hello);
         let placed_surface = PlacedSurface {
             view: placed.view,
@@ -264,7 +264,7 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let [tick, work, cost, late] = TICK_COLUMNS.map(Column::Count);
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
-        let output = Output::create(path)?.of_recording(max_recorded_bytes(path));
+        let output = Output::create(path)?.for_recording(max_recorded_bytes(path));
         if let Some(partial) = output.partial() {
             guardian::report(&WorkerMessage::Recording(partial.to_owned()));
         }

@@ -148,7 +148,7 @@ impl<'t> Watch<'t> {
     }
 
     fn record(&mut self, sample: &TickRecord) -> Record {
-        let record = self.log.take(sample);
+        let record = self.log.add(sample);
         let (view, placement) = self.log.view();
         if let Some(viewer) = &mut self.viewer {
             viewer.on_sample(sample, &record, (view, placement));

@@ -23,7 +23,7 @@ use crate::terrain::HapticCells;
 pub(super) use recorded::differences;
 
 /// The default settings file, read if it exists.
-const USUAL_FILE: &str = "hapterra.toml";
+const DEFAULT_FILE: &str = "hapterra.toml";
 /// The commands that read a settings file.
 const COMMANDS: [&str; 3] = ["run", "demo", "replay"];
 /// Options that a settings file must not contain.
@@ -46,7 +46,7 @@ impl SettingsOption {
     pub(in crate::cli) fn file(&self) -> Option<PathBuf> {
         match &self.settings {
             Some(path) => Some(path.clone()).filter(|path| path.as_os_str() != "none"),
-            None => Some(PathBuf::from(USUAL_FILE)).filter(|path| path.exists()),
+            None => Some(PathBuf::from(DEFAULT_FILE)).filter(|path| path.exists()),
         }
     }
 }
@@ -163,14 +163,14 @@ fn of_recording(name: &str, matches: &ArgMatches) -> Result<Option<Vec<Setting>>
     match path.filter(|path| !ignores && path.is_file()) {
         Some(path) => {
             let settings = settings_of(path)?;
-            Ok(settings.map(|it| recorded::settings(path, &it, stated_in(matches))))
+            Ok(settings.map(|it| recorded::settings(path, &it, explicit_options(matches))))
         }
         None => Ok(None),
     }
 }
 
 /// Returns the scale and the kind of cells that the user states.
-fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
+fn explicit_options(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
     let scale = matches.try_get_one::<MapScale>("scale");
     let input = matches.try_get_many::<InputSetting>("input").ok().flatten();
     let cells = input.into_iter().flatten().find_map(InputSetting::cells);
@@ -202,7 +202,7 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
             )
         })
         .or_hint("name a recording or a FILE.toml with --settings")?;
-    let settings = recorded::settings(&path, &settings, stated_in(matches));
+    let settings = recorded::settings(&path, &settings, explicit_options(matches));
     Ok(Some((path, settings)))
 }
 

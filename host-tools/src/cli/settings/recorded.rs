@@ -18,7 +18,7 @@ use crate::terrain::HapticCells;
 pub(super) fn settings(
     path: &Path,
     recorded: &Settings,
-    (scale, stated_cells): (Option<MapScale>, Option<HapticCells>),
+    (scale, explicit_cells): (Option<MapScale>, Option<HapticCells>),
 ) -> Vec<Setting> {
     let RenderedTerrain {
         cells,
@@ -28,7 +28,7 @@ pub(super) fn settings(
         measured_at,
         ..
     } = &recorded.rendered;
-    let exaggeration = height(&recorded.rendered, scale, stated_cells.unwrap_or(*cells));
+    let exaggeration = height(&recorded.rendered, scale, explicit_cells.unwrap_or(*cells));
     let max_force = FORCE.format(recorded.force.max_force_n);
     let mut options: Vec<(&str, OsString)> = vec![
         ("input", in_words(*cells).into()),

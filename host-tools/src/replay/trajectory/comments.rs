@@ -11,14 +11,14 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// A stream whose first bytes were already read and are returned again. Positions count from its
 /// beginning.
-pub(super) struct Again<R> {
+pub(super) struct Rewound<R> {
     head: Cursor<Vec<u8>>,
-    rest: BufReader<Bounded<R>>,
+    remaining: BufReader<Bounded<R>>,
 }
 
 /// Reads the comments before the first other line. Returns them without their `#` and a space after
 /// it, and the stream from its beginning.
-pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
+pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Rewound<R>)> {
     let mut rest = BufReader::with_capacity(1 << 16, Bounded::new(stream));
     let (mut head, mut comments) = (Vec::new(), String::new());
     while head.len() < MAX_LINE_BYTES {
@@ -35,23 +35,23 @@ pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
         comments += &String::from_utf8_lossy(comment);
     }
     let head = Cursor::new(head);
-    Ok((comments, Again { head, rest }))
+    Ok((comments, Rewound { head, rest }))
 }
 
-impl<R: Read> Read for Again<R> {
+impl<R: Read> Read for Rewound<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         match self.head.read(into)? {
-            0 => self.rest.read(into),
+            0 => self.remaining.read(into),
             read => Ok(read),
         }
     }
 }
 
-impl<R: Seek> Seek for Again<R> {
+impl<R: Seek> Seek for Rewound<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         // The bytes in `head` are part of the stream.
         self.head.set_position(self.head.get_ref().len() as u64);
-        self.rest.seek(to)
+        self.remaining.seek(to)
     }
 }
 

@@ -21,23 +21,23 @@ pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
 /// static part.
 pub(super) fn over(
     material: &Material,
-    look: &MaterialEntry,
+    entry: &MaterialEntry,
     (file, line, what): (&Path, usize, &str),
 ) -> Result<Material, Failure> {
     let before = &material.friction;
     let friction = Friction {
-        dynamic_mu: look.friction.unwrap_or(before.dynamic_mu),
-        static_mu: look
+        dynamic_mu: entry.friction.unwrap_or(before.dynamic_mu),
+        static_mu: entry
             .static_friction
-            .or(look.friction)
+            .or(entry.friction)
             .unwrap_or(before.static_mu),
-        viscous_s: look.viscous_friction.unwrap_or(before.viscous_s),
+        viscous_s: entry.viscous_friction.unwrap_or(before.viscous_s),
     };
-    let made = texture::texture(look, &material.texture).and_then(|texture| {
+    let made = texture::texture(entry, &material.texture).and_then(|texture| {
         let material = Material {
-            stiffness_n_per_mm: look.stiffness.unwrap_or(material.stiffness_n_per_mm),
+            stiffness_n_per_mm: entry.stiffness.unwrap_or(material.stiffness_n_per_mm),
             friction,
-            damping_ns_per_m: look.damping.unwrap_or(material.damping_ns_per_m),
+            damping_ns_per_m: entry.damping.unwrap_or(material.damping_ns_per_m),
             texture,
         };
         check(&material).map(|()| material)

@@ -25,14 +25,14 @@ fn class_takes_from_the_default_and_the_options() {
     let surface = load(options, text).expect("a table");
     assert_eq!(surface.params.stiffness_n_per_mm, 0.7);
     assert_eq!(surface.params.friction, Friction::coulomb(0.2));
-    let looks = surface.looks.expect("classes");
-    assert_eq!(looks.default, Material::of(&surface.params));
-    let [two, three] = &looks.class[..] else {
-        panic!("{looks:?}");
+    let class_materials = surface.class_materials.expect("classes");
+    assert_eq!(class_materials.default, Material::of(&surface.params));
+    let [two, three] = &class_materials.class[..] else {
+        panic!("{class_materials:?}");
     };
     assert_eq!((two.class, three.class), (2, 3));
     assert_eq!(two.material.stiffness_n_per_mm, 0.9);
-    assert_eq!(two.material.texture, looks.default.texture);
+    assert_eq!(two.material.texture, class_materials.default.texture);
     assert_eq!(three.material.stiffness_n_per_mm, 0.7);
     assert_eq!(three.material.friction, Friction::coulomb(0.5));
     assert_eq!(three.material.texture.pattern, Pattern::Grain);
