@@ -322,7 +322,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn appears_whole_or_not_at_all() {
+    fn output_appears_complete_or_not_at_all() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("out.csv");
         let mut output = Output::create(&path).expect("created");
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impossible_place_is_an_error_at_once() {
+    fn unwritable_path_fails_at_creation() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(Output::create(&folder.path().join("no/such/out.csv")).is_err());
         assert!(Output::create(Path::new("-")).is_err());

@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_is_warned_of_that_fades_under_a_slow_hand() {
+    fn too_fine_texture_has_a_warning() {
         let reported = |wavelength_mm, hz| {
             let texture = Texture {
                 pattern: Pattern::Grain,
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
+    fn textured_surface_has_half_the_stiffness_limit() {
         let reported = |stiffness_n_per_mm| {
             let params = SurfaceParams {
                 stiffness_n_per_mm,
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_is_warned_of_by_the_rate() {
+    fn stiffness_warning_depends_on_the_rate() {
         for (stiffness, hz) in [(0.5, 1000), (1.0, 1000), (2.0, 2000), (2.0, 10_000)] {
             assert_eq!(reported(stiffness, hz, Controller::On), "", "{hz}");
         }
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_is_warned_of_by_the_latency() {
+    fn stiffness_warning_depends_on_the_latency() {
         let trembles = reported_late(1.5, 1000, 1231, Controller::On);
         assert!(
             trembles.contains("above 1 N/mm at 1000 ticks a second and 1.23 ms to the motors"),

@@ -18,7 +18,7 @@ fn output_text(output: &Output) -> String {
 }
 
 #[test]
-fn an_image_fits_its_board_and_no_other() {
+fn image_fits_only_its_board() {
     let images = [
         ("nucleo-g474re", "HAPTERRA_G474_ELF"),
         ("nucleo-h743zi2", "HAPTERRA_H743_ELF"),
@@ -55,7 +55,7 @@ fn an_image_fits_its_board_and_no_other() {
 /// A foreign checkout around the working folder is not built, because a build runs its code.
 #[cfg(unix)]
 #[test]
-fn own_checkout_is_built_wherever_it_is_run() {
+fn own_checkout_is_built_from_any_folder() {
     use std::fs;
     use std::os::unix::fs::PermissionsExt;
     use std::path::Path;

@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn data_may_lie_across_the_chips_blocks_of_ram() {
+    fn segment_may_span_adjacent_ram_blocks() {
         // SRAM1, SRAM2 and CCM of the G474, 128 KiB end to end.
         let data = segment(RAM + 0x1000, FLASH, 8, 0x1_F000);
         assert!(place(Memories::G474, vec![data]).is_ok());
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_of_another_chip_is_refused() {
+    fn image_of_another_chip_is_refused() {
         // The H743's data RAM, and flash past the G474's 512 KiB.
         for stray in [
             segment(0x2400_0000, FLASH, 8, 8),

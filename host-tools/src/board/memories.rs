@@ -84,7 +84,7 @@ mod tests {
     use probe_rs::config::{MemoryRegion, Registry};
 
     #[test]
-    fn the_memories_are_those_of_probe_rs_registry() {
+    fn memories_match_probe_rs_registry() {
         let registry = Registry::from_builtin_families();
         for (chip, memories) in [
             ("STM32G474RETx", Memories::G474),

@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn records_have_fingerprints() {
+    fn fingerprint_differs_between_records() {
         let one = fingerprint(&Calibration::PREMIUM_1_5);
         let mut other = Calibration::PREMIUM_1_5;
         other.motor_sign.y = -1.0;
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn two_boards_of_a_kind_have_a_log_each() {
+    fn boards_of_one_kind_have_separate_logs() {
         let mut device = crate::link::hello();
         device.board = "../evil/board".try_into().expect("fits");
         let place = |device: &DeviceHello| Log::path_of(device).expect("a home");
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_names_no_board_counts_for_none_with_a_number() {
+    fn log_without_serial_is_void_for_a_board_with_one() {
         let text = complete().text().expect("in words");
         let old: String = text
             .lines()

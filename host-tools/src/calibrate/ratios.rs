@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_did_not_move_is_named() {
+    fn unmoved_joint_is_named() {
         let mut moves = moves([1.0; 3], 0.0);
         moves
             .iter_mut()
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_no_fit() {
+    fn inconsistent_moves_give_no_fit() {
         let mut moves = moves([1.0; 3], 0.0);
         moves[0].to = [400, -4_000, 5_000];
         moves[1].mm = -300.0;

@@ -128,7 +128,7 @@ mod tests {
     use heightfield::{OpenOptions, Raster};
 
     #[test]
-    fn every_second_sample_is_written_and_read_again() {
+    fn npy_of_level_1_has_every_second_sample() {
         let height = |column: u32, row: u32| {
             if (column, row) == (2, 4) {
                 f32::NAN

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_floods_the_log_leaves_no_line_of_another_out() {
+    fn flooding_device_omits_no_line_of_another_device() {
         let text = written(|| {
             let subscriber = tracing::dispatcher::get_default(Clone::clone);
             let flood = |device: &'static str, lines: u32| {
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn host_lines_are_never_left_out_and_contain_no_controls() {
+    fn host_log_lines_are_never_omitted_and_have_no_controls() {
         let text = written(|| {
             for row in 0..10 {
                 tracing::warn!(target: "hapterra::replay", row, "odd");

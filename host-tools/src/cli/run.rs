@@ -266,7 +266,7 @@ mod tests {
     use crate::link::Timeouts;
 
     #[test]
-    fn the_default_of_silence_is_the_sessions() {
+    fn default_silence_is_that_of_the_session() {
         assert_eq!(silence("30s"), Ok(Timeouts::REAL_SILENCE_S));
     }
 }

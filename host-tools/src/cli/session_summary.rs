@@ -217,7 +217,7 @@ mod tests {
 
     /// A cell of level 3 is eight cells of the file wide, and its height is scaled equally.
     #[test]
-    fn a_level_changes_no_proportion() {
+    fn level_keeps_proportions() {
         let raster = Raster::from_fn(65, 65, |column, row| (column + row) as f32);
         let raster = raster.expect("a field");
         for level in [0, 3] {

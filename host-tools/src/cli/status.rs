@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_shown_with_its_number_meaning_and_what_to_do() {
+    fn fault_is_shown_with_number_meaning_and_remedy() {
         let mut status = status();
         status.health.report.fault = Some(Fault::EncoderJump);
         status.health.report.blockers = Blockers::FAULT_LATCHED | Blockers::NOT_ZEROED;
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hostile_device_cannot_write_past_its_line() {
+    fn hostile_device_text_has_no_control_characters() {
         let mut status = status();
         status.device.board = "\x1b[2J\x1b[H".try_into().expect("fits");
         status.device.version = "1\r\nfault none".try_into().expect("fits");
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crash_before_is_shown() {
+    fn previous_crash_is_shown() {
         let mut status = status();
         status.boot = BootReport {
             cause: ResetCause::Watchdog,

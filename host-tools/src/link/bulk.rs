@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_serial_number_reaches_no_terminal_raw() {
+    fn serial_number_is_sanitised_for_the_terminal() {
         assert_eq!(printable("00\u{1b}[2J3A\r\n"), "00[2J3A");
         assert_eq!(printable(&"F".repeat(500)).len(), 64);
     }

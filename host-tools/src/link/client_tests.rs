@@ -90,7 +90,7 @@ impl Bench<'_> {
         }
     }
 
-    fn alive(&self) -> ToHost {
+    fn heartbeat(&self) -> ToHost {
         ToHost::Heartbeat {
             count: SampleCount::default(),
             epoch: Some(self.client.scene().epoch),
@@ -183,7 +183,7 @@ fn repeated_device_messages_open_one_session() {
 }
 
 #[test]
-fn hello_is_repeated_whatever_else_arrives_and_then_given_up() {
+fn hello_is_repeated_despite_noise_until_it_times_out() {
     on_bench(None, |bench| {
         let foreign = SessionNumber::new(7);
         let mut noise = 0;
@@ -224,7 +224,7 @@ fn scene_without_ack_times_out_after_ten_attempts() {
 }
 
 #[test]
-fn telemetry_alone_is_no_answer() {
+fn telemetry_does_not_count_as_answer() {
     on_bench(None, |bench| {
         bench.open();
         bench.drain_sent();
@@ -246,7 +246,7 @@ fn unanswered_arm_is_retried_reported_and_then_disarmed() {
     on_bench(Some(Arming::default()), |bench| {
         bench.open();
         for _ in 0..80 {
-            bench.deliver(&bench.alive());
+            bench.deliver(&bench.heartbeat());
             bench.advance(ms(50)).expect("alive");
         }
         let sent = bench.drain_sent();
@@ -258,7 +258,7 @@ fn unanswered_arm_is_retried_reported_and_then_disarmed() {
 }
 
 #[test]
-fn an_answer_ends_the_repeating_and_brings_the_next_request() {
+fn answer_ends_repetition_and_sends_next_request() {
     on_bench(Some(Arming::VIRTUAL), |bench| {
         bench.open();
         assert_eq!(
@@ -315,7 +315,7 @@ fn repeated_query_keeps_its_number() {
         bench.client.enqueue(HostRequest::Status);
         bench.client.enqueue(HostRequest::Request(Request::Disarm));
         for _ in 0..40 {
-            bench.deliver(&bench.alive());
+            bench.deliver(&bench.heartbeat());
             bench.advance(ms(50)).expect("alive");
         }
         let sent = bench.drain_sent();
@@ -349,7 +349,7 @@ fn tile_requests_wait_for_the_answer_to_zero() {
 }
 
 #[test]
-fn a_refusal_in_mid_session_or_of_the_own_protocol_is_noise() {
+fn late_or_same_protocol_version_refusal_is_ignored() {
     on_bench(None, |bench| {
         let refuse = |bench: &mut Bench<'_>, protocol| {
             let mut frame = [0; 16];
@@ -372,7 +372,7 @@ fn a_refusal_in_mid_session_or_of_the_own_protocol_is_noise() {
 }
 
 #[test]
-fn a_device_that_was_restarted_gets_its_scene_again() {
+fn restarted_device_gets_the_scene_again() {
     on_bench(None, |bench| {
         bench.open();
         bench.advance(ms(800)).expect("patient");
@@ -399,7 +399,7 @@ fn a_device_that_was_restarted_gets_its_scene_again() {
 }
 
 #[test]
-fn another_host_is_noticed() {
+fn frames_of_another_host_end_the_session() {
     on_bench(None, |bench| {
         bench.open();
         let other = SessionNumber::new(7);
@@ -422,7 +422,7 @@ fn another_host_is_noticed() {
             bench
                 .deliver_in(other, &ToHost::Telemetry(Default::default()))
                 .expect("passed over");
-            bench.deliver(&bench.alive());
+            bench.deliver(&bench.heartbeat());
             bench.advance(ms(50)).expect("it is ours");
         }
     });
@@ -468,7 +468,7 @@ fn session_closed_by_device_ends_client_with_its_reason() {
 }
 
 #[test]
-fn an_old_word_that_a_session_is_over_ends_no_other() {
+fn late_session_closed_message_ends_no_other_session() {
     let ends = [SessionEnd::Replaced, SessionEnd::HostSilent];
     on_bench(None, |bench| {
         let first = bench.client.session();
@@ -548,7 +548,7 @@ fn close_request_is_retried_until_confirmed_or_times_out() {
         bench.open();
         bench.client.leave(bench.now, &mut bench.out);
         let error = loop {
-            bench.deliver(&bench.alive());
+            bench.deliver(&bench.heartbeat());
             if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
@@ -558,7 +558,7 @@ fn close_request_is_retried_until_confirmed_or_times_out() {
 }
 
 #[test]
-fn new_line_draws_a_new_session_number() {
+fn new_line_begins_a_new_session_number() {
     on_bench(None, |bench| {
         let first = bench.client.session();
         bench.client.greet(bench.now, &mut bench.out);
@@ -690,7 +690,7 @@ fn placement_is_resent_until_acknowledged_then_applied() {
         assert_eq!(bench.viewed, [(1, true)]);
         assert_eq!(bench.client.scene().epoch, epoch);
         bench.out.clear();
-        bench.deliver(&bench.alive());
+        bench.deliver(&bench.heartbeat());
         bench.advance(ms(600)).expect("in time");
         let sent = bench.drain_sent();
         assert_eq!(
@@ -712,7 +712,7 @@ fn refused_or_unanswered_placement_keeps_the_scene() {
         bench.put_view(2);
         for _ in 0..9 {
             bench.advance(ms(500)).expect("in time");
-            bench.deliver(&bench.alive());
+            bench.deliver(&bench.heartbeat());
         }
         assert_eq!(bench.viewed, [(1, false), (2, false)]);
         assert_eq!(bench.client.scene().epoch, before);

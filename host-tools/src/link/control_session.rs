@@ -422,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn a_calibration_is_taken_stored_and_refused_with_a_reason() {
+    fn calibration_is_stored_or_refused_with_a_reason() {
         let press: FaultInjector = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
         let device = Box::new(Native::for_replay().free_running().with_fault_injector(press));
         let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");

@@ -51,7 +51,7 @@ fn index_at(materials: &Materials, terrain: &Raster, ground: [f64; 2]) -> u8 {
 }
 
 #[test]
-fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
+fn point_has_the_class_of_its_pixel() {
     let utm = Some(32632);
     let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
     // Pixels of 37 m; the centre of the first lies 3 m west and 5 m south of the terrain.
@@ -86,7 +86,7 @@ fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
 }
 
 #[test]
-fn classes_in_another_system_lie_where_they_are_on_the_globe() {
+fn classes_in_another_reference_system_are_converted() {
     // The border is a meridian: 9° east is the middle of zone 32.
     let terrain = raster(
         (101, 101),
@@ -113,7 +113,7 @@ fn classes_in_another_system_lie_where_they_are_on_the_globe() {
 }
 
 #[test]
-fn a_tile_has_the_classes_of_its_level() {
+fn tile_has_the_classes_of_its_level() {
     let terrain = raster((101, 71), [0.0; 2], 1.0, None, |x, y| (x * y) as f32);
     let classes = raster((101, 71), [0.0; 2], 1.0, None, |x, y| {
         ((x / 7 + y / 5) % 3) as f32
@@ -240,7 +240,7 @@ fn class_raster_of_another_body_is_refused() {
 }
 
 #[test]
-fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
+fn url_key_is_in_no_recording_and_no_message() {
     let utm = Some(32632);
     let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
     let at = |x: f64| {
@@ -262,7 +262,7 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
 }
 
 #[test]
-fn pending_class_is_no_answer_of_the_default() {
+fn pending_class_does_not_count_as_default() {
     let folder = tempfile::tempdir().expect("a folder");
     let utm = Some(32632);
     let terrain = raster((600, 600), [0.0, 0.0], 1.0, utm, |_, _| 1.0);

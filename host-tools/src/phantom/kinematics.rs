@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_links_there_is_no_pose() {
+    fn point_beyond_the_links_has_no_pose() {
         let model = PhantomModel::premium_1_5();
         assert_eq!(inverse(&model, [0.4, 0.0, 0.0]), None);
         assert_eq!(inverse(&model, [0.001, 0.0, 0.0]), None);

@@ -174,7 +174,7 @@ mod tests {
     const HAND: fn() -> HandModel = HandModel::default;
 
     #[test]
-    fn a_press_aims_below_by_what_the_springs_give() {
+    fn press_target_is_below_surface_by_spring_deflection() {
         let plan = Touch::start(&|_, _| Some(10.0), &HAND(), 0.5, [1.0, 2.0], 8.0)
             .press(2.0, 1.0)
             .finish();

@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bar_is_round_on_the_ground_and_never_too_long() {
+    fn scale_bar_is_a_round_length_within_its_limit() {
         for (width_mm, metres_per_mm, metres, text) in [
             (300.0, 10.0, 500.0, "500 m = 50 mm"),
             (300.0, 30.0, 2000.0, "2 km = 66.7 mm"),

@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_single_spike_survives_thinning() {
+    fn single_spike_survives_thinning() {
         let points = (0..100_000).map(|i| {
             let y = if i == 77_123 { 9.0 } else { 0.0 };
             (f64::from(i), Some(y))

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn small_terrains_and_long_paths_are_shown_whole() {
+    fn small_terrain_or_long_path_is_shown_completely() {
         let all = MapView::whole([100.0, 80.0]);
         assert_eq!(
             MapView::choose(path(40., 40., 3., 3.), [100., 80.], 1.0),
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_path_in_a_corner_gets_a_view_inside_the_terrain() {
+    fn view_of_short_corner_path_is_inside_the_terrain() {
         let view = MapView::choose(path(2., 3., 80., 40.), [10_000., 6000.], 1.0);
         assert_eq!((view.west, view.south), (0.0, 0.0));
         assert!(view.width >= 100.0 && view.width < 140.0, "{view:?}");
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_off_the_data_is_still_in_view() {
+    fn path_off_the_data_is_in_view() {
         let view = MapView::choose(path(-30., 10., 20., 20.), [1000., 800.], 1.0);
         assert!(view.west <= -30.0 && view.map_px().0 >= 40);
     }

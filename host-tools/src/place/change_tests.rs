@@ -62,7 +62,7 @@ fn pressing(terrain: &Terrain<'_>) -> Hand {
 }
 
 #[test]
-fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
+fn zoom_keeps_ground_under_proxy_and_hip_depth() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         let before = bounds.first;
@@ -101,7 +101,7 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
 }
 
 #[test]
-fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
+fn level_follows_the_scale_unless_it_is_stated() {
     for (stated, expected) in [(None, [0, 3, 0]), (Some(2), [2, 2, 2])] {
         let bench = Bench {
             level: stated,

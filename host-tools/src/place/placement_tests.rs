@@ -172,7 +172,7 @@ fn home_position_is_above_the_requested_location() {
 }
 
 #[test]
-fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
+fn fit_fills_the_workspace_of_every_premium() {
     for record in [
         Calibration::PREMIUM_1_0,
         Calibration::PREMIUM_1_5,
@@ -220,7 +220,7 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
 }
 
 #[test]
-fn suited_heights_are_true_to_scale_or_exaggerated() {
+fn suitable_heights_are_true_to_scale_or_exaggerated() {
     let metre = CellUnit::Length { metres: 1.0 };
     let options = |sizing| PlacementOptions {
         heights: Heights::Suited,
@@ -552,7 +552,7 @@ fn rounded_numbers_have_three_digits() {
 }
 
 #[test]
-fn a_home_that_is_too_far_to_be_addressed_is_named() {
+fn unaddressable_home_position_is_refused() {
     let raster = hills();
     let grid = Target::Whole
         .grid(&raster, HapticCells::default())

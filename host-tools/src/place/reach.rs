@@ -259,7 +259,7 @@ mod tests {
     ];
 
     #[test]
-    fn every_point_of_a_box_that_is_held_is_reached() {
+    fn every_point_of_a_contained_box_is_reachable() {
         for record in PRESETS {
             let (reach, whole) = (Reach::of(&record), f64::from(record.l1_mm + record.l2_mm));
             let home = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_is_none_reaches_nothing() {
+    fn invalid_record_has_an_empty_workspace() {
         for bad in [f32::NAN, f32::INFINITY, 0.0, -200.0] {
             let mut record = Calibration {
                 l1_mm: bad,

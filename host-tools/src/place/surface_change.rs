@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn materials_have_all_but_shading_by_themselves() {
+    fn material_surfaces_only_accept_shading_changes() {
         let params = &SurfaceParams::PREMIUM;
         let damping = SurfaceChange::Damping(1.0);
         assert_eq!(damping.of(params, true), Err(SurfaceError::OfMaterials));

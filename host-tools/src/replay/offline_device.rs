@@ -203,7 +203,7 @@ mod tests {
     /// A device accepts a placement with the next number, and a tile with the placement's epoch: a
     /// repeated placement needs a new epoch, also after the numbers start again.
     #[test]
-    fn every_view_has_the_next_number_and_an_epoch_of_its_own() {
+    fn placements_have_consecutive_numbers_and_unique_epochs() {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");

@@ -599,7 +599,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_or_later_settings_are_errors_and_remarks_are_not() {
+    fn broken_or_later_settings_are_errors_but_comments_not() {
         assert_eq!(Settings::from_toml(" a remark\n").expect("none"), None);
         let later = Settings::from_toml("hapterra-recording = 2\nall = \"else\"");
         assert!(matches!(later, Err(SettingsError::Later { found: 2 })));

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn each_command_is_read() {
+    fn each_steering_command_is_parsed() {
         let pan = PlacementChange::Pan {
             east_mm: 5.0,
             north_mm: -0.5,
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_is_the_rest_of_its_line() {
+    fn mark_text_is_the_rest_of_its_line() {
         for (line, at_s, text) in [
             ("mark a", None, "a"),
             (

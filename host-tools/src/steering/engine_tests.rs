@@ -116,7 +116,7 @@ fn refused_placement_changes_nothing_and_is_reported() {
 }
 
 #[test]
-fn unopened_clutch_or_silent_device_is_given_up() {
+fn unopened_clutch_or_silent_device_times_out() {
     for answers in [true, false] {
         with(|steering| {
             steering.steer(ZOOM);
@@ -143,7 +143,7 @@ fn unopened_clutch_or_silent_device_is_given_up() {
 
 /// The ground height is unknown until the proxy has landed.
 #[test]
-fn a_view_waits_for_the_tile_under_the_proxy() {
+fn placement_waits_for_the_tile_under_the_proxy() {
     with(|steering| {
         open(steering);
         let waits = TickRecord {
@@ -218,7 +218,7 @@ fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> TickReco
 }
 
 #[test]
-fn far_clutch_measures_cells_again() {
+fn far_clutch_motion_measures_cells_again() {
     let raster = degrees();
     let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
     for (north_mm, by_input) in [(80.0, false), (80.0, true), (0.1, false), (0.1, true)] {

@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_clutch_is_held_while_its_key_repeats() {
+    fn clutch_is_held_while_its_key_repeats() {
         let mut keys = Keys::default();
         let space = Key::Char(' ');
         assert_eq!(keys.press(space, ms(0)), Some(Steer::Clutch(true)));

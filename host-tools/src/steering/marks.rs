@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_mark_is_requested_once_and_gets_its_answers_tick() {
+    fn each_mark_is_requested_once_and_has_its_tick() {
         let mut marks = Marks::default();
         for text in ["a", "b", "c"] {
             assert_eq!(marks.mark(text.to_owned()), None);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_beyond_those_that_may_wait_are_reported() {
+    fn marks_beyond_the_queue_limit_are_reported() {
         let mut marks = Marks::default();
         for _ in 0..MAX_WAITING {
             assert_eq!(marks.mark("x".to_owned()), None);

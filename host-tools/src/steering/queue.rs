@@ -241,7 +241,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn line_without_end_is_refused_and_the_last() {
+    fn endless_command_line_is_cut_and_ends_input() {
         let (send, lines) = sync_channel(4);
         let take = move |line: &str, number| send.send((line.len(), number)).is_ok();
         let endless = Origin::File("/dev/zero".into());
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_wait_for_their_time_and_for_the_ones_before() {
+    fn commands_wait_for_their_time_and_predecessors() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
         let text = "# a tour\nat 1 zoom 2\nnonsense\nzoom 4\nat 0.5 reset\nmark done\n";
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_is_for_each_device_or_for_the_one_that_it_names() {
+    fn command_is_for_all_devices_or_the_named_one() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
         let text = "zoom 2\non 2 zoom 3\non 3 zoom 9\non x reset\non 1 at 0 zoom 4\non 2 nonsense\nenter 7\non 2 enter 7\nzoom 5";
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_takes_no_commands_holds_no_other_up() {
+    fn stalled_device_does_not_block_commands_of_others() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
         let count = MAX_WAITING_EACH + 1000;

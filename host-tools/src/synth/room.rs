@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_file_leaves_nothing_and_spares_what_was_there() {
+    fn interrupted_write_keeps_the_existing_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.tif");
         std::fs::write(&path, "before").expect("written");

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn beside_the_field_there_is_nothing_to_be_off() {
+    fn rectangle_beside_the_field_has_no_distortion() {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("a raster");
         let grid = HapticGrid::new(&raster, HapticCells::Square);
         assert_eq!(grid.worst_in([9.0, 0.0, 12.0, 5.0]), None);

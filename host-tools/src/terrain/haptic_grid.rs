@@ -527,7 +527,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_plane_is_true_in_every_direction_whatever_the_cells() {
+    fn plane_is_true_to_scale_on_cells_of_any_shape() {
         for (across, along, lean) in [
             (10.0, 30.0, 0.0),
             (30.0, 10.0, 0.0),
@@ -560,7 +560,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn square_cells_keep_their_exact_samples_and_so_do_stored_ones() {
+    fn square_and_stored_cells_keep_exact_samples() {
         for (cells, east) in [(HapticCells::Square, 10.009), (HapticCells::Stored, 30.0)] {
             let raster = plane(cell(east, 10.0, 0.0), [0.3, 0.7]);
             let grid = HapticGrid::new(&raster, cells);

@@ -63,7 +63,7 @@ mod tests {
     const STABLE_HASH: u64 = 0x7046_36b8_d443_a868;
 
     #[test]
-    fn the_fingerprint_is_the_same_for_ever() {
+    fn fingerprint_is_stable() {
         let heights = |hole: f32| {
             Raster::from_fn(3, 2, move |x, y| match (x, y) {
                 (2, 1) => hole,
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn filled_heights_are_another_terrain() {
+    fn filled_heights_change_the_fingerprint() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("t.asc");
         let grid = "ncols 3\nnrows 2\ncellsize 1\nNODATA_value -1\n1 -1 3 4 5 6";

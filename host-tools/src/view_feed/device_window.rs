@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tile_takes_the_place_of_the_one_in_its_slot() {
+    fn tile_replaces_the_one_in_its_slot() {
         let mut held = DeviceWindow::new(4, 1);
         assert_eq!(held.take_change(), Some(Tiles::default()));
         let slots =

@@ -61,7 +61,7 @@ mod tests {
     use heightfield::{CellSize, CellUnit, Raster};
 
     #[test]
-    fn the_same_ground_stands_where_the_beginning_has_it() {
+    fn ground_is_mapped_to_the_first_placement() {
         let raster = Raster::from_fn(41, 41, |column, row| (3 * column + row) as f32);
         let raster = raster.expect("raster");
         let cell = |east| CellSize {

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_reads_gets_everything_in_order() {
+    fn reader_receives_everything_in_order() {
         let (pipe, out) = sync_channel(1);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 1 << 20);
         let mut end = Vec::new();

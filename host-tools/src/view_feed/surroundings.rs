@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_layers_follow_a_far_pan_but_not_a_near_one() {
+    fn finer_layers_follow_only_far_pans() {
         assert_eq!(reported(&[([2000.0, 30.0], 9), ([1000.0, 10.0], 9)]), []);
         let layers = reported(&[([15_000.0, 30.0], 9), ([15_100.0, 30.0], 9)]);
         let [layer] = layers.as_slice() else {
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pan_meanwhile_leaves_what_was_being_read() {
+    fn pan_cancels_the_layer_being_read() {
         let layers = reported(&[([9000.0, 30.0], 1), ([15_000.0, 30.0], 9)]);
         let wests: Vec<_> = layers.iter().map(|layer| layer.first[0]).collect();
         assert!(matches!(wests[..], [west] if west > 9000), "{wests:?}");

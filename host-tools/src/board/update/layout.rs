@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_two_chips_loaders_are_understood() {
+    fn layouts_of_both_chips_are_parsed() {
         let read = |words| {
             Layout::read(words)
                 .map(|l| (l.start, l.page_bytes, l.pages))

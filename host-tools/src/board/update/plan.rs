@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_calibrations_are_out_of_reach() {
+    fn calibration_sectors_cannot_be_erased() {
         let calibrations = FLASH + 508 * 1024;
         assert!(plan(&[(FLASH, 8), (calibrations - 8, 8)], G474).is_ok());
         for part in [(calibrations - 8, 9), (calibrations, 1), (FLASH - 4, 8)] {
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn another_chips_loader_is_refused() {
+    fn loader_of_another_chip_is_refused() {
         for words in [
             "@Internal Flash /0x08000000/16*128Kg",
             "@Internal Flash /0x08000000/128*02Kg",

@@ -130,7 +130,7 @@ fn update_writes_and_starts_image_and_erases_no_other_page() {
 }
 
 #[test]
-fn the_vectors_are_erased_first_and_written_last() {
+fn vectors_are_erased_first_and_written_last() {
     for rom in ROMS {
         let (device, _) = try_update(Scripted::new(rom, Faults::default()), &image(rom));
         assert_eq!(device.operations.first(), Some(&FlashOperation::Erased(FLASH)));
@@ -350,7 +350,7 @@ fn update_progress_reaches_its_announced_totals() {
 }
 
 #[test]
-fn the_scripted_loader_forgives_nothing() {
+fn scripted_loader_rejects_protocol_violations() {
     let mut device = Scripted::new(&G474, Faults::default());
     // The second status request is too early.
     device

@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_mistake_has_its_name() {
+    fn each_encoder_mistake_has_its_own_finding() {
         let back = |there: [i32; 3]| there.map(|counts| -counts);
         let judge_one = |there| judge(1, there, back(there));
         assert_eq!(judge_one([40, 2_800, 700]), Ok(()));

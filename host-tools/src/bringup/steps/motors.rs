@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn each_mistake_has_its_name() {
+    fn each_motor_mistake_has_its_own_finding() {
         assert_eq!(judge([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]), Ok(1));
         let right = -1;
         let inverted = Err(Finding::InvertedMotor { motor: 2, right });
@@ -214,14 +214,14 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_that_moves_more_than_the_motor_is_not_taken_for_it() {
+    fn hand_motion_beyond_motor_motion_is_unclear() {
         let unclear = Err(Finding::Unclear { motor: 2 });
         assert_eq!(judge([0.0, 0.03, 0.0], [0.0, 0.02, 0.0]), unclear);
         assert_eq!(judge([0.02, 0.0, 0.0], [0.02, 0.0, 0.0]), unclear);
     }
 
     #[test]
-    fn levers_of_the_zero_pose() {
+    fn levers_in_the_zero_pose_match_the_links() {
         let levers = [0, 1, 2].map(|axis| lever_mm(&RECORD, axis));
         for (lever, link) in levers.into_iter().zip([209.55, 209.55, 169.545]) {
             assert!((lever - link).abs() < 1e-3, "{lever} {link}");

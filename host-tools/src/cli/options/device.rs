@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn devices_by_name() {
+    fn device_choices_are_parsed() {
         let emulated = |image: Option<&str>| {
             let image = image.map(Into::into);
             EmulatedBoard { image }
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_device_in_memory_talks() {
+    fn native_device_reports_its_board() {
         let device = Device {
             device: DeviceChoice::Connected(DeviceAddress::Native),
         };

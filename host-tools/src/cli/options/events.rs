@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn port_and_every_nth_sample() {
+    fn port_and_sample_interval_are_parsed() {
         let samples = None;
         assert_eq!(
             events("4100"),

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_heights_and_auto() {
+    fn exaggerations_are_parsed() {
         for (text, wanted) in [
             ("auto", Exaggeration::Auto),
             ("2.5", Exaggeration::Times(2.5)),

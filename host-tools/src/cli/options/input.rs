@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn each_key_with_its_example_is_read() {
+    fn each_input_key_parses_its_example() {
         for (key, value) in KEYS {
             let text = format!("{key}={value}");
             assert!(text.parse::<InputSetting>().is_ok(), "{text}");
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn sources_that_disagree_are_refused() {
+    fn contradicting_input_options_are_refused() {
         let why = options(&["band=1", "band=2"]).expect_err("twice");
         assert!(why.contains("band=… is given twice"), "{why}");
         assert!(options(&["variable=a", "asset=b"]).is_err());
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn units_of_height() {
+    fn height_units_are_parsed() {
         let feet = 1200.0 / 3937.0;
         for (unit, metres) in [("m", 1.0), ("ft", 0.3048), ("us-ft", feet), ("0.01", 0.01)] {
             assert_eq!(height_unit(unit), Ok(metres));

@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coordinates_by_name() {
+    fn coordinate_systems_are_parsed() {
         assert_eq!(coordinates("file"), Ok(Coordinates::Own));
         assert_eq!(coordinates("lonlat"), Ok(Coordinates::LonLat));
         assert_eq!(coordinates("epsg:2056"), Ok(Coordinates::Epsg(2056)));
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_between_commas() {
+    fn comma_separated_numbers_are_parsed() {
         assert_eq!(numbers("-72.5, 44"), Ok([-72.5, 44.0]));
         for bad in ["1", "1,2,3", "1;2", "1,", "inf,0", "nan,1", ""] {
             assert!(numbers::<2>(bad).is_err(), "{bad}");

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_unit_names_the_right_ones() {
+    fn invalid_unit_error_names_the_valid_ones() {
         for (units, text, wanted) in [
             (&STIFFNESS, "0.5N", "N/mm, N/m"),
             (&LENGTH, "2m", "mm, cm"),

@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn metres_and_cells() {
+    fn map_scales_are_parsed() {
         for (text, wanted) in [
             ("5", MapScale::GroundMPerMm(5.0)),
             ("5m/mm", MapScale::GroundMPerMm(5.0)),

@@ -60,7 +60,7 @@ fn several_devices_have_numbered_names_and_recordings() {
 }
 
 #[test]
-fn a_device_that_is_named_twice_is_refused_also_by_two_names() {
+fn device_named_twice_is_refused_also_by_alias() {
     for (more, says) in [
         ("--device usb:7 --device usb:7", "are both usb:7"),
         ("--device usb --device usb:7", "usb:SERIAL"),

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_device_that_failed_is_named_with_what_to_do() {
+    fn each_failed_device_is_named_with_a_hint() {
         assert!(all_failures(2, vec![]).is_ok());
         let lost = || Failure::new("it is gone").hint("plug it in");
         let reported = |count, failures| match all_failures(count, failures) {

@@ -31,7 +31,7 @@ fn completed(text: &str, line: &str) -> Result<Vec<String>, String> {
 }
 
 #[test]
-fn settings_stand_before_the_words_of_the_user() {
+fn settings_precede_user_arguments() {
     let text = "scale = \"5m/mm\"\ntip = 2\nsurface = \"sand\"\ninput = [\"band=2\", \"cell=30m\"]\nview = true\n";
     let words = completed(text, "run t.tif").expect("settings");
     assert_eq!(
@@ -81,7 +81,7 @@ fn command_line_wins() {
 }
 
 #[test]
-fn keys_of_other_commands_are_left_alone() {
+fn keys_of_other_commands_are_ignored() {
     let text = "rounds = 3\nsilence = \"30s\"\nrows-are-ticks = true\n";
     let words = completed(text, "demo t.tif").expect("settings");
     assert_eq!(words, ["--rounds=3", "--settings"]);
@@ -90,7 +90,7 @@ fn keys_of_other_commands_are_left_alone() {
 }
 
 #[test]
-fn surface_may_stand_in_the_file() {
+fn settings_file_may_contain_a_surface() {
     let text = "device = \"native\"\n[surface.default]\nfriction = 0.4\n";
     let words = completed(text, "run t.tif").expect("settings");
     assert_eq!(words, ["--device=native", "--surface=FILE", "--settings"]);
@@ -181,7 +181,7 @@ fn replayed(more: &str) -> (crate::cli::replay::Args, Vec<String>) {
 }
 
 #[test]
-fn options_of_a_recording_are_those_of_its_making() {
+fn recording_options_are_those_of_the_recorded_run() {
     let (args, lines) = replayed("");
     assert_eq!(lines, [""; 0]);
     let rendering = &args.rendering;

@@ -346,7 +346,7 @@ mod tests {
     };
 
     #[test]
-    fn an_enter_from_before_the_question_is_no_answer() {
+    fn enter_before_the_question_is_no_answer() {
         let (press, mut prompts) = with_user();
         press.send(()).expect("listening");
         prompts.on_event(&Event::Guard(&not_zeroed()));
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_whose_state_flickers_does_not_flood_the_terminal() {
+    fn flickering_state_does_not_flood_the_terminal() {
         let (_press, mut prompts) = with_user();
         let mut shown = 0;
         for flicker in 0..10_000 {

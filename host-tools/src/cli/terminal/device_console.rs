@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn each_device_has_its_own_line_at_the_bottom() {
+    fn each_device_has_its_own_status_line() {
         let two = DeviceConsole::of_each(&["native", "usb:7"]);
         let bottom = || {
             let several = two[0].several.as_ref().expect("several");

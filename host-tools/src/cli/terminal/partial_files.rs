@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_its_size_and_what_to_do_are_named() {
+    fn partial_file_is_named_with_size_and_remedy() {
         let folder = tempfile::tempdir().expect("a folder");
         let partial = folder.path().join("out.csv.a1B2c3.partial");
         std::fs::write(&partial, "t_s,x_mm").expect("written");

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn work_that_ends_ends_the_waiting() {
+    fn progress_ends_with_the_work() {
         assert_eq!(shown_meanwhile(String::new, || 7), 7);
         let panics = || shown_meanwhile(String::new, || panic!("of the work"));
         assert!(std::panic::catch_unwind(panics).is_err());

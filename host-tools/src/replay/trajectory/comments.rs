@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_are_separated_and_all_bytes_are_kept() {
+    fn comments_are_separated_without_loss_of_bytes() {
         for (text, expected) in [
             (
                 &b"# a = 1\n#\n#b\r\nt_s\n0\n# later\n"[..],
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn views_between_rows_are_found_and_other_remarks_are_not() {
+    fn placements_between_rows_are_found_among_comments() {
         let text = "# a = 1\n# [[view]]\nt_s\n0\n# [[view]]\n# number = 1\n1\n# a remark\n\
                     # [[view]]\n2\n# [[mark]]\n# t_s = 1\n# [[view]]\r\n# number = 2\r\n3\n";
         let found = later(text.as_bytes()).expect("in memory");
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_are_no_rows_are_counted() {
+    fn non_row_lines_are_counted() {
         for (text, count) in [("1,2\n", 0), ("\n# a\n \r\n1,2\n", 3), ("", 0), ("#", 1)] {
             assert_eq!(lines_before_a_row(text.as_bytes()), count, "{text:?}");
         }

@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_table_is_not_read_to_its_end() {
+    fn oversized_table_is_refused_unread() {
         let file = tempfile::NamedTempFile::new().expect("a file");
         // A sparse file, which needs no disk space.
         file.as_file().set_len(1 << 40).expect("sparse");

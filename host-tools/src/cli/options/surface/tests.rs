@@ -15,7 +15,7 @@ fn load(options: SurfaceOptions, text: &str) -> Result<Surface, String> {
 }
 
 #[test]
-fn class_takes_from_the_default_and_the_options() {
+fn class_inherits_the_default_and_the_options() {
     let options = SurfaceOptions {
         stiffness: Some(0.7),
         friction: Some(0.2),

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_class_takes_what_it_does_not_state_from_the_default() {
+    fn class_texture_inherits_unstated_numbers() {
         let numbers = [Some(0.1), Some(1.5), Some(20.0)];
         let default = texture_with(Some(TextureName::Grating), numbers).expect("valid");
         let higher = MaterialEntry {
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_with_what_to_do() {
+    fn invalid_texture_is_refused_with_a_remedy() {
         let (grain, grating) = (Some(TextureName::Grain), Some(TextureName::Grating));
         let bad = [
             (None, [Some(0.1), None, None], "of no texture"),
