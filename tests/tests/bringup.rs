@@ -241,7 +241,7 @@ fn wrong_tick_rate_of_the_board_is_named() {
 }
 
 #[test]
-fn a_usb_clock_that_does_not_follow_the_host_is_named() {
+fn unlocked_usb_clock_is_named() {
     let unlocked = BenchMistakes {
         usb_clock_unlocked: true,
         ..BenchMistakes::default()
@@ -282,7 +282,7 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
 }
 
 #[test]
-fn an_amplifier_of_another_scale_is_named() {
+fn wrongly_scaled_amplifier_is_named() {
     for (gain, axis, step) in [(0.4, 0, Step::Motor1), (2.0, 1, Step::Motor2)] {
         let wiring = Wiring::RIGHT.with_gain(axis, gain);
         let (_, finding) = found_from(step, wired(wiring), RECORD);
@@ -301,7 +301,7 @@ fn an_amplifier_of_another_scale_is_named() {
 }
 
 #[test]
-fn a_weight_that_the_record_does_not_know_is_named() {
+fn wrong_gravity_record_is_named() {
     // It is detected before the arm is as fast as in a jog: `walked` checks that.
     for gravity_2_nm in [0.03, 0.1, -0.06, -0.1] {
         let record = Calibration {
@@ -323,7 +323,7 @@ fn swapped_motors_are_named() {
 }
 
 #[test]
-fn an_inverted_sign_is_named() {
+fn inverted_motor_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
         .into_iter()
         .enumerate()
@@ -339,7 +339,7 @@ fn an_inverted_sign_is_named() {
 }
 
 #[test]
-fn a_dead_encoder_is_named() {
+fn dead_encoder_is_named() {
     for axis in 0..3 {
         let (step, finding) = found(wired(Wiring::RIGHT.with_dead_encoder(axis)), RECORD);
         assert_eq!(step, Step::Encoders);
@@ -349,7 +349,7 @@ fn a_dead_encoder_is_named() {
 }
 
 #[test]
-fn a_wrong_ratio_is_named() {
+fn wrong_ratio_is_named() {
     let mut model = PhantomModel::premium_1_5();
     model.drive[1].ratio *= 0.8;
     let (step, finding) = found(VirtualBench::new(model, Wiring::RIGHT), RECORD);
@@ -391,7 +391,7 @@ fn miswired_emergency_stop_is_named() {
 }
 
 #[test]
-fn an_enable_line_without_its_pull_down_is_named() {
+fn enable_line_without_pull_down_is_named() {
     let floats = BenchMistakes {
         enable_floats: true,
         ..BenchMistakes::default()
@@ -404,7 +404,7 @@ fn an_enable_line_without_its_pull_down_is_named() {
 }
 
 #[test]
-fn a_ready_input_that_no_amplifier_drives_is_named() {
+fn grounded_ready_input_is_named() {
     for axis in 0..3 {
         let mut mistakes = BenchMistakes::default();
         mistakes.ready_grounded[axis] = true;
@@ -416,7 +416,7 @@ fn a_ready_input_that_no_amplifier_drives_is_named() {
 }
 
 #[test]
-fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
+fn output_offset_is_named_at_the_amplifier_input() {
     for axis in 0..3 {
         let off = |volts| {
             let mut mistakes = BenchMistakes::default();
@@ -476,7 +476,7 @@ fn amplifiers_without_ready_lines_are_noted() {
 }
 
 #[test]
-fn a_motor_that_does_not_push_is_named() {
+fn motor_without_push_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
         .into_iter()
         .enumerate()
@@ -490,7 +490,7 @@ fn a_motor_that_does_not_push_is_named() {
 }
 
 #[test]
-fn a_jog_beyond_its_bounds_is_refused() {
+fn jog_beyond_its_bounds_is_refused() {
     let user = VirtualUser::new(Wiring::RIGHT);
     let opened = ControlSession::open(Box::new(user.device(RECORD)), HANG);
     let mut control = opened.expect("it answers");

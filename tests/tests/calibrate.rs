@@ -62,7 +62,7 @@ fn calibration_recovers_true_ratios_signs_and_weights() {
 }
 
 #[test]
-fn a_ruler_read_half_a_millimetre_off_costs_a_per_cent() {
+fn ruler_error_of_half_a_millimetre_costs_one_per_cent() {
     let mut user = VirtualUser::with_stylus();
     user.ruler_error_mm = 0.5;
     let review = calibrated(&mut user);
@@ -72,7 +72,7 @@ fn a_ruler_read_half_a_millimetre_off_costs_a_per_cent() {
 }
 
 #[test]
-fn an_attendant_who_does_not_agree_changes_nothing() {
+fn rejected_calibration_changes_nothing() {
     /// Refuses the result at the end.
     struct No(VirtualUser);
 

@@ -179,7 +179,7 @@ fn ramped(times: f32) -> Result<(), String> {
 }
 
 #[test]
-fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
+fn ramped_force_is_checked_against_the_ramp_share() {
     assert_eq!(ramped(1.0), Ok(()));
     // Damping may double it.
     assert_eq!(ramped(1.99), Ok(()));

@@ -79,7 +79,7 @@ const fn up(newtons: f64) -> [f64; 3] {
 }
 
 #[test]
-fn a_tick_as_it_should_be_passes_and_is_measured() {
+fn correct_tick_passes_and_is_measured() {
     let (watch, stated) = Tick::pushing(up(7.6)).judged();
     assert_eq!(stated, Ok(()));
     let seen = watch.extremes;
@@ -175,7 +175,7 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
 }
 
 #[test]
-fn a_singular_pose_is_counted_not_judged() {
+fn singular_pose_is_counted_but_not_checked() {
     let mut tick = Tick::pushing(up(7.6));
     tick.truth.q_rad = [0.0, 1.4, 0.2];
     let (watch, stated) = tick.judged();
@@ -186,7 +186,7 @@ fn a_singular_pose_is_counted_not_judged() {
 /// While the core is halted no tick reads switches or encoders, but outputs and the true pose
 /// count.
 #[test]
-fn a_command_that_is_held_is_judged_by_what_is_true() {
+fn held_command_is_checked_against_the_true_pose() {
     let held = |tick: &Tick| {
         let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
         watch.held(&tick.drive, &tick.truth)

@@ -100,7 +100,7 @@ fn tip_rests_at_the_depth_of_two_newtons() {
 }
 
 #[test]
-fn lifted_there_is_no_force() {
+fn lifted_hand_has_no_force() {
     let (samples, _, _) = press(0.5);
     let end = &samples[samples.len() - 300..];
     assert!(end.iter().all(|s| s.state == ContactState::Free));

@@ -152,7 +152,7 @@ fn brought_to_degrees(folder: &Path, name: &str, program: &str, code: &str) -> R
 }
 
 #[test]
-fn a_map_without_longitudes_gets_them_by_the_hint() {
+fn hint_adds_longitudes_to_a_map_without_them() {
     if !has_gdal() {
         return;
     }
@@ -262,7 +262,7 @@ fn hint_turns_pictures_and_complex_data_into_heights() {
 
 /// A name may contain any character with a meaning in a shell.
 #[test]
-fn a_name_that_a_shell_would_read_is_quoted() {
+fn shell_metacharacters_in_names_are_quoted() {
     if !has_gdal() {
         return;
     }

@@ -72,7 +72,7 @@ fn assert_passes(what: &str, most: [u32; 3]) {
 
 /// The hardest case: only the tremor moves the other joints.
 #[test]
-fn a_hand_that_turns_one_joint_only_trembles_enough() {
+fn tremor_prevents_dead_encoder_fault_on_one_joint_motion() {
     let ways = [(0.1, 0.3), (0.3, 0.3), (0.8, 0.3), (0.5, 0.03)];
     for (tremor_mm, (hz, rad)) in [0.2, 0.4].into_iter().flat_map(|t| ways.map(|w| (t, w))) {
         for joint in 0..3 {
@@ -91,7 +91,7 @@ fn a_hand_that_turns_one_joint_only_trembles_enough() {
 }
 
 #[test]
-fn a_wandering_hand_needs_no_tremor() {
+fn wandering_hand_causes_no_dead_encoder_fault() {
     let way = |t: f64| {
         [
             0.25 * (1.9 * t).sin() + 0.1 * (4.1 * t).sin(),

@@ -159,7 +159,7 @@ fn record_above_absolute_limit_is_refused_before_sending() {
 }
 
 #[test]
-fn wrong_words_are_answered_with_what_to_do() {
+fn wrong_arguments_have_an_error_with_a_remedy() {
     fails(
         &["status", "--device", "serial"],
         2,

@@ -118,7 +118,7 @@ fn second_run_reads_no_coarse_block_and_has_identical_heights() {
 }
 
 #[test]
-fn a_file_that_is_another_now_has_its_own_heights() {
+fn replaced_file_has_its_own_heights() {
     let bed = bed();
     look(&bed.file, &bed.cache);
     // With the same size, path and time.
@@ -176,7 +176,7 @@ fn file_overwritten_while_open_is_reread_by_next_run() {
 }
 
 #[test]
-fn a_file_that_was_written_a_moment_ago_is_not_kept() {
+fn just_written_file_is_not_cached() {
     let bed = bed();
     set_just_changed(&bed.file);
     look(&bed.file, &bed.cache);
@@ -187,7 +187,7 @@ fn a_file_that_was_written_a_moment_ago_is_not_kept() {
 }
 
 #[test]
-fn whatever_becomes_of_the_folder_the_heights_are_right() {
+fn heights_are_right_with_a_damaged_cache() {
     let bed = bed();
     let truth = truth(&bed.file);
     look(&bed.file, &bed.cache);
@@ -252,7 +252,7 @@ fn unwritable_or_full_folder_behaves_like_no_cache() {
 }
 
 #[test]
-fn several_at_once_on_one_file_have_the_same_heights() {
+fn concurrent_runs_on_one_file_have_the_same_heights() {
     let bed = bed();
     let truth = truth(&bed.file);
     std::thread::scope(|scope| {
@@ -357,7 +357,7 @@ fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
 }
 
 #[test]
-fn coarse_samples_are_kept_in_the_stated_folder_or_not_at_all() {
+fn coarse_samples_are_cached_only_in_the_given_folder() {
     let bed = bed();
     let opening = open(&bed.file, &DiskCache::off()).blocks_read();
     let there = bed.folder.path().join("there");

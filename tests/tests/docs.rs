@@ -186,7 +186,7 @@ fn figure(place: &str, shown: &str) -> String {
 }
 
 #[test]
-fn a_figure_of_the_table_is_right_to_the_digits_shown() {
+fn figure_matches_the_table_to_its_digits() {
     for (place, shown) in [
         ("sliding, median", "1218"),
         ("sliding, median", "1,218"),
@@ -225,7 +225,7 @@ fn cells_of_a_table_are_compared() {
 }
 
 #[test]
-fn a_figure_that_is_not_the_tables_is_found() {
+fn figure_that_differs_from_the_table_is_detected() {
     for (place, shown, why) in [
         (
             "sliding, median",

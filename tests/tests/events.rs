@@ -448,7 +448,7 @@ fn enter_answers_the_question_of_its_number() {
 }
 
 #[test]
-fn a_port_that_is_taken_is_an_error_before_anything_is_armed() {
+fn occupied_port_is_an_error_before_arming() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");

@@ -92,7 +92,7 @@ fn writes_a_file(path: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn an_image_cannot_reach_the_hosts_files() {
+fn emulated_image_cannot_access_host_files() {
     let Some(qemu) = qemu() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (target, path) = (folder.path().join("taken"), folder.path().join("image.elf"));

@@ -149,7 +149,7 @@ fn sliding_friction_on_real_terrain_is_within_three_percent() {
 }
 
 #[test]
-fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
+fn stuck_proxy_is_unmoved_by_an_hour_of_encoder_noise() {
     let raster =
         Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
     let terrain = terrain(&raster);
@@ -227,7 +227,7 @@ fn live(
 }
 
 #[test]
-fn a_live_tick_ends_where_friction_holds() {
+fn tick_in_real_time_ends_inside_the_friction_cone() {
     let files = real_ground::more_files();
     if files.is_empty() {
         println!("skipped: no elevation models beside the checkout");

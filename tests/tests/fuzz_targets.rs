@@ -123,7 +123,7 @@ fn tick_on_materials_survives_random_bytes() {
 
 /// Tries each check of the fuzz target: a tick with one change is refused.
 #[test]
-fn a_tick_that_may_not_be_is_refused() {
+fn invalid_tick_is_refused_by_the_fuzz_target() {
     let refuses = |change: fn(&mut Outcome)| {
         let mut outcome = Outcome::default();
         change(&mut outcome);

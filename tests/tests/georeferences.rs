@@ -61,7 +61,7 @@ fn assert_same(found: Option<Bounds>, wanted: [f64; 4], file: &str) {
 }
 
 #[test]
-fn files_lie_where_gdal_sees_them() {
+fn files_are_placed_as_by_gdal() {
     let Some(folder) = shared("dem") else {
         return;
     };

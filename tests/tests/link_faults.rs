@@ -163,7 +163,7 @@ fn telemetry_that_is_lost_is_counted() {
 }
 
 #[test]
-fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
+fn returning_host_resumes_the_session_of_its_device() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("placed");
@@ -212,7 +212,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
 }
 
 #[test]
-fn a_device_that_restarts_ends_a_replay_with_a_word() {
+fn device_restart_ends_a_replay_with_an_error() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     /// Replaces the device by a new one during the session.
@@ -253,7 +253,7 @@ fn refusal(device: &mut Native, bytes: &[u8]) -> Option<VersionCheck> {
 }
 
 #[test]
-fn the_device_refuses_a_host_of_another_version() {
+fn host_of_another_version_is_refused() {
     let mut device = Native::for_replay();
     let mut frame = [0; 64];
     for protocol in [PROTOCOL + 1, PROTOCOL - 1, u16::MAX] {

@@ -34,7 +34,7 @@ fn single_harms() -> Vec<(Direction, usize, Harm)> {
 }
 
 #[test]
-fn undisturbed_it_ends_at_once_and_nothing_is_uncertain() {
+fn undisturbed_session_ends_at_once_without_uncertainty() {
     let report = agree(&Plan::default());
     eprintln!("{report:?}");
     assert!(report.ticks < 2_000 && report.uncertain == 0, "{report:?}");
@@ -130,12 +130,12 @@ fn interrupted(what: Interruption) {
 }
 
 #[test]
-fn the_host_may_be_killed_at_any_moment() {
+fn host_may_be_killed_at_any_moment() {
     interrupted(Interruption::HostKilled);
 }
 
 #[test]
-fn the_device_may_be_reset_at_any_moment() {
+fn device_may_be_reset_at_any_moment() {
     interrupted(Interruption::DeviceReset);
 }
 
@@ -220,7 +220,7 @@ fn frames_from_before_a_reset_do_not_change_the_outcome() {
 }
 
 #[test]
-fn a_host_of_another_version_may_speak_at_any_moment() {
+fn host_of_another_version_may_connect_at_any_moment() {
     at_every_moment_after(&histories(), Interruption::OtherHost);
 }
 
@@ -277,7 +277,7 @@ fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
 }
 
 #[test]
-fn every_request_is_done_or_refused_once_under_lost_frames() {
+fn lost_frames_leave_every_request_executed_once_or_refused() {
     let whole = agree(&with_errands(vec![]));
     eprintln!("{whole:?}");
     assert_eq!(whole.came_of, [10, 0, 0], "all are done");
@@ -390,7 +390,7 @@ fn random_faults_end_in_confirmed_disarm_or_a_report() {
 }
 
 #[test]
-fn a_dead_line_ends_in_a_word_and_not_in_a_hang() {
+fn dead_line_is_reported_without_a_hang() {
     for way in [Direction::ToDevice, Direction::ToHost] {
         for at in [0, 200, 400] {
             let interruptions = vec![(at, Interruption::Cut(way, u64::MAX / 2))];

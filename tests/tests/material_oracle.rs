@@ -179,7 +179,7 @@ fn friction_of_the_place_after_is_found() {
 }
 
 #[test]
-fn two_textures_at_once_are_found() {
+fn two_simultaneous_textures_are_detected() {
     let textured = |wavelength_mm| Material {
         texture: Texture {
             wavelength_mm,
@@ -229,7 +229,7 @@ fn shaded_force_is_checked_by_magnitude() {
 }
 
 #[test]
-fn a_force_without_a_contact_is_found() {
+fn force_without_contact_is_detected() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::None);
     let found = way.at_once(0, |rendered| {
         assert_eq!(rendered.sample.state, ContactState::Free);

@@ -169,7 +169,7 @@ fn classes_in_another_system_and_resolution_are_in_place() {
 }
 
 #[test]
-fn recording_keeps_its_materials_for_its_replay() {
+fn replay_uses_the_materials_of_the_recording() {
     let folder = Folder::new();
     let replay = |more: &[&str], output: &str| {
         folder.hapterra(&[&["replay", "level.asc", "a.csv", "--out", output][..], more].concat())

@@ -59,7 +59,7 @@ fn holed() -> Raster {
 }
 
 #[test]
-fn a_replay_gives_the_same_bits_on_the_emulated_board() {
+fn replay_is_bit_identical_on_the_emulated_board() {
     let Some((qemu, image)) = emulated_board() else {
         return;
     };

@@ -100,7 +100,7 @@ fn lonlat_target_resolves_to_its_sample() {
 }
 
 #[test]
-fn cells_are_as_large_as_on_their_own_body() {
+fn cell_sizes_are_those_on_the_own_body() {
     for row in rows() {
         for reader in Reader::all() {
             let raster = row.raster_by(reader);

@@ -78,7 +78,7 @@ fn large_files_stay_on_disk_and_overviews_survey_them() {
 }
 
 #[test]
-fn file_unknown_to_gdal_keeps_its_own_error() {
+fn file_unknown_to_gdal_has_the_original_error() {
     if !has_gdal() {
         return;
     }
@@ -150,7 +150,7 @@ fn vrts_name_files_beside_them_and_other_vrts() {
 /// VRT.
 #[cfg(unix)]
 #[test]
-fn pipes_are_not_opened_however_they_are_named() {
+fn pipes_are_not_opened_under_any_name() {
     if !has_gdal() {
         return;
     }
@@ -274,7 +274,7 @@ fn labels_beside_planetary_images_are_opened() {
 
 /// ENVI's samples have any extension, and a unit beside a zone is the unit of the coordinates.
 #[test]
-fn envi_is_placed_by_its_own_unit() {
+fn envi_file_is_placed_in_its_own_unit() {
     if !has_gdal() {
         return;
     }
@@ -374,7 +374,7 @@ fn grass_null_mark_is_refused_and_no_data_number_is_read() {
 /// A libgdal that needs 300 ms for each block delays no tick: until the blocks arrive the coarse
 /// fallback is under the hand, not no-data.
 #[test]
-fn slow_libgdal_holds_up_no_tick() {
+fn slow_libgdal_delays_no_tick() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let recording = at.join("felt.csv");

@@ -138,7 +138,7 @@ fn reports_only(
 /// With friction of 0.5, and 0.8 at rest: the proxy is outside the cone, or moves inside it, on
 /// flat ground and on a ridge.
 #[test]
-fn a_proxy_that_friction_would_hold_otherwise_is_found() {
+fn proxy_outside_its_friction_rule_is_detected() {
     use Invariant::{Cone, Stuck};
     let friction = Friction {
         static_mu: 0.8,
@@ -187,7 +187,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
 
 /// The slide of a proxy in a tick determines the viscous part of its friction.
 #[test]
-fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
+fn proxy_trailing_beyond_its_viscous_slide_is_detected() {
     let friction = Friction {
         viscous_s: 0.003,
         ..Friction::coulomb(0.05)
@@ -206,7 +206,7 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
 
 /// A height, and so the pull, is exact only to the last place of the corners it is made from.
 #[test]
-fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
+fn pull_within_corner_rounding_is_not_checked() {
     // Level in the middle of the patch (10, 10) for any corner heights.
     let found = |corner: f32| -> Vec<Invariant> {
         let saddle = Terrain::from_fn(Kind::Rough, SIZE, |x, y| match (x, y) {
@@ -224,7 +224,7 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
 
 /// With shading the force has the length of the unshaded one, along the smoothed normal.
 #[test]
-fn a_force_that_is_shaded_otherwise_is_found() {
+fn wrongly_shaded_force_is_detected() {
     let ridge = ridge();
     // A quarter of a cell east of the edge, under a side that falls by 1 a cell; the slope there
     // goes from 0 at the edge to 1 at the next sample, with a linear change of direction.
@@ -262,7 +262,7 @@ fn a_force_that_is_shaded_otherwise_is_found() {
 /// With texture the force is the untextured one plus the relief's, after the proxy was slow for
 /// some time.
 #[test]
-fn a_force_that_is_textured_otherwise_is_found() {
+fn wrongly_textured_force_is_detected() {
     let flat = flat();
     let grating = Texture {
         pattern: Pattern::Grating,
@@ -327,7 +327,7 @@ const ON: [f64; 3] = [10.5, 10.5, 2.0];
 
 /// Checks of a single answer.
 #[test]
-fn an_answer_that_is_no_answer_is_found() {
+fn invalid_answer_is_detected() {
     use Invariant::{Clamp, Consistent, Finite, Work};
     let terrain = flat();
     let honest = touching(BELOW, ON);
@@ -372,7 +372,7 @@ fn forces(seen: ObservedTick, change: impl Fn([f64; 3]) -> [f64; 3]) -> Observed
 }
 
 #[test]
-fn a_proxy_off_the_surface_is_found() {
+fn proxy_off_the_surface_is_detected() {
     let honest = touching(BELOW, ON);
     for off in [-1e-4, -3e-6, 3e-6, 1e-4] {
         let forged = touching(BELOW, [10.5, 10.5, 2.0 + off]);
@@ -381,7 +381,7 @@ fn a_proxy_off_the_surface_is_found() {
 }
 
 #[test]
-fn a_proxy_beside_the_closest_point_is_found() {
+fn proxy_beside_the_closest_point_is_detected() {
     // On level ground, on a slope of 1, and beside the edge where it should rest.
     let level = |off: f64| touching(BELOW, [10.5 + off, 10.5, 2.0]);
     let slope = |off: f64| touching([17.0, 10.5, -2.0], [16.5 + off, 10.5, -1.5 + off]);
@@ -407,7 +407,7 @@ fn a_proxy_beside_the_closest_point_is_found() {
 }
 
 #[test]
-fn a_contact_that_pulls_is_found() {
+fn pulling_contact_is_detected() {
     let above = |off: f64| touching([10.5, 10.5, 2.0 - off], ON);
     let slope = |off: f64| touching([16.5 + off, 10.5, -1.5 - off], [16.5, 10.5, -1.5]);
     for off in [1e-4, 0.1, 3.0] {
@@ -452,7 +452,7 @@ fn friction_at_no_data_edge_excuses_a_hip_above_ground() {
 
 /// Rounding of a patch's corners is allowed where they contribute, but not at the foot of one.
 #[test]
-fn a_spike_at_one_corner_excuses_nothing_at_the_others() {
+fn spike_at_one_corner_allows_no_error_at_the_others() {
     let spike = Terrain::from_fn(Kind::Spikes, SIZE, |x, y| {
         if (x, y) == (11, 11) { 1e6 } else { 2.0 }
     });
@@ -476,7 +476,7 @@ fn proxy_crossing_a_ridge_to_a_farther_point_is_reported() {
 }
 
 #[test]
-fn a_contact_beyond_the_first_crossing_is_found() {
+fn contact_beyond_the_first_crossing_is_detected() {
     let honest = touching(IN_RIDGE, NEAR_SIDE);
     let forged = touching(IN_RIDGE, FAR_SIDE);
     let before = free([18.875, 10.5, 1.5]);
@@ -490,7 +490,7 @@ fn a_contact_beyond_the_first_crossing_is_found() {
 }
 
 #[test]
-fn a_contact_with_nothing_crossed_is_found() {
+fn contact_without_a_crossing_is_detected() {
     let before = free(ABOVE);
     let near = [10.625, 10.5, 2.5];
     // Still moving, or the oracle would report it for pulling.
@@ -499,7 +499,7 @@ fn a_contact_with_nothing_crossed_is_found() {
 }
 
 #[test]
-fn a_free_hip_below_the_surface_is_found() {
+fn free_hip_below_the_surface_is_detected() {
     for depth in [1.0 / 65536.0, 0.5, 100.0] {
         let below = [10.5, 10.5, 2.0 - depth];
         let honest = touching(below, ON);
@@ -514,7 +514,7 @@ fn a_free_hip_below_the_surface_is_found() {
 }
 
 #[test]
-fn a_contact_out_of_nowhere_is_found() {
+fn contact_of_an_unseeded_proxy_is_detected() {
     let (before, forged) = (waiting(BELOW), touching(BELOW, ON));
     reports_only(
         Invariant::SeenAbove,
@@ -527,7 +527,7 @@ fn a_contact_out_of_nowhere_is_found() {
 
 /// For any motion of the HIP, but not while a tile is missing.
 #[test]
-fn a_proxy_that_gets_no_farther_is_found() {
+fn proxy_without_progress_is_detected() {
     let flies = |tick: usize, height: f64| {
         let hip = [15.5 + 0.1 * tick as f64, 10.5, 1.5];
         with(free(hip), |f| {
@@ -553,7 +553,7 @@ fn a_proxy_that_gets_no_farther_is_found() {
 }
 
 #[test]
-fn a_wall_that_is_passed_is_found() {
+fn passage_through_a_wall_is_detected() {
     let before = free([20.5, 10.5, 3.0]);
     let honest = free([21.5, 10.5, 3.0]);
     let forged = free([25.5, 10.5, 3.0]);
@@ -646,7 +646,7 @@ fn other_bits_are_found() {
 }
 
 #[test]
-fn other_bits_far_away_are_found() {
+fn different_bits_far_away_are_detected() {
     let shift = [3200, 6400, -1_000_000];
     let (scene, seen, mut buffers) = played(Supply::Held);
     let pulled = Supply::Pulled { latency: 0 };
@@ -695,7 +695,7 @@ fn result_differing_under_a_symmetry_is_reported() {
 }
 
 #[test]
-fn a_hip_that_is_never_answered_is_found() {
+fn unanswered_hip_is_detected() {
     let path = vec![ABOVE, BELOW];
     let never = Supply::Pulled { latency: 1 << 30 };
     let scene = Scene::given(flat(), path, Execution::LockStep, never);

@@ -16,7 +16,7 @@ use heightfield::{OpenOptions, Raster, RasterError};
 const FLOATS: usize = 4 * TILE_SAMPLES * TILE_SAMPLES;
 
 #[test]
-fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
+fn tiles_of_real_terrain_are_lossless_and_smaller() {
     let Some(folder) = shared("dem/real") else {
         return;
     };

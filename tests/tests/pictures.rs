@@ -43,17 +43,17 @@ fn is_same(one: &str, other: &str) -> bool {
 }
 
 #[test]
-fn the_picture_of_friction_is_the_examples() {
+fn friction_picture_is_that_of_the_example() {
     is_kept(stick_slip::drawn(), "stick_slip", "stick-slip.svg");
 }
 
 #[test]
-fn the_picture_of_shading_is_the_examples() {
+fn shading_picture_is_that_of_the_example() {
     is_kept(shaded_force::drawn(), "shaded_force", "shading.svg");
 }
 
 #[test]
-fn the_picture_of_texture_is_the_examples() {
+fn texture_picture_is_that_of_the_example() {
     is_kept(textured_force::drawn(), "textured_force", "texture.svg");
 }
 

@@ -314,7 +314,7 @@ fn force_makes_no_step_while_panning_and_scaling() {
 }
 
 #[test]
-fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
+fn surface_command_during_contact_causes_no_force_step() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let texture = Texture {
@@ -376,7 +376,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
 }
 
 #[test]
-fn a_tip_set_while_it_presses_makes_no_step() {
+fn tip_command_during_contact_causes_no_force_step() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let first = touching.change(PlacementChange::Zoom(64.0));

@@ -100,21 +100,21 @@ proptest! {
     })]
 
     #[test]
-    fn everything_holds_on_gentle_ground(
+    fn invariants_hold_on_gentle_ground(
         heights in gentle(), path in path(), execution in execution(),
     ) {
         holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
     }
 
     #[test]
-    fn everything_holds_on_wild_ground(
+    fn invariants_hold_on_wild_ground(
         heights in wild(), path in path(), execution in execution(),
     ) {
         holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
     }
 
     #[test]
-    fn everything_holds_while_tiles_arrive(
+    fn invariants_hold_while_tiles_arrive(
         heights in gentle(), path in path(), execution in execution(), latency in 0..4_u32,
     ) {
         let supply = Supply::Pulled { latency };

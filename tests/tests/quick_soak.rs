@@ -48,12 +48,12 @@ fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
 }
 
 #[test]
-fn everything_holds_in_a_thousand_random_scenes() {
+fn invariants_hold_in_a_thousand_random_scenes() {
     none(Surface::Smooth, thousand(Surface::Smooth).broken.iter());
 }
 
 #[test]
-fn everything_holds_with_friction_too() {
+fn invariants_hold_with_friction() {
     let stats = thousand(Surface::Rough);
     let judged = stats.total().on_materials;
     assert!(

@@ -264,7 +264,7 @@ fn no_data_edge_releases_smoothly_and_reentry_has_no_force() {
 
 /// The paper's Figure 8: from one side of a peak to the other in one tick.
 #[test]
-fn a_fast_sweep_does_not_pass_through_a_peak() {
+fn fast_sweep_does_not_pass_through_a_peak() {
     let raster = Raster::from_fn(64, 64, |x, _| if x == 30 || x == 33 { 10.0 } else { 0.0 });
     let raster = raster.expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
@@ -281,7 +281,7 @@ fn a_fast_sweep_does_not_pass_through_a_peak() {
 }
 
 #[test]
-fn the_same_trajectory_gives_the_same_bits_again() {
+fn replay_of_a_trajectory_is_deterministic() {
     let raster = synthetic(Kind::Fractal);
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let path = wander(&terrain, 3, 1500, 1.0);

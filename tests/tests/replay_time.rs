@@ -148,7 +148,7 @@ fn pressed(replayed: &[Row]) -> usize {
 }
 
 #[test]
-fn damping_is_the_same_however_often_a_path_has_rows() {
+fn damping_is_independent_of_the_row_rate() {
     let folder = Folder::new();
     let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     for hz in [2, 10, 100, 250, 1_000, 1_600, 8_000, 100_000] {
@@ -296,7 +296,7 @@ fn rows_without_times_are_ticks_and_this_is_reported() {
 }
 
 #[test]
-fn wrong_times_are_refused_and_odd_ones_remarked_on() {
+fn wrong_times_are_refused_and_odd_ones_reported() {
     let folder = Folder::new();
     for (rows, expected) in [
         (
@@ -334,7 +334,7 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
 }
 
 #[test]
-fn a_board_of_another_rate_than_a_recording_is_refused() {
+fn board_with_another_rate_than_the_recording_is_refused() {
     let Some((_, image)) = emulated_board() else {
         return;
     };

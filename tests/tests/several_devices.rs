@@ -171,7 +171,7 @@ fn two_native_arms_render_the_same_bits_as_each_alone() {
 }
 
 #[test]
-fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
+fn signal_closes_each_session_with_confirmation() {
     for name in ["INT", "TERM"] {
         let pair = Pair::of(SocketDevice::start());
         let child = pair.start();
@@ -217,7 +217,7 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
 }
 
 #[test]
-fn the_second_signal_names_the_boards_that_have_not_confirmed() {
+fn second_signal_names_the_unconfirmed_boards() {
     let pair = Pair::of(SocketDevice::start());
     let mut child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
@@ -346,7 +346,7 @@ fn fault_is_reported_only_for_the_affected_device() {
 }
 
 #[test]
-fn a_hostile_device_costs_the_other_nothing() {
+fn hostile_device_does_not_disturb_the_other() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let (there, greedy) = (

@@ -149,7 +149,7 @@ fn items_with_absolute_paths_form_one_terrain() {
 }
 
 #[test]
-fn an_item_that_lies_elsewhere_than_its_file_is_named() {
+fn item_placed_elsewhere_than_its_file_is_named() {
     if !has_gdal() {
         return;
     }

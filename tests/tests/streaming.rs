@@ -17,7 +17,7 @@ fn peak_mib() -> Option<f64> {
 }
 
 #[test]
-fn a_field_of_4096_by_4096_streams_through_a_window() {
+fn field_of_4096_by_4096_streams_through_a_window() {
     let raster = Raster::from_fn(SIDE, SIDE, |x, y| {
         8.0 * (x as f32 * 0.021).sin() + 6.0 * (y as f32 * 0.033).cos()
     })

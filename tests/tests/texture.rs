@@ -93,7 +93,7 @@ fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
 }
 
 #[test]
-fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
+fn texture_changes_the_force_but_not_the_proxy() {
     for (name, raster) in &rasters() {
         let grid = HapticGrid::new(raster, HapticCells::Square);
         let scale = grid.true_scale(1.0).expect("scale");
@@ -128,7 +128,7 @@ fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
 /// A demonstration with a texture is recorded with it, replayed with it, and replayed again to the
 /// same bytes.
 #[test]
-fn a_recording_keeps_its_texture() {
+fn replay_uses_the_texture_of_the_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let hapterra = |args: &[&str]| {
         let run = Command::new(hapterra_binary())

@@ -70,7 +70,7 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
 }
 
 #[test]
-fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
+fn tick_in_contact_is_within_work_and_stack_budgets() {
     let Some((samples, status)) = rendered() else {
         return;
     };

@@ -139,7 +139,7 @@ fn check_distance(name: &str, raster: &Raster, radius: f64) {
 const RADII: [f64; 4] = [0.5, 2.0, 4.0, 8.0];
 
 #[test]
-fn a_ball_touches_real_ground_a_radius_away() {
+fn ball_touches_real_ground_a_radius_away() {
     for file in [
         "dem/real/bigtujunga.tif",
         "dem/real/mt_everest_90m.tif",
@@ -158,7 +158,7 @@ fn a_ball_touches_real_ground_a_radius_away() {
 type Shape<'s> = &'s dyn Fn(u32, u32) -> bool;
 
 #[test]
-fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
+fn ball_touches_poles_walls_and_pits_a_radius_away() {
     let every = |x: u32, n: u32| x % n == n / 2;
     let shapes: [(&str, Shape<'_>, f32); 5] = [
         ("poles", &|x, y| every(x, 5) && every(y, 5), 10.0),
@@ -224,7 +224,7 @@ fn pole_is_rendered_at_steps_of_one_and_a_half_radii() {
 /// A longer step also meets the pole. Without friction its proxy slides around the pole to a HIP
 /// beyond it; with friction it stays where the cone holds it.
 #[test]
-fn friction_holds_a_ball_at_a_pole_at_any_speed() {
+fn friction_stops_a_ball_at_a_pole_at_any_speed() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for speed in [5.0, 12.0, 30.0] {
             // A step longer than the window restarts the contact; 32 haptic cells are a radius.
@@ -395,7 +395,7 @@ fn recordings_of_a_ball_are_replayed_with_it() {
 }
 
 #[test]
-fn a_tip_of_too_many_cells_takes_a_coarser_level() {
+fn tip_of_too_many_cells_selects_a_coarser_level() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     terrain_file(&folder.join("hills.tif"), Kind::Fractal, 256, 1);
@@ -533,7 +533,7 @@ impl Touched {
 
 /// With the default ball of a hand.
 #[test]
-fn friction_holds_no_hand_on_ten_real_grounds() {
+fn friction_catches_no_hand_on_ten_real_terrains() {
     for name in [
         "dom1_32_356_5699_1_nw_2020.tif",
         "bijou_gully_5m.asc",

@@ -38,7 +38,7 @@ fn enumerated() -> (Board, Found) {
 }
 
 #[test]
-fn a_board_is_enumerated_and_found_by_the_client() {
+fn board_is_enumerated_and_found_by_the_client() {
     let (mut board, found) = enumerated();
     let device = DeviceDescriptor::new(&found.device).expect("well formed");
     assert_eq!(
@@ -173,7 +173,7 @@ fn packets_of_one_byte_and_of_none_make_the_same_message() {
 }
 
 #[test]
-fn a_packet_that_is_too_long_is_never_taken_and_harms_nothing() {
+fn oversized_packet_is_rejected_without_effect() {
     let (mut board, _) = enumerated();
     for _ in 0..3 {
         let babble = send_packet(&mut board, LINK, &[0xA5; PACKET + 1]);
@@ -339,7 +339,7 @@ fn unplugged_board_keeps_ticking_and_resumes_its_session() {
 }
 
 #[test]
-fn the_udev_rule_names_the_board_as_it_names_itself() {
+fn udev_rule_matches_the_usb_identity() {
     let rules = include_str!("../../host-tools/udev/70-hapterra.rules");
     let rule = rules
         .lines()

@@ -41,7 +41,7 @@ fn arming_needs_the_switch_and_ramps_over_two_seconds() {
 }
 
 #[test]
-fn a_switch_held_from_the_beginning_never_arms() {
+fn switch_held_from_the_start_never_arms() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let held: Wrong = |_, sense| sense.dead_man = true;
@@ -129,7 +129,7 @@ fn rearming_after_fault_needs_clear_command_and_new_press() {
 }
 
 #[test]
-fn an_encoder_that_slips_away_runs_into_the_joint_limits() {
+fn slipping_encoder_trips_the_joint_limits() {
     let raster = plane();
     let terrain = on_plane(&raster);
     // Counts that are lost slowly, without a jump.
@@ -153,7 +153,7 @@ fn an_encoder_that_slips_away_runs_into_the_joint_limits() {
 }
 
 #[test]
-fn a_dead_encoder_under_load_is_found() {
+fn dead_encoder_under_load_is_detected() {
     let raster = plane();
     let terrain = on_plane(&raster);
     thread_local! {
@@ -203,7 +203,7 @@ fn motors_that_work_hard_are_derated_and_stay_cool_enough() {
 }
 
 #[test]
-fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
+fn force_drops_for_a_fast_hand_and_ends_for_a_thrown_arm() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let [x, y] = MIDDLE_MM;

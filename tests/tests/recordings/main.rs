@@ -24,7 +24,7 @@ const SETTINGS: [&str; 6] = [
 ];
 
 #[test]
-fn a_recording_is_replayed_with_its_own_settings() {
+fn recording_is_replayed_with_its_own_settings() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let (terrain, input) = (folder.text("hills.tif"), folder.text("in.csv"));
@@ -67,7 +67,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
 }
 
 #[test]
-fn a_recording_of_another_terrain_is_refused() {
+fn recording_of_another_terrain_is_refused() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
@@ -215,7 +215,7 @@ pub(crate) fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
 }
 
 #[test]
-fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
+fn location_far_from_the_middle_replays_with_its_own_cells() {
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
     let [terrain, out] = ["hills.asc", "demo"].map(|name| folder.text(name));
@@ -265,7 +265,7 @@ fn python() -> Option<(String, &'static str)> {
 }
 
 #[test]
-fn a_parquet_recording_is_opened_by_polars_or_pandas() {
+fn parquet_recording_is_opened_by_polars_or_pandas() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
@@ -418,7 +418,7 @@ fn commands_refuse_to_overwrite_sidecars_of_their_input() {
 }
 
 #[test]
-fn a_calibration_file_is_text_and_show_prints_it() {
+fn calibration_file_is_text_and_printed_by_show() {
     let folder = Folder::new();
     let arm = folder.text("arm.toml");
     let native = [
@@ -510,7 +510,7 @@ fn closed_output_pipe_causes_no_panic() {
 
 /// A full disk causes no crash either, for messages or files.
 #[test]
-fn an_output_that_cannot_be_written_is_no_crash() {
+fn unwritable_output_causes_no_crash() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let [hills, input, out, file] =
@@ -645,7 +645,7 @@ fn unusual_outputs_and_options_work_or_are_reported() {
 }
 
 #[test]
-fn exaggeration_is_given_once_and_defaults_to_true_scale() {
+fn exaggeration_is_stated_once_and_defaults_to_true_scale() {
     let folder = Folder::new();
     let hills = folder.text("hills.tif");
     for (more, expected) in [

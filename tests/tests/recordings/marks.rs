@@ -27,7 +27,7 @@ fn marks_of(folder: &Folder, name: &str) -> Vec<Mark> {
 }
 
 #[test]
-fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
+fn mark_has_tick_time_and_host_clock() {
     let folder = Folder::new();
     let printed = run(&folder, "felt.csv");
     let [began, ended] = ["commands", "felt.csv"].map(|name| changed_at_unix_s(&folder.path(name)));
@@ -84,7 +84,7 @@ fn marks_survive_replays_in_both_forms() {
 }
 
 #[test]
-fn a_demo_keeps_its_marks() {
+fn demo_recording_has_its_marks() {
     let folder = Folder::new();
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));

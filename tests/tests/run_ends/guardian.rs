@@ -274,7 +274,7 @@ fn worker_that_does_not_react_to_ctrl_c_is_killed() {
 /// Ctrl-C in a terminal reaches both processes, but counts as one: the worker may still close its
 /// session, and is not ended at once.
 #[test]
-fn signal_to_both_processes_is_pressed_once() {
+fn signal_to_both_processes_counts_once() {
     let armed = Armed::new();
     armed.served.deaf.store(true, Ordering::Relaxed);
     armed.kill_worker("INT");
