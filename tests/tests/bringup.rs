@@ -23,35 +23,35 @@ const LATE_RAD_S: f64 = 0.3;
 
 thread_local! {
     /// Messages, one a line.
-    static STATED: RefCell<String> = const { RefCell::new(String::new()) };
+    static PRINTED: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-fn say(line: &str) {
+fn print_line(line: &str) {
     println!("{line}");
-    STATED.with_borrow_mut(|text| *text += &format!("{line}\n"));
+    PRINTED.with_borrow_mut(|text| *text += &format!("{line}\n"));
 }
 
 /// Runs the walk with a user, and checks the speeds of the joints.
-fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
-    let ended = walked_unwatched(user, record, log);
+fn run_bringup(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
+    let result = run_unchecked(user, record, log);
     let fastest = user.bench().borrow().max_rate_rad_s();
     println!("fastest {fastest:?} rad/s");
-    let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
-    assert!(fastest.iter().all(|speed| *speed < most), "{fastest:?}");
-    ended
+    let limit = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
+    assert!(fastest.iter().all(|speed| *speed < limit), "{fastest:?}");
+    result
 }
 
 /// Runs the walk with a user from the end of a log; the board is power-cycled where the steps
 /// require it.
-fn walked_unwatched(
+fn run_unchecked(
     user: &mut VirtualUser,
     record: Calibration,
     log: &mut Log,
 ) -> Result<(), BringupError> {
-    STATED.take();
+    PRINTED.take();
     loop {
         let device = user.device(record);
-        match walked_once(user, device, log) {
+        match run_once(user, device, log) {
             Ok(SequenceEnd::BoardPoweredOff) => {}
             Ok(SequenceEnd::Complete) => return Ok(()),
             Err(error) => return Err(error),
@@ -59,7 +59,7 @@ fn walked_unwatched(
     }
 }
 
-fn walked_once(
+fn run_once(
     user: &mut dyn Attendant,
     device: Native<StoppedClock>,
     log: &mut Log,
@@ -82,7 +82,7 @@ fn found(bench: VirtualBench, record: Calibration) -> (Step, Finding) {
 /// Same as `found`, with all steps before this one passed earlier.
 fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
     let mut user = VirtualUser::at(bench);
-    user.print = say;
+    user.print = print_line;
     let mut log = Log::default();
     let opened = ControlSession::open(Box::new(user.device(record)), HANG);
     let opened = opened.expect("it answers");
@@ -90,9 +90,9 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     for step in Step::ALL.into_iter().filter(|step| *step < from) {
         log.add(step, true, String::new());
     }
-    let ended = walked(&mut user, record, &mut log);
-    let Err(BringupError::Found { step, finding }) = ended else {
-        panic!("{ended:?}");
+    let result = run_bringup(&mut user, record, &mut log);
+    let Err(BringupError::Found { step, finding }) = result else {
+        panic!("{result:?}");
     };
     // The log records it, and the next start is at this step.
     assert_eq!(log.next(), Some(step));
@@ -110,27 +110,27 @@ fn wired(wiring: Wiring) -> VirtualBench {
 #[test]
 fn correct_arm_completes_every_step() {
     let mut user = VirtualUser::new(Wiring::RIGHT);
-    user.print = say;
+    user.print = print_line;
     let mut log = Log::default();
-    walked(&mut user, RECORD, &mut log).expect("to the end");
+    run_bringup(&mut user, RECORD, &mut log).expect("to the end");
     assert_eq!(log.next(), None);
     assert_eq!(log.entries.len(), Step::ALL.len());
-    assert_eq!(STATED.take(), transcript());
+    assert_eq!(PRINTED.take(), transcript());
 }
 
 #[test]
 fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     let mut user = VirtualUser::new(Wiring::RIGHT.with_gain(1, -1.0));
-    user.print = say;
+    user.print = print_line;
     let mut log = Log::default();
-    walked(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
+    run_bringup(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
     assert_eq!(log.next(), Some(Step::Motor2));
-    let error = STATED.take() + "error: " + &log.entries.last().expect("one").result + "\n";
+    let error = PRINTED.take() + "error: " + &log.entries.last().expect("one").result + "\n";
     assert!(error.contains("step 8 of 11: motor 2"));
     // The next start is at this step, and the arm must be zeroed again.
-    let ended = walked(&mut user, RECORD, &mut log);
-    assert!(ended.is_err());
-    let text = STATED.take();
+    let result = run_bringup(&mut user, RECORD, &mut log);
+    assert!(result.is_err());
+    let text = PRINTED.take();
     assert!(
         text.starts_with("step 8 of 11") && text.contains("zero pose"),
         "{text}"
@@ -138,14 +138,14 @@ fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     // With the reported sign the record changes, so it is measured again.
     let mut record = RECORD;
     record.motor_sign.y = -1.0;
-    walked(&mut user, record, &mut log).expect("to the end");
-    let text = STATED.take();
+    run_bringup(&mut user, record, &mut log).expect("to the end");
+    let text = PRINTED.take();
     assert!(text.starts_with("the calibration is another one"), "{text}");
     assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
 
 /// A user who does some tasks and answers some questions differently.
-struct Another {
+struct OtherUser {
     user: VirtualUser,
     /// Response to a task.
     does: fn(Task) -> Task,
@@ -153,8 +153,8 @@ struct Another {
     answers: fn(Question) -> Option<bool>,
 }
 
-impl Another {
-    fn than(user: VirtualUser) -> Self {
+impl OtherUser {
+    fn new(user: VirtualUser) -> Self {
         Self {
             user,
             does: |task| task,
@@ -163,13 +163,13 @@ impl Another {
     }
 
     /// Never holds the tip at a motor's first jog.
-    fn careless(user: VirtualUser) -> Self {
+    fn without_hold(user: VirtualUser) -> Self {
         Self {
             does: |task| match task {
                 Task::HoldLoosely => Task::ReleaseTip,
                 task => task,
             },
-            ..Self::than(user)
+            ..Self::new(user)
         }
     }
 
@@ -177,12 +177,12 @@ impl Another {
     fn without_ready(user: VirtualUser) -> Self {
         Self {
             answers: |question| (question == Question::ReadyIsWired).then_some(false),
-            ..Self::than(user)
+            ..Self::new(user)
         }
     }
 }
 
-impl Attendant for Another {
+impl Attendant for OtherUser {
     fn notify(&mut self, line: &str) {
         self.user.notify(line);
     }
@@ -257,21 +257,21 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     model.gravity_m_s2 = 0.0;
     for gain in [1.0, -1.0] {
         let wiring = Wiring::RIGHT.with_gain(0, gain);
-        let mut user = Another::careless(VirtualUser::at(VirtualBench::new(model, wiring)));
-        user.user.print = say;
-        STATED.take();
+        let mut user = OtherUser::without_hold(VirtualUser::at(VirtualBench::new(model, wiring)));
+        user.user.print = print_line;
+        PRINTED.take();
         let mut log = Log::default();
-        let mut ended = Ok(SequenceEnd::BoardPoweredOff);
-        while let Ok(SequenceEnd::BoardPoweredOff) = ended {
+        let mut result = Ok(SequenceEnd::BoardPoweredOff);
+        while let Ok(SequenceEnd::BoardPoweredOff) = result {
             let device = user.user.device(RECORD);
-            ended = walked_once(&mut user, device, &mut log);
+            result = run_once(&mut user, device, &mut log);
         }
-        let text = STATED.take();
+        let text = PRINTED.take();
         assert!(text.contains("the jog ended with fault 22"), "{text}");
         let fastest = user.user.bench().borrow().max_rate_rad_s();
         println!("fastest {fastest:?} rad/s");
-        let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
-        assert!(fastest[0] < most, "{fastest:?}");
+        let limit = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
+        assert!(fastest[0] < limit, "{fastest:?}");
         // The direction of its motion is still reported.
         let inverted = log
             .entries
@@ -302,7 +302,7 @@ fn wrongly_scaled_amplifier_is_named() {
 
 #[test]
 fn wrong_gravity_record_is_named() {
-    // It is detected before the arm is as fast as in a jog: `walked` checks that.
+    // It is detected before the arm is as fast as in a jog: `run_bringup` checks that.
     for gravity_2_nm in [0.03, 0.1, -0.06, -0.1] {
         let record = Calibration {
             gravity_2_nm,
@@ -434,7 +434,7 @@ fn output_offset_is_named_at_the_amplifier_input() {
         // A stage with resistors of one per cent passes.
         let mut log = Log::default();
         let bench = wired(Wiring::RIGHT).with_mistakes(off(0.3));
-        walked(&mut VirtualUser::at(bench), RECORD, &mut log).expect("to the end");
+        run_bringup(&mut VirtualUser::at(bench), RECORD, &mut log).expect("to the end");
     }
 }
 
@@ -462,11 +462,11 @@ fn amplifiers_without_ready_lines_are_noted() {
         ..BenchMistakes::default()
     };
     let bench = wired(Wiring::RIGHT).with_mistakes(mistakes);
-    let mut user = Another::without_ready(VirtualUser::at(bench));
+    let mut user = OtherUser::without_ready(VirtualUser::at(bench));
     let mut log = Log::default();
     let device = user.user.device(RECORD);
-    let ended = walked_once(&mut user, device, &mut log).expect("to the enable line");
-    assert_eq!(ended, SequenceEnd::BoardPoweredOff);
+    let result = run_once(&mut user, device, &mut log).expect("to the enable line");
+    assert_eq!(result, SequenceEnd::BoardPoweredOff);
     let last = log.entries.last().expect("an entry");
     assert_eq!(last.step, Step::EnableLine);
     assert!(
@@ -494,7 +494,7 @@ fn jog_beyond_its_bounds_is_refused() {
     let user = VirtualUser::new(Wiring::RIGHT);
     let opened = ControlSession::open(Box::new(user.device(RECORD)), HANG);
     let mut control = opened.expect("it answers");
-    let mut ask = |request| control.request(&request).expect("it answers");
+    let mut request = |request| control.request(&request).expect("it answers");
     let jog = |axis, current_a, hold_ms| {
         Request::Jog(Jog {
             axis,
@@ -508,9 +508,9 @@ fn jog_beyond_its_bounds_is_refused() {
         jog(0, 0.1, 5_001),
         jog(1, f32::NAN, 1),
     ] {
-        assert_eq!(ask(beyond), Err(Refusal::NoSuchJog), "{beyond:?}");
+        assert_eq!(request(beyond), Err(Refusal::NoSuchJog), "{beyond:?}");
     }
     // Conditions that block arming also block a jog: this arm is not zeroed.
-    let blocked = ask(jog(0, 0.3, 500));
+    let blocked = request(jog(0, 0.3, 500));
     assert_eq!(blocked, Err(Refusal::Blocked(Blockers::NOT_ZEROED)));
 }

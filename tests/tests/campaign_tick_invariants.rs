@@ -46,14 +46,14 @@ impl Tick {
         }
     }
 
-    fn judged(&self) -> (Watch, Result<(), String>) {
+    fn check(&self) -> (Watch, Result<(), String>) {
         let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        let stated = watch.drive(&self.drive, &self.sense, ZERO, &self.truth);
-        (watch, stated)
+        let verdict = watch.drive(&self.drive, &self.sense, ZERO, &self.truth);
+        (watch, verdict)
     }
 
     fn verdict(&self) -> String {
-        self.judged().1.expect_err("a violation")
+        self.check().1.expect_err("a violation")
     }
 }
 
@@ -80,8 +80,8 @@ const fn up(newtons: f64) -> [f64; 3] {
 
 #[test]
 fn correct_tick_passes_and_is_measured() {
-    let (watch, stated) = Tick::pushing(up(7.6)).judged();
-    assert_eq!(stated, Ok(()));
+    let (watch, verdict) = Tick::pushing(up(7.6)).check();
+    assert_eq!(verdict, Ok(()));
     let seen = watch.extremes;
     // The reported pose is in whole counts.
     assert!((seen.read_force_n - 7.6).abs() < 0.01, "{seen:?}");
@@ -163,8 +163,8 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
     tick.truth.counts[1] += OFF_COUNTS as i32;
     assert!(tick.verdict().contains("at the tip"));
     tick.truth.counts[1] += 1;
-    let (watch, stated) = tick.judged();
-    assert_eq!(stated, Ok(()));
+    let (watch, verdict) = tick.check();
+    assert_eq!(verdict, Ok(()));
     let seen = watch.extremes;
     assert!(
         seen.misled.force_n > f64::from(record.max_force_n),
@@ -178,8 +178,8 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
 fn singular_pose_is_counted_but_not_checked() {
     let mut tick = Tick::pushing(up(7.6));
     tick.truth.q_rad = [0.0, 1.4, 0.2];
-    let (watch, stated) = tick.judged();
-    assert_eq!(stated, Ok(()));
+    let (watch, verdict) = tick.check();
+    assert_eq!(verdict, Ok(()));
     assert_eq!(watch.extremes.singular_ticks, 1);
 }
 

@@ -33,12 +33,12 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
         .last()
         .is_none_or(|last: &TickRecord| last.tick < ticks)
     {
-        let mut take = |event: Event<'_>| {
+        let mut on_event = |event: Event<'_>| {
             if let Event::Sample(sample) = event {
                 samples.push(*sample);
             }
         };
-        session.poll(Duration::ZERO, &mut take).expect("goes on");
+        session.poll(Duration::ZERO, &mut on_event).expect("goes on");
     }
     assert_eq!(session.stats().lost + session.stats().dropped, 0);
     assert!(samples.iter().all(|sample| sample.fault.is_none()));

@@ -31,8 +31,8 @@ fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &
             if (column, row) == NO_DATA {
                 assert!(found.is_nan(), "{name}: {found} in the hole");
             } else {
-                let wanted = height(column, row) + 1000.0 * f64::from(band - 1);
-                assert_eq!(found, wanted, "{name}: column {column}, row {row}");
+                let expected = height(column, row) + 1000.0 * f64::from(band - 1);
+                assert_eq!(found, expected, "{name}: column {column}, row {row}");
             }
         }
     }

@@ -71,8 +71,8 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
 /// Returns true if, from a point on a proxy's path, the straight line to a HIP leads through air or
 /// over no-data: there the proxy leaves the surface, lands elsewhere, and may be held where it
 /// lands.
-fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
-    let [from, to] = way;
+fn leaves_surface(terrain: &Terrain<'_>, path: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
+    let [from, to] = path;
     let between = |from: [f64; 3], to: [f64; 3]| {
         (1..=64).map(move |part| {
             let t = f64::from(part) / 64.0;
@@ -104,9 +104,9 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> V
     });
     let ratios = slides.filter_map(|pair| {
         let ratio = ratio(terrain, &pair[1])?;
-        let way = [&pair[0], &pair[1]].map(|sample| position(&sample.proxy));
-        let flew = || flies(terrain, way, position(&pair[1].hip));
-        let counts = (ratio / mu - 1.0).abs() <= off || !flew();
+        let path = [&pair[0], &pair[1]].map(|sample| position(&sample.proxy));
+        let left_surface = || leaves_surface(terrain, path, position(&pair[1].hip));
+        let counts = (ratio / mu - 1.0).abs() <= off || !left_surface();
         counts.then_some(ratio)
     });
     ratios.collect()

@@ -168,7 +168,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             key,
             heights,
         };
-        let stated = match random.below(7) {
+        let message = match random.below(7) {
             0 => ToDevice::Tile(tile),
             5 => ToDevice::MaterialScene(MaterialScene {
                 scene: hapterra_core::scene::Scene {
@@ -199,7 +199,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             },
             _ => ToDevice::Hip(HipCommand { seq, hip }),
         };
-        line.extend(wire::message(&stated));
+        line.extend(wire::message(&message));
     }
     let chunks = line.chunks(255);
     chunks

@@ -106,8 +106,8 @@ impl Transport for Tap {
         let n = self.device.receive(into, wait)?;
         let mut rest = &into[..n];
         while !rest.is_empty() {
-            let (taken, frame) = self.reader.push(rest);
-            rest = &rest[taken..];
+            let (consumed, frame) = self.reader.push(rest);
+            rest = &rest[consumed..];
             let message = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>));
             let (samples, dropped) = self.made.get();
             match message.map(|framed| framed.expect("whole").message) {
@@ -257,8 +257,8 @@ fn host_of_another_version_is_refused() {
     let mut device = Native::for_replay();
     let mut frame = [0; 64];
     for protocol in [PROTOCOL + 1, PROTOCOL - 1, u16::MAX] {
-        let asked = VersionCheck::Asked { protocol };
-        let bytes = encode(&asked, &mut frame).expect("fits");
+        let query = VersionCheck::Asked { protocol };
+        let bytes = encode(&query, &mut frame).expect("fits");
         let refused = VersionCheck::Refused { protocol: PROTOCOL };
         assert_eq!(refusal(&mut device, bytes), Some(refused), "{protocol}");
     }

@@ -29,7 +29,7 @@ fn single_harms() -> Vec<(Direction, usize, Harm)> {
     let to_device = (0..to_device).map(|number| (Direction::ToDevice, number));
     let to_host = (0..to_host).map(|number| (Direction::ToHost, number));
     let all = to_device.chain(to_host);
-    all.flat_map(|(way, number)| HARMS.map(|harm| (way, number, harm)))
+    all.flat_map(|(direction, number)| HARMS.map(|harm| (direction, number, harm)))
         .collect()
 }
 
@@ -81,8 +81,8 @@ fn session_survives_any_two_frame_faults_while_closing() {
     let [to_device, to_host] = frames();
     let last: Vec<_> = single_harms()
         .into_iter()
-        .filter(|(way, number, harm)| {
-            let count = match way {
+        .filter(|(direction, number, harm)| {
+            let count = match direction {
                 Direction::ToDevice => to_device,
                 Direction::ToHost => to_host,
             };
@@ -113,13 +113,13 @@ fn interrupted(what: Interruption) {
         assert_eq!(report.end, End::Agreed, "{plan:?}");
         // The first frames of the run.
         for number in 0..12 {
-            for (way, harm) in [
+            for (direction, harm) in [
                 (Direction::ToDevice, Harm::Lose),
                 (Direction::ToHost, Harm::Lose),
                 (Direction::ToHost, Harm::Repeat(900)),
             ] {
                 let plan = Plan {
-                    harms: vec![(way, number, harm)],
+                    harms: vec![(direction, number, harm)],
                     ..plan.clone()
                 };
                 let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
@@ -148,13 +148,13 @@ fn close_of_an_armed_session_is_confirmed_once_disarmed() {
     let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
     for harm in HARMS {
         // The last frames in each direction: the close, its confirmation, and others around them.
-        for (way, count) in [Direction::ToDevice, Direction::ToHost]
+        for (direction, count) in [Direction::ToDevice, Direction::ToHost]
             .into_iter()
             .zip(frames)
         {
             for number in count.saturating_sub(12)..count {
                 agree(&Plan {
-                    harms: vec![(way, number, harm)],
+                    harms: vec![(direction, number, harm)],
                     ..abrupt()
                 });
             }
@@ -168,9 +168,9 @@ fn close_of_an_armed_session_is_confirmed_once_disarmed() {
     };
     let leaves = agree(&again).ticks - 150;
     for at in leaves..leaves + 150 {
-        for way in [Direction::ToDevice, Direction::ToHost] {
+        for direction in [Direction::ToDevice, Direction::ToHost] {
             agree(&Plan {
-                interruptions: vec![killed, (at, Interruption::Echo(way))],
+                interruptions: vec![killed, (at, Interruption::Echo(direction))],
                 ..abrupt()
             });
         }
@@ -207,8 +207,8 @@ fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interrupt
 
 #[test]
 fn replay_of_earlier_frames_does_not_change_the_outcome() {
-    for way in [Direction::ToDevice, Direction::ToHost] {
-        at_every_moment_after(&histories(), Interruption::Echo(way));
+    for direction in [Direction::ToDevice, Direction::ToHost] {
+        at_every_moment_after(&histories(), Interruption::Echo(direction));
     }
 }
 
@@ -281,11 +281,11 @@ fn lost_frames_leave_every_request_executed_once_or_refused() {
     let whole = agree(&with_errands(vec![]));
     eprintln!("{whole:?}");
     assert_eq!(whole.came_of, [10, 0, 0], "all are done");
-    let ways = [Direction::ToDevice, Direction::ToHost];
-    for (way, count) in ways.into_iter().zip(whole.frames) {
+    let directions = [Direction::ToDevice, Direction::ToHost];
+    for (direction, count) in directions.into_iter().zip(whole.frames) {
         for number in 0..count {
             for harm in [Harm::Lose, Harm::Repeat(900), Harm::Delay(900)] {
-                let plan = with_errands(vec![(way, number, harm)]);
+                let plan = with_errands(vec![(direction, number, harm)]);
                 let report = agree(&plan);
                 assert_eq!(report.came_of, whole.came_of, "{plan:?}");
                 assert_eq!(report.uncertain, 0, "{plan:?}");
@@ -359,9 +359,9 @@ fn arm_is_disarmed_in_time_after_its_host_disappears() {
 fn cut_in_one_direction_ends_in_confirmed_disarm_or_report() {
     let ticks = agree(&Plan::default()).ticks;
     for long in [300, 1_500, 5_000] {
-        for way in [Direction::ToDevice, Direction::ToHost] {
+        for direction in [Direction::ToDevice, Direction::ToHost] {
             for at in (0..ticks).step_by(2 * MOMENTS) {
-                let interruptions = vec![(at, Interruption::Cut(way, long))];
+                let interruptions = vec![(at, Interruption::Cut(direction, long))];
                 let plan = Plan {
                     interruptions,
                     ..Plan::default()
@@ -391,9 +391,9 @@ fn random_faults_end_in_confirmed_disarm_or_a_report() {
 
 #[test]
 fn dead_line_is_reported_without_a_hang() {
-    for way in [Direction::ToDevice, Direction::ToHost] {
+    for direction in [Direction::ToDevice, Direction::ToHost] {
         for at in [0, 200, 400] {
-            let interruptions = vec![(at, Interruption::Cut(way, u64::MAX / 2))];
+            let interruptions = vec![(at, Interruption::Cut(direction, u64::MAX / 2))];
             let plan = Plan {
                 interruptions,
                 ..Plan::default()

@@ -46,12 +46,12 @@ impl Folder {
             "table.toml",
             "[class.10]\nname = \"meadow\"\nstiffness = 0.4\n\n[class.80]\nname = \"rock\"\nstiffness = 1.0\n",
         );
-        let mut way = "t_s,x_mm,y_mm,z_mm\n0,45,40.3,2\n".to_owned();
+        let mut path = "t_s,x_mm,y_mm,z_mm\n0,45,40.3,2\n".to_owned();
         for row in 0..10 * ROWS_PER_MM {
             let x = 45.0 + f64::from(row) / f64::from(ROWS_PER_MM);
-            writeln!(way, "{},{x},40.3,-2", f64::from(row + 1) * 1e-3).expect("written");
+            writeln!(path, "{},{x},40.3,-2", f64::from(row + 1) * 1e-3).expect("written");
         }
-        folder.write("way.csv", &way);
+        folder.write("way.csv", &path);
         folder
     }
 
@@ -280,11 +280,11 @@ fn stiffness_change_is_limited_by_the_stiffest_material() {
 #[test]
 fn invalid_materials_are_refused_with_a_hint() {
     let folder = Folder::new();
-    let fails = |materials: &str, table: &str, wanted: &[&str]| {
+    let fails = |materials: &str, table: &str, parts: &[&str]| {
         let options = ["x.csv", "--materials", materials, "--surface", table];
         let (succeeded, printed) = folder.hapterra(&[&REPLAY[..], &options].concat());
         assert!(!succeeded && printed.contains("hint: "), "{printed}");
-        for part in wanted {
+        for part in parts {
             assert!(printed.contains(part), "{part}: {printed}");
         }
     };

@@ -138,22 +138,22 @@ fn every_netcdf_storage_yields_the_exact_field() {
         for row in 0..SIZE.1 {
             for column in 0..SIZE.0 {
                 let found = rows[(SIZE.1 - 1 - row) as usize][column as usize];
-                let wanted = sign * height(column, row);
+                let expected = sign * height(column, row);
                 match name {
                     // Its valid range, in stored numbers.
-                    "packed.nc" if wanted > 300.0 => {
+                    "packed.nc" if expected > 300.0 => {
                         assert!(found.is_nan(), "{name}: {column} {row}");
                     }
                     _ if (column, row) == NO_DATA => {
                         assert!(found.is_nan(), "{name}: {column} {row}: {found}");
                     }
-                    _ => assert_eq!(found, wanted, "{name}: {column} {row}"),
+                    _ => assert_eq!(found, expected, "{name}: {column} {row}"),
                 }
             }
         }
         let bounds = raster.bounds().expect("its place");
-        for (found, wanted) in [(bounds.west, 7.995), (bounds.north, 50.005)] {
-            assert!((found - wanted).abs() < 1e-9, "{name}: {found}");
+        for (found, expected) in [(bounds.west, 7.995), (bounds.north, 50.005)] {
+            assert!((found - expected).abs() < 1e-9, "{name}: {found}");
         }
     }
 }

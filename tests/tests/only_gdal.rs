@@ -40,10 +40,10 @@ fn files_that_only_gdal_reads_are_exact_and_in_place() {
                 // The file's first row is the northern one.
                 let found = raster.height(column, 3 - row);
                 let above = 1000.0 * f64::from(band - 1);
-                let wanted = 100.5 + 7.0 * f64::from(column) - 3.0 * f64::from(row) + above;
+                let expected = 100.5 + 7.0 * f64::from(column) - 3.0 * f64::from(row) + above;
                 match (column, row) {
                     (3, 1) => assert!(found.is_nan(), "{name}"),
-                    _ => assert_eq!(found, wanted, "{name} {column} {row}"),
+                    _ => assert_eq!(found, expected, "{name} {column} {row}"),
                 }
             }
             let bounds = raster.bounds().expect("placed");
@@ -72,8 +72,8 @@ fn large_files_stay_on_disk_and_overviews_survey_them() {
     // The coarsest overview has every fourth sample.
     assert_eq!(raster.summary().looked_at, 150 * 125);
     for (column, row) in [(0, 0), (599, 499), (17, 300), (512, 33)] {
-        let wanted = column / 16 + row / 16;
-        assert_eq!(raster.height(column, 499 - row), f64::from(wanted));
+        let expected = column / 16 + row / 16;
+        assert_eq!(raster.height(column, 499 - row), f64::from(expected));
     }
 }
 
@@ -109,11 +109,11 @@ fn vrt_gaps_without_no_data_are_reported_as_heights() {
     );
     let raster = Raster::open(&path, &OpenOptions::default()).expect("read by GDAL");
     assert_eq!((raster.height(0, 7), raster.height(0, 0)), (100.5, 0.0));
-    let stated = raster
+    let is_reported = raster
         .remarks()
         .iter()
         .any(|remark| remark.contains("-vrtnodata"));
-    assert!(stated, "{:?}", raster.remarks());
+    assert!(is_reported, "{:?}", raster.remarks());
 }
 
 /// Writes a VRT of 5 × 8 samples; a file has their northern half.
@@ -268,8 +268,8 @@ fn labels_beside_planetary_images_are_opened() {
     std::fs::write(&image, samples).expect("written");
     let raster = Raster::open(&image, &OpenOptions::default()).expect("by its label");
     assert_eq!((raster.height(0, 2), raster.height(3, 0)), (0.0, 11.0));
-    let stated = raster.remarks().join(" ");
-    assert!(stated.contains("MOON.LBL"), "{stated}");
+    let remarks = raster.remarks().join(" ");
+    assert!(remarks.contains("MOON.LBL"), "{remarks}");
 }
 
 /// ENVI's samples have any extension, and a unit beside a zone is the unit of the coordinates.

@@ -17,13 +17,13 @@ mod textured_force;
 /// Tolerance of a line, pixels: on another machine a tangent may round to the next tenth.
 const OFF: f64 = 0.11;
 
-fn is_kept(drawn: Result<String, Box<dyn Error>>, example: &str, kept: &str) {
+fn assert_committed(drawn: Result<String, Box<dyn Error>>, example: &str, file: &str) {
     let drawn = drawn.expect("it is drawn");
-    let kept_text = std::fs::read_to_string(repository().join("docs").join(kept));
-    let kept_text = kept_text.expect("readable");
+    let committed = std::fs::read_to_string(repository().join("docs").join(file));
+    let committed = committed.expect("readable");
     assert!(
-        is_same(drawn.trim_end(), kept_text.trim_end()),
-        "type: cargo run -p hapterra-core --example {example} > docs/{kept}"
+        is_same(drawn.trim_end(), committed.trim_end()),
+        "type: cargo run -p hapterra-core --example {example} > docs/{file}"
     );
 }
 
@@ -44,17 +44,17 @@ fn is_same(one: &str, other: &str) -> bool {
 
 #[test]
 fn friction_picture_is_that_of_the_example() {
-    is_kept(stick_slip::drawn(), "stick_slip", "stick-slip.svg");
+    assert_committed(stick_slip::drawn(), "stick_slip", "stick-slip.svg");
 }
 
 #[test]
 fn shading_picture_is_that_of_the_example() {
-    is_kept(shaded_force::drawn(), "shaded_force", "shading.svg");
+    assert_committed(shaded_force::drawn(), "shaded_force", "shading.svg");
 }
 
 #[test]
 fn texture_picture_is_that_of_the_example() {
-    is_kept(textured_force::drawn(), "textured_force", "texture.svg");
+    assert_committed(textured_force::drawn(), "textured_force", "texture.svg");
 }
 
 #[test]

@@ -81,7 +81,7 @@ fn execution() -> impl Strategy<Value = Execution> {
     prop_oneof![Just(Execution::RealTime), Just(Execution::LockStep)]
 }
 
-fn holds(scene: &Scene) -> Result<(), TestCaseError> {
+fn check_scene(scene: &Scene) -> Result<(), TestCaseError> {
     let ran = scene.run(&mut Buffers::default());
     ran.map(drop)
         .map_err(|violation| TestCaseError::fail(violation.to_string()))
@@ -103,14 +103,14 @@ proptest! {
     fn invariants_hold_on_gentle_ground(
         heights in gentle(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
+        check_scene(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
     }
 
     #[test]
     fn invariants_hold_on_wild_ground(
         heights in wild(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
+        check_scene(&Scene::given(terrain(&heights), path, execution, Supply::Held))?;
     }
 
     #[test]
@@ -118,6 +118,6 @@ proptest! {
         heights in gentle(), path in path(), execution in execution(), latency in 0..4_u32,
     ) {
         let supply = Supply::Pulled { latency };
-        holds(&Scene::given(terrain(&heights), path, execution, supply))?;
+        check_scene(&Scene::given(terrain(&heights), path, execution, supply))?;
     }
 }

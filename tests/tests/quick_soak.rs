@@ -17,21 +17,21 @@ fn thousand(surface: Surface) -> LinkStats {
         twins
             .iter()
             .zip([150, 100, 50, 50])
-            .all(|(n, least)| *n >= least),
+            .all(|(n, minimum)| *n >= minimum),
         "{twins:?}"
     );
     // In another window, shifted, mirrored or turned.
-    let (judged, twins) = (total.on_materials, total.twins_on_materials);
+    let (counts, twins) = (total.on_materials, total.twins_on_materials);
     assert!(
-        judged.in_whole > 20_000 && judged.changing > 10_000,
-        "{judged:?}"
+        counts.in_whole > 20_000 && counts.changing > 10_000,
+        "{counts:?}"
     );
-    assert!(100 * judged.open < judged.in_whole, "{judged:?}");
+    assert!(100 * counts.open < counts.in_whole, "{counts:?}");
     assert!(twins.iter().all(|n| *n >= 20), "{twins:?}");
     stats
 }
 
-fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
+fn assert_no_violations<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
     let rough = surface.option();
     let reported: Vec<String> = broken
         .map(|b| {
@@ -49,16 +49,16 @@ fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b Broken>) {
 
 #[test]
 fn invariants_hold_in_a_thousand_random_scenes() {
-    none(Surface::Smooth, thousand(Surface::Smooth).broken.iter());
+    assert_no_violations(Surface::Smooth, thousand(Surface::Smooth).broken.iter());
 }
 
 #[test]
 fn invariants_hold_with_friction() {
     let stats = thousand(Surface::Rough);
-    let judged = stats.total().on_materials;
+    let counts = stats.total().on_materials;
     assert!(
-        judged.rubbed > 20_000 && judged.sliding > 1_000,
-        "{judged:?}"
+        counts.rubbed > 20_000 && counts.sliding > 1_000,
+        "{counts:?}"
     );
-    none(Surface::Rough, stats.broken.iter());
+    assert_no_violations(Surface::Rough, stats.broken.iter());
 }

@@ -153,8 +153,8 @@ fn hip_leaving_high_ground_is_released() {
     }
     let terrain = field([6, 6], height);
     let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
-    let wanted = [ContactState::Touching, ContactState::Free];
-    assert!(states[1..].chunks(2).all(|pair| pair == wanted));
+    let expected = [ContactState::Touching, ContactState::Free];
+    assert!(states[1..].chunks(2).all(|pair| pair == expected));
 }
 
 /// A part of the path ended exactly on the border of the data, far below it: its entry from outside

@@ -54,7 +54,7 @@ fn to_border(place: [f64; 2]) -> f64 {
 }
 
 /// Wanders over a terrain and checks every result. Returns the number of rows in contact.
-fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
+fn check_contact(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let height = heights(&terrain);
     let oracle = Oracle::new(terrain.size().map(i64::from), &height);
@@ -125,7 +125,7 @@ fn proxy_is_local_closest_point_on_synthetic_terrains() {
         Kind::Spikes,
     ] {
         eprint!("{kind:?}: ");
-        let touched = judge(&synthetic(kind), scale, 11, 3000);
+        let touched = check_contact(&synthetic(kind), scale, 11, 3000);
         assert!(touched > 300, "{kind:?}: the walk hardly touches");
     }
 }
@@ -144,7 +144,7 @@ fn proxy_is_local_closest_point_on_real_terrains() {
         let grid = HapticGrid::new(&raster, HapticCells::default());
         let scale = grid.true_scale(cell_mm).expect("scale");
         eprint!("{file}: ");
-        let touched = judge(&raster, scale, 5, 2000);
+        let touched = check_contact(&raster, scale, 5, 2000);
         assert!(touched > 100, "{file}: the walk hardly touches");
     }
 }

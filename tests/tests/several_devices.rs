@@ -74,7 +74,7 @@ impl Pair {
             .spawn()
             .expect("it runs");
         let named = [self.name(1), self.name(2)].map(|name| format!("{name} device "));
-        child.stdout = Some(hear(child.stdout.take().expect("piped"), &named));
+        child.stdout = Some(read_until(child.stdout.take().expect("piped"), &named));
         child
     }
 }
@@ -83,7 +83,7 @@ impl Pair {
 const MAX_LINES: usize = 60;
 
 /// Reads lines until there was one with each of these beginnings.
-fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
+fn read_until<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     let mut lines = BufReader::with_capacity(1, from);
     let mut missing: Vec<&String> = beginnings.iter().collect();
     for _ in 0..MAX_LINES {
@@ -105,11 +105,11 @@ fn rendered(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
     let (settings, rows): (Vec<&str>, Vec<&str>) =
         text.lines().partition(|line| line.starts_with('#'));
     let names: Vec<&str> = rows[0].split(',').collect();
-    let is_kept = |column: &usize| names.get(*column) != Some(&"cost");
+    let is_compared = |column: &usize| names.get(*column) != Some(&"cost");
     let cells = |row: &&str| {
         let cells = row.split(',').enumerate();
-        let kept = cells.filter(|(column, _)| is_kept(column));
-        kept.map(|(_, cell)| cell.to_owned()).collect()
+        let compared = cells.filter(|(column, _)| is_compared(column));
+        compared.map(|(_, cell)| cell.to_owned()).collect()
     };
     let settings = settings.into_iter().map(str::to_owned).collect();
     (rows.iter().map(cells).collect(), settings)
@@ -196,11 +196,11 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     let output = end_of(child);
     let printed = output_text(&output);
     assert_eq!(output.status.code(), Some(1), "{printed}");
-    let says = "did not confirm that it is disarmed: switch the amplifiers off";
+    let expected = "did not confirm that it is disarmed: switch the amplifiers off";
     let of = |number| {
         let name = pair.name(number);
         let lines = printed.lines().filter(move |line| line.starts_with(&name));
-        lines.filter(|line| line.contains(says)).count()
+        lines.filter(|line| line.contains(expected)).count()
     };
     // When it happened, and at the end.
     assert_eq!((of(1), of(2)), (0, 2), "{printed}");
@@ -223,8 +223,8 @@ fn second_signal_names_the_unconfirmed_boards() {
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
     // The first has confirmed, and the second waits.
-    let kept = format!("{} recording ", pair.name(1));
-    child.stdout = Some(hear(child.stdout.take().expect("piped"), &[kept]));
+    let compared = format!("{} recording ", pair.name(1));
+    child.stdout = Some(read_until(child.stdout.take().expect("piped"), &[compared]));
     pair.served[1].wait_for_unheard_bye();
     signal(&child, "INT");
     let output = end_of(child);
@@ -299,9 +299,9 @@ fn absent_device_fails_alone_and_is_reported_at_once() {
         .spawn()
         .expect("it runs");
     let failed = format!("[1 {absent}] error: ");
-    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[failed]));
+    child.stderr = Some(read_until(child.stderr.take().expect("piped"), &[failed]));
     let serves = format!("[2 {there}] device ");
-    child.stdout = Some(hear(child.stdout.take().expect("piped"), &[serves]));
+    child.stdout = Some(read_until(child.stdout.take().expect("piped"), &[serves]));
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);
@@ -328,7 +328,7 @@ fn fault_is_reported_only_for_the_affected_device() {
     let pair = Pair::of(conducts);
     let mut child = pair.start();
     let fault = format!("{} FAULT ", pair.name(2));
-    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[fault]));
+    child.stderr = Some(read_until(child.stderr.take().expect("piped"), &[fault]));
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);
@@ -363,10 +363,10 @@ fn hostile_device_does_not_disturb_the_other() {
         format!("[1 {greedy}] device "),
         format!("[2 {there}] device "),
     ];
-    child.stdout = Some(hear(child.stdout.take().expect("piped"), &begun));
+    child.stdout = Some(read_until(child.stdout.take().expect("piped"), &begun));
     // Progress lines are from the device with samples.
     let goes = format!("[2 {there}] ");
-    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[goes]));
+    child.stderr = Some(read_until(child.stderr.take().expect("piped"), &[goes]));
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);
@@ -433,7 +433,7 @@ fn second_device_causes_no_additional_terrain_reads() {
 fn options_for_one_device_are_refused_for_several() {
     let folder = tempfile::tempdir().expect("a folder");
     let record = recorded(folder.path(), "felt.csv");
-    for (devices, more, says) in [
+    for (devices, more, expected) in [
         (["tcp:localhost:4", "tcp:127.0.0.1:4"], None, "are the same"),
         (
             ["tcp:h.invalid:4", "tcp:h.invalid:4"],
@@ -450,7 +450,7 @@ fn options_for_one_device_are_refused_for_several() {
         let output = command.args(more).output().expect("it runs");
         let printed = output_text(&output);
         assert_eq!(output.status.code(), Some(1), "{printed}");
-        assert!(printed.contains(says), "{printed}");
+        assert!(printed.contains(expected), "{printed}");
         assert!(printed.contains("hint: "), "{printed}");
     }
     let there = std::fs::read_dir(folder.path()).expect("a folder");

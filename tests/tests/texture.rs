@@ -78,7 +78,7 @@ fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
 
 /// Returns the textured tick for the oracle: the displacement is that of the same scene without
 /// texture.
-fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
+fn observed(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
     let rendered = ContactOutput {
         state: textured.state,
         proxy: textured.proxy,
@@ -110,7 +110,7 @@ fn texture_changes_the_force_but_not_the_proxy() {
             let (mut touched, mut most) = (0, 0.0_f32);
             for (tick, (plain, textured)) in plain.iter().zip(&textured).enumerate() {
                 assert_eq!(plain.proxy, textured.proxy);
-                let judged = judge.look(&seen(plain, textured));
+                let judged = judge.look(&observed(plain, textured));
                 assert_eq!(judged, Ok(()), "{name}, {texture:?}, tick {tick}");
                 touched += u32::from(textured.state == ContactState::Touching);
                 most = most.max((textured.force_n - plain.force_n).length());

@@ -48,7 +48,7 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
         let opened = Session::open(&terrain, scene, Some(Arming::VIRTUAL), link, timeout);
         let (mut session, _) = opened.expect("opened");
         let (mut samples, mut status): (Vec<TickRecord>, Option<Status>) = (vec![], None);
-        let mut asked = false;
+        let mut queried = false;
         while status.is_none() {
             session
                 .poll(Duration::from_millis(100), &mut |event| match event {
@@ -57,14 +57,14 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
                     _ => {}
                 })
                 .expect("goes on");
-            if !asked && samples.last().is_some_and(|last| last.tick >= ticks) {
+            if !queried && samples.last().is_some_and(|last| last.tick >= ticks) {
                 session.enqueue(HostRequest::Status);
-                asked = true;
+                queried = true;
             }
         }
         session.close(&mut |_| {}).expect("confirmed");
         emulator.finish().expect("the board ended well");
-        (samples, status.expect("told"))
+        (samples, status.expect("reported"))
     });
     Some(rendered)
 }

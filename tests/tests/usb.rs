@@ -99,11 +99,11 @@ fn microsoft_os_descriptors_request_winusb() {
     assert_eq!(bos[at + 6], MSOS_VENDOR_CODE);
     let set = control_in(&mut board, (0xC0, MSOS_VENDOR_CODE, 0, 7), length).expect("the set");
     assert_eq!(set.len(), usize::from(length));
-    let holds = |bytes: &[u8]| set.windows(bytes.len()).any(|w| w == bytes);
-    assert!(holds(b"WINUSB\0\0"));
+    let contains = |bytes: &[u8]| set.windows(bytes.len()).any(|w| w == bytes);
+    assert!(contains(b"WINUSB\0\0"));
     let wide = |text: &str| -> Vec<u8> { text.encode_utf16().flat_map(u16::to_le_bytes).collect() };
-    assert!(holds(&wide("DeviceInterfaceGUIDs\0")));
-    assert!(holds(&wide(INTERFACE_GUIDS[0])));
+    assert!(contains(&wide("DeviceInterfaceGUIDs\0")));
+    assert!(contains(&wide(INTERFACE_GUIDS[0])));
 }
 
 #[test]
@@ -151,12 +151,12 @@ fn answers(board: &mut Board) -> bool {
         };
         let mut bytes = packet.as_slice();
         while !bytes.is_empty() {
-            let (taken, frame) = reader.push(bytes);
+            let (consumed, frame) = reader.push(bytes);
             let framed = frame.map(|f| f.and_then(decode::<InSession<ToHost>>));
             if framed.is_some_and(|f| f.is_ok_and(|f| matches!(f.message, ToHost::Hello(_)))) {
                 return true;
             }
-            bytes = &bytes[taken..];
+            bytes = &bytes[consumed..];
         }
     }
     false
@@ -345,9 +345,9 @@ fn udev_rule_matches_the_usb_identity() {
         .lines()
         .find(|line| line.starts_with("SUBSYSTEM"))
         .expect("a rule");
-    let says = |key: &str, value: &str| rule.contains(&format!("{key}==\"{value}\""));
-    assert!(says("ATTR{idVendor}", &format!("{VENDOR_ID:04x}")));
-    assert!(says("ATTR{idProduct}", &format!("{PRODUCT_ID:04x}")));
-    assert!(says("ATTR{product}", &format!("{PRODUCT}*")));
+    let has_value = |key: &str, value: &str| rule.contains(&format!("{key}==\"{value}\""));
+    assert!(has_value("ATTR{idVendor}", &format!("{VENDOR_ID:04x}")));
+    assert!(has_value("ATTR{idProduct}", &format!("{PRODUCT_ID:04x}")));
+    assert!(has_value("ATTR{product}", &format!("{PRODUCT}*")));
     assert!(rule.contains("TAG+=\"uaccess\""));
 }

@@ -115,7 +115,7 @@ impl<'t> Bed<'t> {
         polled.expect("goes on");
     }
 
-    pub(crate) fn ask(&mut self, request: Request) {
+    pub(crate) fn request(&mut self, request: Request) {
         self.session.as_mut().expect("open").request(request);
     }
 

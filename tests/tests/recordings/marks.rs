@@ -16,9 +16,9 @@ fn run(folder: &Folder, record: &str) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, commands, record] =
         ["hills.tif", "commands", record].map(|name| folder.text(name));
-    let words = ["run", &terrain, "--device", "native", "--duration", "5s"];
+    let arguments = ["run", &terrain, "--device", "native", "--duration", "5s"];
     let more = ["--commands", &commands, "--out", &record];
-    folder.runs(&[&words[..], &more].concat())
+    folder.runs(&[&arguments[..], &more].concat())
 }
 
 fn marks_of(folder: &Folder, name: &str) -> Vec<Mark> {
@@ -88,8 +88,8 @@ fn demo_recording_has_its_marks() {
     let folder = Folder::new();
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));
-    let words = ["demo", &terrain, "--out", &out, "--duration", "5s"];
-    folder.runs(&[&words[..], &["--commands", &commands]].concat());
+    let arguments = ["demo", &terrain, "--out", &out, "--duration", "5s"];
+    folder.runs(&[&arguments[..], &["--commands", &commands]].concat());
     let marks = marks_of(&folder, "demo/hills.csv");
     let texts: Vec<_> = marks.iter().map(|mark| mark.text.as_str()).collect();
     assert_eq!(texts, TEXTS);

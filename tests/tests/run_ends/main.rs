@@ -58,8 +58,8 @@ fn unconfirmed_disarm_is_reported_and_the_run_fails() {
         let output = end_of(child);
         let text = output_text(&output);
         assert_eq!(output.status.code(), Some(1), "{name}: {text}");
-        let says = "did not confirm that it is disarmed: switch the amplifiers off";
-        assert!(text.contains(says), "{name}: {text}");
+        let warning = "did not confirm that it is disarmed: switch the amplifiers off";
+        assert!(text.contains(warning), "{name}: {text}");
         assert!(folder.path().join("felt.csv").exists(), "{name}: {text}");
         assert_eq!(served.last_end(), SessionEnd::Replaced, "{name}");
     }

@@ -207,10 +207,10 @@ fn enter_and_keys_affect_only_the_selected_device() {
         .spawn()
         .expect("it runs");
     let name = |number: usize| format!("[{number} tcp:{}] ", served[number - 1].address);
-    let asks = |number| format!("and press {number} and then Enter");
+    let prompt = |number| format!("and press {number} and then Enter");
     // Both prompt for their zero poses, in either order.
     let mut shown = shows(&mut window, "hold it there and press");
-    while ![1, 2].iter().all(|number| shown.contains(&asks(*number))) {
+    while ![1, 2].iter().all(|number| shown.contains(&prompt(*number))) {
         shown += &shows(&mut window, "and then Enter");
     }
     // For neither of them.
