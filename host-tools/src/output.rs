@@ -104,7 +104,7 @@ impl Output {
     }
 
     /// Keeps the partial file of a recording.
-    fn keep(&mut self) {
+    fn keep_partial(&mut self) {
         if let (true, Some(partial)) = (self.is_recording, &mut self.partial) {
             partial.disable_cleanup(true);
         }
@@ -127,7 +127,7 @@ impl Output {
     /// # Errors
     /// When the rest cannot be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
-        let flushed = self.writer.flush().inspect_err(|_| self.keep());
+        let flushed = self.writer.flush().inspect_err(|_| self.keep_partial());
         let path = self.path;
         flushed.map_err(|source| OutputError {
             path: path.clone(),
@@ -151,7 +151,7 @@ impl Write for Output {
             }
             None => Err(io::Error::other("it has as many bytes as it may have")),
         };
-        written.inspect_err(|_| self.keep())
+        written.inspect_err(|_| self.keep_partial())
     }
 
     fn flush(&mut self) -> io::Result<()> {

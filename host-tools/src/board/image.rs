@@ -279,8 +279,8 @@ mod tests {
         let code = segment(FLASH, FLASH, 1000, 1000);
         let data = segment(RAM, FLASH + 1000, 40, 240);
         let image = place(Memories::G474, vec![code, data]).ok().expect("fits");
-        let taken: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
-        assert_eq!(taken, [(true, 1040), (false, 240)]);
+        let ranges: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
+        assert_eq!(ranges, [(true, 1040), (false, 240)]);
         assert_eq!(image.parts.len(), 2);
     }
 

@@ -375,8 +375,8 @@ mod tests {
             ("l1_mm = 209.55", "l1_mm = nan", "does not make sense"),
             ("[links]", "[links", "no calibration file"),
         ] {
-            let stated = message(&good.replacen(from, to, 1));
-            assert!(stated.contains(expected), "{from}: {stated}");
+            let message = message(&good.replacen(from, to, 1));
+            assert!(message.contains(expected), "{from}: {message}");
         }
         assert!(message("").contains("hapterra-calibration"));
     }

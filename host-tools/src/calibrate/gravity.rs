@@ -67,7 +67,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[StaticPose]) -> Result<Gravity
     };
     let (gravity_2_nm, gravity_3_nm) = (weight(0)?, weight(1)?);
     let weights = [gravity_2_nm, gravity_3_nm];
-    let left: f64 = torque_of
+    let sum_of_squares: f64 = torque_of
         .iter()
         .flat_map(|pose| pose.iter().zip(weights))
         .map(|((share, torque), weight)| (torque - weight * share).powi(2))
@@ -75,7 +75,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[StaticPose]) -> Result<Gravity
     Ok(GravityFit {
         gravity_2_nm,
         gravity_3_nm,
-        residual_nm: libm::sqrt(left / (2 * torque_of.len()) as f64),
+        residual_nm: libm::sqrt(sum_of_squares / (2 * torque_of.len()) as f64),
     })
 }
 

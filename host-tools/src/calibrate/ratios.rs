@@ -107,11 +107,11 @@ pub fn fit_ratios(record: &Calibration, moves: &[RulerMove]) -> Result<RatioFit,
     let arm = Arm::of(record);
     let per_turn = f64::from(record.counts_per_turn);
     let begin = TAU / (per_turn * record.ratio.as_dvec3());
-    let tries = (0..8).map(|signs| {
+    let candidates = (0..8).map(|signs| {
         let sign = |joint: u32| if signs >> joint & 1 == 0 { 1.0 } else { -1.0 };
         descend(&arm, moves, begin * DVec3::new(sign(0), sign(1), sign(2)))
     });
-    let best = tries.reduce(|best, next| if next.1 < best.1 { next } else { best });
+    let best = candidates.reduce(|best, next| if next.1 < best.1 { next } else { best });
     let (rad_per_count, square) = best.unwrap_or((begin, f64::INFINITY));
     let residual_mm = libm::sqrt(square / moves.len() as f64);
     if residual_mm.is_nan() || residual_mm > MAX_RESIDUAL_MM {

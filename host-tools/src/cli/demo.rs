@@ -136,7 +136,7 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
 
 /// Returns the demo's own terrain: [`OWN_TERRAIN`].
 pub(super) fn own_terrain() -> Result<Raster, Failure> {
-    let amplitude = Kind::Fractal.usual_amplitude_cells();
+    let amplitude = Kind::Fractal.default_amplitude_cells();
     let raster = Synth::new(Kind::Fractal, 1, amplitude).raster(OWN_SIZE, OWN_SIZE);
     raster.map_err(Failure::new)
 }
@@ -321,7 +321,7 @@ fn tour_emulated<'t>(
             Err(_) if interrupt::requested() => Err("interrupted").or_hint("nothing was written"),
             // If the link broke because the board ended, the board's failure is reported.
             Err(error) => match emulator.failure() {
-                Some(stated) => Err(format!("the emulated board failed: {stated}")).or_hint(report),
+                Some(output) => Err(format!("the emulated board failed: {output}")).or_hint(report),
                 None => Err(error.into()),
             },
         }

@@ -29,13 +29,13 @@ impl LineLimit {
     pub(super) fn admit(&mut self, now: Instant) -> Option<u64> {
         let open = self
             .window
-            .filter(|(began, _)| now.saturating_duration_since(*began) < WINDOW);
-        let (began, stated) = open.unwrap_or((now, 0));
-        if stated >= self.max_lines {
+            .filter(|(start, _)| now.saturating_duration_since(*start) < WINDOW);
+        let (start, shown) = open.unwrap_or((now, 0));
+        if shown >= self.max_lines {
             self.omitted += 1;
             return None;
         }
-        self.window = Some((began, stated + 1));
+        self.window = Some((start, shown + 1));
         Some(std::mem::take(&mut self.omitted))
     }
 
@@ -51,8 +51,8 @@ mod tests {
 
     #[test]
     fn lines_over_the_rate_limit_are_counted_and_reported_once() {
-        let began = Instant::now();
-        let at = |ms: u64| began + Duration::from_millis(ms);
+        let start = Instant::now();
+        let at = |ms: u64| start + Duration::from_millis(ms);
         let mut one = LineLimit::new(1);
         assert_eq!(one.admit(at(0)), Some(0));
         for ms in 1..1000 {
@@ -63,7 +63,7 @@ mod tests {
         assert_eq!(one.admit(at(1001)), None);
         assert_eq!(one.admit(at(2500)), Some(1));
         let mut three = LineLimit::new(3);
-        let stated = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
-        assert_eq!((stated, three.omitted()), (3, 7));
+        let shown = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
+        assert_eq!((shown, three.omitted()), (3, 7));
     }
 }

@@ -88,9 +88,9 @@ fn list_probes() {
 
 fn list_emulated(args: &Args) {
     println!("emulated boards");
-    let usual = [DEFAULT_ADDRESS.to_owned()];
+    let default = [DEFAULT_ADDRESS.to_owned()];
     let addresses = if args.addresses.is_empty() {
-        &usual[..]
+        &default[..]
     } else {
         &args.addresses
     };

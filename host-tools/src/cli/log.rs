@@ -199,15 +199,15 @@ mod tests {
                 tracing::warn!(target: "hapterra::link::client", tile, "no such tile");
             }
         });
-        let stated = text.lines().filter(|line| line.contains("no such tile"));
+        let logged = text.lines().filter(|line| line.contains("no such tile"));
         // One line for each second of the test, and the final number.
-        let (stated, lines) = (stated.count(), text.lines().count());
-        assert!((1..60).contains(&stated) && lines == stated + 1, "{text}");
+        let (logged, lines) = (logged.count(), text.lines().count());
+        assert!((1..60).contains(&logged) && lines == logged + 1, "{text}");
         let omitted = text.lines().filter_map(|line| {
             let (_, rest) = line.split_once('(')?;
             rest.split(' ').next()?.parse::<usize>().ok()
         });
-        assert_eq!(stated + omitted.sum::<usize>(), 100_000, "{text}");
+        assert_eq!(logged + omitted.sum::<usize>(), 100_000, "{text}");
     }
 
     #[test]

@@ -130,8 +130,8 @@ pub(super) fn duration(text: &str) -> Result<f64, String> {
 
 /// Parses the time without a message after which a device disarms, whole seconds.
 fn silence(text: &str) -> Result<u16, String> {
-    let [least, most] = [SILENCE_S.0, SILENCE_S.1].map(f64::from);
-    let seconds = TIME.read_within(text, [least, most])?;
+    let [min, max] = [SILENCE_S.0, SILENCE_S.1].map(f64::from);
+    let seconds = TIME.read_within(text, [min, max])?;
     match seconds.fract() == 0.0 {
         true => Ok(seconds as u16),
         false => Err("whole seconds, as 10s".to_owned()),
@@ -171,7 +171,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
     interrupt::listen();
-    let (arms, met): (Vec<_>, Vec<_>) = devices.iter().map(OneDevice::meet).unzip();
+    let (arms, calibration_read): (Vec<_>, Vec<_>) = devices.iter().map(OneDevice::read_calibration).unzip();
     let placed_surface = of_each(devices.iter().zip(arms), |(device, arm)| {
         InReach::of(&request, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
@@ -194,7 +194,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .map(|(placed, terrain)| Placed { terrain, ..placed })
         .collect();
     let mut device_keys = share_keyboard(args, &devices).into_iter();
-    let each = devices.iter().zip(&placed).zip(met);
+    let each = devices.iter().zip(&placed).zip(calibration_read);
     let servings = each.zip(recordings.into_iter().zip(commands));
     let watchers = (1..).map(|number| {
         let server = events.as_ref();
@@ -202,11 +202,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     });
     let servings = servings.zip(watchers);
     let servings = servings.map(
-        |((((device, placed), met), (recording, commands)), events)| Serving {
+        |((((device, placed), calibration_read), (recording, commands)), events)| Serving {
             args,
             device,
             placed,
-            met,
+            calibration_read,
             recording,
             commands,
             device_keys: device_keys.next(),

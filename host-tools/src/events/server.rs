@@ -280,26 +280,26 @@ mod tests {
         let server = Server::listen(0).expect("listens");
         let (stuck, quick) = (connected(&server), connected(&server));
         let sender = server.sender();
-        let seen = Arc::new(AtomicU64::new(0));
-        let sees = Arc::clone(&seen);
+        let latest = Arc::new(AtomicU64::new(0));
+        let seen_by_thread = Arc::clone(&latest);
         read(quick, move |line| {
             assert!(!line.contains("dropped"), "{line}");
-            sees.fetch_max(number(line).unwrap_or(0), Ordering::AcqRel);
+            seen_by_thread.fetch_max(number(line).unwrap_or(0), Ordering::AcqRel);
         });
         // More than the buffers of system and reader can store.
         let spaces = " ".repeat(1000);
         for n in 1..=20_000 {
             sender.offer(format!("{{\"n\":{n}}}{spaces}\n"));
             if n % 100 == 0 {
-                wait_until("the other reader", || seen.load(Ordering::Acquire) == n);
+                wait_until("the other reader", || latest.load(Ordering::Acquire) == n);
             }
         }
         let notice = Arc::new(AtomicU64::new(0));
-        let says = Arc::clone(&notice);
+        let notice_of_thread = Arc::clone(&notice);
         read(stuck, move |line| {
             let rest = line.strip_prefix("{\"event\":\"dropped\",\"lines\":");
             let lines = rest.and_then(|rest| rest.strip_suffix('}')?.parse().ok());
-            says.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
+            notice_of_thread.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
         });
         wait_until("what it missed is said", || {
             sender.offer("{}\n".to_owned());
@@ -332,8 +332,8 @@ mod tests {
             sender.offer("{}\n".to_owned());
             sender.readers_joined().is_none()
         });
-        let taken = Server::listen(server.address().port());
-        assert_eq!(taken.expect_err("taken").kind(), ErrorKind::AddrInUse);
+        let second = Server::listen(server.address().port());
+        assert_eq!(second.expect_err("taken").kind(), ErrorKind::AddrInUse);
         drop(sender);
         assert_eq!(server.end(), 0);
     }

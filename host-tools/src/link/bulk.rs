@@ -30,15 +30,15 @@ pub enum SelectionError {
     Several,
 }
 
-/// Returns the index of the board with the serial number `wanted`, or of the only board. It never
+/// Returns the index of the board with the serial number `requested`, or of the only board. It never
 /// chooses between two boards, because each has an arm.
 ///
 /// # Errors
 /// [`SelectionError`].
-pub fn select(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize, SelectionError> {
-    let fits = |serial: &Option<String>| match (serial, wanted) {
+pub fn select(serials: &[Option<String>], requested: Option<&str>) -> Result<usize, SelectionError> {
+    let fits = |serial: &Option<String>| match (serial, requested) {
         (_, None) => true,
-        (Some(serial), Some(wanted)) => serial.eq_ignore_ascii_case(wanted),
+        (Some(serial), Some(requested)) => serial.eq_ignore_ascii_case(requested),
         (None, Some(_)) => false,
     };
     let mut fitting = (0..serials.len()).filter(|i| fits(&serials[*i]));

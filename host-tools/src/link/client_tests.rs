@@ -127,12 +127,12 @@ impl Bench<'_> {
         while self.now < end {
             self.now += ms(10);
             let (unanswered, viewed) = (&mut self.unanswered, &mut self.viewed);
-            let mut keep = |event: Event<'_>| match event {
+            let mut record = |event: Event<'_>| match event {
                 Event::Unanswered(request) => unanswered.push(*request),
                 Event::SceneChangeResult { view, accepted } => viewed.push((view.number, accepted)),
                 _ => {}
             };
-            self.client.due(self.now, &mut self.out, &mut keep)?;
+            self.client.due(self.now, &mut self.out, &mut record)?;
         }
         Ok(())
     }

@@ -471,8 +471,8 @@ mod tests {
         check_record(&mut control, Calibration::PREMIUM_1_5);
         let calibration = Calibration::OMNI;
         let request = Request::SetCalibration { calibration };
-        let taken = control.request(&request).expect("it answers");
-        assert_eq!(taken, Ok(()));
+        let result = control.request(&request).expect("it answers");
+        assert_eq!(result, Ok(()));
         check_record(&mut control, calibration);
     }
 
@@ -522,8 +522,8 @@ mod tests {
         for _ in 0..3 {
             let reading = open(&mut device);
             let (last, epoch) = (reading.device().last, reading.device().epoch);
-            let kept = (SessionEnd::Replaced, Some(held.epoch));
-            assert_eq!((last.end, epoch), kept);
+            let expected = (SessionEnd::Replaced, Some(held.epoch));
+            assert_eq!((last.end, epoch), expected);
             reading.end().expect("confirmed");
         }
     }

@@ -62,15 +62,15 @@ impl Tcp {
 
 impl Transport for Tcp {
     fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
-        let began = Instant::now();
+        let start = Instant::now();
         // The time-out holds for all bytes, so a device that reads a byte now and then also counts
         // as gone.
         while !bytes.is_empty() {
-            let left = TIMEOUT.saturating_sub(began.elapsed());
-            if left.is_zero() {
+            let remaining = TIMEOUT.saturating_sub(start.elapsed());
+            if remaining.is_zero() {
                 return Err(io::ErrorKind::TimedOut.into());
             }
-            let sent = self.send_some(bytes, left)?;
+            let sent = self.send_some(bytes, remaining)?;
             bytes = bytes.get(sent..).unwrap_or(&[]);
         }
         Ok(())

@@ -43,11 +43,11 @@ impl Usb {
             (Err(SelectionError::None), _, 0) => {
                 Err(absent("no USB devices at all are visible here".into()))
             }
-            (Err(SelectionError::None), Some(wanted), _) if !found.is_empty() => {
+            (Err(SelectionError::None), Some(requested), _) if !found.is_empty() => {
                 let there: Vec<_> = found.iter().map(Self::place).collect();
-                let wanted = printable(wanted);
+                let requested = printable(requested);
                 let there = there.join(", ");
-                Err(absent(format!("none is usb:{wanted}; there is {there}")))
+                Err(absent(format!("none is usb:{requested}; there is {there}")))
             }
             (Err(SelectionError::None), _, n) => Err(absent(format!(
                 "{n} USB devices, none of them a hapterra board"

@@ -65,12 +65,12 @@ impl Amplifier {
 
     /// Moves the current towards the command for `h_s` seconds.
     pub fn advance(&mut self, h_s: f64) {
-        let aim_a = match self.fault {
+        let target_a = match self.fault {
             None => self.command_a,
             Some(AmplifierFault::Missing | AmplifierFault::MotorOpen) => 0.0,
         };
-        let keep = exp(-h_s / self.axis.motor.current_lag_s);
-        self.current_a = aim_a + (self.current_a - aim_a) * keep;
+        let decay = exp(-h_s / self.axis.motor.current_lag_s);
+        self.current_a = target_a + (self.current_a - target_a) * decay;
     }
 
     /// Returns the present current, A.

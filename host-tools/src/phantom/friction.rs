@@ -26,8 +26,8 @@ pub(super) fn settle(free: DVec3, inverse_mass: &DMat3, coulomb_nm: DVec3, h_s: 
         let before = impulse;
         for joint in 0..3 {
             let column = inverse_mass.col(joint);
-            let wanted = impulse[joint] + rate[joint] / column[joint];
-            let allowed = wanted.clamp(-limit[joint], limit[joint]);
+            let required = impulse[joint] + rate[joint] / column[joint];
+            let allowed = required.clamp(-limit[joint], limit[joint]);
             rate -= column * (allowed - impulse[joint]);
             impulse[joint] = allowed;
         }

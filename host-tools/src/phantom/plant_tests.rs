@@ -120,10 +120,10 @@ fn firmware_kinematics_agree_with_the_plant() {
         let q = [0.8 * turn.sin(), 0.5 * turn.cos(), 0.4 * (2.0 * turn).sin()];
         let plant = Plant::new(premium(), q);
         let pose = device.pose(plant.counts(), [0; 3]);
-        let seen = pose.tip_mm().as_dvec3() * 1e-3;
-        let off = seen.distance(DVec3::from(plant.tip_m()));
+        let tip_m = pose.tip_mm().as_dvec3() * 1e-3;
+        let distance = tip_m.distance(DVec3::from(plant.tip_m()));
         // Half a count of each axis: 12, 15 and 12 µm at home, more stretched out.
-        assert!(off < 45e-6, "{off:e} m at {q:?}");
+        assert!(distance < 45e-6, "{distance:e} m at {q:?}");
     }
 }
 

@@ -179,10 +179,10 @@ mod tests {
             .press(2.0, 1.0)
             .finish();
         assert_eq!(plan.target(0.0).position_mm, [1.0, 2.0, 18.0]);
-        let give = 1.0 / 0.5 + 1.0 / 0.3 + 1.0 / 2.0;
+        let compliance_mm_per_n = 1.0 / 0.5 + 1.0 / 0.3 + 1.0 / 2.0;
         let [x, y, z] = plan.end_mm();
         assert_eq!((x, y), (1.0, 2.0));
-        assert!((z - (10.0 - 2.0 * give)).abs() < 1e-9);
+        assert!((z - (10.0 - 2.0 * compliance_mm_per_n)).abs() < 1e-9);
     }
 
     #[test]

@@ -164,10 +164,10 @@ impl TourPlan<'_> {
         let off = |axis: usize| (2.0 * place[axis] / self.size_mm[axis] - 1.0).abs();
         // The hand approaches at one end and taps at the other.
         let ends = [heights.first(), heights.last()];
-        let holes = ends.iter().flatten().filter(|height| height.is_none());
+        let unknown = ends.iter().flatten().filter(|height| height.is_none());
         10.0 * known(&heights) + relief
             - 0.2 * off(0).max(off(1))
-            - 4.0 * holes.count() as f64
+            - 4.0 * unknown.count() as f64
             - 30.0 * self.beyond(&line, &heights)
     }
 }

@@ -94,11 +94,11 @@ struct Bar {
 impl Bar {
     /// Returns the longest round length within its share of a map's width, mm.
     fn of(width_mm: f64, metres_per_mm: f64) -> Self {
-        let most = BAR_SHARE * width_mm * metres_per_mm;
-        let power = 10f64.powf(most.log10().floor());
+        let max_m = BAR_SHARE * width_mm * metres_per_mm;
+        let power = 10f64.powf(max_m.log10().floor());
         let digit = [5.0, 2.0, 1.0]
             .into_iter()
-            .find(|digit| digit * power <= most);
+            .find(|digit| digit * power <= max_m);
         let metres = digit.unwrap_or(1.0) * power;
         Self {
             metres,

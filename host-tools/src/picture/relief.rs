@@ -145,8 +145,8 @@ impl PixelHeights {
             window.width / f64::from(columns),
             window.height / f64::from(rows),
         ];
-        let wanted = (step[0] / surface.cell_mm).ceil().max(1.0);
-        let samples = (wanted as u32).min(MAX_SAMPLES);
+        let cells = (step[0] / surface.cell_mm).ceil().max(1.0);
+        let samples = (cells as u32).min(MAX_SAMPLES);
         let north = window.south + window.height;
         let heights = places(columns, rows, 1).map(|(x, y)| {
             let west = window.west + f64::from(x) * step[0];
@@ -307,9 +307,9 @@ mod tests {
 
     #[test]
     fn work_is_bounded_by_the_picture_not_the_field() {
-        let asked = Cell::new(0u64);
+        let calls = Cell::new(0u64);
         let height = |x: f64, y: f64, _: f64| {
-            asked.set(asked.get() + 1);
+            calls.set(calls.get() + 1);
             Some(x.sin() + y.cos())
         };
         let field = Surface {
@@ -318,7 +318,7 @@ mod tests {
             cell_mm: 1.0,
         };
         shade(&field, &MapView::whole(field.size_mm), 200, 100);
-        assert!(asked.get() <= 200 * 100 * 9);
+        assert!(calls.get() <= 200 * 100 * 9);
     }
 
     #[test]

@@ -73,8 +73,8 @@ fn picture_shows_hip_and_proxy_on_map_and_profile() {
     let map = [HEADER_PX, heights];
     let profile = [heights, forces];
     for (color, part) in [(HIP, map), (PROXY, map), (HIP, profile), (PROXY, profile)] {
-        let seen = count(&canvas, color, part);
-        assert!(seen > 900, "{color:?} in rows {part:?}: {seen}");
+        let count = count(&canvas, color, part);
+        assert!(count > 900, "{color:?} in rows {part:?}: {count}");
     }
     assert!(count(&canvas, style::INK, [forces, bottom]) > 900);
     let empty = session(&[], [100.0, 90.0]).draw().expect("drawn");
@@ -85,17 +85,17 @@ fn picture_shows_hip_and_proxy_on_map_and_profile() {
 #[test]
 fn partial_map_is_located_on_the_terrain() {
     let samples = walk();
-    let stated: Vec<_> = (0..9)
+    let rows: Vec<_> = (0..9)
         .map(|i| (format!("fact {i}"), "value".to_owned()))
         .collect();
     let facts = GroundFacts {
         metres_per_mm: Some(2.0),
         place_of: &|east, north| format!("{east}, {north}"),
-        lines: &stated,
+        lines: &rows,
     };
     for size_mm in [[5000.0, 3000.0], [1000.0, 3000.0], [5000.0, 400.0]] {
         let picture = SessionPicture {
-            facts: &stated,
+            facts: &rows,
             ground: Some(facts),
             ..session(&samples, size_mm)
         };

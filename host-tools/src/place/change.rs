@@ -139,15 +139,15 @@ impl Hand {
     }
 
     /// Returns true if the terrain's cells at this place differ from the rendered ones
-    /// ([`HapticGrid::measured_anew`]).
+    /// ([`HapticGrid::remeasured_at`]).
     #[must_use]
     pub fn has_other_cell_size(&self, terrain: &Terrain<'_>) -> bool {
         let cell_mm = terrain.scale_of_level_0().cell_mm();
         let [east, north, _] = self.at_mm();
-        let anew = terrain
+        let remeasured = terrain
             .grid()
-            .measured_anew([east / cell_mm, north / cell_mm]);
-        anew.is_some()
+            .remeasured_at([east / cell_mm, north / cell_mm]);
+        remeasured.is_some()
     }
 }
 
@@ -186,10 +186,10 @@ impl Bounds {
         for change in changes {
             (placed_surface, at) = self.step(&mut grid, placed_surface, at, change)?;
         }
-        if let Some(anew) = grid.measured_anew(at) {
-            at = anew.of_ground(grid.to_ground(at));
-            placed_surface.view = placed_surface.view.measured_as(&anew)?;
-            grid = anew;
+        if let Some(remeasured) = grid.remeasured_at(at) {
+            at = remeasured.of_ground(grid.to_ground(at));
+            placed_surface.view = placed_surface.view.measured_as(&remeasured)?;
+            grid = remeasured;
         }
         placed_surface.view.level = match self.level {
             Some(level) => level,
@@ -288,7 +288,7 @@ fn hip_after(
 ) -> ([f64; 3], bool) {
     let cell_mm = after.scale_of_level_0().cell_mm();
     let [east, north] = at.map(|cells| cells * cell_mm);
-    let beside = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
+    let offset = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
     let cell_before_mm = before.scale_of_level_0().cell_mm();
     let place_before = [0, 1].map(|axis| at_mm[axis] / cell_before_mm);
     let (ground_before, before_is_known) = match hand.proxy_mm {
@@ -300,7 +300,7 @@ fn hip_after(
     let risen = ground_before
         .zip(ground_after)
         .map_or(0.0, |(before, after)| after - before);
-    let hip_mm = [east + beside(0), north + beside(1), hand.hip_mm[2] + risen];
+    let hip_mm = [east + offset(0), north + offset(1), hand.hip_mm[2] + risen];
     (hip_mm, before_is_known && after_is_known)
 }
 

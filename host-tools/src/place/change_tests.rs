@@ -102,9 +102,9 @@ fn zoom_keeps_ground_under_proxy_and_hip_depth() {
 
 #[test]
 fn level_follows_the_scale_unless_it_is_stated() {
-    for (stated, expected) in [(None, [0, 3, 0]), (Some(2), [2, 2, 2])] {
+    for (fixed_level, expected) in [(None, [0, 3, 0]), (Some(2), [2, 2, 2])] {
         let bench = Bench {
-            level: stated,
+            level: fixed_level,
             ..Bench::new()
         };
         bench.with(|terrain, bounds| {
@@ -183,7 +183,7 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
 fn refused_placement_change_names_the_bound() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
-        for (change, says) in [
+        for (change, expected) in [
             (PlacementChange::Zoom(2000.0), "no more detail"),
             (PlacementChange::Zoom(1e-3), "mm wide"),
             (PlacementChange::Zoom(-1.0), "not a valid factor"),
@@ -194,8 +194,8 @@ fn refused_placement_change_names_the_bound() {
             (PlacementChange::Stiffness(1e-4), "0.005"),
         ] {
             let refused = bounds.apply(terrain, &bounds.first, &[change], &hand);
-            let said = refused.err().expect("refused").to_string();
-            assert!(said.contains(says), "{change:?}: {said}");
+            let message = refused.err().expect("refused").to_string();
+            assert!(message.contains(expected), "{change:?}: {message}");
         }
     });
     // A terrain that is already too large may be made smaller.

@@ -188,11 +188,11 @@ impl Placement {
     /// Returns the placement over cells measured at another place, equally large on the ground and
     /// in device millimetres, so that scale and exaggeration stay. The caller then has to call
     /// [`Self::moved_to`].
-    pub(super) fn measured_as(self, anew: &HapticGrid<'_>) -> Result<Self, ScaleError> {
-        let cell_mm = self.scale.cell_mm() * self.as_large_as_in(anew);
+    pub(super) fn measured_as(self, grid: &HapticGrid<'_>) -> Result<Self, ScaleError> {
+        let cell_mm = self.scale.cell_mm() * self.as_large_as_in(grid);
         Ok(Self {
             scale: Scale::new(cell_mm, self.scale.height_mm_per_unit())?,
-            side_m: anew.side_m(),
+            side_m: grid.side_m(),
             ..self
         })
     }
@@ -212,14 +212,14 @@ impl Placement {
         home_mm: [f64; 3],
         (before, grid_before): (Scale, &HapticGrid<'_>),
     ) -> Self {
-        let laid = self.extent_mm.map(|mm| mm / before.cell_mm());
-        let laid = grid.around_sides_of(grid_before, laid);
+        let cells = self.extent_mm.map(|mm| mm / before.cell_mm());
+        let cells = grid.around_sides_of(grid_before, cells);
         let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
         let haptic = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
         Self {
             home_mm,
             home_ground: grid.to_ground(haptic),
-            extent_mm: laid.map(|cells| cells * self.scale.cell_mm()),
+            extent_mm: cells.map(|cells| cells * self.scale.cell_mm()),
             heights_mm: match higher.is_finite() {
                 true => self.heights_mm.map(|mm| mm * higher),
                 false => self.heights_mm,

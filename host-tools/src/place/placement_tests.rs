@@ -188,9 +188,9 @@ fn fit_fills_the_workspace_of_every_premium() {
                 };
                 let view = Placement::new(&grid, &reach, &options).expect(name);
                 let around_home = |spare: f64| {
-                    let (laid, heights) = (view.extent_mm, view.heights_mm);
-                    let low = [laid[0], laid[1], heights[0] - spare];
-                    let high = [laid[2], laid[3], heights[1] + spare];
+                    let (extent_mm, heights) = (view.extent_mm, view.heights_mm);
+                    let low = [extent_mm[0], extent_mm[1], heights[0] - spare];
+                    let high = [extent_mm[2], extent_mm[3], heights[1] + spare];
                     ReachBox {
                         low: [0, 1, 2].map(|axis| low[axis] - view.home_mm[axis]),
                         high: [0, 1, 2].map(|axis| high[axis] - view.home_mm[axis]),
@@ -596,11 +596,11 @@ fn place_in_another_reference_system_is_the_same_place() {
     let found = ground(degrees, web, Coordinates::Epsg(3857)).expect("there");
     assert!(near(found, lonlat, 1e-7), "{found:?}");
     let sides = [386_100.0, 3_790_050.0, 386_300.0, 3_790_200.0];
-    let laid = |coordinates| {
+    let extent_mm = |coordinates| {
         let (_, view) = placed(utm, &boxed(sides, coordinates)).expect("there");
         view.extent_mm
     };
-    let (own, other) = (laid(OWN), laid(Coordinates::Epsg(32611)));
+    let (own, other) = (extent_mm(OWN), extent_mm(Coordinates::Epsg(32611)));
     for side in 0..4 {
         assert!((own[side] - other[side]).abs() < 1e-2, "{own:?} {other:?}");
     }

@@ -307,16 +307,16 @@ mod tests {
                     found[3].max(north),
                 ];
             }
-            for (side, (found, stated)) in found.iter().zip(reach.sides_mm()).enumerate() {
+            for (side, (found, expected)) in found.iter().zip(reach.sides_mm()).enumerate() {
                 let outwards = if side < 2 {
-                    found - stated
+                    found - expected
                 } else {
-                    stated - found
+                    expected - found
                 };
                 let room = -reach.step_mm..3.0 * reach.step_mm;
                 assert!(
                     room.contains(&outwards),
-                    "side {side}: {found} and {stated}"
+                    "side {side}: {found} and {expected}"
                 );
             }
         }
@@ -367,8 +367,8 @@ mod tests {
     #[test]
     fn encoder_resolution_matches_the_docs() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());
-        for (found, stated) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
-            assert!((found / stated - 1.0).abs() < 0.01, "{found} for {stated}");
+        for (found, expected) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
+            assert!((found / expected - 1.0).abs() < 0.01, "{found} for {expected}");
         }
     }
 }

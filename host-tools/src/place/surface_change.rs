@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn refused_surface_change_states_the_accepted_range() {
-        for (change, says) in [
+        for (change, expected) in [
             (friction(0.5, 0.3), "at rest not less"),
             (friction(-0.1, 0.0), "from 0 to 10"),
             (friction(f32::NAN, 1.0), "from 0 to 10"),
@@ -198,8 +198,8 @@ mod tests {
             (texture(0.0, 1.0), "above 0"),
             (texture(0.01, 0.1), "from 0.25 to 100 mm"),
         ] {
-            let error = change.of(&SurfaceParams::PREMIUM, false).expect_err(says);
-            assert!(error.to_string().contains(says), "{error}");
+            let error = change.of(&SurfaceParams::PREMIUM, false).expect_err(expected);
+            assert!(error.to_string().contains(expected), "{error}");
         }
     }
 

@@ -198,7 +198,7 @@ impl<'t> ServedSession<'_, 't> {
         if !self.session.has_line()
             && let Ok(line) = (self.connect)()
         {
-            self.session.go_over(line);
+            self.session.switch_line(line);
         }
         match self.has_greeted {
             true => self.session.close(on),

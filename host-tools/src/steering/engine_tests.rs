@@ -10,15 +10,15 @@ use heightfield::Raster;
 
 const ZOOM: Steer = Steer::Change(PlacementChange::Zoom(2.0));
 
-/// Runs `look` on an engine over a plane, at 1 mm a cell.
-fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
+/// Runs `test` on an engine over a plane, at 1 mm a cell.
+fn with<T>(test: impl FnOnce(&mut Steering<'_>) -> T) -> T {
     with_raster(
         &Raster::from_fn(65, 65, |x, _| x as f32).expect("raster"),
-        look,
+        test,
     )
 }
 
-fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
+fn with_raster<T>(raster: &Raster, test: impl FnOnce(&mut Steering<'_>) -> T) -> T {
     let options = PlacementOptions {
         sizing: Sizing::CellMm(1.0),
         ..PlacementOptions::default()
@@ -35,7 +35,7 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
         level: None,
         tip_mm: 0.0,
     };
-    look(&mut Steering::new(bounds, terrain.clone()))
+    test(&mut Steering::new(bounds, terrain.clone()))
 }
 
 fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
@@ -49,7 +49,7 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 
 /// Returns the last request to the clutch.
 fn requested_hold(steering: &mut Steering<'_>) -> Option<ClutchHold> {
-    steering.requests().into_iter().rev().find_map(|ask| match ask {
+    steering.requests().into_iter().rev().find_map(|request| match request {
         HostRequest::Request(Request::Clutch { hold }) => Some(hold),
         _ => None,
     })
@@ -126,8 +126,8 @@ fn unopened_clutch_or_silent_device_times_out() {
                 answer(steering, hold);
                 samples(steering, Limits::CLUTCH_MOVES, MAX_SAMPLES_TO_OPEN as usize + 1);
             } else {
-                let ask = HostRequest::Request(Request::Clutch { hold });
-                steering.on_event(&Event::Unanswered(&ask));
+                let request = HostRequest::Request(Request::Clutch { hold });
+                steering.on_event(&Event::Unanswered(&request));
             }
             let reported = steering.lines();
             assert!(
@@ -232,11 +232,11 @@ fn far_clutch_motion_measures_cells_again() {
             let sample = sample_at(steering, north_mm, limits);
             steering.on_event(&Event::Sample(&sample));
             let requested_hold = requested_hold(steering);
-            let wanted = match by_input {
+            let expected = match by_input {
                 true => (north_mm > 1.0).then_some(ClutchHold::InPlace),
                 false => Some(ClutchHold::WithHand),
             };
-            assert_eq!(requested_hold, wanted);
+            assert_eq!(requested_hold, expected);
             if let Some(hold) = requested_hold {
                 answer(steering, hold);
             }

@@ -218,8 +218,8 @@ fn read_lines(
             let read = input.by_ref().take(MAX).read_line(&mut line);
             let is_whole = line.ends_with('\n') || (line.len() as u64) < MAX;
             // After a cut line, the rest has no meaning.
-            let goes_on = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
-            if !goes_on || !is_whole {
+            let is_accepted = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
+            if !is_accepted || !is_whole {
                 break;
             }
         }

@@ -86,7 +86,7 @@ mod tests {
     use hapterra_core::scene::{SceneChange, Source};
     use heightfield::Raster;
 
-    fn with(look: impl for<'t> FnOnce(Placements<'t>, Terrain<'t>, PlacedSurface)) {
+    fn with(test: impl for<'t> FnOnce(Placements<'t>, Terrain<'t>, PlacedSurface)) {
         let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
         let options = PlacementOptions::default();
         let grid = options.target.grid(&raster, Default::default());
@@ -96,7 +96,7 @@ mod tests {
         let terrain = view.terrain(grid).expect("a terrain");
         let params = SurfaceParams::PREMIUM;
         let views = Placements::new(terrain.clone());
-        look(views, terrain, PlacedSurface { view, params });
+        test(views, terrain, PlacedSurface { view, params });
     }
 
     fn of(view: u8) -> TickRecord {

@@ -133,7 +133,7 @@ impl<'r> HapticGrid<'r> {
     ///
     /// Returns `None` if the cells agree, or if there would be too many square cells to count.
     #[must_use]
-    pub fn measured_anew(&self, haptic: [f64; 2]) -> Option<Self> {
+    pub fn remeasured_at(&self, haptic: [f64; 2]) -> Option<Self> {
         let last = self.last();
         let inside = [0, 1].map(|axis| haptic[axis].clamp(0.0, last[axis]));
         let ground = self.to_ground(inside);
@@ -141,10 +141,10 @@ impl<'r> HapticGrid<'r> {
         if is_alike(&now, &there) {
             return None;
         }
-        let anew = Self::at(self.raster, self.cells, ground);
-        let anew = anew.with_materials(self.materials).with_tip(self.tip_mm);
-        let anew = anew.with_wait(self.wait);
-        (self.cells == HapticCells::Stored || !anew.is_distorted()).then_some(anew)
+        let remeasured = Self::at(self.raster, self.cells, ground);
+        let remeasured = remeasured.with_materials(self.materials).with_tip(self.tip_mm);
+        let remeasured = remeasured.with_wait(self.wait);
+        (self.cells == HapticCells::Stored || !remeasured.is_distorted()).then_some(remeasured)
     }
 
     /// Returns true if the grid has the same samples as another over the same raster.

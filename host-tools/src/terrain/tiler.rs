@@ -420,8 +420,8 @@ impl<'r> Terrain<'r> {
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
         // A patch with no-data at one corner is no-data.
-        let holes = south.iter().chain(&north).any(|h| h.is_nan());
-        (!holes).then(|| mix([mix(south, u), mix(north, u)], v))
+        let has_no_data = south.iter().chain(&north).any(|h| h.is_nan());
+        (!has_no_data).then(|| mix([mix(south, u), mix(north, u)], v))
     }
 
     /// Returns true if the tile exists.

@@ -190,11 +190,11 @@ impl<'t> ViewFeed<'t> {
         let keeps_tiles = picture.terrain.has_tiles_of(&self.terrain);
         // Combines this placement with one that was not sent to the viewer.
         let before = self.scene_due.as_ref();
-        let all_keep = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
+        let keeps_all = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
         self.tiles.change_placement(keeps_tiles, picture.terrain.parts());
         self.terrain = picture.terrain.clone();
         let scene = Scene {
-            keeps_tiles: all_keep,
+            keeps_tiles: keeps_all,
             tick: self.tick.clone(),
             ..picture.scene()
         };

@@ -32,9 +32,9 @@ pub enum Choice<'p> {
 /// [`UpdateError::Nothing`] and [`UpdateError::Several`], which names them.
 pub fn choose<'p>(connected_devices: &'p [ConnectedDevice], serial: Option<&str>) -> Result<Choice<'p>, UpdateError> {
     let fits = |device: &&ConnectedDevice| {
-        serial.is_none_or(|wanted| {
+        serial.is_none_or(|requested| {
             let serial = device.serial.as_deref();
-            serial.is_some_and(|serial| serial.eq_ignore_ascii_case(wanted))
+            serial.is_some_and(|serial| serial.eq_ignore_ascii_case(requested))
         })
     };
     let mut fitting = connected_devices.iter().filter(fits);

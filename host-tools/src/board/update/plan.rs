@@ -39,15 +39,15 @@ impl Plan {
     pub fn new(board: &Board, image: &Image, layout: &Layout) -> Result<Self, UpdateError> {
         let memories = image.memories;
         let expected = (memories.flash, memories.page_bytes, memories.flash_bytes);
-        let stated = (
+        let found = (
             layout.start,
             layout.page_bytes,
             layout.page_bytes * layout.pages,
         );
-        if stated != expected {
+        if found != expected {
             return Err(UpdateError::OtherChip {
                 board: board.name,
-                stated: layout.stated.clone(),
+                description: layout.description.clone(),
             });
         }
         let mut pages = pages(image, &memories)?;

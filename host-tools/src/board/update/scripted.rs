@@ -130,8 +130,8 @@ impl Scripted {
     }
 
     fn count(&mut self) -> io::Result<()> {
-        let has_gone = matches!(self.operations.last(), Some(FlashOperation::Started(_)));
-        if has_gone || self.faults.disconnected_after.is_some_and(|n| self.requests >= n) {
+        let has_started = matches!(self.operations.last(), Some(FlashOperation::Started(_)));
+        if has_started || self.faults.disconnected_after.is_some_and(|n| self.requests >= n) {
             return Err(io::Error::new(io::ErrorKind::NotConnected, "unplugged"));
         }
         self.requests += 1;

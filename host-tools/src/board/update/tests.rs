@@ -191,8 +191,8 @@ fn check_disconnect(rom: &'static Rom, image: &Image, disconnected_after: usize,
         assert!(disconnected_after + 1 == all, "{at}");
         return;
     };
-    let gone = matches!(failure.error, UpdateError::Disconnected { .. });
-    assert!(gone, "{at}: {failure:?}");
+    let is_disconnected = matches!(failure.error, UpdateError::Disconnected { .. });
+    assert!(is_disconnected, "{at}: {failure:?}");
     let erased = !device.operations.is_empty();
     assert!(failure.erased || !erased, "{at}: it was touched");
     let vectors = &device.flash[..rom.word];
@@ -240,27 +240,27 @@ fn loader_failure_aborts_update_and_names_the_reason() {
         let (_, done) = try_update(Scripted::new(&G474, faults), &image(&G474));
         done.expect_err("refused").error.to_string()
     };
-    let stated = refused(Faults {
+    let message = refused(Faults {
         stuck_page: Some(FLASH + 4096),
         ..Faults::default()
     });
     assert!(
-        stated.contains("erase a page") && stated.contains("cannot be erased"),
-        "{stated}"
+        message.contains("erase a page") && message.contains("cannot be erased"),
+        "{message}"
     );
-    let stated = refused(Faults {
+    let message = refused(Faults {
         protected: true,
         ..Faults::default()
     });
     assert!(
-        stated.contains("read back") && stated.contains("protected"),
-        "{stated}"
+        message.contains("read back") && message.contains("protected"),
+        "{message}"
     );
-    let stated = refused(Faults {
+    let message = refused(Faults {
         always_busy: true,
         ..Faults::default()
     });
-    assert!(stated.contains("did not finish"), "{stated}");
+    assert!(message.contains("did not finish"), "{message}");
 }
 
 /// Asserts that nothing was erased or written.

@@ -54,19 +54,19 @@ fn find_sign(
     axis: usize,
 ) -> Result<i8, Halt> {
     let current_a = current_a(record, axis);
-    let mut judged = Err(Finding::Unclear { motor: axis + 1 });
+    let mut sign = Err(Finding::Unclear { motor: axis + 1 });
     for _ in 0..MAX_ATTEMPTS {
         attendant.finish(Task::HoldLoosely)?;
         board.wait_for_rest(attendant)?;
         // The joints' positions also show the cause that a fault would report.
-        let mut gave = |current_a| jog(board, attendant, (axis, current_a, SIGN_JOG_MS), false);
-        let (plus, minus) = (gave(current_a)?.0, gave(-current_a)?.0);
-        judged = sign_from_motion(record, axis, plus, minus);
-        if !matches!(judged, Err(Finding::Unclear { .. })) {
+        let mut jog_once = |current_a| jog(board, attendant, (axis, current_a, SIGN_JOG_MS), false);
+        let (plus, minus) = (jog_once(current_a)?.0, jog_once(-current_a)?.0);
+        sign = sign_from_motion(record, axis, plus, minus);
+        if !matches!(sign, Err(Finding::Unclear { .. })) {
             break;
         }
     }
-    Ok(judged?)
+    Ok(sign?)
 }
 
 /// Runs a jog at the attendant's dead-man press. Returns the joints' motion, rad, and the jog fault
@@ -197,27 +197,27 @@ mod tests {
 
     const RECORD: Calibration = Calibration::PREMIUM_1_5;
 
-    fn judge(plus: [f64; 3], minus: [f64; 3]) -> Result<i8, Finding> {
+    fn sign_of_motor_2(plus: [f64; 3], minus: [f64; 3]) -> Result<i8, Finding> {
         sign_from_motion(&RECORD, 1, DVec3::from(plus), DVec3::from(minus))
     }
 
     #[test]
     fn each_motor_mistake_has_its_own_finding() {
-        assert_eq!(judge([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]), Ok(1));
+        assert_eq!(sign_of_motor_2([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]), Ok(1));
         let right = -1;
         let inverted = Err(Finding::InvertedMotor { motor: 2, right });
-        assert_eq!(judge([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]), inverted);
+        assert_eq!(sign_of_motor_2([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]), inverted);
         let swapped = Err(Finding::SwappedMotors { motor: 2, joint: 3 });
-        assert_eq!(judge([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]), swapped);
-        let none = judge([0.0, 0.000_1, 0.0], [0.000_1, 0.0, 0.0]);
+        assert_eq!(sign_of_motor_2([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]), swapped);
+        let none = sign_of_motor_2([0.0, 0.000_1, 0.0], [0.000_1, 0.0, 0.0]);
         assert!(matches!(none, Err(Finding::NoPush { motor: 2, .. })));
     }
 
     #[test]
     fn hand_motion_beyond_motor_motion_is_unclear() {
         let unclear = Err(Finding::Unclear { motor: 2 });
-        assert_eq!(judge([0.0, 0.03, 0.0], [0.0, 0.02, 0.0]), unclear);
-        assert_eq!(judge([0.02, 0.0, 0.0], [0.02, 0.0, 0.0]), unclear);
+        assert_eq!(sign_of_motor_2([0.0, 0.03, 0.0], [0.0, 0.02, 0.0]), unclear);
+        assert_eq!(sign_of_motor_2([0.02, 0.0, 0.0], [0.02, 0.0, 0.0]), unclear);
     }
 
     #[test]

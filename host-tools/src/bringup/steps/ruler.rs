@@ -36,7 +36,7 @@ pub(super) fn check(
     }
     board.wait_for_rest(attendant)?;
     let fit = fit_ratios(&record, &moves).map_err(Finding::Ruler)?;
-    judge(&record, &fit)?;
+    compare_with_record(&record, &fit)?;
     let found = fit.ratio;
     Ok(format!(
         "ratios {:.2} {:.2} {:.2} by the ruler, {:.2} {:.2} {:.2} in the record",
@@ -45,7 +45,7 @@ pub(super) fn check(
 }
 
 /// Compares the record with the fit.
-fn judge(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
+fn compare_with_record(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
     for joint in 0..3 {
         let sign = record.encoder_sign[joint];
         if f64::from(sign) != fit.sign[joint] {

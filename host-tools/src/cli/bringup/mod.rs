@@ -76,25 +76,25 @@ fn bring_up<A: Attendant>(
 ) -> Result<(), Failure> {
     let mut again_from = args.again_from;
     // A virtual arm's log is written on request only.
-    let mut kept = None;
+    let mut unsaved_log = None;
     loop {
         let mut control = ControlSession::open(connect(user)?, timeout)?;
         let path = log_path(args, &control)?;
-        let mut log = match (&path, kept.take()) {
+        let mut log = match (&path, unsaved_log.take()) {
             (Some(path), _) => Log::read(path)?,
-            (None, kept) => kept.unwrap_or_default(),
+            (None, unsaved_log) => unsaved_log.unwrap_or_default(),
         };
         if let Some(step) = again_from.take() {
             log.entries.retain(|entry| entry.step < step);
         }
-        let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
-        let ended = run_sequence(&mut control, user, &mut log, &mut keep);
+        let mut save = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
+        let ended = run_sequence(&mut control, user, &mut log, &mut save);
         if let Some(path) = &path {
             print_line(format!("log            {}", path.display()));
         }
         match (ended, control) {
             // The session ended with the board's power, so there is none to close.
-            (Ok(SequenceEnd::BoardPoweredOff), _) => kept = Some(log),
+            (Ok(SequenceEnd::BoardPoweredOff), _) => unsaved_log = Some(log),
             (Ok(SequenceEnd::Complete), control) => {
                 control.end()?;
                 break;

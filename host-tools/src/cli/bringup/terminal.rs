@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
-use crate::cli::terminal::questions::{ask, number};
+use crate::cli::terminal::questions::{prompt, number};
 use crate::cli::terminal::writer::print_line;
 use crate::link::DeviceAddress;
 
@@ -27,7 +27,7 @@ impl Attendant for UserAtTerminal {
 
     fn finish(&mut self, task: Task) -> Result<(), Stopped> {
         print_line(format!("  > {task}"));
-        ask("    press Enter when that is done (q stops)")
+        prompt("    press Enter when that is done (q stops)")
             .map(drop)
             .ok_or(Stopped)
     }
@@ -41,7 +41,7 @@ impl Attendant for UserAtTerminal {
     }
 
     fn confirm(&mut self, question: Question) -> Result<bool, Stopped> {
-        let answer = ask(&format!("  ? {question} [y/N]")).ok_or(Stopped)?;
+        let answer = prompt(&format!("  ? {question} [y/N]")).ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 

@@ -141,8 +141,8 @@ fn calibrate(
     control: &mut ControlSession<'_>,
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
-    let (begin, whence) = initial_record(args, control)?;
-    print_line(format!("begins with    {whence}"));
+    let (begin, source) = initial_record(args, control)?;
+    print_line(format!("begins with    {source}"));
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
@@ -178,7 +178,7 @@ fn calibrate(
 /// Returns the initial record and its source.
 fn initial_record(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
     let held = control.calibration()?;
-    let (mut record, whence) = match (&args.from, args.model, held) {
+    let (mut record, source) = match (&args.from, args.model, held) {
         (Some(path), _, _) => (file::read(path)?, path.display().to_string()),
         (None, Some(model), _) => (
             model.preset(),
@@ -203,7 +203,7 @@ fn initial_record(args: &Args, control: &mut ControlSession<'_>) -> Result<(Cali
     valid
         .map_err(|bad| format!("the record cannot be used: {bad}"))
         .or_hint("change it with --set NAME=VALUE")?;
-    Ok((record, whence))
+    Ok((record, source))
 }
 
 /// Activates the record on the device, and stores it there unless `--no-store` is given.

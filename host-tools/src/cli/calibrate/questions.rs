@@ -1,7 +1,7 @@
 //! The questions of a calibration, at a terminal or from a pipe whose lines are the answers.
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
-use crate::cli::terminal::questions::{ask, number};
+use crate::cli::terminal::questions::{prompt, number};
 use crate::cli::terminal::writer::{print_line, show};
 
 /// A user at a terminal.
@@ -25,7 +25,7 @@ impl Attendant for UserAtTerminal {
         print_line(
             "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down",
         );
-        ask("  press Enter when it is there (q stops)")
+        prompt("  press Enter when it is there (q stops)")
             .map(drop)
             .ok_or(Stopped)
     }
@@ -61,7 +61,7 @@ impl Attendant for UserAtTerminal {
         if self.yes {
             return Ok(true);
         }
-        let answer = ask("take this record? [y/N]").ok_or(Stopped)?;
+        let answer = prompt("take this record? [y/N]").ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 }

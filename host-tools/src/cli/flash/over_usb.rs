@@ -13,7 +13,7 @@ use crate::board::update::{
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
 use crate::cli::terminal::progress;
-use crate::cli::terminal::questions::ask;
+use crate::cli::terminal::questions::prompt;
 use crate::cli::terminal::writer::{self, print_line};
 use crate::link::{ControlSession, DeviceAddress, Usb};
 
@@ -70,7 +70,7 @@ fn confirm_loader(args: &Args, device: &ConnectedDevice) -> Result<(), Failure> 
         "loader         {serial} at {place}, as it was found"
     ));
     let question = format!("is this the {board} to write? [y/N]");
-    match ask(&question).as_deref() {
+    match prompt(&question).as_deref() {
         Some("y" | "Y" | "yes") => Ok(()),
         _ => Err(Failure::new(format!(
             "the loader {serial} at {place} could not be confirmed as the board to write"

@@ -143,10 +143,10 @@ impl Watch {
     }
 
     fn is_stuck(&self) -> bool {
-        let since = |asked: &Instant| asked.elapsed();
+        let since = |requests: &Instant| requests.elapsed();
         let is_deaf = !self.may_be_armed.is_subset(&self.leaving);
-        let mut asked = self.pressed.first().into_iter().chain(&self.input_ended);
-        is_deaf && asked.any(|asked| since(asked) > BLOCKED_AFTER)
+        let mut requests = self.pressed.first().into_iter().chain(&self.input_ended);
+        is_deaf && requests.any(|requests| since(requests) > BLOCKED_AFTER)
             || self.pressed.get(1).map(since) > Some(EXIT_TIMEOUT)
     }
 

@@ -112,7 +112,7 @@ impl Rectangle {
 
     /// Returns the edges in longitude and latitude.
     pub(super) fn lonlat(raster: &Raster) -> Option<Self> {
-        let way = match (raster.cell()?.unit, raster.reference_system()) {
+        let source = match (raster.cell()?.unit, raster.reference_system()) {
             _ if raster.reference_system_from() == Certainty::Assumed => Certainty::Assumed,
             (CellUnit::Degree, system) if system.is_none_or(ReferenceSystem::counts_lonlat) => {
                 raster.cell()?.certainty
@@ -124,7 +124,7 @@ impl Rectangle {
         Some(Self::new(
             raster.bounds_lonlat()?,
             "degree".into(),
-            way,
+            source,
             Some(globe),
         ))
     }

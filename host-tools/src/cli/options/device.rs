@@ -168,9 +168,9 @@ fn run_and_close<T>(
     mut control: ControlSession<'_>,
     run: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let stated = run(&mut control)?;
+    let result = run(&mut control)?;
     control.end()?;
-    Ok(stated)
+    Ok(result)
 }
 
 fn open_session<'t>(
@@ -206,8 +206,8 @@ mod tests {
             let image = image.map(Into::into);
             EmulatedBoard { image }
         };
-        let usual = DeviceChoice::Emulated(emulated(None));
-        assert_eq!("emulated".parse(), Ok(usual));
+        let default = DeviceChoice::Emulated(emulated(None));
+        assert_eq!("emulated".parse(), Ok(default));
         let named = VirtualDevice::Emulated(emulated(Some("a:b/c.elf")));
         assert_eq!("emulated:a:b/c.elf".parse(), Ok(named));
         assert_eq!("native".parse(), Ok(VirtualDevice::Native));

@@ -199,8 +199,8 @@ fn number(text: &str) -> Result<f64, String> {
 /// Parses the distance within which no-data is filled.
 fn fill(text: &str) -> Result<Fill, String> {
     let samples = text.trim().parse().ok();
-    let wanted = || format!("a whole number of samples from 1 to {}", Fill::MAX);
-    samples.and_then(Fill::within).ok_or_else(wanted)
+    let expected = || format!("a whole number of samples from 1 to {}", Fill::MAX);
+    samples.and_then(Fill::within).ok_or_else(expected)
 }
 
 /// Parses a unit of height, in metres.
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn invalid_input_setting_error_names_the_valid_form() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("bands=2", "band=2"),
             ("stored", "cells=stored"),
             ("gdal:=1", "gdal:NAME"),
@@ -285,7 +285,7 @@ mod tests {
             ("encoding=morse", "terrarium"),
         ] {
             let why = text.parse::<InputSetting>().expect_err(text);
-            assert!(why.contains(wanted), "{text}: {why}");
+            assert!(why.contains(expected), "{text}: {why}");
         }
     }
 

@@ -173,17 +173,17 @@ pub(in crate::cli) fn picture_lines(
         ),
     });
     if let Some(times) = view.exaggeration {
-        let stated = match (times - 1.0).abs() < 1e-9 {
+        let text = match (times - 1.0).abs() < 1e-9 {
             true => "true to scale".to_owned(),
             false => format!("× {}", short(times)),
         };
-        lines.push(("heights".to_owned(), stated));
+        lines.push(("heights".to_owned(), text));
     }
     let home = coordinates_in_words(file, view.home_ground);
     lines.push(("home position".to_owned(), home));
     if let Some([longitude, latitude]) = file.to_lonlat(view.home_ground) {
-        let stated = format!("{longitude:.5}, {latitude:.5}");
-        lines.push(("longitude, latitude".to_owned(), stated));
+        let text = format!("{longitude:.5}, {latitude:.5}");
+        lines.push(("longitude, latitude".to_owned(), text));
     }
     lines
 }
@@ -254,14 +254,14 @@ mod tests {
 
     #[test]
     fn lengths_are_printed_with_five_significant_digits() {
-        for (value, stated) in [
+        for (value, text) in [
             (10.9, "10.9"),
             (0.123_456_7, "0.12346"),
             (1234.567, "1234.6"),
             (400_000.0, "400000"),
             (5.0, "5"),
         ] {
-            assert_eq!(short(value), stated);
+            assert_eq!(short(value), text);
         }
     }
 }

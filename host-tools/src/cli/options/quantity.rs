@@ -113,12 +113,12 @@ impl Units {
     /// As [`Units::read`]; the quantity is out of range.
     pub fn read_within(&self, text: &str, range: [f64; 2]) -> Result<f64, String> {
         let value = self.read(text)?;
-        let [least, most] = range;
+        let [min, max] = range;
         let unit = self.default_unit();
-        (least..=most)
+        (min..=max)
             .contains(&value)
             .then_some(value)
-            .ok_or_else(|| format!("{} from {least} to {most} {unit}", self.name))
+            .ok_or_else(|| format!("{} from {min} to {max} {unit}", self.name))
     }
 
     /// Formats a quantity as on the command line.
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn invalid_unit_error_names_the_valid_ones() {
-        for (units, text, wanted) in [
+        for (units, text, part) in [
             (&STIFFNESS, "0.5N", "N/mm, N/m"),
             (&LENGTH, "2m", "mm, cm"),
             (&TIME, "soon", "s, ms, min, h"),
@@ -192,7 +192,7 @@ mod tests {
             (&ANGLE, "1 2deg", "deg"),
         ] {
             let why = units.read(text).expect_err(text);
-            assert!(why.contains(wanted), "{text}: {why}");
+            assert!(why.contains(part), "{text}: {why}");
         }
         let why = TIME.read_within("0.5s", [1.0, 60.0]).expect_err("short");
         assert_eq!(why, "a time from 1 to 60 s");

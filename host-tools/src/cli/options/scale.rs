@@ -81,15 +81,15 @@ mod tests {
 
     #[test]
     fn map_scales_are_parsed() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("5", MapScale::GroundMPerMm(5.0)),
             ("5m/mm", MapScale::GroundMPerMm(5.0)),
             ("0.25 km/mm", MapScale::GroundMPerMm(250.0)),
             ("1.5mm/cell", MapScale::CellMm(1.5)),
             ("0.1 mm/cell", MapScale::CellMm(0.1)),
         ] {
-            assert_eq!(text.parse(), Ok(wanted));
-            assert_eq!(wanted.to_string().parse(), Ok(wanted));
+            assert_eq!(text.parse(), Ok(expected));
+            assert_eq!(expected.to_string().parse(), Ok(expected));
         }
         for bad in [
             "",

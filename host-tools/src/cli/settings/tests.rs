@@ -98,7 +98,7 @@ fn settings_file_may_contain_a_surface() {
 
 #[test]
 fn errors_name_file_and_line() {
-    for (text, wanted) in [
+    for (text, expected) in [
         (
             "tip = 2\nscales = 3\n",
             "line 2: no command has an option --scales",
@@ -113,7 +113,7 @@ fn errors_name_file_and_line() {
         ("at = \"1,2\"\nbbox = \"1,2,3,4\"\n", "cannot be used with"),
     ] {
         let why = completed(text, "run t.tif").expect_err(text);
-        assert!(why.contains(wanted), "{text}: {why}");
+        assert!(why.contains(expected), "{text}: {why}");
     }
 }
 

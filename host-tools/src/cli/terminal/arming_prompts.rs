@@ -187,8 +187,8 @@ impl ArmingPrompts {
                 return self.prompt_for_enter(report.blockers);
             }
         }
-        let news = |r: &Report| (r.mode, r.fault, r.blockers);
-        if before.as_ref().map(news) == Some(news(report)) {
+        let state = |r: &Report| (r.mode, r.fault, r.blockers);
+        if before.as_ref().map(state) == Some(state(report)) {
             return;
         }
         let was = before.and_then(|before| before.fault);
@@ -397,8 +397,8 @@ mod tests {
         assert!(prompts.lines().join("\n").contains("EncoderJump"));
         press.send(()).expect("listening");
         let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
-        assert_eq!(prompts.requests(), wanted);
+        let expected = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
+        assert_eq!(prompts.requests(), expected);
     }
 
     #[test]
@@ -517,7 +517,7 @@ mod tests {
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
         let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
-        assert_eq!(prompts.requests(), wanted);
+        let expected = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
+        assert_eq!(prompts.requests(), expected);
     }
 }

@@ -14,8 +14,8 @@ pub fn report<'p>(files: impl IntoIterator<Item = &'p Path>) {
 
 /// Returns two lines for each partial file of `file`.
 fn lines(file: &Path) -> Vec<String> {
-    let found = partial_files(file).into_iter().flat_map(|left| {
-        let (path, bytes) = (left.path.display(), left.bytes);
+    let found = partial_files(file).into_iter().flat_map(|partial| {
+        let (path, bytes) = (partial.path.display(), partial.bytes);
         [
             format!(
                 "note: {path} ({bytes} bytes) is what a command that was killed had written of {}",

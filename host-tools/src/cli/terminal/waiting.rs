@@ -98,14 +98,14 @@ mod tests {
             blocks.set(blocks.get() + 10);
             waits.get() < 4
         };
-        let mut stated = vec![];
+        let mut lines = vec![];
         in_lines(
             || format!("{} of 40", blocks.get()),
             should_continue,
-            |line| stated.push(line),
+            |line| lines.push(line),
         );
         assert_eq!(
-            stated,
+            lines,
             ["10 of 40 (1 s)", "20 of 40 (4 s)", "30 of 40 (7 s)"]
         );
         in_lines(String::new, |_| false, |line| panic!("{line}"));

@@ -56,11 +56,11 @@ fn rows_a_tick_apart_are_ticks_bit_for_bit() {
         &|row| format!("{}", row as f32 / 1000.0),
         &|row| format!("{:.6}", f64::from(row) * 1e-3 + 0.000_000_4),
     ];
-    for (way, write) in write.iter().enumerate() {
+    for (variant, write) in write.iter().enumerate() {
         let times: Vec<_> = (0..5_000).map(write).collect();
         let rows: Vec<_> = (0..).zip(&times).map(|(row, t)| (&t[..], x(row))).collect();
         let ticks = by_time(&rows).expect("ticks");
-        assert_eq!(ticks.len(), rows.len(), "{way}");
+        assert_eq!(ticks.len(), rows.len(), "{variant}");
         for ((t, place), row) in ticks.iter().zip(&rows) {
             let written: f64 = row.0.parse().expect("a time");
             assert_eq!(
@@ -214,8 +214,8 @@ fn impossible_times_are_errors() {
             "line 3, column t_s: the HIP moves during a gap",
         ),
     ] {
-        let stated = by_time(rows).expect_err("is wrong");
-        assert!(stated.contains(expected), "{rows:?}: {stated}");
+        let message = by_time(rows).expect_err("is wrong");
+        assert!(message.contains(expected), "{rows:?}: {message}");
     }
 }
 
@@ -320,9 +320,9 @@ fn recording_rows_are_whole_ticks_apart() {
     ] {
         match recorded(rows, tick_hz) {
             Ok(ticks) => assert_eq!((ticks.len(), expected), (4, "")),
-            Err(stated) => assert!(
-                !expected.is_empty() && stated.contains(expected),
-                "{stated}"
+            Err(message) => assert!(
+                !expected.is_empty() && message.contains(expected),
+                "{message}"
             ),
         }
     }
@@ -331,10 +331,10 @@ fn recording_rows_are_whole_ticks_apart() {
         .map(|row| (f64::from(row) * 1.003e-3).to_string())
         .collect();
     let rows: Vec<_> = times.iter().map(|t| (&t[..], 0.0)).collect();
-    let stated = recorded(&rows, 1000).expect_err("drifts");
+    let message = recorded(&rows, 1000).expect_err("drifts");
     assert!(
-        stated.contains("line 6, column t_s: 0.004012 s"),
-        "{stated}"
+        message.contains("line 6, column t_s: 0.004012 s"),
+        "{message}"
     );
 }
 

@@ -65,11 +65,11 @@ fn earlier_state_names_are_updated() {
     let text = "t_s,x_mm,y_mm,z_mm,contact,state\n0,1,2,3,0,waiting\n1,1,2,3,0,letting go\n2,1,2,3,0,unseeded\n3,1,2,3,0,free\n";
     std::fs::write(&path, text).expect("written");
     let read = RecordedColumns::read(&path).expect("a recording");
-    let wanted = ["unseeded", "releasing", "unseeded", "free"].map(String::from);
+    let states = ["unseeded", "releasing", "unseeded", "free"].map(String::from);
     let last = read.columns.last();
     assert_eq!(
         last,
-        Some(&("state".into(), ColumnValues::Texts(wanted.into())))
+        Some(&("state".into(), ColumnValues::Texts(states.into())))
     );
 }
 

@@ -161,8 +161,8 @@ impl SurfaceOptions {
         for (line, entry) in std::iter::once((*line, entry)).chain(of_classes) {
             self.check_stiffness(entry, (file, line))?;
         }
-        let usual = Material::of(&SurfaceParams::PREMIUM);
-        let mut default = over(&usual, entry, (file, *line, "the default"))?;
+        let material = Material::of(&SurfaceParams::PREMIUM);
+        let mut default = over(&material, entry, (file, *line, "the default"))?;
         if let Some(stiffness) = self.stiffness {
             default.stiffness_n_per_mm = stiffness;
         }
@@ -209,13 +209,13 @@ impl SurfaceOptions {
         entry: &MaterialEntry,
         (file, line): (&Path, usize),
     ) -> Result<(), Failure> {
-        let most = STIFFEST_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
-        let Some(stiffness) = entry.stiffness.filter(|asked| *asked > most) else {
+        let max = STIFFEST_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
+        let Some(stiffness) = entry.stiffness.filter(|stiffness| *stiffness > max) else {
             return Ok(());
         };
         let place = format!("{}, line {line}:", file.display());
         Err(Failure::new(format!(
-            "a stiffness of {stiffness} N/mm: a table may ask for {most} N/mm at most"
+            "a stiffness of {stiffness} N/mm: a table may ask for {max} N/mm at most"
         ))
         .hint(format!(
             "if you trust the table, say --stiffness {stiffness}"

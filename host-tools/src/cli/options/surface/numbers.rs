@@ -67,9 +67,9 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
         ..Damping::NONE
     };
     if !damping.is_valid() {
-        let (damping, most) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
+        let (damping, max) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
         return Err(format!(
-            "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
+            "a damping of {damping} N·s/m: damping from 0 to {max} N·s/m"
         ));
     }
     let stiffness = material.stiffness_n_per_mm;

@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn table_error_names_its_line() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("[default]\nfrictoin = 1\n", ["line 2", "frictoin"]),
             ("[class.10]\n\n[class.trees]\n", ["line 3", "whole number"]),
             ("[class.10]\n[class.010]\n", ["line 1", "class 10"]),
@@ -280,7 +280,7 @@ mod tests {
         ] {
             let why = read(text).expect_err(text);
             assert!(
-                wanted.iter().all(|part| why.contains(part)),
+                expected.iter().all(|part| why.contains(part)),
                 "{text}: {why}"
             );
         }

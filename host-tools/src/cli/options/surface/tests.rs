@@ -53,7 +53,7 @@ fn scene_has_shading_and_passivity() {
 
 #[test]
 fn numbers_that_no_surface_has_are_refused_with_class_and_line() {
-    for (text, wanted) in [
+    for (text, expected) in [
         (
             "\n[class.7]\nfriction = -1\n",
             "line 2, class 7: a friction of -1",
@@ -73,45 +73,45 @@ fn numbers_that_no_surface_has_are_refused_with_class_and_line() {
         ),
     ] {
         let why = load(SurfaceOptions::default(), text).expect_err(text);
-        assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
+        assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
 }
 
 #[test]
 fn options_that_no_surface_has_are_refused() {
-    let usual = SurfaceOptions::default;
-    for (options, wanted) in [
+    let default = SurfaceOptions::default;
+    for (options, expected) in [
         (
             SurfaceOptions {
                 friction: Some(-0.1),
-                ..usual()
+                ..default()
             },
             "a friction of -0.1",
         ),
         (
             SurfaceOptions {
                 friction: Some(f32::NAN),
-                ..usual()
+                ..default()
             },
             "a friction of NaN",
         ),
         (
             SurfaceOptions {
                 stiffness: Some(-1.0),
-                ..usual()
+                ..default()
             },
             "a stiffness of -1",
         ),
         (
             SurfaceOptions {
                 max_force: Some(-1.0),
-                ..usual()
+                ..default()
             },
             "force of -1",
         ),
     ] {
-        let why = options.load().map(|it| it.params).expect_err(wanted).text();
-        assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
+        let why = options.load().map(|it| it.params).expect_err(expected).text();
+        assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
 }
 
@@ -197,13 +197,13 @@ fn raster_or_classes_alone_are_refused() {
     };
     assert_eq!(with(None, None), Ok(false));
     assert_eq!(with(None, Some("[default]\nfriction = 0.1")), Ok(false));
-    for (materials, text, wanted) in [
+    for (materials, text, expected) in [
         (Some("c.tif"), None, "--surface FILE.toml"),
         (None, Some("[class.1]"), "--materials"),
         (Some("no/c.tif"), Some("[class.1]"), "no/c.tif"),
     ] {
         let why = with(materials, text).expect_err("one alone");
-        assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
+        assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
     let options = SurfaceOptions {
         surface: Some(SurfaceChoice::File("no/t.toml".into())),

@@ -56,14 +56,14 @@ pub(super) fn texture(entry: &MaterialEntry, default: &Texture) -> Result<Textur
 
 /// Returns the name of the first stated number.
 fn first_number(entry: &MaterialEntry) -> Option<&'static str> {
-    let stated = [
+    let numbers = [
         (entry.texture_amplitude.is_some(), "texture_amplitude"),
         (entry.texture_wavelength.is_some(), "texture_wavelength"),
         (entry.texture_direction.is_some(), "texture_direction"),
         (entry.texture_seed.is_some(), "texture_seed"),
     ];
-    let mut stated = stated.into_iter().filter(|(is_stated, _)| *is_stated);
-    stated.next().map(|(_, name)| name)
+    let mut numbers = numbers.into_iter().filter(|(is_stated, _)| *is_stated);
+    numbers.next().map(|(_, name)| name)
 }
 
 /// Returns a texture if its numbers can be felt and rendered.
@@ -80,10 +80,10 @@ fn checked(texture: Texture) -> Result<Texture, String> {
             "a texture with a wavelength of {wavelength} mm: texture_wavelength from {shortest}, a few encoder counts, to {longest} mm"
         ));
     }
-    let most = (wavelength * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
-    if !(amplitude > 0.0 && amplitude <= most) {
+    let max = (wavelength * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
+    if !(amplitude > 0.0 && amplitude <= max) {
         return Err(format!(
-            "a texture of {amplitude} mm with a wavelength of {wavelength} mm: texture_amplitude above 0 and up to {most} mm, which is an eighth of the wavelength, and {} mm at most",
+            "a texture of {amplitude} mm with a wavelength of {wavelength} mm: texture_amplitude above 0 and up to {max} mm, which is an eighth of the wavelength, and {} mm at most",
             Texture::MAX_AMPLITUDE_MM
         ));
     }
@@ -174,9 +174,9 @@ mod tests {
             (grating, [None, None, Some(f32::NAN)], "direction NaN°"),
             (grating, [None, None, Some(400.0)], "direction 400°"),
         ];
-        for (pattern, numbers, wanted) in bad {
-            let why = texture_with(pattern, numbers).expect_err(wanted);
-            assert!(why.contains(wanted) && why.contains(": "), "{why}");
+        for (pattern, numbers, expected) in bad {
+            let why = texture_with(pattern, numbers).expect_err(expected);
+            assert!(why.contains(expected) && why.contains(": "), "{why}");
         }
     }
 }
