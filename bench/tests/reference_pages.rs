@@ -202,7 +202,7 @@ fn faults_are_those_of_the_code() {
          A fault switches the amplifiers off. It stays until it is cleared: `hapterra status --clear`.\n\n"
     );
     for fault in Fault::ALL {
-        let (meaning, remedy) = (sentence(fault.meaning()), sentence(fault.remedy()));
+        let (meaning, remedy) = (sentence(fault.meaning()), sentence(fault.what_to_do()));
         item(
             &mut page,
             &format!("**{} {fault:?}**: {meaning} {remedy}", fault.number()),

@@ -15,13 +15,13 @@ use super::finding::Finding;
 use super::halt::Halt;
 use crate::link::{ControlSession, LinkError};
 
-/// Duration of a look, the interval of status requests, ms of the board's time.
+/// Interval of status requests, ms of the board's time.
 const STATUS_INTERVAL_MS: u32 = 100;
-/// Time limit for the board to detect a user's action, in looks.
+/// Time limit for the board to detect a user's action, in status requests.
 const MAX_POLLS: usize = 600;
-/// Looks within which a board must remove the force after a disarm command.
+/// Status requests within which a board must remove the force after a disarm command.
 const MAX_POLLS_TO_DISARM: usize = 20;
-/// Largest change between two looks of an encoder at rest.
+/// Largest change between two status requests of an encoder at rest.
 const STILL_COUNTS: u32 = 3;
 
 /// A board on the link.
@@ -57,7 +57,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(self.control.calibration()?)
     }
 
-    /// Returns the status after `STATUS_INTERVAL_MS` (one look), or as soon as `on` returns true for a sample.
+    /// Returns the status after `STATUS_INTERVAL_MS`, or as soon as `on` returns true for a sample.
     /// Sends the flat tiles that the board requests.
     ///
     /// # Errors
@@ -93,7 +93,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(passed?)
     }
 
-    /// Returns the status after one look; calls `on` for each sample.
+    /// Returns the status after one interval; calls `on` for each sample.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
@@ -104,7 +104,7 @@ impl<'d, 't> Board<'d, 't> {
         })
     }
 
-    /// Returns the status after one look.
+    /// Returns the status after one interval.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].

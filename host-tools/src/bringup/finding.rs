@@ -174,7 +174,7 @@ impl Finding {
     #[must_use]
     pub fn remedy(&self) -> String {
         match self {
-            Self::Fault(fault) => return fault.remedy().into(),
+            Self::Fault(fault) => return fault.what_to_do().into(),
             Self::InvertedMotor { motor, right } => {
                 return format!(
                     "exchange the motor's two wires, or type: hapterra calibrate --measure none --set motor-sign-{motor}={right}"

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Step (in order) ─▶ steps/ ─ asks ─▶ Attendant (a terminal, or a VirtualUser)
-//!                       │     looks, asks ─▶ Board (over the link)
+//!                       │     requests    ─▶ Board (over the link)
 //!                       ▼
 //!           result, or a Finding that names what is wrong ─▶ Log (TOML)
 //! ```

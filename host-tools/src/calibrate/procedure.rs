@@ -10,7 +10,7 @@ use super::review::Review;
 
 /// Distance of the move along the ruler, mm.
 const MOVE_MM: f64 = 80.0;
-/// Largest change between two looks of an encoder at rest.
+/// Largest change between two readings of an encoder at rest.
 const STILL_COUNTS: u32 = 3;
 /// Number of poses for the weight.
 const POSES: usize = 4;

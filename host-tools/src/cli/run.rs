@@ -37,7 +37,7 @@ use super::terminal::device_console::DeviceConsole;
 use super::terminal::shared_keyboard::{self, DeviceKeys};
 use super::terminal::writer::notify;
 use super::terminal::{interrupt, partial_files};
-use super::viewing::{ToBeShown, Viewing};
+use super::viewing::{PreparedViewer, Viewing};
 use crate::output::check_distinct;
 use crate::steering::keys::KEYS;
 use devices::{OneDevice, ServedDevice};
@@ -46,7 +46,7 @@ use session::{Serving, recording};
 use together::serve_each;
 
 /// Maximum stiffness that `hapterra-lab stability` tests by default, N/mm.
-const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
+const MAX_TESTED_N_PER_MM: f32 = 20.0;
 
 /// Hint for a recording that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
@@ -180,15 +180,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .map_err(|failure| failure.about(device.device_console.name()))
     })?;
     // The coarse levels are read before any device is armed. A viewer shows one device.
-    let shown = viewer
+    let viewer = viewer
         .zip(placed.first())
-        .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &name));
+        .map(|(program, of)| PreparedViewer::new(program, of.terrain, &of.view, &name));
     raster.check_complete()?;
     materials
         .as_ref()
         .map_or(Ok(()), |it| it.classes().check_complete())?;
     // No read of terrain may wait while an arm may be armed.
-    let mut shown = shown.map(ToBeShown::non_blocking);
+    let mut viewer = viewer.map(PreparedViewer::non_blocking);
     let terrains: Vec<_> = placed.iter().map(|of| of.terrain.non_blocking()).collect();
     let placed: Vec<_> = (placed.into_iter().zip(&terrains))
         .map(|(placed, terrain)| Placed { terrain, ..placed })
@@ -210,7 +210,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             recording,
             commands,
             device_keys: device_keys.next(),
-            shown: shown.take(),
+            viewer: viewer.take(),
             events,
         },
     );
@@ -221,11 +221,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// Checks that a stiffness is plausible for an arm.
 fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
-    if n_per_mm <= STIFFEST_TRIED_N_PER_MM {
+    if n_per_mm <= MAX_TESTED_N_PER_MM {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "a stiffness of {n_per_mm} N/mm: no arm renders more than {STIFFEST_TRIED_N_PER_MM} N/mm"
+        "a stiffness of {n_per_mm} N/mm: no arm renders more than {MAX_TESTED_N_PER_MM} N/mm"
     ))
     .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }

@@ -145,8 +145,8 @@ pub struct Client<'t> {
 
 /// The served terrain: the borrowed one, or the one of a scene change.
 enum ServedTerrain<'t> {
-    Whole(&'t Terrain<'t>),
-    SceneChange(Box<Terrain<'t>>),
+    Borrowed(&'t Terrain<'t>),
+    Changed(Box<Terrain<'t>>),
 }
 
 impl<'t> Deref for ServedTerrain<'t> {
@@ -154,8 +154,8 @@ impl<'t> Deref for ServedTerrain<'t> {
 
     fn deref(&self) -> &Terrain<'t> {
         match self {
-            Self::Whole(terrain) => terrain,
-            Self::SceneChange(terrain) => terrain,
+            Self::Borrowed(terrain) => terrain,
+            Self::Changed(terrain) => terrain,
         }
     }
 }
@@ -183,7 +183,7 @@ impl<'t> Client<'t> {
         seed: u64,
     ) -> Self {
         Self {
-            terrain: ServedTerrain::Whole(terrain),
+            terrain: ServedTerrain::Borrowed(terrain),
             next: None,
             scene,
             arming,
@@ -288,7 +288,7 @@ impl<'t> Client<'t> {
                 self.scene = view.scene;
                 self.awaited.clear();
                 self.prefetch.forget();
-                self.terrain = ServedTerrain::SceneChange(Box::new(terrain));
+                self.terrain = ServedTerrain::Changed(Box::new(terrain));
             }
             on(Event::SceneChangeResult { view: &view, accepted });
         }

@@ -20,7 +20,7 @@ pub struct Tcp {
 /// gone.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// The shortest time-out: a socket rejects zero.
-const AT_LEAST: Duration = Duration::from_micros(1);
+const MIN_WAIT: Duration = Duration::from_micros(1);
 
 impl Tcp {
     /// Connects to `HOST:PORT`.
@@ -77,7 +77,7 @@ impl Transport for Tcp {
     }
 
     fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
-        let wait = wait.max(AT_LEAST);
+        let wait = wait.max(MIN_WAIT);
         if wait != self.write_wait {
             self.stream.set_write_timeout(Some(wait))?;
             self.write_wait = wait;
@@ -89,7 +89,7 @@ impl Transport for Tcp {
     }
 
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let wait = wait.max(AT_LEAST);
+        let wait = wait.max(MIN_WAIT);
         if wait != self.wait {
             self.stream.set_read_timeout(Some(wait))?;
             self.wait = wait;

@@ -12,7 +12,7 @@ pub(super) struct MapView {
 /// Max finished pixels of a map.
 pub(super) const MAP_PX: (f64, f64) = (1096.0, 800.0);
 /// Share of the terrain's extent from which a path is shown on all of it.
-const WHOLE_SHARE: f64 = 0.55;
+const MIN_WHOLE_SHARE: f64 = 0.55;
 /// A terrain of at most this many cells in each direction is always shown whole.
 const SMALL_CELLS: f64 = 160.0;
 /// Margin around a path, as a share of its extent.
@@ -60,7 +60,7 @@ impl MapView {
         };
         let small = whole.width.max(whole.height) <= SMALL_CELLS * cell_mm;
         let far =
-            path.width > WHOLE_SHARE * whole.width || path.height > WHOLE_SHARE * whole.height;
+            path.width > MIN_WHOLE_SHARE * whole.width || path.height > MIN_WHOLE_SHARE * whole.height;
         if small || far {
             return whole.union(path);
         }

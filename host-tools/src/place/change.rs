@@ -78,12 +78,12 @@ pub enum ChangeError {
     },
     /// A stiffness outside the valid range, N/mm.
     #[error(
-        "a stiffness of {0:.3} N/mm: from {SOFTEST_N_PER_MM} to {STIFFEST_N_PER_MM} N/mm can be had"
+        "a stiffness of {0:.3} N/mm: from {MIN_STIFFNESS_N_PER_MM} to {MAX_STIFFNESS_N_PER_MM} N/mm can be had"
     )]
     Stiffness(f32),
     /// A stiffness of a material above the maximum, N/mm.
     #[error(
-        "the stiffest of the materials would have {0:.3} N/mm: up to {STIFFEST_N_PER_MM} N/mm can be had"
+        "the stiffest of the materials would have {0:.3} N/mm: up to {MAX_STIFFNESS_N_PER_MM} N/mm can be had"
     )]
     Material(f32),
     /// An invalid surface parameter.

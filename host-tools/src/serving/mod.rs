@@ -1,7 +1,7 @@
 //! A terrain served to a device, from the connection to a confirmed end.
 //!
 //! ```text
-//! Service (terrain, device) ─ open ─▶ Served ─ serve ─▶ End
+//! Service (terrain, device) ─ open ─▶ ServedSession ─ serve ─▶ End
 //!                                       │  ▲
 //!                       SessionHandler ◀┘  └─ connections, reopened when one is lost
 //! ```

@@ -27,7 +27,7 @@ pub struct Command {
 
 /// A line without a valid command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{line}` is no command ({why}); understood are: {UNDERSTOOD}")]
+#[error("`{line}` is no command ({why}); understood are: {KNOWN_COMMANDS}")]
 pub struct CommandError {
     line: String,
     why: &'static str,

@@ -56,7 +56,7 @@ impl Marks {
     pub fn mark(&mut self, text: String) -> Option<String> {
         if self.waiting.len() >= MAX_WAITING {
             return Some(format!(
-                "the mark `{text}` is left out: {WAITING} marks wait for the device"
+                "the mark `{text}` is left out: {MAX_WAITING} marks wait for the device"
             ));
         }
         self.waiting.push_back((text, host_unix_s()));

@@ -12,7 +12,7 @@ use super::super::halt::Halt;
 const COUNT_S: f64 = 10.0;
 /// Largest relative error of the tick rate: twice that of the chips' own oscillators.
 const MAX_RELATIVE_ERROR: f64 = 0.02;
-/// Looks within which the USB oscillator must lock; the board measures it once a second.
+/// Status requests within which the USB oscillator must lock; the board measures it once a second.
 const MAX_POLLS: usize = 30;
 
 /// Counts the ticks by the attendant's clock, and checks that the USB oscillator is locked. Returns

@@ -8,7 +8,7 @@ use crate::calibrate::Direction;
 /// Distance of the move, mm.
 const MOVE_MM: u16 = 80;
 /// Counts that a working encoder exceeds in this move.
-const ALIVE_COUNTS: u32 = 400;
+const MIN_LIVE_COUNTS: u32 = 400;
 /// Largest relative difference of forth and back: a hand returns to the zero pose no better.
 const MAX_LOSS_SHARE: f64 = 0.1;
 
@@ -42,15 +42,15 @@ fn check_joint(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Find
     let max_joint = (0..3).max_by_key(|i| there[*i].unsigned_abs());
     let max_joint = max_joint.unwrap_or(joint);
     let counts = there[joint];
-    let alive = counts.unsigned_abs() > ALIVE_COUNTS / 10;
-    if max_joint != joint && alive && there[max_joint].unsigned_abs() > ALIVE_COUNTS {
+    let is_live = counts.unsigned_abs() > MIN_LIVE_COUNTS / 10;
+    if max_joint != joint && is_live && there[max_joint].unsigned_abs() > MIN_LIVE_COUNTS {
         return Err(Finding::SwappedEncoders {
             joint: joint + 1,
             encoder: max_joint + 1,
         });
     }
     // A joint's encoder that does not count is dead, even if others count.
-    if counts.unsigned_abs() <= ALIVE_COUNTS {
+    if counts.unsigned_abs() <= MIN_LIVE_COUNTS {
         return Err(Finding::DeadEncoder {
             joint: joint + 1,
             counts,

@@ -13,7 +13,7 @@ use crate::bringup::finding::Finding;
 
 /// Distance of the scene's plane below the tip, mm: out of reach.
 const OUT_OF_REACH_MM: f32 = 1_000.0;
-/// Looks, of 0.1 s each, for which the tip is released.
+/// Status requests, 0.1 s apart, for which the tip is released.
 const MAX_POLLS: usize = 30;
 /// Largest drift of the tip in that time, mm.
 const MAX_DRIFT_MM: f64 = 20.0;

@@ -12,9 +12,9 @@ use crate::bringup::finding::Finding;
 const BELOW_MM: f32 = 20.0;
 /// Depth to which the tip must be pushed, mm.
 const DEEP_MM: f32 = 5.0;
-/// Largest increase of depth in a look while the tip is at rest, mm.
+/// Largest increase of depth between two status requests while the tip is at rest, mm.
 const STILL_MM: f32 = 0.1;
-/// Maximum looks, of 0.1 s each.
+/// Maximum status requests, 0.1 s apart.
 const MAX_POLLS: usize = 600;
 
 /// Contact with the plane.
@@ -26,7 +26,7 @@ struct PlaneContact {
     max_n: f32,
     /// Present force, N.
     now_n: f32,
-    /// Maximum depth until the last look, mm.
+    /// Maximum depth at the last status request, mm.
     polled_depth_mm: f32,
 }
 

@@ -21,7 +21,7 @@
 //!
 //! On systems other than Unix there is no guardian.
 //!
-//! [`BLOCKED_AFTER`]: process::DEAF
+//! [`BLOCKED_AFTER`]: process::BLOCKED_AFTER
 
 #[cfg(unix)]
 mod close;

@@ -6,7 +6,7 @@ use super::rendering::Rendering;
 use super::scale::MapScale;
 use crate::cli::failure::Failure;
 use crate::place::{
-    Coordinates, FELT_MM, PlaceError, Placement, PlacementOptions, Reach, Target,
+    Coordinates, CLEAR_RELIEF_MM, PlaceError, Placement, PlacementOptions, Reach, Target,
     coordinates_in_words, place_in_words,
 };
 use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};
@@ -124,7 +124,7 @@ pub(in crate::cli) fn reported(view: &Placement, terrain: &Terrain<'_>) -> Strin
     }
     let relief = view.heights_mm[1] - view.heights_mm[0];
     if relief > 0.0 && relief < FLAT_MM && view.exaggeration.is_some_and(|times| times == 1.0) {
-        let times = (FELT_MM / relief).round();
+        let times = (CLEAR_RELIEF_MM / relief).round();
         text += &format!(
             "relief         {relief:.2} mm in the hand; --exaggeration {times} makes it {:.0} mm\n",
             times * relief

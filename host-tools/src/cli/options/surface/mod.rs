@@ -17,7 +17,7 @@ use super::terrain_file::ReadingOptions;
 use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::{ClassMaterial, ClassMaterials, Materials};
 use crate::named_surfaces::{NAMED_SURFACES, NamedSurface};
-use crate::place::STIFFEST_N_PER_MM;
+use crate::place::MAX_STIFFNESS_N_PER_MM;
 use heightfield::{Raster, files_read_with};
 use numbers::{check, over, reported, rubbed};
 use table::{MaterialEntry, PassivityName, ShadingName, TableFile};
@@ -209,7 +209,7 @@ impl SurfaceOptions {
         entry: &MaterialEntry,
         (file, line): (&Path, usize),
     ) -> Result<(), Failure> {
-        let max = STIFFEST_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
+        let max = MAX_STIFFNESS_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
         let Some(stiffness) = entry.stiffness.filter(|stiffness| *stiffness > max) else {
             return Ok(());
         };
