@@ -80,7 +80,10 @@ mod tests {
     fn named_surfaces_can_be_rendered() {
         for NamedSurface { name, material } in NAMED_SURFACES {
             assert!(material.is_valid(), "{name}");
-            assert!(material.stiffness_n_per_mm <= MAX_STIFFNESS_N_PER_MM, "{name}");
+            assert!(
+                material.stiffness_n_per_mm <= MAX_STIFFNESS_N_PER_MM,
+                "{name}"
+            );
             let texture = &material.texture;
             let shortest_mm = Texture::shortest_mm(TickRate::default());
             assert!(

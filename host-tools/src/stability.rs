@@ -64,7 +64,11 @@ pub fn warn(params: &SurfaceParams, device: &DeviceHello) {
 
 /// As [`warn`], for a surface of several materials, once for each warning. The device sets its
 /// controller for the stiffest of them.
-pub fn warn_for_materials(params: &SurfaceParams, materials: Option<&MaterialTable>, device: &DeviceHello) {
+pub fn warn_for_materials(
+    params: &SurfaceParams,
+    materials: Option<&MaterialTable>,
+    device: &DeviceHello,
+) {
     let Some(table) = materials else {
         return warn(params, device);
     };
@@ -246,7 +250,10 @@ mod tests {
             [reported(0.3, 2000), reported(0.4, 1000)],
             [String::new(), String::new()]
         );
-        assert_eq!(fine_texture_warning(&Texture::NONE, TickRate::DEFAULT), None);
+        assert_eq!(
+            fine_texture_warning(&Texture::NONE, TickRate::DEFAULT),
+            None
+        );
     }
 
     #[test]

@@ -280,7 +280,10 @@ fn pipes_and_devices_are_refused_unopened() {
             .spawn();
         let output = end_of(child.expect("the binary starts"));
         let reported = String::from_utf8_lossy(&output.stderr);
-        assert!(reported.contains("a pipe (FIFO)"), "{arguments:?}: {reported}");
+        assert!(
+            reported.contains("a pipe (FIFO)"),
+            "{arguments:?}: {reported}"
+        );
     }
 }
 

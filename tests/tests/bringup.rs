@@ -5,8 +5,8 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use hapterra::bringup::{
-    Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, Step,
-    Stopped, Task, VirtualBench, VirtualUser, SequenceEnd, run_sequence,
+    Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, SequenceEnd,
+    Step, Stopped, Task, VirtualBench, VirtualUser, run_sequence,
 };
 use hapterra::link::{ControlSession, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
@@ -32,7 +32,11 @@ fn print_line(line: &str) {
 }
 
 /// Runs the walk with a user, and checks the speeds of the joints.
-fn run_bringup(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
+fn run_bringup(
+    user: &mut VirtualUser,
+    record: Calibration,
+    log: &mut Log,
+) -> Result<(), BringupError> {
     let result = run_unchecked(user, record, log);
     let fastest = user.bench().borrow().max_rate_rad_s();
     println!("fastest {fastest:?} rad/s");

@@ -22,7 +22,8 @@ fn calibrated(user: &mut VirtualUser) -> Review {
     };
     let mut counts =
         || -> Result<[i32; 3], LinkError> { Ok(control.fresh_status()?.health.sense.counts) };
-    let review = run_procedure(&Calibration::PREMIUM_1_5, plan, user, &mut counts).expect("a record");
+    let review =
+        run_procedure(&Calibration::PREMIUM_1_5, plan, user, &mut counts).expect("a record");
     let stored = control.store(review.after).expect("it answers");
     assert_eq!(stored, Ok(()));
     assert_eq!(

@@ -141,7 +141,10 @@ fn energy_created_by_taps_is_reported_with_controller_on() {
     // A spring that is sampled in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
     // and twice 0.75 mm.
     let (reported, energy_mj) = tap(&PARAMS, 0.0, true);
-    assert!(!reported && (energy_mj - 0.0229).abs() < 0.001, "{energy_mj}");
+    assert!(
+        !reported && (energy_mj - 0.0229).abs() < 0.001,
+        "{energy_mj}"
+    );
     let (reported, energy_mj) = tap(&PARAMS, 0.5, true);
     assert!(reported && energy_mj > 0.05, "{energy_mj}");
     // Not checked during a fault or without the controller.

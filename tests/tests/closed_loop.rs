@@ -38,7 +38,9 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
                 samples.push(*sample);
             }
         };
-        session.poll(Duration::ZERO, &mut on_event).expect("goes on");
+        session
+            .poll(Duration::ZERO, &mut on_event)
+            .expect("goes on");
     }
     assert_eq!(session.stats().lost + session.stats().dropped, 0);
     assert!(samples.iter().all(|sample| sample.fault.is_none()));

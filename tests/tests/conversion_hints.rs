@@ -403,7 +403,10 @@ fn archives_are_unpacked_by_the_hint() {
     assert!(shell(at, "gzip picture.tif").status.success());
     follow(at, &hint(&at.join("picture.tif.gz")), "gzip");
     follow(at, &hint(&picture), "gdal_translate");
-    assert_eq!(open_and_delete(&at.join("picture-converted.tif")).rows(), 30);
+    assert_eq!(
+        open_and_delete(&at.join("picture-converted.tif")).rows(),
+        30
+    );
 }
 
 /// Point clouds: their ground points, on a grid in their own reference system.

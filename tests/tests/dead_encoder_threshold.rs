@@ -36,7 +36,12 @@ impl TravelWhileStill {
 }
 
 /// Moves the tip along `path` (joint angles by time) with a tremor.
-fn travel_along(path: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds: f64) -> [u32; 3] {
+fn travel_along(
+    path: impl Fn(f64) -> [f64; 3],
+    tremor_mm: f64,
+    current_a: f64,
+    seconds: f64,
+) -> [u32; 3] {
     let model = PhantomModel::premium_1_5();
     let mut plant = Plant::new(model, path(0.0)).with_hand(HandModel::default());
     let target = |t: f64| {

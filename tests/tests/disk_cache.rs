@@ -216,7 +216,11 @@ fn heights_are_right_with_a_damaged_cache() {
         let (found, read) = read_heights(&bed.file, &bed.cache);
         assert!(found == truth && read > 0, "{number}: {read}");
         // It was written again, and is complete.
-        assert_eq!(read_heights(&bed.file, &bed.cache), (truth.clone(), 0), "{number}");
+        assert_eq!(
+            read_heights(&bed.file, &bed.cache),
+            (truth.clone(), 0),
+            "{number}"
+        );
     }
     for (path, _) in &whole {
         fs::remove_file(path).expect("removed");

@@ -452,7 +452,11 @@ fn occupied_port_is_an_error_before_arming() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
     let occupied = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let port = occupied.local_addr().expect("an address").port().to_string();
+    let port = occupied
+        .local_addr()
+        .expect("an address")
+        .port()
+        .to_string();
     let arguments = ["run", text(&hills), "--device", "native", "--events", &port];
     let run = hapterra(&arguments).output().expect("started");
     let reported = String::from_utf8_lossy(&run.stderr).into_owned();

@@ -119,7 +119,7 @@ impl<'t> Slide<'t> {
                 }
             };
             client
-                .due(ms(tick), &mut out, &mut on_event)
+                .append_due(ms(tick), &mut out, &mut on_event)
                 .expect("it is there");
             line.send(&std::mem::take(&mut out));
             let output = device.tick(client.session(), &line.carry());

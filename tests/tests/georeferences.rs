@@ -124,7 +124,10 @@ fn compare(raster: &Raster, row: &Row, reader: Reader) {
     // Without the code, the shift to WGS 84 is that of the datum's name: usually within 45 m.
     let found = sides(raster.bounds_lonlat().expect("a known projection"));
     for (found, expected) in found.iter().zip(degrees) {
-        assert!((found - expected).abs() * 110_000.0 < 45.0, "{file}: {found}");
+        assert!(
+            (found - expected).abs() * 110_000.0 < 45.0,
+            "{file}: {found}"
+        );
     }
 }
 

@@ -61,7 +61,10 @@ fn replaced_frame(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let printed = frames::changed(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
         ToHost::Status { status, .. } => rename(&mut status.device),
-        ToHost::SceneAck { epoch: acknowledged, .. } => *epoch = *acknowledged,
+        ToHost::SceneAck {
+            epoch: acknowledged,
+            ..
+        } => *epoch = *acknowledged,
         ToHost::Telemetry(_) => has_samples = true,
         _ => {}
     });

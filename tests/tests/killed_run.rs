@@ -88,7 +88,11 @@ fn recording_of_a_killed_run_is_kept_and_named_at_next_start() {
     let mut again = replay(folder, &terrain).spawn().expect("started");
     write_points(&mut again);
     drop(again.stdin.take());
-    assert_names_partial_file(&again.wait_with_output().expect("ended"), &partial_file, &content);
+    assert_names_partial_file(
+        &again.wait_with_output().expect("ended"),
+        &partial_file,
+        &content,
+    );
     assert!(folder.join("out.csv").exists());
     assert_eq!(partial(folder), [partial_file.as_path()]);
 

@@ -105,7 +105,8 @@ impl Case {
         let moved = |rendered: &mut Replied| {
             rendered.proxy[0] += east;
             rendered.sample.proxy = point(rendered.proxy);
-            let force_n = [0, 1, 2].map(|i| ((rendered.proxy[i] - rendered.hip[i]) * stiffness) as f32);
+            let force_n =
+                [0, 1, 2].map(|i| ((rendered.proxy[i] - rendered.hip[i]) * stiffness) as f32);
             rendered.sample.force_n = Vec3::from_array(force_n);
         };
         self.at_once(at, moved)

@@ -237,8 +237,9 @@ fn wrongly_shaded_force_is_detected() {
         });
         ObservedTick { shaded, ..observed }
     };
-    let found =
-        |observed: ObservedTick| -> Vec<Invariant> { broken_of(TickOracle::new(&ridge), &[observed]) };
+    let found = |observed: ObservedTick| -> Vec<Invariant> {
+        broken_of(TickOracle::new(&ridge), &[observed])
+    };
     // Bends of 90° are turned along a fifth of an edge: this is beyond it.
     let along = [0.05, 0.05];
     assert_eq!(found(shaded(along, true)), []);
@@ -342,7 +343,10 @@ fn invalid_answer_is_detected() {
         (Consistent, with(honest, |f| f.displacement.x = 0.01)),
         (Consistent, with(honest, |f| f.displacement.z = -0.5)),
         (Consistent, with(honest, |f| f.displacement.z = 0.501)),
-        (Consistent, with(unseeded(BELOW), |f| f.displacement.z = 0.1)),
+        (
+            Consistent,
+            with(unseeded(BELOW), |f| f.displacement.z = 0.1),
+        ),
         // Forces: too long, of another spring, in the opposite direction, NaN.
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
@@ -415,7 +419,13 @@ fn pulling_contact_is_detected() {
             (flat(), &above as &dyn Fn(f64) -> ObservedTick),
             (ridge(), &slope),
         ] {
-            reports_only(Invariant::HipBelow, &terrain, &[], observed(off), observed(-off));
+            reports_only(
+                Invariant::HipBelow,
+                &terrain,
+                &[],
+                observed(off),
+                observed(-off),
+            );
         }
     }
     // Correct contacts are not reported: a valley, the border of the data.
@@ -629,7 +639,10 @@ fn assert_violates<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, 
 #[test]
 fn other_bits_are_found() {
     let (scene, observed, mut buffers) = run_scene(Supply::Held);
-    assert_eq!(metamorphic::repeated(&scene, &observed, &mut buffers), Ok(true));
+    assert_eq!(
+        metamorphic::repeated(&scene, &observed, &mut buffers),
+        Ok(true)
+    );
     for forged in other_bits(&observed) {
         let verdict = metamorphic::repeated(&scene, &forged, &mut buffers);
         assert_violates(Invariant::Repeatable, verdict);

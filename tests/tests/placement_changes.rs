@@ -8,8 +8,8 @@ use std::time::Duration;
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::place::{
-    Bounds, Coordinates, PlacedSurface, Placement, PlacementChange, PlacementOptions, Reach, Sizing,
-    SurfaceChange, Target,
+    Bounds, Coordinates, PlacedSurface, Placement, PlacementChange, PlacementOptions, Reach,
+    Sizing, SurfaceChange, Target,
 };
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::HapticCells;
@@ -115,10 +115,7 @@ fn pressed_at<T>(
     let played = play(&mut touching);
     let stats = touching.session.stats();
     assert_eq!(stats.lost + stats.dropped, 0);
-    touching
-        .session
-        .close(&mut |_| {})
-        .expect("confirmed");
+    touching.session.close(&mut |_| {}).expect("confirmed");
     played
 }
 
@@ -138,7 +135,9 @@ impl Touching<'_> {
             self.session.enqueue(request);
         }
         if let Some(update) = self.steering.take_update() {
-            self.session.put_view(update.view, update.terrain).expect("said");
+            self.session
+                .put_view(update.view, update.terrain)
+                .expect("said");
         }
         self.messages.extend(self.steering.lines());
     }
@@ -198,11 +197,7 @@ fn check_press(samples: &[TickRecord], max_n: f32, max_ratio: f32) {
         let share = MAX_SLEW_N_PER_S / 1_000.0;
         assert!(change <= share, "tick {}: {change} N", after.tick);
         let (force, first) = (after.force_n.length(), samples[0].force_n.length());
-        assert!(
-            force <= max_ratio * first,
-            "tick {}: {force} N",
-            after.tick
-        );
+        assert!(force <= max_ratio * first, "tick {}: {force} N", after.tick);
     }
     let worst = samples
         .windows(2)
@@ -367,7 +362,11 @@ fn surface_command_during_contact_causes_no_force_step() {
             "{:?}",
             touching.messages
         );
-        assert_eq!(touching.steering.now().params, expected, "it stays as it was");
+        assert_eq!(
+            touching.steering.now().params,
+            expected,
+            "it stays as it was"
+        );
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.steering.now().params, SurfaceParams::PREMIUM);
@@ -391,7 +390,12 @@ fn tip_command_during_contact_causes_no_force_step() {
             // A ball rests beside a point's position, where the slope differs.
             let share = sample.force_n.length() / first.force_n.length();
             assert!((0.95..1.05).contains(&share), "{expected_mm} mm: {share}");
-            assert_eq!(tip(touching), (expected_mm, is_ball), "{:?}", touching.messages);
+            assert_eq!(
+                tip(touching),
+                (expected_mm, is_ball),
+                "{:?}",
+                touching.messages
+            );
         }
         assert_eq!(touching.messages, [""; 0]);
         touching.change(PlacementChange::Tip(-1.0));

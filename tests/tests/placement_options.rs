@@ -256,7 +256,11 @@ fn cell_distortion_within_workspace_is_printed_at_start() {
         // The last row of haptic cells.
         assert!((54.0..54.5).contains(&latitude), "{all}");
         let off = percent - expected(47.25, latitude);
-        assert!(off.abs() < 0.2, "{percent} for {}", expected(47.25, latitude));
+        assert!(
+            off.abs() < 0.2,
+            "{percent} for {}",
+            expected(47.25, latitude)
+        );
         // At a scale at which the arm reaches 20 km to each side, cells are correct.
         let near = ["--at", "15,47", "--scale", "5m/mm"];
         let near = output_text(&hapterra(command, &file, &near));

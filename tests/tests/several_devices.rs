@@ -322,7 +322,9 @@ fn fault_is_reported_only_for_the_affected_device() {
         let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
             sense.measured_ma = Some([2_000, 0, 0]);
         });
-        let device = Native::for_replay().free_running().with_fault_injector(current);
+        let device = Native::for_replay()
+            .free_running()
+            .with_fault_injector(current);
         (device, || {})
     });
     let pair = Pair::of(conducts);

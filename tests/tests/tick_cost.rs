@@ -94,7 +94,7 @@ fn tick_in_contact_is_within_work_and_stack_budgets() {
             (Mode::Armed, ContactState::Touching) => 3,
             _ => 0,
         };
-        costs[kind].1.take(cost * INSTRUCTIONS_PER_COUNT);
+        costs[kind].1.add(cost * INSTRUCTIONS_PER_COUNT);
     }
     for (name, cost) in &costs {
         let (mean, max) = (cost.mean(), cost.max());

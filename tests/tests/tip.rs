@@ -486,7 +486,10 @@ impl Touched {
     fn in_demo(folder: &std::path::Path, file: &std::path::Path, friction: &str) -> Self {
         let file_text = file.to_string_lossy();
         let arguments = ["demo", &file_text, "--device", "native", "--out", friction];
-        runs(folder, &[&arguments[..], &["--friction", friction]].concat());
+        runs(
+            folder,
+            &[&arguments[..], &["--friction", friction]].concat(),
+        );
         let name = file.file_stem().expect("a name").to_string_lossy();
         let recording = folder.join(friction).join(format!("{name}.csv"));
         let text = std::fs::read_to_string(recording).expect("there");

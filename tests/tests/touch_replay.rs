@@ -209,7 +209,11 @@ fn materials_are_those_of_a_replay() {
             })
             .collect(),
     };
-    let over = Materials::over(("heights", &raster), ("classes", of_classes), class_materials);
+    let over = Materials::over(
+        ("heights", &raster),
+        ("classes", of_classes),
+        class_materials,
+    );
     let over = over.expect("they overlap");
     let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(Some(&over));
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");

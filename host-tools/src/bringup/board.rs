@@ -71,25 +71,28 @@ impl<'d, 't> Board<'d, 't> {
         }
         let done = Cell::new(false);
         let check_done = || done.get();
-        let passed = self
-            .control
-            .run_for(STATUS_INTERVAL_MS, &check_done, &mut |message| match message {
-                ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
-                    epoch: *epoch,
-                    key: *key,
-                    heights: Heights::Flat {
-                        base: 0,
-                        height: 0.0,
-                    },
-                })),
-                ToHost::Telemetry(telemetry) => {
-                    for sample in &telemetry.samples {
-                        done.set(done.get() | on(sample));
+        let passed =
+            self.control.run_for(
+                STATUS_INTERVAL_MS,
+                &check_done,
+                &mut |message| match message {
+                    ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
+                        epoch: *epoch,
+                        key: *key,
+                        heights: Heights::Flat {
+                            base: 0,
+                            height: 0.0,
+                        },
+                    })),
+                    ToHost::Telemetry(telemetry) => {
+                        for sample in &telemetry.samples {
+                            done.set(done.get() | on(sample));
+                        }
+                        None
                     }
-                    None
-                }
-                _ => None,
-            });
+                    _ => None,
+                },
+            );
         Ok(passed?)
     }
 
@@ -97,7 +100,10 @@ impl<'d, 't> Board<'d, 't> {
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
-    pub(super) fn poll_status_with(&mut self, on: &mut dyn FnMut(&TickRecord)) -> Result<Status, Halt> {
+    pub(super) fn poll_status_with(
+        &mut self,
+        on: &mut dyn FnMut(&TickRecord),
+    ) -> Result<Status, Halt> {
         self.poll_status_until(&mut |sample| {
             on(sample);
             false
@@ -136,7 +142,10 @@ impl<'d, 't> Board<'d, 't> {
     ///
     /// # Errors
     /// [`Halt::Link`].
-    pub(super) fn wait_for_rest(&mut self, attendant: &mut dyn Attendant) -> Result<[i32; 3], Halt> {
+    pub(super) fn wait_for_rest(
+        &mut self,
+        attendant: &mut dyn Attendant,
+    ) -> Result<[i32; 3], Halt> {
         let mut before = self.poll_status()?.health.sense.counts;
         for poll in 0.. {
             let now = self.poll_status()?.health.sense.counts;
@@ -244,7 +253,9 @@ impl<'d, 't> Board<'d, 't> {
     fn disarm(&mut self) -> Result<bool, LinkError> {
         let answer = self.control.request(&Request::Disarm)?;
         for _ in 0..MAX_POLLS_TO_DISARM {
-            let status = self.control.run_for(STATUS_INTERVAL_MS, &|| false, &mut |_| None)?;
+            let status = self
+                .control
+                .run_for(STATUS_INTERVAL_MS, &|| false, &mut |_| None)?;
             if status.health.report.mode == Mode::Disarmed {
                 return Ok(answer.is_ok());
             }

@@ -1,8 +1,8 @@
 //! The bring-up of a board and its arm, step by step; no step is skipped.
 //!
 //! ```text
-//! Step (in order) ─▶ steps/ ─ asks ─▶ Attendant (a terminal, or a VirtualUser)
-//!                       │     requests    ─▶ Board (over the link)
+//! Step (in order) ─▶ steps/ ─ tasks ─▶ Attendant (a terminal, or a VirtualUser)
+//!                       │     requests ─▶ Board (over the link)
 //!                       ▼
 //!           result, or a Finding that names what is wrong ─▶ Log (TOML)
 //! ```
@@ -24,12 +24,11 @@ mod utc;
 mod virtual_bench;
 mod virtual_user;
 
-
 pub use attendant::{Attendant, BoardState, Question, Reading, Stopped, Task};
 pub use finding::Finding;
 pub use halt::Halt;
 pub use log::{Entry, Identity, Log, LogError};
+pub use sequence::{BringupError, SequenceEnd, run_sequence};
 pub use step::Step;
 pub use virtual_bench::{BenchMistakes, VirtualBench};
 pub use virtual_user::VirtualUser;
-pub use sequence::{BringupError, SequenceEnd, run_sequence};

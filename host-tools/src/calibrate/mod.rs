@@ -16,15 +16,15 @@ mod arm;
 pub mod file;
 mod fit_error;
 mod gravity;
+mod procedure;
 mod ratios;
 mod review;
 mod virtual_user;
-mod procedure;
 
 pub use arm::Arm;
 pub use fit_error::FitError;
 pub use gravity::{GravityFit, N_PER_GRAM, StaticPose, fit_gravity};
-pub use ratios::{RulerMove, Direction, RatioFit, fit_ratios};
+pub use procedure::{Attendant, Plan, ProcedureError, Stopped, run_procedure};
+pub use ratios::{Direction, RatioFit, RulerMove, fit_ratios};
 pub use review::Review;
 pub use virtual_user::VirtualUser;
-pub use procedure::{Attendant, Plan, ProcedureError, Stopped, run_procedure};

@@ -5,7 +5,7 @@ use hapterra_core::phantom::Calibration;
 use super::arm::Arm;
 use super::fit_error::FitError;
 use super::gravity::{StaticPose, fit_gravity};
-use super::ratios::{RulerMove, Direction, fit_ratios};
+use super::ratios::{Direction, RulerMove, fit_ratios};
 use super::review::Review;
 
 /// Distance of the move along the ruler, mm.

@@ -161,7 +161,10 @@ fn descend(arm: &Arm, moves: &[RulerMove], start: DVec3) -> (DVec3, f64) {
 /// ruler have less weight.
 fn residual(arm: &Arm, ruler_move: &RulerMove, rad_per_count: DVec3) -> DVec3 {
     let tip = |counts| arm.tip_mm(arm.angles(rad_per_count, counts));
-    let (moved, unit) = (tip(ruler_move.to) - tip(ruler_move.from), ruler_move.direction.unit());
+    let (moved, unit) = (
+        tip(ruler_move.to) - tip(ruler_move.from),
+        ruler_move.direction.unit(),
+    );
     let along = moved.dot(unit);
     CROSS_WEIGHT * (moved - along * unit) + (along - ruler_move.mm) * unit
 }

@@ -18,7 +18,7 @@ use super::session_summary::{self, SessionSummary};
 use super::settings::SettingsOption;
 use super::terminal::waiting::shown_planning;
 use super::terminal::{interrupt, partial_files, progress, writer};
-use super::viewing::{ViewerSession, PreparedViewer, Viewing};
+use super::viewing::{PreparedViewer, ViewerSession, Viewing};
 use crate::events::{Event as Reported, Watcher};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Session, Timeouts, Transport, move_arm_while,
@@ -215,7 +215,7 @@ fn show(
             if args.viewing.view || args.events.events.is_some() {
                 device = device.in_real_time();
             }
-            tour.go(Box::new(device), Timeouts::EMULATED)?
+            tour.run(Box::new(device), Timeouts::EMULATED)?
         }
         VirtualDevice::Emulated(board) => tour_emulated(&board, tour, arm)?,
     };
@@ -283,15 +283,26 @@ struct TourResult<'t> {
 
 /// Draws only the last placement's samples, because another placement's coordinates are other
 /// positions of the hand.
-fn draw(tour_result: &TourResult<'_>, first: &Placement, name: &str, path: &Path) -> Result<(), Failure> {
-    let last = tour_result.rows.last().map_or(0, |(_, of_loop)| of_loop.view());
+fn draw(
+    tour_result: &TourResult<'_>,
+    first: &Placement,
+    name: &str,
+    path: &Path,
+) -> Result<(), Failure> {
+    let last = tour_result
+        .rows
+        .last()
+        .map_or(0, |(_, of_loop)| of_loop.view());
     let in_last = tour_result
         .rows
         .iter()
         .filter(|(_, of_loop)| of_loop.view() == last);
     let records: Vec<Record> = in_last.map(|(record, _)| *record).collect();
     let placement = tour_result.views.get(last as usize);
-    let view = placement.placed_surface.as_ref().map_or(*first, |placed_surface| placed_surface.view);
+    let view = placement
+        .placed_surface
+        .as_ref()
+        .map_or(*first, |placed_surface| placed_surface.view);
     let title = match (last, records.first()) {
         (0, _) | (_, None) => name.to_owned(),
         (_, Some(began)) => format!("{name}, view {last}, from {:.1} s on", began.t_s),
@@ -309,7 +320,7 @@ fn tour_emulated<'t>(
     let (emulator, mut lines) = board.start()?;
     let report = "please report it with the file";
     move_arm_while(&mut lines.plant, &mut arm, || {
-        match tour.go(Box::new(lines.link), Timeouts::EMULATED) {
+        match tour.run(Box::new(lines.link), Timeouts::EMULATED) {
             Ok(tour_result) => {
                 // The arm must run until the board has reduced its force to zero.
                 let ended = emulator.finish().map(|()| tour_result);
@@ -340,7 +351,7 @@ struct Tour<'p, 't> {
 
 impl<'t> Tour<'_, 't> {
     /// Serves the terrain until the tour ends.
-    fn go(
+    fn run(
         self,
         transport: Box<dyn Transport + 't>,
         timeouts: Timeouts,
@@ -436,7 +447,11 @@ impl<'t> Tour<'_, 't> {
     }
 }
 
-fn write(tour_result: &TourResult<'_>, settings: &Settings, path: &Path) -> Result<(), OutputError> {
+fn write(
+    tour_result: &TourResult<'_>,
+    settings: &Settings,
+    path: &Path,
+) -> Result<(), OutputError> {
     let mut recording = Recording::new(Output::create(path)?, &LoopColumns::COLUMNS)?;
     recording.describe(settings);
     let (mut described_view, mut marks) = (0, tour_result.marks.iter().peekable());
@@ -444,12 +459,19 @@ fn write(tour_result: &TourResult<'_>, settings: &Settings, path: &Path) -> Resu
         while let Some(mark) = marks.next_if(|mark| mark.t_s <= record.t_s) {
             recording.mark(mark);
         }
-        let (number, placement) = (columns.view(), tour_result.views.get(columns.view() as usize));
+        let (number, placement) = (
+            columns.view(),
+            tour_result.views.get(columns.view() as usize),
+        );
         if number > described_view
             && let Some(placed_surface) = &placement.placed_surface
         {
             described_view = number;
-            recording.view(&PlacementSettings::new(number, &placement.terrain, placed_surface))?;
+            recording.view(&PlacementSettings::new(
+                number,
+                &placement.terrain,
+                placed_surface,
+            ))?;
         }
         recording.write(record, &columns.values())?;
     }

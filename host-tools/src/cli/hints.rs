@@ -284,9 +284,10 @@ impl Hint for UpdateError {
             Self::Calibrations { .. } | Self::NoVectors(_) => {
                 "nothing was touched: `cargo xtask image BOARD` builds an image that fits"
             }
-            Self::Disconnected { .. } | Self::Refused { .. } | Self::Endless(_) | Self::Differs(_) => {
-                "press the board's reset button and try again"
-            }
+            Self::Disconnected { .. }
+            | Self::Refused { .. }
+            | Self::Endless(_)
+            | Self::Differs(_) => "press the board's reset button and try again",
         };
         hint.into()
     }

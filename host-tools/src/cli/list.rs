@@ -96,7 +96,7 @@ fn list_emulated(args: &Args) {
     };
     for address in addresses {
         match Tcp::connect(address).and_then(|link| describe(Box::new(link))) {
-            Ok(who) => println!("  tcp:{address}: {who}"),
+            Ok(description) => println!("  tcp:{address}: {description}"),
             Err(LinkError::Absent { why, .. }) => {
                 println!("  none at tcp:{address}: {why}");
                 println!(

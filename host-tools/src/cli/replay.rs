@@ -388,7 +388,7 @@ fn replay<'t>(
             let home_mm = settings.map(|settings| settings.home_mm);
             feed.change_placement(replayed.picture(terrain, home_mm));
         }
-        feed.detail(record);
+        feed.keep_detailed(record);
         feed.on_sample(sample, record);
     };
     let summary = replay_trajectory(

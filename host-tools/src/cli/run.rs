@@ -171,14 +171,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
     interrupt::listen();
-    let (arms, calibration_read): (Vec<_>, Vec<_>) = devices.iter().map(OneDevice::read_calibration).unzip();
+    let (arms, calibration_read): (Vec<_>, Vec<_>) =
+        devices.iter().map(OneDevice::read_calibration).unzip();
     let placed_surface = of_each(devices.iter().zip(arms), |(device, arm)| {
         InReach::of(&request, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
-    let placed = of_each(devices.iter().zip(&placed_surface), |(device, placed_surface)| {
-        Placed::new(device, (&name, placed_surface), params)
-            .map_err(|failure| failure.about(device.device_console.name()))
-    })?;
+    let placed = of_each(
+        devices.iter().zip(&placed_surface),
+        |(device, placed_surface)| {
+            Placed::new(device, (&name, placed_surface), params)
+                .map_err(|failure| failure.about(device.device_console.name()))
+        },
+    )?;
     // The coarse levels are read before any device is armed. A viewer shows one device.
     let viewer = viewer
         .zip(placed.first())

@@ -113,7 +113,8 @@ impl SessionSummary {
         title: &str,
         records: &[Record],
     ) -> Result<(), Failure> {
-        let height_mm = |east: f64, north: f64, apart: f64| terrain.picture_height_mm(east, north, apart);
+        let height_mm =
+            |east: f64, north: f64, apart: f64| terrain.picture_height_mm(east, north, apart);
         let file = terrain.raster().georeference();
         let cell_mm = view.scale.cell_mm();
         let place_of = |east: f64, north: f64| {

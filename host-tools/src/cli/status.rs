@@ -37,7 +37,9 @@ pub struct Args {
 /// No device, no reply, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
-        let status = args.device.with_read_only_session(|control| Ok(control.fresh_status()?))?;
+        let status = args
+            .device
+            .with_read_only_session(|control| Ok(control.fresh_status()?))?;
         put(&text(&status))?;
         if args.device.device == DeviceChoice::Connected(DeviceAddress::Native) {
             print_line(

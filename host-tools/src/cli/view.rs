@@ -118,7 +118,7 @@ fn show<'t>(
             shown = row.view;
             change_placement(&mut feed, terrain, title, (shown, recorded))?;
         }
-        feed.detail(&row.record);
+        feed.keep_detailed(&row.record);
         feed.row(&row.record, None);
         let is_read = count % CHECK_INTERVAL_ROWS != 0 || feed.wait_for_room();
         if !is_read || interrupt::requested() {

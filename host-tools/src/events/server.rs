@@ -121,7 +121,7 @@ struct Reader {
 
 impl Reader {
     /// Adds a line if there is room, after the number of lines dropped before it.
-    fn take(&mut self, line: &[u8]) {
+    fn push_line(&mut self, line: &[u8]) {
         let notice = match self.dropped {
             0 => String::new(),
             lines => reader_line(&Event::Dropped { lines }),
@@ -169,12 +169,12 @@ impl Readers {
         loop {
             self.accept();
             match lines.recv_timeout(POLL_INTERVAL) {
-                Ok(line) => self.take(&line),
+                Ok(line) => self.push_line(&line),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             for line in lines.try_iter().take(MAX_QUEUED_LINES) {
-                self.take(&line);
+                self.push_line(&line);
             }
             self.write();
         }
@@ -187,10 +187,10 @@ impl Readers {
         self.dropped
     }
 
-    fn take(&mut self, line: &str) {
+    fn push_line(&mut self, line: &str) {
         for reader in &mut self.readers {
             let before = reader.dropped;
-            reader.take(line.as_bytes());
+            reader.push_line(line.as_bytes());
             self.dropped += u64::from(reader.dropped > before);
         }
     }

@@ -320,7 +320,8 @@ mod tests {
             default,
             class: vec![class],
         };
-        let materials = Materials::over(("t", &raster), ("c", classes), class_materials).expect("overlap");
+        let materials =
+            Materials::over(("t", &raster), ("c", classes), class_materials).expect("overlap");
         let grid = HapticGrid::new(&raster, HapticCells::Stored).with_materials(Some(&materials));
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::over(grid, scale, 0)

@@ -35,7 +35,10 @@ pub enum SelectionError {
 ///
 /// # Errors
 /// [`SelectionError`].
-pub fn select(serials: &[Option<String>], requested: Option<&str>) -> Result<usize, SelectionError> {
+pub fn select(
+    serials: &[Option<String>],
+    requested: Option<&str>,
+) -> Result<usize, SelectionError> {
     let fits = |serial: &Option<String>| match (serial, requested) {
         (_, None) => true,
         (Some(serial), Some(requested)) => serial.eq_ignore_ascii_case(requested),
@@ -152,12 +155,18 @@ mod tests {
         assert_eq!(select(&serials, Some("0039001b")), Ok(1));
         assert_eq!(select(&serials, Some("0039001")), Err(SelectionError::None));
         assert_eq!(select(&serials[..1], None), Ok(0));
-        assert_eq!(select(&serials[..1], Some("0039001B")), Err(SelectionError::None));
+        assert_eq!(
+            select(&serials[..1], Some("0039001B")),
+            Err(SelectionError::None)
+        );
         assert_eq!(select(&[None], None), Ok(0));
         assert_eq!(select(&[None], Some("")), Err(SelectionError::None));
         assert_eq!(select(&[], None), Err(SelectionError::None));
         let twins = [&serials[0], &serials[0]].map(Clone::clone);
-        assert_eq!(select(&twins, Some("0039001A")), Err(SelectionError::Several));
+        assert_eq!(
+            select(&twins, Some("0039001A")),
+            Err(SelectionError::Several)
+        );
     }
 
     #[test]

@@ -108,7 +108,7 @@ const MAX_AWAITED: usize = 64;
 const LOG_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Serves one terrain to one device. [`Client::receive`] processes bytes from the device; it and
-/// [`Client::due`], which must be called regularly, append bytes for the device. `now` is the time
+/// [`Client::append_due`], which must be called regularly, append bytes for the device. `now` is the time
 /// since any fixed moment.
 pub struct Client<'t> {
     terrain: ServedTerrain<'t>,
@@ -290,7 +290,10 @@ impl<'t> Client<'t> {
                 self.prefetch.forget();
                 self.terrain = ServedTerrain::Changed(Box::new(terrain));
             }
-            on(Event::SceneChangeResult { view: &view, accepted });
+            on(Event::SceneChangeResult {
+                view: &view,
+                accepted,
+            });
         }
     }
 
@@ -305,7 +308,7 @@ impl<'t> Client<'t> {
     /// # Errors
     /// When a deadline has passed: [`LinkError::Silent`], [`LinkError::Taken`],
     /// [`LinkError::NotConfirmed`].
-    pub fn due(
+    pub fn append_due(
         &mut self,
         now: Duration,
         out: &mut Vec<u8>,
@@ -315,7 +318,7 @@ impl<'t> Client<'t> {
             self.samples_since_heartbeat = 0;
             self.protocol.make_heartbeat_due();
         }
-        let checked = self.protocol.due(now, out);
+        let checked = self.protocol.append_due(now, out);
         if self.protocol.take_unanswered_view(now).is_some() {
             self.resolve_view(true, on);
         }
@@ -391,7 +394,9 @@ impl<'t> Client<'t> {
             }
             ProtocolEvent::SceneChange => self.resolve_view(true, on),
             ProtocolEvent::SceneAck => self.on_scene_ack(now, out, on),
-            ProtocolEvent::Answered(request, message) => self.on_answered(now, request, &message, out, on),
+            ProtocolEvent::Answered(request, message) => {
+                self.on_answered(now, request, &message, out, on)
+            }
             ProtocolEvent::Other(message) => self.on_message(now, message, out, on),
         }
     }

@@ -132,7 +132,8 @@ impl Bench<'_> {
                 Event::SceneChangeResult { view, accepted } => viewed.push((view.number, accepted)),
                 _ => {}
             };
-            self.client.due(self.now, &mut self.out, &mut record)?;
+            self.client
+                .append_due(self.now, &mut self.out, &mut record)?;
         }
         Ok(())
     }
@@ -325,7 +326,11 @@ fn repeated_query_keeps_its_number() {
             result: Ok(()),
         }));
         bench.advance(ms(300)).expect("alive");
-        assert_eq!(count_of(&bench.drain_sent(), "1 Status"), 1, "no answer to it");
+        assert_eq!(
+            count_of(&bench.drain_sent(), "1 Status"),
+            1,
+            "no answer to it"
+        );
     });
 }
 

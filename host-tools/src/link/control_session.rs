@@ -14,7 +14,7 @@ use hapterra_core::wire::status::Status;
 use super::error::LinkError;
 use super::host_protocol::{HostProtocol, ProtocolEvent, State};
 use super::host_request::HostRequest;
-use super::line::{POLL_INTERVAL, Line};
+use super::line::{Line, POLL_INTERVAL};
 use super::messages::{FromDevice, from_device, next_frame};
 use super::timeouts::Timeouts;
 use super::transport::Transport;
@@ -60,7 +60,10 @@ impl<'t> ControlSession<'t> {
     ///
     /// # Errors
     /// As [`ControlSession::open`].
-    pub fn open_read_only(transport: Box<dyn Transport + 't>, timeout: Duration) -> Result<Self, LinkError> {
+    pub fn open_read_only(
+        transport: Box<dyn Transport + 't>,
+        timeout: Duration,
+    ) -> Result<Self, LinkError> {
         Self::with(transport, Timeouts::read_only(timeout))
     }
 
@@ -229,7 +232,9 @@ impl Exchange<'_> {
         self.protocol.reset_silence(self.line.now());
         self.protocol.enqueue(request);
         self.wait_for(|event| match event {
-            ProtocolEvent::Answered(answered, message) if answered.is_like(&request) => read(message),
+            ProtocolEvent::Answered(answered, message) if answered.is_like(&request) => {
+                read(message)
+            }
             _ => None,
         })
     }
@@ -308,7 +313,7 @@ impl Exchange<'_> {
         on: &mut dyn FnMut(ProtocolEvent),
     ) -> Result<(), LinkError> {
         let line = &mut self.line;
-        self.protocol.due(line.now(), &mut line.out)?;
+        self.protocol.append_due(line.now(), &mut line.out)?;
         if let Some(request) = self.protocol.take_unanswered().pop() {
             tracing::debug!(?request, "given up");
             return Err(LinkError::Silent(self.protocol.timeouts().give_up));
@@ -410,7 +415,8 @@ mod tests {
     #[test]
     fn read_only_session_is_not_recorded_as_a_host() {
         let mut device = Native::for_replay().free_running();
-        let mut control = ControlSession::open_read_only(Box::new(&mut device), TIMEOUT).expect("it answers");
+        let mut control =
+            ControlSession::open_read_only(Box::new(&mut device), TIMEOUT).expect("it answers");
         let known = control.calibration().expect("it answers");
         assert_eq!(known, Some(Calibration::PREMIUM_1_5));
         let status = control.fresh_status().expect("it answers");
@@ -424,7 +430,11 @@ mod tests {
     #[test]
     fn calibration_is_stored_or_refused_with_a_reason() {
         let press: FaultInjector = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
-        let device = Box::new(Native::for_replay().free_running().with_fault_injector(press));
+        let device = Box::new(
+            Native::for_replay()
+                .free_running()
+                .with_fault_injector(press),
+        );
         let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");
         let mut calibration = Calibration::OMNI;
         assert_eq!(control.store(calibration).expect("it answers"), Ok(()));
@@ -594,7 +604,8 @@ mod tests {
     #[test]
     fn protocol_mismatch_is_distinguished_from_silence() {
         let open_after = |bytes: Vec<u8>| {
-            let opened = ControlSession::open(Box::new(OneMessage(bytes)), Duration::from_millis(5));
+            let opened =
+                ControlSession::open(Box::new(OneMessage(bytes)), Duration::from_millis(5));
             opened.map(|_| ())
         };
         assert!(matches!(open_after(vec![]), Err(LinkError::Silent(_))));

@@ -127,7 +127,9 @@ impl Emulator {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        Err(io::Error::other(format!("it still ran after {END_TIMEOUT:?}")))
+        Err(io::Error::other(format!(
+            "it still ran after {END_TIMEOUT:?}"
+        )))
     }
 
     /// Returns the output of the board or QEMU if it has ended by itself; ends it otherwise.

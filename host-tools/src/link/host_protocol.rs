@@ -391,7 +391,7 @@ impl HostProtocol {
         if self.state != State::Open {
             return;
         }
-        if let Some(message) = self.requests.append_due(now, &self.timeouts) {
+        if let Some(message) = self.requests.next_message(now, &self.timeouts) {
             self.append_message(&message, out);
         }
     }

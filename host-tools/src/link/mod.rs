@@ -41,7 +41,7 @@ mod timeouts;
 mod transport;
 mod usb;
 
-pub use bulk::{Bulk, BulkEndpoints, SelectionError, Pipes, is_hapterra, printable, select};
+pub use bulk::{Bulk, BulkEndpoints, Pipes, SelectionError, is_hapterra, printable, select};
 #[cfg(test)]
 pub(crate) use client::tests::hello;
 pub use client::{Arming, Client, Event};

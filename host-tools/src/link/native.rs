@@ -199,7 +199,8 @@ impl<C: TickClock> Native<C> {
                 due = now;
             }
         });
-        self.with_fault_injector(pace).with_ticks_per_call(REAL_TIME_TICKS_PER_CALL)
+        self.with_fault_injector(pace)
+            .with_ticks_per_call(REAL_TIME_TICKS_PER_CALL)
     }
 
     /// Returns the virtual arm, if the device has one.

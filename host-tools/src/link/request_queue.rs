@@ -56,7 +56,11 @@ impl RequestQueue {
     }
 
     /// Returns the message to send now: the pending request if it is due again, or the next one.
-    pub(super) fn due(&mut self, now: Duration, timeouts: &Timeouts) -> Option<ToDevice<'static>> {
+    pub(super) fn next_message(
+        &mut self,
+        now: Duration,
+        timeouts: &Timeouts,
+    ) -> Option<ToDevice<'static>> {
         self.give_up_overdue(now, timeouts);
         match &mut self.pending {
             Some(pending) if now.saturating_sub(pending.sent_at) < timeouts.retry => return None,
@@ -66,11 +70,15 @@ impl RequestQueue {
                 self.pending = Some(self.begin(request, now));
             }
         }
-        self.pending.map(|Pending { request, number, .. }| match request {
-            HostRequest::Request(request) => ToDevice::Request { number, request },
-            HostRequest::Status => ToDevice::Status { number },
-            HostRequest::Calibration => ToDevice::GetCalibration { number },
-        })
+        self.pending.map(
+            |Pending {
+                 request, number, ..
+             }| match request {
+                HostRequest::Request(request) => ToDevice::Request { number, request },
+                HostRequest::Status => ToDevice::Status { number },
+                HostRequest::Calibration => ToDevice::GetCalibration { number },
+            },
+        )
     }
 
     fn give_up_overdue(&mut self, now: Duration, timeouts: &Timeouts) {
@@ -110,11 +118,7 @@ impl RequestQueue {
     }
 
     /// Returns the pending query if the answer has its number.
-    pub(super) fn query_answered(
-        &mut self,
-        query: HostRequest,
-        number: u8,
-    ) -> Option<HostRequest> {
+    pub(super) fn query_answered(&mut self, query: HostRequest, number: u8) -> Option<HostRequest> {
         self.answered(number, |request| *request == query)
     }
 
@@ -124,7 +128,10 @@ impl RequestQueue {
         number: u8,
         is_match: impl Fn(&HostRequest) -> bool,
     ) -> Option<HostRequest> {
-        let is_match = |pending: &mut Pending| pending.number == number && is_match(&pending.request);
-        self.pending.take_if(is_match).map(|pending| pending.request)
+        let is_match =
+            |pending: &mut Pending| pending.number == number && is_match(&pending.request);
+        self.pending
+            .take_if(is_match)
+            .map(|pending| pending.request)
     }
 }

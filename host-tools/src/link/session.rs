@@ -10,7 +10,7 @@ use super::client::{Arming, Client, Event};
 use super::error::LinkError;
 use super::host_protocol::State;
 use super::host_request::HostRequest;
-use super::line::{POLL_INTERVAL, Line};
+use super::line::{Line, POLL_INTERVAL};
 use super::link_stats::LinkStats;
 use super::timeouts::Timeouts;
 use super::transport::Transport;
@@ -164,7 +164,7 @@ impl<'t> Session<'t> {
     /// [`LinkError`]. After a passing one the session can continue with [`Session::resume`].
     pub fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         let line = &mut self.line;
-        self.client.due(line.now(), &mut line.out, on)?;
+        self.client.append_due(line.now(), &mut line.out, on)?;
         self.flush()?;
         let (now, bytes, out) = self.line.receive(wait)?;
         self.client.receive(now, bytes, out, on)?;
@@ -199,10 +199,7 @@ impl<'t> Session<'t> {
     ///
     /// # Errors
     /// As [`Session::close`].
-    pub fn open_and_close(
-        &mut self,
-        on: &mut dyn FnMut(Event<'_>),
-    ) -> Result<(), LinkError> {
+    pub fn open_and_close(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         self.client.greet(self.line.now(), &mut self.line.out);
         self.close(on)
     }
@@ -229,6 +226,7 @@ impl<'t> Session<'t> {
     }
 
     fn flush(&mut self) -> Result<(), LinkError> {
-        self.line.flush_while(self.close_deadline, self.should_continue)
+        self.line
+            .flush_while(self.close_deadline, self.should_continue)
     }
 }

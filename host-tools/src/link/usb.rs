@@ -8,7 +8,9 @@ use nusb::MaybeFuture;
 use nusb::io::{EndpointRead, EndpointWrite};
 use nusb::transfer::{self, In, Out};
 
-use super::bulk::{Bulk, BulkEndpoints, SelectionError, Pipes, TRANSFER, is_hapterra, printable, select};
+use super::bulk::{
+    Bulk, BulkEndpoints, Pipes, SelectionError, TRANSFER, is_hapterra, printable, select,
+};
 use super::error::LinkError;
 
 /// Number of concurrent transfers from the device, so that none of its packets waits.

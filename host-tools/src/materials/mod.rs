@@ -198,8 +198,9 @@ impl Materials {
             return unread;
         }
         let mut found = [0_u32; MaterialTable::MAX];
-        let place =
-            |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(SEARCHED_PLACES) * f64::from(count - 1);
+        let place = |i: u32, count: u32| {
+            (f64::from(i) + 0.5) / f64::from(SEARCHED_PLACES) * f64::from(count - 1)
+        };
         for i in 0..SEARCHED_PLACES * SEARCHED_PLACES {
             let (column, row) = (i % SEARCHED_PLACES, i / SEARCHED_PLACES);
             let ground = grid.to_ground([place(column, grid.columns()), place(row, grid.rows())]);

@@ -99,7 +99,10 @@ impl From<'_> {
     /// Returns the value of the file's pixel at a point in the terrain's coordinates, NaN in
     /// no-data and beyond the file; and whether it is known.
     pub(super) fn value(&self, ground: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
-        let there = self.pixels.conversion.convert(self.terrain, &self.classes, ground);
+        let there = self
+            .pixels
+            .conversion
+            .convert(self.terrain, &self.classes, ground);
         let place = there.map(|at| self.classes.transform().to_samples(at));
         match place.and_then(|place| pixel(&self.pixels.raster, place)) {
             Some([column, row]) => self.pixels.raster.read_height(column, row, wait),
@@ -148,9 +151,13 @@ fn overlaps(
     (from, of): (&Georeference<'_>, &Raster),
     (to, on): (&Georeference<'_>, &Raster),
 ) -> bool {
-    let place = |i: u32, count: u32| f64::from(i) / f64::from(TESTED_PLACES - 1) * f64::from(count - 1);
+    let place =
+        |i: u32, count: u32| f64::from(i) / f64::from(TESTED_PLACES - 1) * f64::from(count - 1);
     (0..TESTED_PLACES * TESTED_PLACES).any(|i| {
-        let sample = [place(i % TESTED_PLACES, of.columns()), place(i / TESTED_PLACES, of.rows())];
+        let sample = [
+            place(i % TESTED_PLACES, of.columns()),
+            place(i / TESTED_PLACES, of.rows()),
+        ];
         let there = conversion.convert(from, to, from.transform().to_ground(sample));
         let there = there.map(|at| to.transform().to_samples(at));
         there.is_some_and(|there| pixel(on, there).is_some())

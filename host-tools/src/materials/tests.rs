@@ -38,7 +38,11 @@ fn class_materials(classes: &[i64]) -> ClassMaterials {
     }
 }
 
-fn over(terrain: &Raster, classes: Raster, class_materials: ClassMaterials) -> Result<Materials, GroundError> {
+fn over(
+    terrain: &Raster,
+    classes: Raster,
+    class_materials: ClassMaterials,
+) -> Result<Materials, GroundError> {
     Materials::over(("t.tif", terrain), ("c.tif", classes), class_materials)
 }
 
@@ -183,7 +187,11 @@ fn class_raster_that_does_not_fit_terrain_is_refused() {
     assert_eq!(bad, no_system);
     let bad = over(&unplaced, utm([0.0; 2]), class_materials(&[1])).expect_err("no system");
     assert!(matches!(bad, GroundError::NoSystem { unplaced, .. } if unplaced == "t.tif"));
-    let elsewhere = over(&terrain, utm([510_000.0, 5_000_000.0]), class_materials(&[1]));
+    let elsewhere = over(
+        &terrain,
+        utm([510_000.0, 5_000_000.0]),
+        class_materials(&[1]),
+    );
     let reported = elsewhere.expect_err("apart").to_string();
     assert!(
         reported.contains("longitude 9.127") && reported.contains("longitude 8.999"),

@@ -94,7 +94,9 @@ impl<'a> Touch<'a> {
     pub fn lift(mut self, above_mm: f64) -> Self {
         let [x, y, z] = self.script.end_mm();
         let ground = nearest_ground(self.surface, x, y).unwrap_or(z);
-        self.script = self.script.line_to([x, y, ground + above_mm], APPROACH_MM_S);
+        self.script = self
+            .script
+            .line_to([x, y, ground + above_mm], APPROACH_MM_S);
         self
     }
 

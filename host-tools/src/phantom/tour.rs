@@ -82,7 +82,10 @@ impl TourPlan<'_> {
                 Ok(()) => {}
                 Err(far) => first_failure = first_failure.or(Some(far)),
             }
-            if best.as_ref().is_some_and(|best| best.0 >= ENOUGH_KNOWN_SHARE) {
+            if best
+                .as_ref()
+                .is_some_and(|best| best.0 >= ENOUGH_KNOWN_SHARE)
+            {
                 break;
             }
         }
@@ -133,9 +136,8 @@ impl TourPlan<'_> {
         let on_terrain = [middle - room, middle + room];
         match self.home_mm {
             None => on_terrain,
-            Some(home) => {
-                [-MAX_HOME_DISTANCE_MM, MAX_HOME_DISTANCE_MM].map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1]))
-            }
+            Some(home) => [-MAX_HOME_DISTANCE_MM, MAX_HOME_DISTANCE_MM]
+                .map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1])),
         }
     }
 

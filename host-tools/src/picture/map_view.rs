@@ -59,8 +59,8 @@ impl MapView {
             return whole;
         };
         let small = whole.width.max(whole.height) <= SMALL_CELLS * cell_mm;
-        let far =
-            path.width > MIN_WHOLE_SHARE * whole.width || path.height > MIN_WHOLE_SHARE * whole.height;
+        let far = path.width > MIN_WHOLE_SHARE * whole.width
+            || path.height > MIN_WHOLE_SHARE * whole.height;
         if small || far {
             return whole.union(path);
         }

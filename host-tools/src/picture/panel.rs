@@ -121,7 +121,10 @@ fn key(area: &Area<'_>, top: i32, has_no_data: bool) -> Result<i32, PictureError
             for (row, column) in (0..16).flat_map(|row| (0..40).map(move |column| (row, column))) {
                 let (x, y) = (px(column), y + px(row - 8));
                 let pixel = [(x, y), (x + px(1) - 1, y + px(1) - 1)];
-                area.draw(&Rectangle::new(pixel, relief::no_data_color(column, row).filled()))?;
+                area.draw(&Rectangle::new(
+                    pixel,
+                    relief::no_data_color(column, row).filled(),
+                ))?;
             }
             Ok(())
         })?;

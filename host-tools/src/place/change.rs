@@ -195,7 +195,8 @@ impl Bounds {
             Some(level) => level,
             None => finest_level(&grid, self.resolution_mm, &placed_surface.view.scale),
         };
-        let terrain_after = terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
+        let terrain_after =
+            terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
         let (hip_mm, ground_is_known) = hip_after((terrain, &terrain_after), hand, at_mm, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];

@@ -3,7 +3,7 @@
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
 use super::place_text::{
-    place_as_given, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
+    bounds_in_words, box_in_words, own_box_in_words, place_as_given, system_in_words,
 };
 use crate::terrain::HapticGrid;
 use heightfield::{
@@ -284,7 +284,9 @@ fn heights(
     [west, south, east, north]: Sides,
 ) -> (Option<[f64; 2]>, ReadStatus) {
     let along = |from: f64, to: f64| {
-        let samples = MAX_SAMPLES_PER_SIDE.min((to.ceil() - from.floor()) as u32 + 1).max(2);
+        let samples = MAX_SAMPLES_PER_SIDE
+            .min((to.ceil() - from.floor()) as u32 + 1)
+            .max(2);
         (0..samples).map(move |index| {
             let share = f64::from(index) / f64::from(samples - 1);
             (from.floor() + share * (to.ceil() - from.floor())).round() as u32

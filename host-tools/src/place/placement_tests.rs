@@ -196,7 +196,11 @@ fn fit_fills_the_workspace_of_every_premium() {
                         high: [0, 1, 2].map(|axis| high[axis] - view.home_mm[axis]),
                     }
                 };
-                assert!(reach.contains(&around_home(9.9)), "{name} {:?}", record.model);
+                assert!(
+                    reach.contains(&around_home(9.9)),
+                    "{name} {:?}",
+                    record.model
+                );
                 let tip = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
                 let held = around_home(9.9);
                 for corner in 0..8 {
@@ -234,7 +238,10 @@ fn suitable_heights_are_true_to_scale_or_exaggerated() {
             let relief = view.heights_mm[1] - view.heights_mm[0];
             let times = view.exaggeration.expect("known");
             match side > 10.0 {
-                true => assert!((relief - CLEAR_RELIEF_MM).abs() < 1e-6 && times > 2.0, "{view:?}"),
+                true => assert!(
+                    (relief - CLEAR_RELIEF_MM).abs() < 1e-6 && times > 2.0,
+                    "{view:?}"
+                ),
                 false => assert!(relief > CLEAR_RELIEF_MM && times == 1.0, "{view:?}"),
             }
         }
@@ -528,13 +535,19 @@ fn invalid_placement_is_refused_with_the_bounds() {
         heights: Heights::MmPerUnit(50.0),
         ..PlacementOptions::default()
     };
-    assert!(matches!(placed(utm, &tall), Err(PlaceError::TooTall { .. })));
+    assert!(matches!(
+        placed(utm, &tall),
+        Err(PlaceError::TooTall { .. })
+    ));
     for times in [0.0, f64::NAN] {
         let flat = PlacementOptions {
             heights: Heights::Exaggerated(times),
             ..PlacementOptions::default()
         };
-        assert!(matches!(placed(utm, &flat), Err(PlaceError::Exaggeration(_))));
+        assert!(matches!(
+            placed(utm, &flat),
+            Err(PlaceError::Exaggeration(_))
+        ));
     }
 }
 

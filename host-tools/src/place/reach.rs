@@ -368,7 +368,10 @@ mod tests {
     fn encoder_resolution_matches_the_docs() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());
         for (found, expected) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
-            assert!((found / expected - 1.0).abs() < 0.01, "{found} for {expected}");
+            assert!(
+                (found / expected - 1.0).abs() < 0.01,
+                "{found} for {expected}"
+            );
         }
     }
 }

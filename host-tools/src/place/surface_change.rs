@@ -198,7 +198,9 @@ mod tests {
             (texture(0.0, 1.0), "above 0"),
             (texture(0.01, 0.1), "from 0.25 to 100 mm"),
         ] {
-            let error = change.of(&SurfaceParams::PREMIUM, false).expect_err(expected);
+            let error = change
+                .of(&SurfaceParams::PREMIUM, false)
+                .expect_err(expected);
             assert!(error.to_string().contains(expected), "{error}");
         }
     }

@@ -231,7 +231,13 @@ impl<R: Real> Patch<R> {
 
     /// Returns Newton's point, or the bounded one if that is outside the patch.
     #[inline]
-    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R), iterations: u32) -> PatchPoint<R> {
+    fn closest(
+        &self,
+        cell: [i32; 2],
+        hip: &[R; 3],
+        start: (R, R),
+        iterations: u32,
+    ) -> PatchPoint<R> {
         let inside = |x: R| x >= R::zero() && x <= R::one();
         match self.newton(hip, start, iterations) {
             Some((u, v)) if inside(u) && inside(v) => self.place(cell, hip, u, v),

@@ -477,7 +477,9 @@ impl RenderedTerrain {
             return None;
         }
         let same_size = match (self.cell_m, grid.side_m()) {
-            (Some(recorded), Some(now)) => (recorded - now).abs() <= MAX_CELL_DIFFERENCE * recorded.abs(),
+            (Some(recorded), Some(now)) => {
+                (recorded - now).abs() <= MAX_CELL_DIFFERENCE * recorded.abs()
+            }
             (recorded, now) => recorded == now,
         };
         let metres = |side: Option<f64>| side.map_or("unknown".into(), |m| format!("{m} m"));

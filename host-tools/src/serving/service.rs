@@ -59,10 +59,10 @@ pub struct ServedSession<'s, 't> {
 #[derive(Debug)]
 pub struct End {
     /// The error that ended the service, if there was one.
-    pub why: Result<(), LinkError>,
+    pub result: Result<(), LinkError>,
     /// The device's confirmation that it is disarmed: [`LinkError::NotConfirmed`] if it does not
     /// confirm, and [`LinkError::Taken`] if it answers that it has another host. This host must not
-    /// disarm another host's arm: if [`End::why`] is [`LinkError::Taken`], this is no error.
+    /// disarm another host's arm: if [`End::result`] is [`LinkError::Taken`], this is no error.
     pub disarmed: Result<(), LinkError>,
     /// Statistics of the link.
     pub stats: LinkStats,
@@ -112,11 +112,11 @@ impl<'t> ServedSession<'_, 't> {
     /// Serves until the handler ends, the user ends, or an error occurs that waiting does not fix;
     /// then closes the session.
     pub fn serve(mut self, handler: &mut dyn SessionHandler<'t>) -> End {
-        let why = self.run_until_over(handler);
-        let disarmed = self.close(why.as_ref().err(), &mut |event| handler.on_event(event));
+        let result = self.run_until_over(handler);
+        let disarmed = self.close(result.as_ref().err(), &mut |event| handler.on_event(event));
         let stats = self.session.stats().clone();
         End {
-            why,
+            result,
             disarmed,
             stats,
         }
@@ -124,7 +124,9 @@ impl<'t> ServedSession<'_, 't> {
 
     fn run_until_over(&mut self, handler: &mut dyn SessionHandler<'t>) -> Result<(), LinkError> {
         while (self.should_continue)() && !handler.is_over() {
-            let polled = self.session.poll(POLL, &mut |event| handler.on_event(event));
+            let polled = self
+                .session
+                .poll(POLL, &mut |event| handler.on_event(event));
             for request in handler.requests() {
                 self.session.enqueue(request);
             }

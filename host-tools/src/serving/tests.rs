@@ -227,10 +227,10 @@ fn served(bench: &Bench, polls: u32, last: &mut dyn FnMut()) -> (End, Vec<String
 fn finished_run_closes_the_session_or_reports_no_confirmation() {
     let bench = Bench::new();
     let (end, _) = served(&bench, 5, &mut || {});
-    assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
+    assert!(end.result.is_ok() && end.disarmed.is_ok(), "{end:?}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
     let (end, _) = served(&bench, 5, &mut || bench.deaf.set(true));
-    assert!(end.why.is_ok(), "{end:?}");
+    assert!(end.result.is_ok(), "{end:?}");
     assert!(matches!(end.disarmed, Err(LinkError::NotConfirmed)));
     assert_eq!(bench.last_end(), SessionEnd::Replaced);
 }
@@ -302,7 +302,7 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
         bench.dead_up_to.set(1);
         served.serve(&mut handler)
     });
-    assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
+    assert!(end.result.is_ok() && end.disarmed.is_ok(), "{end:?}");
     let received = handler.received.join("\n");
     assert!(received.contains("goes on where it was"), "{received}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
@@ -332,7 +332,7 @@ fn close_during_an_outage_is_sent_after_it() {
             bench.dead_up_to.set(1);
             served.serve(&mut handler)
         });
-        assert!(end.why.is_ok(), "{end:?}");
+        assert!(end.result.is_ok(), "{end:?}");
         assert_eq!(end.disarmed.is_ok(), back, "{end:?}");
         let last = [SessionEnd::Replaced, SessionEnd::Goodbye][usize::from(back)];
         assert_eq!(bench.last_end(), last);
@@ -350,7 +350,7 @@ fn losing_the_device_warns_of_an_armed_arm() {
         another = Some(ControlSession::open(line, TIMEOUTS.give_up).expect("it answers"));
         served.serve(&mut handler)
     });
-    let Err(taken @ LinkError::Taken) = end.why else {
+    let Err(taken @ LinkError::Taken) = end.result else {
         panic!("{end:?}");
     };
     assert!(taken.to_string().contains("may be armed"), "{taken}");

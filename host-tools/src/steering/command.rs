@@ -3,7 +3,7 @@
 use hapterra_core::force::{Pattern, Shading, Texture};
 
 use super::marks::text_of;
-use super::{Steer, Action};
+use super::{Action, Steer};
 use crate::named_surfaces::NamedSurface;
 use crate::place::{PlacementChange, SurfaceChange};
 use heightfield::printable_text::printable;

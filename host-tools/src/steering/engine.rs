@@ -149,7 +149,9 @@ impl<'r> Steering<'r> {
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Sample(sample) => self.on_sample(sample),
-            Event::SceneChangeResult { view, accepted } => self.on_scene_change_result(view, *accepted),
+            Event::SceneChangeResult { view, accepted } => {
+                self.on_scene_change_result(view, *accepted)
+            }
             Event::Opened { resumed, .. } => {
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
@@ -253,7 +255,10 @@ impl<'r> Steering<'r> {
             return;
         }
         let changes = std::mem::take(&mut self.waiting);
-        let waited = self.waiting_since.get_or_insert_with(Instant::now).elapsed();
+        let waited = self
+            .waiting_since
+            .get_or_insert_with(Instant::now)
+            .elapsed();
         let next = self.next_view(&changes, sample, waited < MAX_GROUND_WAIT);
         if let Ok(None) = next {
             (self.waiting, self.must_measure) = (changes, must_measure);
@@ -263,7 +268,8 @@ impl<'r> Steering<'r> {
         match next {
             Ok(None) => {}
             Ok(Some(update)) => {
-                self.stage = Stage::Applying(Box::new((update.placed_surface, update.terrain.clone())));
+                self.stage =
+                    Stage::Applying(Box::new((update.placed_surface, update.terrain.clone())));
                 self.update = Some(update);
             }
             Err(why) => self.lines.push(format!("the view stays as it was: {why}")),

@@ -49,10 +49,14 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 
 /// Returns the last request to the clutch.
 fn requested_hold(steering: &mut Steering<'_>) -> Option<ClutchHold> {
-    steering.requests().into_iter().rev().find_map(|request| match request {
-        HostRequest::Request(Request::Clutch { hold }) => Some(hold),
-        _ => None,
-    })
+    steering
+        .requests()
+        .into_iter()
+        .rev()
+        .find_map(|request| match request {
+            HostRequest::Request(Request::Clutch { hold }) => Some(hold),
+            _ => None,
+        })
 }
 
 fn answer(steering: &mut Steering<'_>, hold: ClutchHold) {
@@ -124,7 +128,11 @@ fn unopened_clutch_or_silent_device_times_out() {
             let hold = requested_hold(steering).expect("asked");
             if answers {
                 answer(steering, hold);
-                samples(steering, Limits::CLUTCH_MOVES, MAX_SAMPLES_TO_OPEN as usize + 1);
+                samples(
+                    steering,
+                    Limits::CLUTCH_MOVES,
+                    MAX_SAMPLES_TO_OPEN as usize + 1,
+                );
             } else {
                 let request = HostRequest::Request(Request::Clutch { hold });
                 steering.on_event(&Event::Unanswered(&request));

@@ -21,7 +21,7 @@ mod queue;
 use crate::place::PlacementChange;
 
 pub use engine::{PlacementUpdate, Steering};
-pub use marks::{UserMark, Marks};
+pub use marks::{Marks, UserMark};
 pub use queue::{CommandQueue, Origin};
 
 /// Request of a command.

@@ -101,7 +101,12 @@ impl CommandQueue {
 
     /// Returns the next command that is due at a time of the device, s; `is_free` is true if the
     /// earlier ones are done. Faults of lines are reported.
-    pub fn due(&mut self, t_s: f64, is_free: bool, notify: &mut dyn FnMut(String)) -> Option<Action> {
+    pub fn due(
+        &mut self,
+        t_s: f64,
+        is_free: bool,
+        notify: &mut dyn FnMut(String),
+    ) -> Option<Action> {
         while self.waiting.len() < MAX_WAITING
             && let Some(Ok(read)) = self.lines.as_ref().map(Receiver::try_recv)
         {
@@ -158,7 +163,9 @@ fn distribute(line: &str, number: u64, senders: &[DeviceSender]) -> bool {
                 .filter(|sender| is_served(sender, Ok(command.clone())));
             served.count() > 0
         }
-        Err(why) => senders.iter().any(|sender| is_served(sender, Err(why.clone()))),
+        Err(why) => senders
+            .iter()
+            .any(|sender| is_served(sender, Err(why.clone()))),
     }
 }
 

@@ -28,25 +28,33 @@ impl<'t> Placements<'t> {
     pub fn new(terrain: Terrain<'t>) -> Self {
         let placed_surface = None;
         Self {
-            views: vec![SessionPlacement { terrain, placed_surface }],
+            views: vec![SessionPlacement {
+                terrain,
+                placed_surface,
+            }],
             of_number: [0; 256],
         }
     }
 
     /// Adds a placement with a number: later samples may belong to it.
-    pub fn put(&mut self, number: u8, terrain: Terrain<'t>, placed_surface: PlacedSurface) {
+    pub fn add(&mut self, number: u8, terrain: Terrain<'t>, placed_surface: PlacedSurface) {
         if let Some(index) = self.of_number.get_mut(usize::from(number)) {
             *index = self.views.len();
         }
         let placed_surface = Some(placed_surface);
-        self.views.push(SessionPlacement { terrain, placed_surface });
+        self.views.push(SessionPlacement {
+            terrain,
+            placed_surface,
+        });
     }
 
     /// Processes an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             // A placement that was not accepted has no samples.
-            Event::SceneChangeResult { accepted: false, .. } if self.views.len() > 1 => {
+            Event::SceneChangeResult {
+                accepted: false, ..
+            } if self.views.len() > 1 => {
                 self.views.pop();
             }
             // A restarted device begins with the latest placement as its scene.
@@ -112,7 +120,7 @@ mod tests {
             assert_eq!(views.index_of(&of(0)), 0);
             for count in 1..=300_usize {
                 let number = count as u8;
-                views.put(number, terrain.clone(), placed_surface);
+                views.add(number, terrain.clone(), placed_surface);
                 assert_eq!(views.index_of(&of(number)), count);
             }
             // 300 is 44 in a byte, and 45 is still the earlier one.
@@ -124,7 +132,7 @@ mod tests {
     #[test]
     fn refused_placement_has_no_sample() {
         with(|mut views, terrain, placed_surface| {
-            views.put(1, terrain.clone(), placed_surface);
+            views.add(1, terrain.clone(), placed_surface);
             let hip = GridPoint::default();
             let scene = terrain.scene(placed_surface.params, Source::Encoders, hip);
             let view = SceneChange {
@@ -142,7 +150,7 @@ mod tests {
     #[test]
     fn restarted_device_begins_with_the_latest_placement() {
         with(|mut views, terrain, placed_surface| {
-            views.put(1, terrain.clone(), placed_surface);
+            views.add(1, terrain.clone(), placed_surface);
             let device = hello();
             for (resumed, index) in [(true, 0), (false, 1)] {
                 let device = &device;

@@ -110,7 +110,10 @@ mod tests {
             (0.0, (10.0, 10.0), 0.0),
         ] {
             let distortion = grid_distortion(lean, sides, HapticCells::Stored);
-            assert!((distortion - expected).abs() < 1e-9, "{distortion} for {expected}");
+            assert!(
+                (distortion - expected).abs() < 1e-9,
+                "{distortion} for {expected}"
+            );
             assert!(grid_distortion(lean, sides, HapticCells::Square) < 1e-9);
         }
     }

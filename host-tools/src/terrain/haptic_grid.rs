@@ -142,7 +142,9 @@ impl<'r> HapticGrid<'r> {
             return None;
         }
         let remeasured = Self::at(self.raster, self.cells, ground);
-        let remeasured = remeasured.with_materials(self.materials).with_tip(self.tip_mm);
+        let remeasured = remeasured
+            .with_materials(self.materials)
+            .with_tip(self.tip_mm);
         let remeasured = remeasured.with_wait(self.wait);
         (self.cells == HapticCells::Stored || !remeasured.is_distorted()).then_some(remeasured)
     }

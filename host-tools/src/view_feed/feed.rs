@@ -191,7 +191,8 @@ impl<'t> ViewFeed<'t> {
         // Combines this placement with one that was not sent to the viewer.
         let before = self.scene_due.as_ref();
         let keeps_all = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
-        self.tiles.change_placement(keeps_tiles, picture.terrain.parts());
+        self.tiles
+            .change_placement(keeps_tiles, picture.terrain.parts());
         self.terrain = picture.terrain.clone();
         let scene = Scene {
             keeps_tiles: keeps_all,

@@ -37,7 +37,10 @@ impl<'t> ToFirstPlacement<'t> {
 
     /// Converts a position, mm: the same ground and height.
     pub(super) fn place(&self, [east, north, up]: [f64; 3]) -> [f64; 3] {
-        let (from, to) = (self.view.scale_of_level_0(), self.in_first_cells.scale_of_level_0());
+        let (from, to) = (
+            self.view.scale_of_level_0(),
+            self.in_first_cells.scale_of_level_0(),
+        );
         let cells = [east, north].map(|mm| mm / from.cell_mm());
         let ground = self.view.grid().to_ground(cells);
         let [east, north] = self.in_first_cells.grid().of_ground(ground);

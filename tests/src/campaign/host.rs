@@ -145,7 +145,7 @@ impl<'t> Host<'t> {
 
     /// Repeats unanswered messages, and opens a new session if the device is gone.
     fn do_what_is_due(&mut self, now: u64, out: &mut Vec<u8>) {
-        match self.client.due(time(now), out, &mut |_| {}) {
+        match self.client.append_due(time(now), out, &mut |_| {}) {
             Ok(()) => {}
             Err(LinkError::Silent(_) | LinkError::NotConfirmed) => {
                 self.client.greet(time(now), out);

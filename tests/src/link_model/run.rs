@@ -360,7 +360,7 @@ impl<'t> World<'t> {
             }
             received = received.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
         }
-        let received = received.and_then(|()| self.client.due(now, &mut out, &mut on));
+        let received = received.and_then(|()| self.client.append_due(now, &mut out, &mut on));
         self.say(&out);
         let session = self.client.session().get();
         self.judge.reported(session, opened.as_ref(), &samples)?;

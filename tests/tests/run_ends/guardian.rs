@@ -147,7 +147,9 @@ fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
         is_on.store(drive.enabled, Ordering::Relaxed);
         sense.dead_man = is_pressed.load(Ordering::Relaxed);
     };
-    Native::for_replay().free_running().with_fault_injector(Box::new(hand))
+    Native::for_replay()
+        .free_running()
+        .with_fault_injector(Box::new(hand))
 }
 
 /// Returns the truncated recording.

@@ -30,7 +30,10 @@ pub enum Choice<'p> {
 ///
 /// # Errors
 /// [`UpdateError::Nothing`] and [`UpdateError::Several`], which names them.
-pub fn choose<'p>(connected_devices: &'p [ConnectedDevice], serial: Option<&str>) -> Result<Choice<'p>, UpdateError> {
+pub fn choose<'p>(
+    connected_devices: &'p [ConnectedDevice],
+    serial: Option<&str>,
+) -> Result<Choice<'p>, UpdateError> {
     let fits = |device: &&ConnectedDevice| {
         serial.is_none_or(|requested| {
             let serial = device.serial.as_deref();
@@ -50,7 +53,9 @@ pub fn choose<'p>(connected_devices: &'p [ConnectedDevice], serial: Option<&str>
                 None => "a hapterra board, or an STM32 in its loader".into(),
             },
         }),
-        (Some(_), Some(_)) => Err(UpdateError::Several(connected_devices.iter().map(name).collect())),
+        (Some(_), Some(_)) => Err(UpdateError::Several(
+            connected_devices.iter().map(name).collect(),
+        )),
     }
 }
 

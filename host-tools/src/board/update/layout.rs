@@ -111,7 +111,8 @@ mod tests {
 
     #[test]
     fn control_characters_from_a_loader_are_removed() {
-        let Err(UpdateError::Layout(description)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}") else {
+        let Err(UpdateError::Layout(description)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}")
+        else {
             panic!("refused");
         };
         assert_eq!(description, "@[2JFlash");

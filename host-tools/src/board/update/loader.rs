@@ -209,7 +209,12 @@ impl<P: ControlPipe> Loader<P> {
     }
 
     /// Sends a block to the loader and waits until it is processed.
-    fn send_block(&mut self, block: u16, bytes: &[u8], operation: &'static str) -> Result<(), UpdateError> {
+    fn send_block(
+        &mut self,
+        block: u16,
+        bytes: &[u8],
+        operation: &'static str,
+    ) -> Result<(), UpdateError> {
         let sent = self.pipe.write(request::DNLOAD, block, bytes);
         sent.map_err(|source| self.failed(operation, source))?;
         let mut waited = Duration::ZERO;

@@ -30,4 +30,4 @@ pub use layout::Layout;
 pub use loader::{ControlPipe, Loader, request};
 pub use plan::{FlashRange, Plan};
 pub use procedure::{Step, update};
-pub use system::{LOADER_PRODUCT_ID, LOADER_VENDOR_ID, SystemPipe, open_loader, connected_devices};
+pub use system::{LOADER_PRODUCT_ID, LOADER_VENDOR_ID, SystemPipe, connected_devices, open_loader};

@@ -131,7 +131,12 @@ impl Scripted {
 
     fn count(&mut self) -> io::Result<()> {
         let has_started = matches!(self.operations.last(), Some(FlashOperation::Started(_)));
-        if has_started || self.faults.disconnected_after.is_some_and(|n| self.requests >= n) {
+        if has_started
+            || self
+                .faults
+                .disconnected_after
+                .is_some_and(|n| self.requests >= n)
+        {
             return Err(io::Error::new(io::ErrorKind::NotConnected, "unplugged"));
         }
         self.requests += 1;
@@ -195,7 +200,8 @@ impl Scripted {
             return 0x03;
         }
         cells.copy_from_slice(bytes);
-        self.operations.push(FlashOperation::Wrote(address, bytes.len()));
+        self.operations
+            .push(FlashOperation::Wrote(address, bytes.len()));
         0
     }
 

@@ -1,6 +1,6 @@
 //! Whole updates with a scripted loader, without faults and with each fault.
 
-use super::scripted::{FlashOperation, Faults, G474, H743, Rom, Scripted, State, TRANSFER};
+use super::scripted::{Faults, FlashOperation, G474, H743, Rom, Scripted, State, TRANSFER};
 use super::{ControlPipe, Loader, Plan, Step, UpdateError, UpdateFailure, request, update};
 use crate::board::image::Part;
 use crate::board::{Board, Image, Memories};
@@ -125,7 +125,10 @@ fn update_writes_and_starts_image_and_erases_no_other_page() {
         };
         let erased: Vec<u64> = device.operations.iter().filter_map(erased).collect();
         assert_eq!(erased, touched, "{}", rom.board);
-        assert_eq!(device.operations.last(), Some(&FlashOperation::Started(FLASH)));
+        assert_eq!(
+            device.operations.last(),
+            Some(&FlashOperation::Started(FLASH))
+        );
     }
 }
 
@@ -133,11 +136,19 @@ fn update_writes_and_starts_image_and_erases_no_other_page() {
 fn vectors_are_erased_first_and_written_last() {
     for rom in ROMS {
         let (device, _) = try_update(Scripted::new(rom, Faults::default()), &image(rom));
-        assert_eq!(device.operations.first(), Some(&FlashOperation::Erased(FLASH)));
-        let writes = device.operations.iter().filter_map(|operation| match operation {
-            FlashOperation::Wrote(address, bytes) => Some((*address < FLASH + rom.word as u64, *bytes)),
-            _ => None,
-        });
+        assert_eq!(
+            device.operations.first(),
+            Some(&FlashOperation::Erased(FLASH))
+        );
+        let writes = device
+            .operations
+            .iter()
+            .filter_map(|operation| match operation {
+                FlashOperation::Wrote(address, bytes) => {
+                    Some((*address < FLASH + rom.word as u64, *bytes))
+                }
+                _ => None,
+            });
         let writes: Vec<(bool, usize)> = writes.collect();
         let [others @ .., last] = &writes[..] else {
             panic!("nothing was written");
@@ -224,7 +235,8 @@ fn image_that_fails_verification_is_not_started() {
             let failure = done.expect_err("found");
             assert!(matches!(failure.error, UpdateError::Differs(at) if at == bad));
             assert!(failure.erased);
-            let started = |operation: &FlashOperation| matches!(operation, FlashOperation::Started(_));
+            let started =
+                |operation: &FlashOperation| matches!(operation, FlashOperation::Started(_));
             assert!(!device.operations.iter().any(started));
             let is_vectors = bad < FLASH + rom.word as u64;
             let mut vectors = device.flash[..rom.word].iter();

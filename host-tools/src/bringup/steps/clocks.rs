@@ -20,7 +20,10 @@ const MAX_POLLS: usize = 30;
 ///
 /// # Errors
 /// [`Finding::WrongTickRate`], [`Finding::UsbClockUnlocked`], [`Halt`].
-pub(super) fn check_tick_rate(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<f64, Halt> {
+pub(super) fn check_tick_rate(
+    board: &mut Board<'_, '_>,
+    attendant: &dyn Attendant,
+) -> Result<f64, Halt> {
     check_usb_clock(board)?;
     let first = board.poll_status()?;
     let nominal_hz = f64::from(first.device.tick_hz);

@@ -87,7 +87,10 @@ mod tests {
         assert_eq!(check_joint_2([40, 700, 2_800]), Err(swapped));
         // The counts are from the link and may have any value.
         let max_joint = check_joint(1, [0, i32::MAX, 0], [0, i32::MAX, 0]);
-        assert!(matches!(max_joint, Err(Finding::CountsLost { joint: 2, .. })));
+        assert!(matches!(
+            max_joint,
+            Err(Finding::CountsLost { joint: 2, .. })
+        ));
         let lost = check_joint(1, [40, 2_800, 700], [-40, -2_000, -700]);
         assert!(matches!(lost, Err(Finding::CountsLost { joint: 2, .. })));
     }

@@ -53,7 +53,10 @@ impl TipMotion {
         {
             self.latest.pop_front();
         }
-        let then = self.latest.front().filter(|then| since(then) >= SPEED_INTERVAL_MS);
+        let then = self
+            .latest
+            .front()
+            .filter(|then| since(then) >= SPEED_INTERVAL_MS);
         if let Some(then) = then {
             let mm_s = 1e3 * now.1.distance(then.1) / f64::from(since(then));
             self.max_speed_mm_s = self.max_speed_mm_s.max(mm_s);

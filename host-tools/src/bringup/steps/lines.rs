@@ -45,7 +45,11 @@ fn ready_lines(
 
 fn enable_line(attendant: &mut dyn Attendant) -> Result<String, Halt> {
     let mut reported = Vec::new();
-    for is in [BoardState::Running, BoardState::InReset, BoardState::Unplugged] {
+    for is in [
+        BoardState::Running,
+        BoardState::InReset,
+        BoardState::Unplugged,
+    ] {
         let volts = attendant.read(Reading::EnableVolts(is))?;
         if volts.is_nan() || volts.abs() > LOW_V {
             return Err(Finding::EnableHigh(volts).into());

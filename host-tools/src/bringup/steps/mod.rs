@@ -82,7 +82,10 @@ fn stored_record(board: &mut Board<'_, '_>) -> Result<Calibration, Halt> {
 }
 
 /// Returns the record of the zeroed arm; zeroes it with the attendant if necessary.
-fn zeroed_record(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Calibration, Halt> {
+fn zeroed_record(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<Calibration, Halt> {
     let record = stored_record(board)?;
     if board.poll_status()?.health.zero.is_none() {
         zero(board, attendant)?;

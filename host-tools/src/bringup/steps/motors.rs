@@ -121,7 +121,12 @@ fn jog(
 }
 
 /// Returns the motor's sign, from the joints' motion under a positive and a negative current, rad.
-fn sign_from_motion(record: &Calibration, axis: usize, plus: DVec3, minus: DVec3) -> Result<i8, Finding> {
+fn sign_from_motion(
+    record: &Calibration,
+    axis: usize,
+    plus: DVec3,
+    minus: DVec3,
+) -> Result<i8, Finding> {
     let (by_motor, by_hand) = (0.5 * (plus - minus), 0.5 * (plus + minus));
     let joint = by_motor.abs().max_position();
     let motor = axis + 1;
@@ -203,12 +208,21 @@ mod tests {
 
     #[test]
     fn each_motor_mistake_has_its_own_finding() {
-        assert_eq!(sign_of_motor_2([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]), Ok(1));
+        assert_eq!(
+            sign_of_motor_2([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]),
+            Ok(1)
+        );
         let right = -1;
         let inverted = Err(Finding::InvertedMotor { motor: 2, right });
-        assert_eq!(sign_of_motor_2([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]), inverted);
+        assert_eq!(
+            sign_of_motor_2([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]),
+            inverted
+        );
         let swapped = Err(Finding::SwappedMotors { motor: 2, joint: 3 });
-        assert_eq!(sign_of_motor_2([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]), swapped);
+        assert_eq!(
+            sign_of_motor_2([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]),
+            swapped
+        );
         let none = sign_of_motor_2([0.0, 0.000_1, 0.0], [0.000_1, 0.0, 0.0]);
         assert!(matches!(none, Err(Finding::NoPush { motor: 2, .. })));
     }

@@ -5,7 +5,7 @@ use hapterra_core::phantom::Calibration;
 use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, Reading, Task};
 use crate::bringup::finding::Finding;
-use crate::calibrate::{RulerMove, Direction, RatioFit, fit_ratios};
+use crate::calibrate::{Direction, RatioFit, RulerMove, fit_ratios};
 
 /// Distance of the move, mm.
 const MOVE_MM: u16 = 80;

@@ -80,7 +80,10 @@ pub(super) fn check(
 type IsDone = fn(&PlaneContact) -> bool;
 
 /// Waits until the tip is deep enough, and then until it has no force.
-fn wait_for_touch(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<PlaneContact, Halt> {
+fn wait_for_touch(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<PlaneContact, Halt> {
     let mut contact = PlaneContact::default();
     // Deep enough and at rest.
     let deep = |contact: &PlaneContact| {

@@ -11,9 +11,9 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
-use super::terminal::writer::{print_line, notify};
+use super::terminal::writer::{notify, print_line};
 use crate::bringup::{
-    Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, SequenceEnd, run_sequence,
+    Attendant, BringupError, Halt, Log, LogError, SequenceEnd, Step, VirtualUser, run_sequence,
 };
 use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native, Transport};
 use crate::phantom::Wiring;

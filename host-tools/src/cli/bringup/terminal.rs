@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
-use crate::cli::terminal::questions::{prompt, number};
+use crate::cli::terminal::questions::{number, prompt};
 use crate::cli::terminal::writer::print_line;
 use crate::link::DeviceAddress;
 

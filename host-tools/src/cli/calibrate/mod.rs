@@ -105,7 +105,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     match &args.show {
         Some(Some(path)) => return put(&file::to_toml(&file::read(path)?)),
         // A read-only query does not take the arm from its host.
-        Some(None) => return put(&file::to_toml(&args.device.with_read_only_session(device_record)?)),
+        Some(None) => {
+            return put(&file::to_toml(
+                &args.device.with_read_only_session(device_record)?,
+            ));
+        }
         None => {}
     }
     partial_files::report(args.out.as_deref());
@@ -176,7 +180,10 @@ fn calibrate(
 }
 
 /// Returns the initial record and its source.
-fn initial_record(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
+fn initial_record(
+    args: &Args,
+    control: &mut ControlSession<'_>,
+) -> Result<(Calibration, String), Failure> {
     let held = control.calibration()?;
     let (mut record, source) = match (&args.from, args.model, held) {
         (Some(path), _, _) => (file::read(path)?, path.display().to_string()),

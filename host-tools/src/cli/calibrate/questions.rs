@@ -1,7 +1,7 @@
 //! The questions of a calibration, at a terminal or from a pipe whose lines are the answers.
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
-use crate::cli::terminal::questions::{prompt, number};
+use crate::cli::terminal::questions::{number, prompt};
 use crate::cli::terminal::writer::{print_line, show};
 
 /// A user at a terminal.

@@ -7,8 +7,8 @@ use hapterra_core::wire::request::Request;
 use super::Args;
 use crate::board::Image;
 use crate::board::update::{
-    Choice, Loader, Plan, ConnectedDevice, Step, SystemPipe, UpdateError, choose, open_loader, connected_devices,
-    update,
+    Choice, ConnectedDevice, Loader, Plan, Step, SystemPipe, UpdateError, choose,
+    connected_devices, open_loader, update,
 };
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
@@ -109,7 +109,9 @@ fn wait_for<T>(
     let start = Instant::now();
     loop {
         match find() {
-            Ok(None) | Err(UpdateError::Disconnected { .. }) if start.elapsed() < REAPPEAR_TIMEOUT => {
+            Ok(None) | Err(UpdateError::Disconnected { .. })
+                if start.elapsed() < REAPPEAR_TIMEOUT =>
+            {
                 std::thread::sleep(POLL_INTERVAL);
             }
             other => return other,

@@ -154,7 +154,9 @@ impl Watch {
         let mut chunk = [0; 4096];
         loop {
             match self.message.read(&mut chunk) {
-                Ok(n @ 1..) => self.unparsed.extend_from_slice(chunk.get(..n).unwrap_or(&[])),
+                Ok(n @ 1..) => self
+                    .unparsed
+                    .extend_from_slice(chunk.get(..n).unwrap_or(&[])),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 _ => break,
             }

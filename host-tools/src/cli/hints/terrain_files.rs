@@ -44,7 +44,9 @@ fn hint(path: &Path, fault: &RasterError) -> String {
             );
         }
         RasterError::ToBuild { files, .. } => return vrt_command(path, files),
-        RasterError::Unsupported { .. } => return with_gdal(path) + &conversion_command(path, PLAIN),
+        RasterError::Unsupported { .. } => {
+            return with_gdal(path) + &conversion_command(path, PLAIN);
+        }
         RasterError::InTile { file, fault } => return hint(file, fault),
         RasterError::TilesDiffer { file, other, .. } => {
             return resampling_command(path, file, other);
@@ -244,7 +246,11 @@ fn conversion_command(path: &Path, options: &str) -> String {
 fn vrt_command(path: &Path, files: &[String]) -> String {
     /// More names would make the command unreadable.
     const MAX_NAMES: usize = 20;
-    let each: Vec<_> = files.iter().take(MAX_NAMES).map(|file| quoted(file)).collect();
+    let each: Vec<_> = files
+        .iter()
+        .take(MAX_NAMES)
+        .map(|file| quoted(file))
+        .collect();
     let more = match files.len() {
         0..=MAX_NAMES => String::new(),
         count => format!(" … (all {count} files)"),

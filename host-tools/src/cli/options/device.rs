@@ -150,7 +150,8 @@ impl Device {
         let mut arm = resting_phantom()?;
         match &self.device {
             DeviceChoice::Connected(address) => {
-                let native = || Native::new(HostClock::default(), Some(Box::new(arm))).free_running();
+                let native =
+                    || Native::new(HostClock::default(), Some(Box::new(arm))).free_running();
                 run_and_close(open(address.connect(native)?, TIMEOUT)?, run)
             }
             DeviceChoice::Emulated(board) => {

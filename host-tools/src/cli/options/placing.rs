@@ -6,7 +6,7 @@ use super::rendering::Rendering;
 use super::scale::MapScale;
 use crate::cli::failure::Failure;
 use crate::place::{
-    Coordinates, CLEAR_RELIEF_MM, PlaceError, Placement, PlacementOptions, Reach, Target,
+    CLEAR_RELIEF_MM, Coordinates, PlaceError, Placement, PlacementOptions, Reach, Target,
     coordinates_in_words, place_in_words,
 };
 use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};

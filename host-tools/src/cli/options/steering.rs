@@ -17,7 +17,9 @@ use crate::link::{Event, HostRequest};
 use crate::place::{Bounds, PlacedSurface, Reach};
 use crate::replay::Mark;
 use crate::steering::keys::{KEYS, Key, Keys};
-use crate::steering::{CommandQueue, UserMark, Marks, Origin, PlacementUpdate, Steer, Steering, Action};
+use crate::steering::{
+    Action, CommandQueue, Marks, Origin, PlacementUpdate, Steer, Steering, UserMark,
+};
 use crate::telemetry::{Placements, SampleLog};
 use crate::terrain::Terrain;
 
@@ -235,9 +237,16 @@ impl<'t> PlacementControl<'t> {
     }
 
     /// Returns the placement to activate now; samples may use it from now on.
-    pub(in crate::cli) fn take_update(&mut self, views: &mut Placements<'t>) -> Option<PlacementUpdate<'t>> {
+    pub(in crate::cli) fn take_update(
+        &mut self,
+        views: &mut Placements<'t>,
+    ) -> Option<PlacementUpdate<'t>> {
         let update = self.steering.take_update()?;
-        views.put(update.view.number, update.terrain.clone(), update.placed_surface);
+        views.add(
+            update.view.number,
+            update.terrain.clone(),
+            update.placed_surface,
+        );
         Some(update)
     }
 
@@ -295,7 +304,11 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
 }
 
 /// Describes a new placement in one line.
-pub(in crate::cli) fn reported(number: usize, placed_surface: &PlacedSurface, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn reported(
+    number: usize,
+    placed_surface: &PlacedSurface,
+    terrain: &Terrain<'_>,
+) -> String {
     let file = terrain.raster().georeference();
     format!(
         "view {number}: {}; {}; {}; {} under the home position",

@@ -93,7 +93,8 @@ impl<'t> Serving<'_, 't> {
         let may_be_armed = |may| interrupt::device_may_be_armed(name, &device.address, may);
         may_be_armed(true);
         let calibration_read = self.calibration_read;
-        let opened = service.open(|line| calibration_read.and_then(|()| check_servable(args, device, line)));
+        let opened =
+            service.open(|line| calibration_read.and_then(|()| check_servable(args, device, line)));
         // Pending messages are shown even if the session cannot be opened.
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
@@ -133,18 +134,19 @@ impl<'t> Serving<'_, 't> {
             }
         }
         // If the viewer does not start, the session continues.
-        let viewer =
-            (self.viewer).and_then(|viewer| viewer.start(&hello, |line| device_console.notify(line)));
+        let viewer = (self.viewer)
+            .and_then(|viewer| viewer.start(&hello, |line| device_console.notify(line)));
         let control = (control, self.device_keys.as_ref());
         let watch = Watch::new(args, (placed, device_console), &hello, recording, control);
         let mut watch = watch.with_viewer(viewer).with_events(self.events);
         let end = served.serve(&mut watch);
-        let is_others = matches!(end.why, Err(LinkError::Taken));
+        let is_others = matches!(end.result, Err(LinkError::Taken));
         watch.ended(end.disarmed.is_ok() && !is_others);
         // The recording is saved first, regardless of the cause of the end.
         let log = watch.finish();
         let recording_result = log.recording_result.or_hint(OTHER_FILE);
-        let ended = reported(end.why, end.disarmed, &notify).and(check_terrain_arrived(log.has_stalled));
+        let ended =
+            reported(end.result, end.disarmed, &notify).and(check_terrain_arrived(log.has_stalled));
         may_be_armed(false);
         let summary = SessionSummary {
             ticks: log.ticks,
@@ -191,8 +193,9 @@ impl<F: FnMut()> Drop for OnDrop<F> {
 fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
     while done.get().is_none() {
-        let ended = Tcp::connect(address)
-            .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Disconnected));
+        let ended = Tcp::connect(address).and_then(|mut line| {
+            serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Disconnected)
+        });
         if let Err(why) = ended {
             tracing::info!("the plant's line at {address}: {why:?}");
             std::thread::sleep(RETRY);
@@ -202,7 +205,11 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
 
 /// Checks that a device may be served: a real board must be brought up, and a board with a virtual
 /// arm must not drive a real one.
-fn check_servable(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
+fn check_servable(
+    args: &Args,
+    device: &OneDevice,
+    line: &mut dyn Transport,
+) -> Result<(), Failure> {
     match (&device.plant, &device.address) {
         (_, DeviceAddress::Native) => Ok(()),
         // Even with `--unchecked`: a virtual arm's zero pose and lines would be assumed for a real

@@ -160,8 +160,11 @@ impl<'t> Watch<'t> {
             && let Some(placed_surface) = &placement.placed_surface
         {
             self.described_view = view;
-            self.device_console
-                .notify(steering::reported(view, placed_surface, &placement.terrain));
+            self.device_console.notify(steering::reported(
+                view,
+                placed_surface,
+                &placement.terrain,
+            ));
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
                 let settings = PlacementSettings::new(number, &placement.terrain, placed_surface);
@@ -204,7 +207,9 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
 
     fn requests(&mut self) -> Vec<HostRequest> {
         let lines = self.prompts.lines();
-        lines.iter().for_each(|line| self.device_console.notify(line));
+        lines
+            .iter()
+            .for_each(|line| self.device_console.notify(line));
         if let Some(events) = &mut self.events {
             events.arming(lines, self.prompts.open_question());
         }
@@ -215,7 +220,8 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
             }
             device_console.notify(text);
         };
-        self.control.update(self.log.t_s(), &mut |text| refuse(text));
+        self.control
+            .update(self.log.t_s(), &mut |text| refuse(text));
         if let Some(number) = self.control.entered()
             && !self.prompts.answer(number)
         {

@@ -162,7 +162,9 @@ impl ArmingPrompts {
             },
             Event::Unanswered(request) => {
                 self.zeroing &= **request != HostRequest::Status;
-                self.push_line(format!("the device does not answer: {request:?} was given up"));
+                self.push_line(format!(
+                    "the device does not answer: {request:?} was given up"
+                ));
             }
             Event::Status(status) if self.zeroing => {
                 self.zeroing = false;
@@ -220,7 +222,10 @@ impl ArmingPrompts {
 
     fn push_line(&mut self, text: impl Into<String>) {
         let text = text.into();
-        self.lines.push(Line { text, question: None });
+        self.lines.push(Line {
+            text,
+            question: None,
+        });
     }
 
     /// Prints each blocker with its remedy.

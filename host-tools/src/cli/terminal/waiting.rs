@@ -93,7 +93,14 @@ mod tests {
     fn progress_lines_appear_from_first_second_until_work_ends() {
         let (blocks, waits) = (Cell::new(0), Cell::new(0));
         let should_continue = |time| {
-            assert_eq!(time, if waits.get() == 0 { FIRST_LINE_AFTER } else { LINE_INTERVAL });
+            assert_eq!(
+                time,
+                if waits.get() == 0 {
+                    FIRST_LINE_AFTER
+                } else {
+                    LINE_INTERVAL
+                }
+            );
             waits.set(waits.get() + 1);
             blocks.set(blocks.get() + 10);
             waits.get() < 4

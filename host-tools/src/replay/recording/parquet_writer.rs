@@ -155,7 +155,10 @@ fn empty(more: &[Column]) -> Vec<Values> {
     });
     let columns = before.iter().map(numbers);
     let columns = columns.chain([Values::Flags(Vec::new())]);
-    columns.chain(after.iter().map(numbers)).chain(more).collect()
+    columns
+        .chain(after.iter().map(numbers))
+        .chain(more)
+        .collect()
 }
 
 fn begin(output: Output, more: &[Column]) -> Result<SerializedFileWriter<Output>, ParquetError> {

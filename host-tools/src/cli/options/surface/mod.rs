@@ -143,13 +143,19 @@ impl SurfaceOptions {
             return Err(format!("{} is no recording, and no .toml", file.display()))
                 .or_hint("name a recording, or a surface in a FILE.toml, with --surface");
         };
-        let class_materials = settings.materials.as_ref().map(|it| it.class_materials.clone());
+        let class_materials = settings
+            .materials
+            .as_ref()
+            .map(|it| it.class_materials.clone());
         if self.friction.is_some() && class_materials.is_some() {
             return Err("--friction: each of the recorded materials has its own")
                 .or_hint("leave it out, or name a table that states it with --surface");
         }
         let params = settings.params();
-        Ok(Surface { params, class_materials })
+        Ok(Surface {
+            params,
+            class_materials,
+        })
     }
 
     /// Returns the surface of a table: the options replace numbers of its default, and the classes
@@ -247,7 +253,9 @@ impl Surface {
     ) -> Result<Option<Materials>, Failure> {
         let has_classes = |class_materials: &&ClassMaterials| !class_materials.class.is_empty();
         let (file, class_materials) = match (&options.materials, &self.class_materials) {
-            (None, class_materials) if class_materials.as_ref().is_some_and(|it| has_classes(&it)) => {
+            (None, class_materials)
+                if class_materials.as_ref().is_some_and(|it| has_classes(&it)) =>
+            {
                 return Err("the surface lists several classes, but no class raster is given")
                     .or_hint("name the raster with --materials");
             }
@@ -260,7 +268,11 @@ impl Surface {
         };
         let classes = Raster::open(file, &reading.of_classes()?).map_err(of_classes)?;
         let name = file.display().to_string();
-        Ok(Some(Materials::over(terrain, (&name, classes), class_materials)?))
+        Ok(Some(Materials::over(
+            terrain,
+            (&name, classes),
+            class_materials,
+        )?))
     }
 }
 

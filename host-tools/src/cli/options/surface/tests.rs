@@ -110,7 +110,11 @@ fn options_that_no_surface_has_are_refused() {
             "force of -1",
         ),
     ] {
-        let why = options.load().map(|it| it.params).expect_err(expected).text();
+        let why = options
+            .load()
+            .map(|it| it.params)
+            .expect_err(expected)
+            .text();
         assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
 }

@@ -47,7 +47,8 @@ pub(super) fn texture(entry: &MaterialEntry, default: &Texture) -> Result<Textur
     let seed = entry.texture_seed.or(inherited.map(|it| it.seed));
     checked(Texture {
         pattern,
-        amplitude_mm: amplitude_mm.unwrap_or((DEFAULT_AMPLITUDE_SHARE * wavelength_mm).min(MAX_DEFAULT_AMPLITUDE_MM)),
+        amplitude_mm: amplitude_mm
+            .unwrap_or((DEFAULT_AMPLITUDE_SHARE * wavelength_mm).min(MAX_DEFAULT_AMPLITUDE_MM)),
         wavelength_mm,
         direction_deg: direction_deg.unwrap_or(0.0),
         seed: seed.unwrap_or(0),
@@ -98,7 +99,10 @@ fn checked(texture: Texture) -> Result<Texture, String> {
 mod tests {
     use super::*;
 
-    fn texture_with(texture: Option<TextureName>, numbers: [Option<f32>; 3]) -> Result<Texture, String> {
+    fn texture_with(
+        texture: Option<TextureName>,
+        numbers: [Option<f32>; 3],
+    ) -> Result<Texture, String> {
         let [texture_amplitude, texture_wavelength, texture_direction] = numbers;
         let entry = MaterialEntry {
             texture,
