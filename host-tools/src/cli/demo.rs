@@ -186,7 +186,7 @@ fn show(
         "terrain        {name}: {}",
         session_summary::in_words(terrain)
     );
-    print!("{}", placing::reported(view, terrain));
+    print!("{}", placing::describe(view, terrain));
     if let Some(line) = session_summary::materials(terrain) {
         println!("{line}");
     }
@@ -403,7 +403,7 @@ impl<'t> Tour<'_, 't> {
                 refuse("a virtual arm has asked nothing that `enter` answers".into());
             }
             for mark in control.marks(&log, false) {
-                print_line(steering::marked(&mark));
+                print_line(steering::mark_text(&mark));
                 if let Some(events) = &events {
                     events.mark(&mark);
                 }

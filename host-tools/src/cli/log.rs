@@ -178,7 +178,7 @@ mod tests {
     }
 
     /// Returns the log of `log_lines` and of its end.
-    fn written(log_lines: impl FnOnce()) -> String {
+    fn log_of(log_lines: impl FnOnce()) -> String {
         let page = Page::default();
         let copy = page.clone();
         let log = Log::to(move || copy.clone());
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn flooding_device_gets_one_log_line_a_second() {
-        let text = written(|| {
+        let text = log_of(|| {
             for tile in 0..100_000 {
                 tracing::warn!(target: "hapterra::link::client", tile, "no such tile");
             }
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn flooding_device_omits_no_line_of_another_device() {
-        let text = written(|| {
+        let text = log_of(|| {
             let subscriber = tracing::dispatcher::get_default(Clone::clone);
             let flood = |device: &'static str, lines: u32| {
                 let subscriber = subscriber.clone();
@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn host_log_lines_are_never_omitted_and_have_no_controls() {
-        let text = written(|| {
+        let text = log_of(|| {
             for row in 0..10 {
                 tracing::warn!(target: "hapterra::replay", row, "odd");
             }

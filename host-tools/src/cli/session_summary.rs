@@ -207,7 +207,7 @@ fn kind_of_device(hello: &DeviceHello) -> String {
 pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
     let grid = terrain.grid();
     let materials = grid.materials()?;
-    Some(format!("materials      {}", materials.reported(grid)))
+    Some(format!("materials      {}", materials.describe(grid)))
 }
 
 #[cfg(test)]

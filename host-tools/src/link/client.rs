@@ -271,7 +271,7 @@ impl<'t> Client<'t> {
         terrain: Terrain<'t>,
         out: &mut Vec<u8>,
     ) {
-        prefetch::read_around(&terrain, &view.hip);
+        prefetch::prefetch_around(&terrain, &view.hip);
         self.next = Some((view, terrain));
         self.protocol.put_view(view, now, out);
     }
@@ -516,10 +516,10 @@ impl<'t> Client<'t> {
             }
             ToHost::Guard(report) => on(Event::Guard(&report)),
             ToHost::Heartbeat { count, report, .. } => {
-                self.stats.reported(count);
+                self.stats.set_reported(count);
                 on(Event::Guard(&report));
             }
-            ToHost::Goodbye(count) => self.stats.reported(count),
+            ToHost::Goodbye(count) => self.stats.set_reported(count),
             // A repeated message, or one about a scene that is not served any more.
             _ => {}
         }

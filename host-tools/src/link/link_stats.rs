@@ -62,7 +62,7 @@ impl Numbering {
 
     /// Stores the device's count; returns the number of samples dropped since the last count. A
     /// late count changes nothing.
-    fn reported(&mut self, count: SampleCount) -> u64 {
+    fn set_reported(&mut self, count: SampleCount) -> u64 {
         self.reported.sent = self
             .reported
             .sent
@@ -113,7 +113,7 @@ impl LinkStats {
             return;
         };
         match last {
-            Some(count) => self.dropped += previous.reported(count),
+            Some(count) => self.dropped += previous.set_reported(count),
             None => self.uncertain += 1,
         }
         self.gaps += previous.tail();
@@ -143,7 +143,7 @@ impl LinkStats {
         self.gaps += u64::from(gap);
         self.samples += u64::from(count);
         self.current.expected = telemetry.first.wrapping_add(count);
-        self.reported(SampleCount {
+        self.set_reported(SampleCount {
             sent: self.current.expected,
             dropped: telemetry.dropped,
         });
@@ -151,8 +151,8 @@ impl LinkStats {
     }
 
     /// Stores the device's own count of this session.
-    pub(super) fn reported(&mut self, count: SampleCount) {
-        self.dropped += self.current.reported(count);
+    pub(super) fn set_reported(&mut self, count: SampleCount) {
+        self.dropped += self.current.set_reported(count);
         self.count_lost();
     }
 
@@ -200,13 +200,13 @@ mod tests {
     fn loss_at_the_start_and_at_the_end_is_counted() {
         let mut stats = LinkStats::default();
         stats.on_opened(None);
-        stats.reported(count(16, 1));
+        stats.set_reported(count(16, 1));
         assert_eq!(counted(&stats), (0, 16, 1));
         assert!(stats.received(&batch(8, 1)));
         assert_eq!(counted(&stats), (4, 12, 1));
-        stats.reported(count(12, 1));
-        stats.reported(count(36, 2));
-        stats.reported(count(36, 2));
+        stats.set_reported(count(12, 1));
+        stats.set_reported(count(36, 2));
+        stats.set_reported(count(36, 2));
         assert_eq!(counted(&stats), (4, 32, 2));
     }
 
@@ -229,7 +229,7 @@ mod tests {
         let mut stats = LinkStats::default();
         stats.on_opened(None);
         assert!(stats.received(&batch(0, 0)));
-        stats.reported(count(12, 1));
+        stats.set_reported(count(12, 1));
         stats.on_restarted();
         assert!(stats.received(&batch(0, 1)));
         assert_eq!((counted(&stats), stats.uncertain), ((8, 8, 2), 1));
@@ -241,7 +241,7 @@ mod tests {
             expected: u32::MAX - 3,
             reported: count(u32::MAX - 3, 0),
         };
-        assert_eq!(numbering.reported(count(4, 0)), 0);
+        assert_eq!(numbering.set_reported(count(4, 0)), 0);
         assert_eq!(numbering.tail(), 8);
     }
 }

@@ -58,7 +58,7 @@ impl Prefetch {
 }
 
 /// Prefetches the tiles around a HIP's next position.
-pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
+pub(super) fn prefetch_around(terrain: &Terrain<'_>, hip: &GridPoint) {
     let [east, north, _] = hip.cell();
     let tile = TILE_CELLS as i32;
     let (from, to) = (

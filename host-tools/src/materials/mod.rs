@@ -191,7 +191,7 @@ impl Materials {
     /// Describes the materials of a terrain in one line: those found at some hundred places, and
     /// the share of the default. Nothing is fetched if the file is at a URL.
     #[must_use]
-    pub fn reported(&self, grid: &HapticGrid<'_>) -> String {
+    pub fn describe(&self, grid: &HapticGrid<'_>) -> String {
         let count = self.class_materials.class.len();
         let unread = format!("{count} classes in the table; the file is read where it is touched");
         if is_url(&self.file) {

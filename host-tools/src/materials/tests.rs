@@ -109,7 +109,7 @@ fn classes_in_another_reference_system_are_converted() {
     assert_eq!([at(499_999.0), at(500_001.0)], [1, 2]);
     assert_eq!([at(499_900.0), at(500_100.0)], [1, 2]);
     let grid = HapticGrid::new(&terrain, HapticCells::Square).with_materials(Some(&materials));
-    let reported = materials.reported(&grid);
+    let reported = materials.describe(&grid);
     assert!(
         reported.contains("trees") && reported.contains("class 20"),
         "{reported}"
@@ -262,7 +262,7 @@ fn url_key_is_in_no_recording_and_no_message() {
     let grid = HapticGrid::new(&terrain, HapticCells::Stored);
     assert!(
         materials
-            .reported(&grid)
+            .describe(&grid)
             .contains("read where it is touched")
     );
     let apart = at(900_000.0).expect_err("elsewhere").to_string();

@@ -73,8 +73,8 @@ impl TourPlan<'_> {
         for shrink in SHRINK {
             let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * MAX_USED_SHARE * self.size_mm[i]);
             let half = [0, 1].map(|i| shrink * limit(i));
-            let line = winding(self.best_place(half), half);
-            let (known, tour) = (known(&self.heights(&line)), self.at(&line));
+            let line = wave_path(self.best_place(half), half);
+            let (known, tour) = (known_share(&self.heights(&line)), self.tour_along(&line));
             match tour.placement.check(&self.model, &tour.script) {
                 Ok(()) if best.as_ref().is_none_or(|best| known > best.0) => {
                     best = Some((known, tour));
@@ -102,7 +102,7 @@ impl TourPlan<'_> {
         line.iter().map(|p| (self.surface)(p[0], p[1])).collect()
     }
 
-    fn at(&self, line: &[[f64; 2]]) -> Tour {
+    fn tour_along(&self, line: &[[f64; 2]]) -> Tour {
         let touch = Touch::start(self.surface, &self.hand, self.wall_n_per_mm, line[0], 12.0)
             .press(PRESS_FACTOR * self.push_n, 0.6);
         let length = touch.slide_length_mm(line, self.push_n);
@@ -119,7 +119,7 @@ impl TourPlan<'_> {
 
     fn best_place(&self, half: [f64; 2]) -> [f64; 2] {
         let along = |step: u32, axis: usize| {
-            let [low, high] = self.room(axis, half[axis]);
+            let [low, high] = self.middle_range(axis, half[axis]);
             low + (high - low) * f64::from(step) / f64::from(PLACES - 1)
         };
         let places = (0..PLACES * PLACES).map(|i| [along(i % PLACES, 0), along(i / PLACES, 1)]);
@@ -130,7 +130,7 @@ impl TourPlan<'_> {
 
     /// Returns the range for the middle of a plan along an axis: on the terrain and, if the home
     /// position is fixed, within [`MAX_HOME_DISTANCE_MM`] of it.
-    fn room(&self, axis: usize, half: f64) -> [f64; 2] {
+    fn middle_range(&self, axis: usize, half: f64) -> [f64; 2] {
         let (middle, room) = (0.5 * self.size_mm[axis], half / MAX_USED_SHARE);
         let room = (middle - room).max(0.0);
         let on_terrain = [middle - room, middle + room];
@@ -142,7 +142,7 @@ impl TourPlan<'_> {
     }
 
     /// Returns the share of a line beyond the arm's reach from a fixed home position.
-    fn beyond(&self, line: &[[f64; 2]], heights: &[Option<f64>]) -> f64 {
+    fn share_beyond_reach(&self, line: &[[f64; 2]], heights: &[Option<f64>]) -> f64 {
         let Some(home_mm) = self.home_mm else {
             return 0.0;
         };
@@ -156,7 +156,7 @@ impl TourPlan<'_> {
     /// Returns the score of a place: known ground counts most, then relief up to
     /// [`ENOUGH_RELIEF_MM`], then closeness to the centre.
     fn score(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
-        let line = winding(place, half);
+        let line = wave_path(place, half);
         let heights = self.heights(&line);
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         for height in heights.iter().flatten() {
@@ -167,15 +167,15 @@ impl TourPlan<'_> {
         // The hand approaches at one end and taps at the other.
         let ends = [heights.first(), heights.last()];
         let unknown = ends.iter().flatten().filter(|height| height.is_none());
-        10.0 * known(&heights) + relief
+        10.0 * known_share(&heights) + relief
             - 0.2 * off(0).max(off(1))
             - 4.0 * unknown.count() as f64
-            - 30.0 * self.beyond(&line, &heights)
+            - 30.0 * self.share_beyond_reach(&line, &heights)
     }
 }
 
 /// Returns the share of a line on known ground.
-fn known(heights: &[Option<f64>]) -> f64 {
+fn known_share(heights: &[Option<f64>]) -> f64 {
     heights.iter().flatten().count() as f64 / heights.len() as f64
 }
 
@@ -188,7 +188,7 @@ fn middle(script: &Script) -> [f64; 3] {
 }
 
 /// Returns one and a half waves from west to east.
-fn winding(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
+fn wave_path(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
     (0..=240)
         .map(|i| {
             let u = f64::from(i) / 240.0;

@@ -102,14 +102,14 @@ impl<H: Heights, R: Real> Paper<H, R> {
     #[inline]
     pub fn step(&mut self, hip: [R; 3]) -> Option<[R; 3]> {
         match self.last_hip.replace(hip) {
-            Some(last) if last != hip => self.follow(last, hip),
+            Some(last) if last != hip => self.follow_hip(last, hip),
             _ => {}
         }
         self.contact.as_ref().map(|place| place.displacement)
     }
 
     #[inline]
-    fn follow(&mut self, last: [R; 3], hip: [R; 3]) {
+    fn follow_hip(&mut self, last: [R; 3], hip: [R; 3]) {
         let middle = (R::HALF, R::HALF);
         let start = match (&self.contact, self.start) {
             (Some(place), Start::LastPoint) => Some((place.cell, (place.u, place.v))),

@@ -27,26 +27,26 @@ impl Terrain<'_> {
     #[must_use]
     pub fn with_fallback(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
         let mut scene = Scene {
-            fallback: self.under(&scene, reach_mm),
+            fallback: self.fallback_of(&scene, reach_mm),
             ..scene
         };
         scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
         scene
     }
 
-    fn under(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Fallback> {
+    fn fallback_of(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Fallback> {
         let size = self.size();
         if size.iter().all(|cells| *cells <= 2 * TILE_CELLS as i32) {
             return None;
         }
-        let wide = self.wide(scene, reach_mm)?;
+        let wide = self.wide_tile(scene, reach_mm)?;
         let near = near(&wide, scene.home.column());
         let fallback = Fallback { wide, near };
         fallback.is_valid(self.level()).then_some(fallback)
     }
 
     /// Returns the finest tile that spans the rectangle.
-    fn wide(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<CoarseTile> {
+    fn wide_tile(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<CoarseTile> {
         let home = self.scale().to_mm(&scene.home);
         let size = self.size();
         let along = |axis: usize| {

@@ -25,9 +25,9 @@ impl Layout {
     /// # Errors
     /// [`UpdateError::Layout`] unless it is one block of pages of one size that can be read, erased
     /// and written.
-    pub fn read(words: &str) -> Result<Self, UpdateError> {
+    pub fn read(description: &str) -> Result<Self, UpdateError> {
         let printable = |c: &char| c.is_ascii_graphic() || *c == ' ';
-        let description: String = words.chars().filter(printable).take(100).collect();
+        let description: String = description.chars().filter(printable).take(100).collect();
         Self::parse(&description).ok_or(UpdateError::Layout(description))
     }
 
@@ -76,8 +76,8 @@ mod tests {
 
     #[test]
     fn layouts_of_both_chips_are_parsed() {
-        let read = |words| {
-            Layout::read(words)
+        let read = |description| {
+            Layout::read(description)
                 .map(|l| (l.start, l.page_bytes, l.pages))
                 .ok()
         };
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn malformed_flash_layout_is_refused_without_panic() {
-        for words in [
+        for description in [
             "",
             "@",
             "@Option Bytes   /0x1FF22000/01*048 e",
@@ -105,7 +105,7 @@ mod tests {
             "@Internal Flash /0x08000000/256*0\u{e9}g",
             "@Internal Flash /0x08000000/256*02Ka",
         ] {
-            assert!(Layout::read(words).is_err(), "{words:?}");
+            assert!(Layout::read(description).is_err(), "{description:?}");
         }
     }
 

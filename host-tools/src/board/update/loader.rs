@@ -93,8 +93,8 @@ impl<P: ControlPipe> Loader<P> {
     ///
     /// # Errors
     /// [`UpdateError`]: the loader is unsuitable or does not respond.
-    pub fn open(pipe: P, words: &str, functional: &[u8]) -> Result<Self, UpdateError> {
-        let layout = Layout::read(words)?;
+    pub fn open(pipe: P, description: &str, functional: &[u8]) -> Result<Self, UpdateError> {
+        let layout = Layout::read(description)?;
         let (attributes, transfer) = match functional {
             [_, FUNCTIONAL, attributes, _, _, low, high, ..] => {
                 (*attributes, u16::from_le_bytes([*low, *high]))
@@ -167,7 +167,7 @@ impl<P: ControlPipe> Loader<P> {
         while all.len() < bytes {
             let length = (bytes - all.len()).min(self.transfer.into()) as u16;
             let got = self.pipe.read(request::UPLOAD, block, length);
-            let got = got.map_err(|source| self.failed(OPERATION, source))?;
+            let got = got.map_err(|source| self.failure(OPERATION, source))?;
             if got.len() != usize::from(length) {
                 return Err(UpdateError::Cannot("read back what was written"));
             }
@@ -193,7 +193,7 @@ impl<P: ControlPipe> Loader<P> {
         // The loader ends at the status request, possibly before it replies.
         match self.status(OPERATION) {
             Ok(status) if matches!(status.state, MANIFEST | MANIFEST_SYNC) => Ok(()),
-            Ok(status) => Err(refused(OPERATION, status)),
+            Ok(status) => Err(refusal(OPERATION, status)),
             Err(_) => Ok(()),
         }
     }
@@ -216,7 +216,7 @@ impl<P: ControlPipe> Loader<P> {
         operation: &'static str,
     ) -> Result<(), UpdateError> {
         let sent = self.pipe.write(request::DNLOAD, block, bytes);
-        sent.map_err(|source| self.failed(operation, source))?;
+        sent.map_err(|source| self.failure(operation, source))?;
         let mut waited = Duration::ZERO;
         while waited < TIMEOUT {
             let status = self.status(operation)?;
@@ -228,16 +228,16 @@ impl<P: ControlPipe> Loader<P> {
                     self.pipe.wait(wait);
                     waited += wait;
                 }
-                _ => return Err(refused(operation, status)),
+                _ => return Err(refusal(operation, status)),
             }
         }
         Err(UpdateError::Endless(operation))
     }
 
     /// Returns the error of a failed transfer: the loader's status, if it still responds.
-    fn failed(&mut self, operation: &'static str, source: io::Error) -> UpdateError {
+    fn failure(&mut self, operation: &'static str, source: io::Error) -> UpdateError {
         match self.status(operation) {
-            Ok(status) if status.state == ERROR => refused(operation, status),
+            Ok(status) if status.state == ERROR => refusal(operation, status),
             _ => UpdateError::Disconnected { operation, source },
         }
     }
@@ -276,7 +276,7 @@ impl<P: ControlPipe> Loader<P> {
     }
 }
 
-fn refused(operation: &'static str, Status { status, state, .. }: Status) -> UpdateError {
+fn refusal(operation: &'static str, Status { status, state, .. }: Status) -> UpdateError {
     UpdateError::Refused {
         operation,
         why: meaning(status),

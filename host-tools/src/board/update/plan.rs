@@ -120,9 +120,9 @@ mod tests {
         }
     }
 
-    fn plan(parts: &[(u64, usize)], words: &str) -> Result<Plan, UpdateError> {
+    fn plan(parts: &[(u64, usize)], description: &str) -> Result<Plan, UpdateError> {
         let board = Board::named("nucleo-g474re").expect("known");
-        let layout = Layout::read(words).expect("understood");
+        let layout = Layout::read(description).expect("understood");
         Plan::new(board, &image(parts), &layout)
     }
 
@@ -145,8 +145,8 @@ mod tests {
     fn h743_plan_writes_32_byte_words_and_erases_sectors() {
         const SECTOR: u64 = 128 * 1024;
         let board = Board::named("nucleo-h743zi2").expect("known");
-        let words = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";
-        let layout = Layout::read(words).expect("understood");
+        let description = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";
+        let layout = Layout::read(description).expect("understood");
         let of = |parts: &[(u64, usize)]| {
             let memories = Memories::H743;
             let image = Image {
@@ -192,16 +192,16 @@ mod tests {
 
     #[test]
     fn loader_of_another_chip_is_refused() {
-        for words in [
+        for description in [
             "@Internal Flash /0x08000000/16*128Kg",
             "@Internal Flash /0x08000000/128*02Kg",
             "@Internal Flash /0x08000000/128*04Kg",
             "@Internal Flash /0x90000000/256*02Kg",
         ] {
-            let refused = plan(&[(FLASH, 8)], words);
+            let refused = plan(&[(FLASH, 8)], description);
             assert!(
                 matches!(refused, Err(UpdateError::OtherChip { .. })),
-                "{words}"
+                "{description}"
             );
         }
         let refused = plan(&[(FLASH + 0x800, 8)], G474);

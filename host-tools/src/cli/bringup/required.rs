@@ -23,7 +23,7 @@ pub(in crate::cli) fn check_brought_up(transport: &mut dyn Transport) -> Result<
         let record = control.calibration()?;
         let device = control.device();
         let log = Log::read(&Log::path_of(device)?)?;
-        if let Some(step) = missing(device, record.as_ref(), log) {
+        if let Some(step) = missing_step(device, record.as_ref(), log) {
             let (board, number, title) = (printable(&device.board), step.number(), step.title());
             let serial = device.serial;
             return Err(Failure::new(format!(
@@ -61,7 +61,7 @@ fn is_real(board: &str) -> bool {
 }
 
 /// Returns the first step missing in the log, for the device's current identity and record.
-fn missing(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
+fn missing_step(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
     log.update_identity(Identity::of(device, record));
     log.next()
 }
@@ -87,23 +87,26 @@ mod tests {
         let (device, record) = (device(), Calibration::PREMIUM_1_5);
         let mut log = Log::default();
         assert_eq!(
-            missing(&device, Some(&record), log.clone()),
+            missing_step(&device, Some(&record), log.clone()),
             Some(Step::Board)
         );
         log.update_identity(Identity::of(&device, Some(&record)));
         for step in Step::ALL {
-            assert_eq!(missing(&device, Some(&record), log.clone()), Some(step));
+            assert_eq!(
+                missing_step(&device, Some(&record), log.clone()),
+                Some(step)
+            );
             log.add(step, true, String::new());
         }
-        assert_eq!(missing(&device, Some(&record), log.clone()), None);
+        assert_eq!(missing_step(&device, Some(&record), log.clone()), None);
         let twin = DeviceHello {
             serial: SerialNumber::new([0x2B; 12]),
             ..device.clone()
         };
-        let never = missing(&twin, Some(&record), log.clone());
+        let never = missing_step(&twin, Some(&record), log.clone());
         assert_eq!(never, Some(Step::Board), "another board's log");
         let other = Calibration::PREMIUM_3_0;
-        let again = missing(&device, Some(&other), log);
+        let again = missing_step(&device, Some(&other), log);
         assert_eq!(again, Some(Step::Calibration));
     }
 

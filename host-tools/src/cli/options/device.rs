@@ -30,7 +30,7 @@ impl FromStr for DeviceChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (EmulatedBoard::named(text), text.parse()) {
+        match (EmulatedBoard::parse_name(text), text.parse()) {
             (Some(board), _) => Ok(Self::Emulated(board)),
             (None, Ok(address)) => Ok(Self::Connected(address)),
             (None, Err(_)) => Err(
@@ -54,7 +54,7 @@ impl FromStr for VirtualDevice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (text, EmulatedBoard::named(text)) {
+        match (text, EmulatedBoard::parse_name(text)) {
             ("native", _) => Ok(Self::Native),
             (_, Some(board)) => Ok(Self::Emulated(board)),
             _ => Err("native, emulated or emulated:ELF".into()),
@@ -71,7 +71,7 @@ pub struct EmulatedBoard {
 
 impl EmulatedBoard {
     /// Parses the name of an emulated board, if it is one.
-    fn named(text: &str) -> Option<Self> {
+    fn parse_name(text: &str) -> Option<Self> {
         match text.strip_prefix("emulated")? {
             "" => Some(Self::default()),
             rest => {

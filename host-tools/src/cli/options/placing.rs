@@ -104,7 +104,7 @@ fn placement(
 }
 
 /// Returns the place and scale of a terrain, in lines that `run` and `demo` print.
-pub(in crate::cli) fn reported(view: &Placement, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn describe(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(
         "place          {} under the home position\nscale          {}\n",

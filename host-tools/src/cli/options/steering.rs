@@ -60,7 +60,7 @@ impl Commands {
                 .map(|queues| queues.into_iter().next().unwrap_or_default());
         }
         let queue = self.commands.as_ref().map(CommandQueue::of);
-        self.opened(queue.transpose())
+        self.with_hint(queue.transpose())
             .map(Option::unwrap_or_default)
     }
 
@@ -85,11 +85,11 @@ impl Commands {
         let several = |origin| CommandQueue::of_several(origin, devices, at_end);
         let queues = self.commands.as_ref().map(several);
         let none = || (0..devices).map(|_| CommandQueue::default()).collect();
-        self.opened(queues.transpose())
+        self.with_hint(queues.transpose())
             .map(|queues| queues.unwrap_or_else(none))
     }
 
-    fn opened<T>(&self, opened: std::io::Result<T>) -> Result<T, Failure> {
+    fn with_hint<T>(&self, opened: std::io::Result<T>) -> Result<T, Failure> {
         let from = match self.file() {
             Some(path) => format!(" from {}", path.display()),
             None => String::new(),
@@ -293,7 +293,7 @@ fn surface_in_words(params: &SurfaceParams) -> String {
 }
 
 /// Describes a mark in one line.
-pub(in crate::cli) fn marked(mark: &Mark) -> String {
+pub(in crate::cli) fn mark_text(mark: &Mark) -> String {
     let Mark { text, t_s, .. } = mark;
     match mark.tick {
         Some(tick) => format!("mark           `{text}` at tick {tick}, {t_s:.3} s"),
@@ -304,7 +304,7 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
 }
 
 /// Describes a new placement in one line.
-pub(in crate::cli) fn reported(
+pub(in crate::cli) fn placement_text(
     number: usize,
     placed_surface: &PlacedSurface,
     terrain: &Terrain<'_>,

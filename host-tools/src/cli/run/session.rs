@@ -99,7 +99,7 @@ impl<'t> Serving<'_, 't> {
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         device_console.print_line(format!("terrain        {}: {how}", args.terrain.name()));
-        device_console.show(placing::reported(&placed.view, placed.terrain));
+        device_console.show(placing::session_result(&placed.view, placed.terrain));
         if let Some(line) = session_summary::materials(placed.terrain) {
             device_console.print_line(line);
         }
@@ -145,8 +145,8 @@ impl<'t> Serving<'_, 't> {
         // The recording is saved first, regardless of the cause of the end.
         let log = watch.finish();
         let recording_result = log.recording_result.or_hint(OTHER_FILE);
-        let ended =
-            reported(end.result, end.disarmed, &notify).and(check_terrain_arrived(log.has_stalled));
+        let ended = session_result(end.result, end.disarmed, &notify)
+            .and(check_terrain_arrived(log.has_stalled));
         may_be_armed(false);
         let summary = SessionSummary {
             ticks: log.ticks,
@@ -248,7 +248,7 @@ fn service<'s, 't: 's>(
 }
 
 /// Returns the failure of the session; if there are two, prints the first.
-fn reported(
+fn session_result(
     why: Result<(), LinkError>,
     disarmed: Result<(), LinkError>,
     notify: &dyn Fn(&str),

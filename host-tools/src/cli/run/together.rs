@@ -39,7 +39,7 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
 }
 
 /// Returns the failure of a thread, with the device's name; `None` after success.
-fn failed(
+fn failure_of(
     (name, thread): (String, ScopedJoinHandle<'_, Result<(), Failure>>),
 ) -> Option<(String, Failure)> {
     // A session that panics closes the device, and reports a missing confirmation.

@@ -137,7 +137,7 @@ impl<'t> Watch<'t> {
     /// Records new marks; at the end also those without a reply.
     fn record_marks(&mut self, is_over: bool) {
         for mark in self.control.marks(&self.log, is_over) {
-            self.device_console.notify(steering::marked(&mark));
+            self.device_console.notify(steering::mark_text(&mark));
             if let Some(events) = &self.events {
                 events.mark(&mark);
             }
@@ -160,7 +160,7 @@ impl<'t> Watch<'t> {
             && let Some(placed_surface) = &placement.placed_surface
         {
             self.described_view = view;
-            self.device_console.notify(steering::reported(
+            self.device_console.notify(steering::placement_text(
                 view,
                 placed_surface,
                 &placement.terrain,

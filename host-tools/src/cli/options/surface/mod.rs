@@ -19,7 +19,7 @@ use crate::materials::{ClassMaterial, ClassMaterials, Materials};
 use crate::named_surfaces::{NAMED_SURFACES, NamedSurface};
 use crate::place::MAX_STIFFNESS_N_PER_MM;
 use heightfield::{Raster, files_read_with};
-use numbers::{check, over, reported, rubbed};
+use numbers::{check, failure_of, with_coefficient, with_entry};
 use table::{MaterialEntry, PassivityName, ShadingName, TableFile};
 
 /// Surface of a terrain.
@@ -123,12 +123,12 @@ impl SurfaceOptions {
             params.stiffness_n_per_mm = stiffness;
         }
         if let Some(mu) = self.friction {
-            params.friction = rubbed(&params.friction, mu);
+            params.friction = with_coefficient(&params.friction, mu);
         }
         if let Some(force) = self.max_force {
             params.max_force_n = force;
         }
-        check(&Material::of(params)).map_err(|why| reported(&why))?;
+        check(&Material::of(params)).map_err(|why| failure_of(&why))?;
         let limit = params.max_force_n;
         if !(limit.is_finite() && limit >= 0.0) {
             return Err(format!("a largest force of {limit} N is not valid"))
@@ -168,12 +168,12 @@ impl SurfaceOptions {
             self.check_stiffness(entry, (file, line))?;
         }
         let material = Material::of(&SurfaceParams::PREMIUM);
-        let mut default = over(&material, entry, (file, *line, "the default"))?;
+        let mut default = with_entry(&material, entry, (file, *line, "the default"))?;
         if let Some(stiffness) = self.stiffness {
             default.stiffness_n_per_mm = stiffness;
         }
         if let Some(mu) = self.friction {
-            default.friction = rubbed(&default.friction, mu);
+            default.friction = with_coefficient(&default.friction, mu);
         }
         if default.stiffness_n_per_mm == 0.0 {
             return Err("[default] has no stiffness, and a placement scales all stiffnesses by it")
@@ -184,7 +184,7 @@ impl SurfaceOptions {
             Ok(ClassMaterial {
                 class: *class,
                 name: entry.name.clone(),
-                material: over(&default, entry, (file, *line, &what))?,
+                material: with_entry(&default, entry, (file, *line, &what))?,
             })
         });
         let class = classes.collect::<Result<_, Failure>>()?;

@@ -10,7 +10,7 @@ use super::texture;
 use crate::cli::failure::Failure;
 
 /// Returns a friction with another coefficient, also for static friction.
-pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
+pub(super) fn with_coefficient(friction: &Friction, mu: f32) -> Friction {
     Friction {
         viscous_s: friction.viscous_s,
         ..Friction::coulomb(mu)
@@ -19,7 +19,7 @@ pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
 
 /// Returns a material with a table's numbers in place of its own. A stated friction also sets the
 /// static part.
-pub(super) fn over(
+pub(super) fn with_entry(
     material: &Material,
     entry: &MaterialEntry,
     (file, line, what): (&Path, usize, &str),
@@ -44,7 +44,7 @@ pub(super) fn over(
     });
     made.map_err(|why| {
         let place = format!("{}, line {line}, {what}:", file.display());
-        reported(&why).about(Some(&place))
+        failure_of(&why).about(Some(&place))
     })
 }
 
@@ -82,7 +82,7 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
 }
 
 /// Returns the failure with a message and a hint.
-pub(super) fn reported(why: &str) -> Failure {
+pub(super) fn failure_of(why: &str) -> Failure {
     let (what, next_step) = why
         .split_once(": ")
         .unwrap_or((why, "choose another number"));
