@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<S
         let values = match value.into_inner() {
             // The surface is in this file.
             Value::Table(_) if key == "surface" => Some(vec![path.into()]),
-            Value::Array(values) => values.iter().map(word).collect(),
+            Value::Array(values) => values.iter().map(argument).collect(),
             value => argument(&value).map(|word| vec![word]),
         };
         let values = values

@@ -116,7 +116,7 @@ pub(in crate::cli) fn input_ended() {
 fn press() {
     REQUESTED.store(true, Ordering::Relaxed);
     if PRESSED.swap(true, Ordering::Relaxed) {
-        raw_mode::put_back();
+        raw_mode::restore();
         if let Some(line) = not_confirmed(&may_be_armed()) {
             print_line(line);
         }

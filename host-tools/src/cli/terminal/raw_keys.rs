@@ -28,7 +28,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
             }
         }
     }
-    raw_mode::put_back();
+    raw_mode::restore();
 }
 
 /// Meaning of a byte, or of the end of a sequence.

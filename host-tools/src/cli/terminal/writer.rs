@@ -106,10 +106,10 @@ fn write(output: TerminalOutput, bottom: &mut Option<ProgressBar>) {
     }
 }
 
-fn write_above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
+fn write_above(bottom: &Option<ProgressBar>, write: impl FnOnce()) {
     match bottom {
-        Some(bar) => bar.suspend(put),
-        None => write_text(),
+        Some(bar) => bar.suspend(write),
+        None => write(),
     }
 }
 
