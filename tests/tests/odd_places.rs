@@ -263,8 +263,8 @@ fn unsupported_projection_is_named_with_a_remedy() {
             ])
             .output()
             .expect("it runs");
-        let output = String::from_utf8(output.stderr).expect("text");
         assert!(!output.status.success());
+        let output = String::from_utf8(output.stderr).expect("text");
         for part in [name, "--at X,Y", "gdalwarp -t_srs EPSG:4326"] {
             assert!(output.contains(part), "{part} in:\n{output}");
         }

@@ -12,8 +12,8 @@ use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{Press, Setting, Trial, Verdict};
 use hapterra::phantom::PhantomModel;
 use hapterra::stability::{
-    RAMP_UP_N_PER_MM_LONG, RAMP_UP_N_PER_MM, TEXTURE_FACTOR_LONG, TEXTURE_FACTOR, LONG_US,
-    SHORT_US, STABLE_N_PER_MM_LONG, STABLE_N_PER_MM,
+    LONG_US, RAMP_UP_N_PER_MM, RAMP_UP_N_PER_MM_LONG, SHORT_US, STABLE_N_PER_MM,
+    STABLE_N_PER_MM_LONG, TEXTURE_FACTOR, TEXTURE_FACTOR_LONG,
 };
 
 const UNDAMPED: Damping = Damping {

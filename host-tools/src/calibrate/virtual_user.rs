@@ -6,9 +6,9 @@ use std::rc::Rc;
 use glam::DVec3;
 
 use super::gravity::N_PER_GRAM;
+use super::procedure::{Attendant, Stopped};
 use super::ratios::Direction;
 use super::review::Review;
-use super::run_procedure::{Attendant, Stopped};
 use crate::link::FaultInjector;
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 

@@ -604,7 +604,7 @@ fn nonexistent_tile_requests_are_counted_and_rarely_logged() {
             bench.deliver(&ToHost::TileRequest { epoch, key });
         }
         assert_eq!(bench.client.stats().no_tiles, 1_000);
-        assert_eq!(bench.client.logged, Some(bench.now));
+        assert_eq!(bench.client.logged_at, Some(bench.now));
         assert_eq!(bench.drain_sent(), Vec::<String>::new());
     });
 }

@@ -154,7 +154,7 @@ impl Emulator {
             if Instant::now() > deadline {
                 // Its output can be read to the end only after it has ended.
                 let _ = self.child.kill();
-                return Err(self.startup_error(format!("no connection in {START:?}")));
+                return Err(self.startup_error(format!("no connection in {START_TIMEOUT:?}")));
             }
             std::thread::sleep(Duration::from_millis(2));
         }

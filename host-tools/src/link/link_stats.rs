@@ -77,7 +77,7 @@ impl Numbering {
 fn lead_of(earlier: u32, later: u32) -> u32 {
     match later.wrapping_sub(earlier) {
         behind if behind > u32::MAX / 2 => 0,
-        lead => lead_of,
+        lead => lead,
     }
 }
 

@@ -98,7 +98,7 @@ impl<'t> Session<'t> {
     /// Closes the line. Some devices can be opened only once: another line to them can be opened
     /// after this call.
     pub fn close_line(&mut self) {
-        self.line.close_line();
+        self.line.close();
     }
 
     /// Returns true if the line is open.

@@ -79,13 +79,13 @@ fn open(steering: &mut Steering<'_>) {
 }
 
 /// Opens the clutch, and returns the change that is sent.
-fn put(steering: &mut Steering<'_>) -> SceneChange {
+fn update(steering: &mut Steering<'_>) -> SceneChange {
     open(steering);
     samples(steering, Limits::CLUTCH_OPEN, 1);
     steering.take_update().expect("a view").view
 }
 
-fn viewed(steering: &mut Steering<'_>, view: &SceneChange, accepted: bool) {
+fn report_result(steering: &mut Steering<'_>, view: &SceneChange, accepted: bool) {
     steering.on_event(&Event::SceneChangeResult { view, accepted });
 }
 
@@ -94,7 +94,7 @@ fn accepted_placement_is_applied_and_releases_the_clutch() {
     with(|steering| {
         let view = update(steering);
         assert_eq!((view.number, steering.now().view.scale.cell_mm()), (1, 1.0));
-        viewed(steering, &view, true);
+        report_result(steering, &view, true);
         assert_eq!(steering.now().view.scale.cell_mm(), 2.0);
         samples(steering, Limits::CLUTCH_OPEN, 1);
         assert_eq!(requested_hold(steering), Some(ClutchHold::LetGo));
@@ -108,7 +108,7 @@ fn accepted_placement_is_applied_and_releases_the_clutch() {
 fn refused_placement_changes_nothing_and_is_reported() {
     with(|steering| {
         let view = update(steering);
-        viewed(steering, &view, false);
+        report_result(steering, &view, false);
         assert_eq!(steering.now().view.scale.cell_mm(), 1.0);
         assert_eq!(steering.lines().len(), 1);
         samples(steering, Limits::CLUTCH_OPEN, 1);
@@ -174,7 +174,7 @@ fn restarted_device_counts_placements_from_zero() {
     for (resumed, number) in [(false, 1), (true, 2)] {
         with(|steering| {
             let view = update(steering);
-            viewed(steering, &view, true);
+            report_result(steering, &view, true);
             let device = hello();
             let device = &device;
             steering.on_event(&Event::Opened { device, resumed });
@@ -189,7 +189,7 @@ fn restarted_device_counts_placements_from_zero() {
 fn host_releases_a_clutch_held_by_the_board_input() {
     with(|steering| {
         let view = update(steering);
-        viewed(steering, &view, true);
+        report_result(steering, &view, true);
         let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
         samples(steering, held, 1);
         assert_eq!(requested_hold(steering), Some(ClutchHold::LetGo));
@@ -258,7 +258,7 @@ fn far_clutch_motion_measures_cells_again() {
             let [_, latitude] = update.terrain.grid().measured_at().expect("a place");
             assert!((57.0..58.0).contains(&latitude), "{latitude}");
             assert!(!update.view.keeps_tiles);
-            viewed(steering, &update.view, true);
+            report_result(steering, &update.view, true);
             assert!((metres(steering).expect("known") / before - 1.0).abs() < 1e-12);
             // The cells are measured once; the clutch is released when the user releases it.
             let open = TickRecord {

@@ -110,7 +110,12 @@ impl Effects {
             class: (1..).zip(&self.classes).map(class).collect(),
         };
         let over = ("terrain", terrain);
-        Materials::over(over, ("classes", classes.expect("classes")), class_materials).ok()
+        Materials::over(
+            over,
+            ("classes", classes.expect("classes")),
+            class_materials,
+        )
+        .ok()
     }
 
     /// Returns the surface parameters of a scene with `times` the stiffness.

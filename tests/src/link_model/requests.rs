@@ -106,7 +106,9 @@ impl RequestSequence {
                 RequestStep::HostRequest(HostRequest::Request(asked)),
             ) if **request == asked => usize::from(result.is_err()),
             (Event::Calibration(_), RequestStep::HostRequest(HostRequest::Calibration)) => 0,
-            (Event::SceneChangeResult { view, accepted }, RequestStep::View(number)) if view.number == number => {
+            (Event::SceneChangeResult { view, accepted }, RequestStep::View(number))
+                if view.number == number =>
+            {
                 usize::from(!*accepted)
             }
             (Event::Unanswered(given_up), RequestStep::HostRequest(asked))

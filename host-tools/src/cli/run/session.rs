@@ -99,7 +99,7 @@ impl<'t> Serving<'_, 't> {
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         device_console.print_line(format!("terrain        {}: {how}", args.terrain.name()));
-        device_console.show(placing::session_result(&placed.view, placed.terrain));
+        device_console.show(placing::describe(&placed.view, placed.terrain));
         if let Some(line) = session_summary::materials(placed.terrain) {
             device_console.print_line(line);
         }

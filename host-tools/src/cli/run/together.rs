@@ -33,7 +33,10 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
                 (name, thread)
             })
             .collect();
-        threads.into_iter().filter_map(failure_of).collect::<Vec<_>>()
+        threads
+            .into_iter()
+            .filter_map(failure_of)
+            .collect::<Vec<_>>()
     });
     all_failures(count, failures)
 }

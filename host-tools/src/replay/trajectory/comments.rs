@@ -19,11 +19,12 @@ pub(super) struct Rewound<R> {
 /// Reads the comments before the first other line. Returns them without their `#` and a space after
 /// it, and the stream from its beginning.
 pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Rewound<R>)> {
-    let mut rest = BufReader::with_capacity(1 << 16, Bounded::new(stream));
+    let mut remaining = BufReader::with_capacity(1 << 16, Bounded::new(stream));
     let (mut head, mut comments) = (Vec::new(), String::new());
     while head.len() < MAX_LINE_BYTES {
         let from = head.len();
-        rest.by_ref()
+        remaining
+            .by_ref()
             .take((MAX_LINE_BYTES - from) as u64)
             .read_until(b'\n', &mut head)?;
         let line = head.get(from..).unwrap_or_default();
@@ -35,7 +36,7 @@ pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Rewound<R>)> {
         comments += &String::from_utf8_lossy(comment);
     }
     let head = Cursor::new(head);
-    Ok((comments, Rewound { head, rest }))
+    Ok((comments, Rewound { head, remaining }))
 }
 
 impl<R: Read> Read for Rewound<R> {
