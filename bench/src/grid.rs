@@ -46,7 +46,7 @@ impl Grid {
 
     /// Creates synthetic mountains, with heights times `steepness`.
     pub fn fractal(name: &str, size: [usize; 2], seed: u64, steepness: f64) -> Self {
-        let amplitude = steepness * Kind::Fractal.usual_amplitude_cells();
+        let amplitude = steepness * Kind::Fractal.default_amplitude_cells();
         let synth = Synth::new(Kind::Fractal, seed, amplitude);
         Self::from_fn(name, size, |x, y| synth.height(x as u32, y as u32))
     }

@@ -74,13 +74,16 @@ mod tests {
     use hapterra_core::rate::TickRate;
 
     use super::*;
-    use crate::place::STIFFEST_N_PER_MM;
+    use crate::place::MAX_STIFFNESS_N_PER_MM;
 
     #[test]
     fn named_surfaces_can_be_rendered() {
         for NamedSurface { name, material } in NAMED_SURFACES {
             assert!(material.is_valid(), "{name}");
-            assert!(material.stiffness_n_per_mm <= STIFFEST_N_PER_MM, "{name}");
+            assert!(
+                material.stiffness_n_per_mm <= MAX_STIFFNESS_N_PER_MM,
+                "{name}"
+            );
             let texture = &material.texture;
             let shortest_mm = Texture::shortest_mm(TickRate::default());
             assert!(

@@ -25,17 +25,17 @@ pub struct OutputError {
 }
 
 /// A file being written. If it is dropped before [`Output::finish`], no file remains, except for a
-/// recording with a write error ([`Output::of_recording`]).
+/// recording with a write error ([`Output::for_recording`]).
 pub struct Output {
     path: PathBuf,
     writer: BufWriter<File>,
     /// Temporary file beside the file that it will replace; `None` for a pipe, a device and
     /// standard output, which are not replaced.
-    beside: Option<TempPath>,
+    partial: Option<TempPath>,
     /// True if a partial file remains after a write error.
     is_recording: bool,
     /// Bytes that may still be written.
-    room: u64,
+    free_bytes: u64,
 }
 
 impl Output {
@@ -60,13 +60,13 @@ impl Output {
             }
             _ => temporary(path).map(|(file, place)| (file, Some(place))),
         };
-        let (file, beside) = opened.map_err(failed)?;
+        let (file, partial) = opened.map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
             writer: BufWriter::with_capacity(1 << 16, file),
-            beside,
+            partial,
             is_recording: false,
-            room: u64::MAX,
+            free_bytes: u64::MAX,
         })
     }
 
@@ -85,28 +85,28 @@ impl Output {
         Ok(Self {
             path: path.to_owned(),
             writer: BufWriter::with_capacity(1 << 16, file),
-            beside: None,
+            partial: None,
             is_recording: false,
-            room: u64::MAX,
+            free_bytes: u64::MAX,
         })
     }
 
     /// Makes this the file of a recording. It cannot be repeated, so its partial file remains after
-    /// a write error. Its size is limited to `most` bytes, because the device determines its
+    /// a write error. Its size is limited to `max_bytes` bytes, because the device determines its
     /// growth.
     #[must_use]
-    pub fn of_recording(self, most: u64) -> Self {
+    pub fn for_recording(self, max_bytes: u64) -> Self {
         Self {
             is_recording: true,
-            room: most,
+            free_bytes: max_bytes,
             ..self
         }
     }
 
     /// Keeps the partial file of a recording.
-    fn keep(&mut self) {
-        if let (true, Some(beside)) = (self.is_recording, &mut self.beside) {
-            beside.disable_cleanup(true);
+    fn keep_partial(&mut self) {
+        if let (true, Some(partial)) = (self.is_recording, &mut self.partial) {
+            partial.disable_cleanup(true);
         }
     }
 
@@ -119,7 +119,7 @@ impl Output {
     /// Returns the path of the partial file; `None` for a pipe, a device and standard output.
     #[must_use]
     pub fn partial(&self) -> Option<&Path> {
-        self.beside.as_deref()
+        self.partial.as_deref()
     }
 
     /// Moves the complete file to its place.
@@ -127,15 +127,15 @@ impl Output {
     /// # Errors
     /// When the rest cannot be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
-        let flushed = self.writer.flush().inspect_err(|_| self.keep());
+        let flushed = self.writer.flush().inspect_err(|_| self.keep_partial());
         let path = self.path;
         flushed.map_err(|source| OutputError {
             path: path.clone(),
             source,
         })?;
         let finished = self.writer.into_inner().map_err(|error| error.into_error());
-        let placed = finished.and_then(|mut file| match self.beside {
-            Some(beside) => beside.persist(&path).map_err(|error| error.error),
+        let placed = finished.and_then(|mut file| match self.partial {
+            Some(partial) => partial.persist(&path).map_err(|error| error.error),
             None => file.flush(),
         });
         placed.map_err(|source| OutputError { path, source })
@@ -144,14 +144,14 @@ impl Output {
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = match self.room.checked_sub(bytes.len() as u64) {
+        let written = match self.free_bytes.checked_sub(bytes.len() as u64) {
             Some(room) => {
-                self.room = room;
+                self.free_bytes = room;
                 self.writer.write(bytes)
             }
             None => Err(io::Error::other("it has as many bytes as it may have")),
         };
-        written.inspect_err(|_| self.keep())
+        written.inspect_err(|_| self.keep_partial())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -189,7 +189,7 @@ fn standard_output() -> io::Result<File> {
 ///
 /// # Errors
 /// [`OutputError`] names the output and the input.
-pub fn keep_apart(
+pub fn check_distinct(
     outputs: &[impl AsRef<Path>],
     inputs: &[impl AsRef<Path>],
 ) -> Result<(), OutputError> {
@@ -212,7 +212,7 @@ pub fn keep_apart(
 #[derive(Debug)]
 pub struct OutputFolder {
     /// The folder, if this program created it.
-    made: Option<PathBuf>,
+    created: Option<PathBuf>,
 }
 
 impl OutputFolder {
@@ -227,7 +227,7 @@ impl OutputFolder {
             source,
         })?;
         Ok(Self {
-            made: (!was_there).then(|| path.to_owned()),
+            created: (!was_there).then(|| path.to_owned()),
         })
     }
 }
@@ -235,7 +235,7 @@ impl OutputFolder {
 impl Drop for OutputFolder {
     fn drop(&mut self) {
         // The system refuses to remove a folder that is not empty.
-        let _ = self.made.as_ref().map(std::fs::remove_dir);
+        let _ = self.created.as_ref().map(std::fs::remove_dir);
     }
 }
 
@@ -262,11 +262,11 @@ pub struct PartialFile {
 #[must_use]
 pub fn partial_files(path: &Path) -> Vec<PartialFile> {
     let beginning = beginning_of_partial(path);
-    let beside = folder_of(path).read_dir().into_iter().flatten().flatten();
-    let partial = beside.filter(|entry| is_partial(&beginning, &entry.file_name()));
+    let partial = folder_of(path).read_dir().into_iter().flatten().flatten();
+    let partial = partial.filter(|entry| is_partial(&beginning, &entry.file_name()));
     let mut found: Vec<_> = partial
         .map(|entry| entry.path())
-        .filter(|path| is_nobodys(path))
+        .filter(|path| is_abandoned(path))
         .filter_map(|path| {
             let bytes = path.metadata().ok()?.len();
             Some(PartialFile { path, bytes })
@@ -299,7 +299,7 @@ fn is_partial(beginning: &str, name: &OsStr) -> bool {
 }
 
 /// Returns true if no process is writing a partial file.
-fn is_nobodys(path: &Path) -> bool {
+fn is_abandoned(path: &Path) -> bool {
     let file = regular_file::open(path);
     file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
@@ -322,7 +322,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn appears_whole_or_not_at_all() {
+    fn output_appears_complete_or_not_at_all() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("out.csv");
         let mut output = Output::create(&path).expect("created");
@@ -342,7 +342,7 @@ mod tests {
     fn recording_that_cannot_grow_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("felt.csv");
-        let begin = || Output::create(&path).expect("created").of_recording(12);
+        let begin = || Output::create(&path).expect("created").for_recording(12);
         let mut output = begin();
         output.write_all(b"eight by").expect("written");
         drop(output);
@@ -401,12 +401,12 @@ mod tests {
         }
         let (new, other, terrain) = (at("new.csv"), at("other.tif"), at("terrain.tif"));
         for name in names {
-            let wrong = keep_apart(&[&new, &name], &[&terrain]).expect_err("the input");
+            let wrong = check_distinct(&[&new, &name], &[&terrain]).expect_err("the input");
             let cause = std::error::Error::source(&wrong).map(ToString::to_string);
             assert!(cause.is_some_and(|cause| cause.contains("terrain.tif")));
             assert_eq!(wrong.path, name);
         }
-        assert!(keep_apart(&[&new, &other], &[&terrain]).is_ok());
+        assert!(check_distinct(&[&new, &other], &[&terrain]).is_ok());
     }
 
     #[test]
@@ -415,9 +415,9 @@ mod tests {
         let path = folder.path().join("out");
         drop(OutputFolder::create(&path).expect("made"));
         assert!(!path.exists());
-        let made = OutputFolder::create(&path).expect("made");
+        let created = OutputFolder::create(&path).expect("made");
         std::fs::write(path.join("kept"), "").expect("written");
-        drop(made);
+        drop(created);
         assert!(path.join("kept").exists());
         std::fs::remove_file(path.join("kept")).expect("removed");
         drop(OutputFolder::create(&path).expect("there"));
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impossible_place_is_an_error_at_once() {
+    fn unwritable_path_fails_at_creation() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(Output::create(&folder.path().join("no/such/out.csv")).is_err());
         assert!(Output::create(Path::new("-")).is_err());

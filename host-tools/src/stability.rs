@@ -8,10 +8,10 @@ use hapterra_core::wire::hello::DeviceHello;
 
 /// Stiffness up to which a press in a light grasp is stable, N/mm: ticks a second, without and with
 /// the passivity controller.
-pub type StillUpTo = [(u32, f32, f32); 4];
+pub type StiffnessLimits = [(u32, f32, f32); 4];
 
 /// Limits at [`SHORT_US`]. The tests repeat the trials.
-pub const STILL_N_PER_MM: StillUpTo = [
+pub const STABLE_N_PER_MM: StiffnessLimits = [
     (1_000, 2.0, 6.0),
     (2_000, 3.0, 8.0),
     (4_000, 4.0, 8.0),
@@ -19,7 +19,7 @@ pub const STILL_N_PER_MM: StillUpTo = [
 ];
 
 /// Limits at [`LONG_US`].
-pub const STILL_LATE_N_PER_MM: StillUpTo = [
+pub const STABLE_N_PER_MM_LONG: StiffnessLimits = [
     (1_000, 1.0, 3.0),
     (2_000, 1.0, 3.0),
     (4_000, 1.0, 3.0),
@@ -29,11 +29,11 @@ pub const STILL_LATE_N_PER_MM: StillUpTo = [
 /// Stiffness up to which the force ramps up well on an arm with a tenth of the model's friction,
 /// with the controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the ramp,
 /// and while the clutch closes. The tests repeat the trials.
-pub const ENTERS_N_PER_MM: [(u32, f32); 4] =
+pub const RAMP_UP_N_PER_MM: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 2.0), (4_000, 2.0), (10_000, 2.0)];
 
 /// Limits at [`LONG_US`].
-pub const ENTERS_LATE_N_PER_MM: [(u32, f32); 4] =
+pub const RAMP_UP_N_PER_MM_LONG: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 1.0), (4_000, 1.0), (10_000, 0.5)];
 
 /// Latencies of the trials, µs: of boards whose converters command the amplifiers, and of boards
@@ -44,9 +44,9 @@ pub const SHORT_US: u16 = 310;
 pub const LONG_US: u16 = 1_240;
 
 /// Factor for a textured surface at [`SHORT_US`]: its steepest slopes also excite a light grasp.
-pub const LEFT_WITH_TEXTURE: f32 = 0.5;
+pub const TEXTURE_FACTOR: f32 = 0.5;
 /// Factor for a textured surface at [`LONG_US`].
-pub const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
+pub const TEXTURE_FACTOR_LONG: f32 = 1.0 / 3.0;
 
 /// Warns of a surface that is too stiff for a device's tick rate and latency.
 pub fn warn(params: &SurfaceParams, device: &DeviceHello) {
@@ -54,7 +54,7 @@ pub fn warn(params: &SurfaceParams, device: &DeviceHello) {
     let warnings = rate.map(|rate| {
         [
             warning(params, rate, latency_us),
-            too_fine(&params.texture, rate),
+            fine_texture_warning(&params.texture, rate),
         ]
     });
     for warning in warnings.into_iter().flatten().flatten() {
@@ -64,7 +64,11 @@ pub fn warn(params: &SurfaceParams, device: &DeviceHello) {
 
 /// As [`warn`], for a surface of several materials, once for each warning. The device sets its
 /// controller for the stiffest of them.
-pub fn warn_of(params: &SurfaceParams, materials: Option<&MaterialTable>, device: &DeviceHello) {
+pub fn warn_for_materials(
+    params: &SurfaceParams,
+    materials: Option<&MaterialTable>,
+    device: &DeviceHello,
+) {
     let Some(table) = materials else {
         return warn(params, device);
     };
@@ -89,7 +93,7 @@ fn warnings_of(
         params.stiffness_n_per_mm *= scale;
         let warnings = [
             warning(&params, rate, latency_us),
-            too_fine(&params.texture, rate),
+            fine_texture_warning(&params.texture, rate),
         ];
         reported.extend(warnings.into_iter().flatten());
     }
@@ -99,7 +103,7 @@ fn warnings_of(
 }
 
 /// Returns the warning about a texture too fine for a slow hand.
-fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
+fn fine_texture_warning(texture: &Texture, rate: TickRate) -> Option<String> {
     let (wavelength, shortest) = (texture.wavelength_mm, Texture::shortest_mm(rate));
     let hz = rate.hz();
     let whole_mm_s = wavelength * hz as f32 / 8.0;
@@ -118,7 +122,7 @@ fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<St
     let latency_s = 1e-6 * f32::from(latency_us);
     let is_controlled = params.is_controlled();
     let with = if is_controlled { "with" } else { "without" };
-    let still = still_n_per_mm(rate, latency_us, is_controlled, &params.texture);
+    let still = stable_n_per_mm(rate, latency_us, is_controlled, &params.texture);
     let late = match latency_us > SHORT_US {
         true => format!(" and {:.2} ms to the motors", 1e3 * latency_s),
         false => String::new(),
@@ -132,7 +136,7 @@ fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<St
             "a stiffness of {stiffness} N/mm: on the virtual arm a light grasp {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra-lab stability)"
         ));
     }
-    let enters = enters_n_per_mm(rate, latency_us);
+    let enters = ramp_up_n_per_mm(rate, latency_us);
     (stiffness > enters).then(|| {
         format!(
             "a stiffness of {stiffness} N/mm: on a virtual arm with a tenth of a Premium 1.5's friction the tip vibrates above {enters} N/mm at {hz} ticks a second{late}, in the ramp or after the clutch (hapterra-lab stability)"
@@ -140,11 +144,11 @@ fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<St
     })
 }
 
-/// As [`still_n_per_mm`], for a force that ramps up.
-fn enters_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
+/// As [`stable_n_per_mm`], for a force that ramps up.
+fn ramp_up_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
     let tried = match latency_us > SHORT_US {
-        true => ENTERS_LATE_N_PER_MM,
-        false => ENTERS_N_PER_MM,
+        true => RAMP_UP_N_PER_MM_LONG,
+        false => RAMP_UP_N_PER_MM,
     };
     let slower = tried.iter().rev().find(|(hz, _)| *hz <= rate.hz());
     slower.unwrap_or(&tried[0]).1
@@ -152,10 +156,10 @@ fn enters_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
 
 /// Returns the limit from the trials at the fastest rate that is not faster, and at the latency
 /// that is not shorter.
-fn still_n_per_mm(rate: TickRate, latency_us: u16, is_controlled: bool, texture: &Texture) -> f32 {
+fn stable_n_per_mm(rate: TickRate, latency_us: u16, is_controlled: bool, texture: &Texture) -> f32 {
     let (tried, left) = match latency_us > SHORT_US {
-        true => (STILL_LATE_N_PER_MM, LEFT_LATE_WITH_TEXTURE),
-        false => (STILL_N_PER_MM, LEFT_WITH_TEXTURE),
+        true => (STABLE_N_PER_MM_LONG, TEXTURE_FACTOR_LONG),
+        false => (STABLE_N_PER_MM, TEXTURE_FACTOR),
     };
     let slower = tried.iter().rev().find(|(hz, ..)| *hz <= rate.hz());
     let (_, without, with) = slower.unwrap_or(&tried[0]);
@@ -228,14 +232,14 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_is_warned_of_that_fades_under_a_slow_hand() {
+    fn too_fine_texture_has_a_warning() {
         let reported = |wavelength_mm, hz| {
             let texture = Texture {
                 pattern: Pattern::Grain,
                 wavelength_mm,
                 ..Texture::NONE
             };
-            too_fine(&texture, TickRate::new(hz).expect("a rate")).unwrap_or_default()
+            fine_texture_warning(&texture, TickRate::new(hz).expect("a rate")).unwrap_or_default()
         };
         let fine = reported(0.3, 1000);
         assert!(
@@ -246,11 +250,14 @@ mod tests {
             [reported(0.3, 2000), reported(0.4, 1000)],
             [String::new(), String::new()]
         );
-        assert_eq!(too_fine(&Texture::NONE, TickRate::DEFAULT), None);
+        assert_eq!(
+            fine_texture_warning(&Texture::NONE, TickRate::DEFAULT),
+            None
+        );
     }
 
     #[test]
-    fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
+    fn textured_surface_has_half_the_stiffness_limit() {
         let reported = |stiffness_n_per_mm| {
             let params = SurfaceParams {
                 stiffness_n_per_mm,
@@ -274,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_is_warned_of_by_the_rate() {
+    fn stiffness_warning_depends_on_the_rate() {
         for (stiffness, hz) in [(0.5, 1000), (1.0, 1000), (2.0, 2000), (2.0, 10_000)] {
             assert_eq!(reported(stiffness, hz, Controller::On), "", "{hz}");
         }
@@ -292,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_is_warned_of_by_the_latency() {
+    fn stiffness_warning_depends_on_the_latency() {
         let trembles = reported_late(1.5, 1000, 1231, Controller::On);
         assert!(
             trembles.contains("above 1 N/mm at 1000 ticks a second and 1.23 ms to the motors"),

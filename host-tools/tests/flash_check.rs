@@ -18,7 +18,7 @@ fn output_text(output: &Output) -> String {
 }
 
 #[test]
-fn an_image_fits_its_board_and_no_other() {
+fn image_fits_only_its_board() {
     let images = [
         ("nucleo-g474re", "HAPTERRA_G474_ELF"),
         ("nucleo-h743zi2", "HAPTERRA_H743_ELF"),
@@ -32,22 +32,22 @@ fn an_image_fits_its_board_and_no_other() {
             continue;
         };
         let output = check(board, &image);
-        let stated = output_text(&output);
-        assert!(output.status.success(), "{board}: {stated}");
+        let output_text = output_text(&output);
+        assert!(output.status.success(), "{board}: {output_text}");
         assert!(
-            stated.contains("flash") && stated.contains("RAM"),
-            "{stated}"
+            output_text.contains("flash") && output_text.contains("RAM"),
+            "{output_text}"
         );
         for (other, _) in images.iter().filter(|(other, _)| *other != board) {
             let output = check(other, &image);
-            let stated = output_text(&output);
+            let output_text = output_text(&output);
             assert_eq!(
                 output.status.code(),
                 Some(1),
-                "{board} as {other}: {stated}"
+                "{board} as {other}: {output_text}"
             );
-            assert!(stated.contains("built for"), "{stated}");
-            assert!(stated.contains("--board"), "{stated}");
+            assert!(output_text.contains("built for"), "{output_text}");
+            assert!(output_text.contains("--board"), "{output_text}");
         }
     }
 }
@@ -55,7 +55,7 @@ fn an_image_fits_its_board_and_no_other() {
 /// A foreign checkout around the working folder is not built, because a build runs its code.
 #[cfg(unix)]
 #[test]
-fn own_checkout_is_built_wherever_it_is_run() {
+fn own_checkout_is_built_from_any_folder() {
     use std::fs;
     use std::os::unix::fs::PermissionsExt;
     use std::path::Path;
@@ -75,14 +75,14 @@ fn own_checkout_is_built_wherever_it_is_run() {
         .env("CARGO", &cargo)
         .output()
         .expect("it runs");
-    let stated = output_text(&output);
+    let output_text = output_text(&output);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let root = fs::canonicalize(root.expect("a folder above")).expect("there");
     let started = format!("\n{}\n", root.display());
     assert!(
-        format!("\n{stated}").contains(&started),
-        "{started}: {stated}"
+        format!("\n{output_text}").contains(&started),
+        "{started}: {output_text}"
     );
-    assert!(stated.contains("source         "), "{stated}");
-    assert_eq!(output.status.code(), Some(1), "{stated}");
+    assert!(output_text.contains("source         "), "{output_text}");
+    assert_eq!(output.status.code(), Some(1), "{output_text}");
 }

@@ -93,7 +93,7 @@ impl VirtualArm {
             .placement
             .joints_at(&model, *first_mm)
             .map_err(refused)?;
-        Ok(Some(Plant::new(model, q).held_by(self.hand)))
+        Ok(Some(Plant::new(model, q).with_hand(self.hand)))
     }
 
     /// Runs ticks at the first of these targets, up to the next check for Ctrl-C.
@@ -123,7 +123,7 @@ impl VirtualArm {
             let next_mm = targets.get(index + 1).map_or(target_mm, |(_, next)| next);
             let speed: [f64; 3] = std::array::from_fn(|i| (next_mm[i] - target_mm[i]) / tick_s);
             let target_m = self.placement.to_device_m(plant.model(), *target_mm);
-            plant.aim(
+            plant.set_target(
                 target_m,
                 ArmFrame::turn_to_device(speed).map(|mm_s| 1e-3 * mm_s),
             );

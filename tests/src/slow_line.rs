@@ -117,7 +117,7 @@ impl Stepped for InMemory {
     }
 
     fn tick(&mut self, _: SessionNumber, frames: &[u8]) -> Vec<u8> {
-        let drive = self.device.tick(self.arm.sense());
+        let drive = self.device.tick(self.arm.guard_inputs());
         if self.device.link.is_arm_in_use() {
             let currents_a = drive.currents_a.to_array().map(f64::from);
             self.arm.step(currents_a, 1e-3);
@@ -228,7 +228,7 @@ impl Stepped for OnBoard {
     }
 
     fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8> {
-        let (tick, sense) = (self.ticks, self.arm.sense());
+        let (tick, sense) = (self.ticks, self.arm.guard_inputs());
         let mut frame = [0; 64];
         let sensed = encode(&PlantState { tick, sense }, &mut frame).expect("it fits");
         self.plant.send(sensed).expect("the board is there");

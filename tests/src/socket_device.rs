@@ -42,7 +42,7 @@ struct MessageCounts {
 impl SocketDevice {
     /// Starts a device whose arm rests.
     pub fn start() -> Self {
-        Self::with(|| (Native::for_replay().restless(), || {}))
+        Self::with(|| (Native::for_replay().free_running(), || {}))
     }
 
     /// Starts the device that `make` creates in its own thread, with a function called every few
@@ -139,7 +139,7 @@ fn serve(
         }
         between();
         // A few milliseconds of its time pass.
-        device.pass(TICKS);
+        device.run_ticks(TICKS);
         counts.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
         let sent = device
             .receive(&mut chunk, Duration::ZERO)

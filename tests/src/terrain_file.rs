@@ -14,6 +14,6 @@ pub fn terrain_file(path: &Path, kind: Kind, side: u32, seed: u64) {
         rows: side,
         cell_m: 10.0,
     };
-    let synth = Synth::new(kind, seed, kind.usual_amplitude_cells() * grid.cell_m);
+    let synth = Synth::new(kind, seed, kind.default_amplitude_cells() * grid.cell_m);
     write(path, &synth, &grid, &mut || true).expect("written");
 }

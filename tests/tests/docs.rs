@@ -71,7 +71,7 @@ fn dead_links(page: &Path, text: &str) -> Vec<String> {
     let is_local = |link: &&str| !link.contains("://") && !link.starts_with("mailto:");
     let mut dead = Vec::new();
     for link in links.filter(is_local) {
-        let (file, wanted) = link.split_once('#').unwrap_or((link, ""));
+        let (file, expected) = link.split_once('#').unwrap_or((link, ""));
         let folder = page.parent().expect("a folder");
         let target = if file.is_empty() {
             page.to_owned()
@@ -80,12 +80,12 @@ fn dead_links(page: &Path, text: &str) -> Vec<String> {
         };
         if !target.exists() {
             dead.push(format!("{}: {link}: no such file", page.display()));
-        } else if !wanted.is_empty() {
+        } else if !expected.is_empty() {
             let target = std::fs::read_to_string(&target).unwrap_or_default();
             let target = prose(&target);
             let headings = target.lines().filter(|line| line.starts_with('#'));
             let anchors: HashSet<String> = headings.map(anchor).collect();
-            if !anchors.contains(wanted) {
+            if !anchors.contains(expected) {
                 dead.push(format!("{}: {link}: no such heading", page.display()));
             }
         }
@@ -186,7 +186,7 @@ fn figure(place: &str, shown: &str) -> String {
 }
 
 #[test]
-fn a_figure_of_the_table_is_right_to_the_digits_shown() {
+fn figure_matches_the_table_to_its_digits() {
     for (place, shown) in [
         ("sliding, median", "1218"),
         ("sliding, median", "1,218"),
@@ -225,7 +225,7 @@ fn cells_of_a_table_are_compared() {
 }
 
 #[test]
-fn a_figure_that_is_not_the_tables_is_found() {
+fn figure_that_differs_from_the_table_is_detected() {
     for (place, shown, why) in [
         (
             "sliding, median",

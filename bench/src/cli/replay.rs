@@ -21,5 +21,5 @@ pub struct Args {
 /// # Errors
 /// As of `hapterra replay`.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    replay::run_by(&args.replay, args.contact)
+    replay::run_with_rule(&args.replay, args.contact)
 }

@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.out.is_some() && args.out == args.picture {
         return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
     }
-    partial_files::tell(
+    partial_files::report(
         { args.out.iter() }
             .chain(&args.picture)
             .map(PathBuf::as_path),

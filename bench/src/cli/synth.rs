@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let error = format!("too small: {columns} × {rows} samples");
         return Err(Failure::new(error).hint("a surface needs at least --size 2x2"));
     }
-    let usual = args.kind.usual_amplitude_cells() * args.cell;
+    let usual = args.kind.default_amplitude_cells() * args.cell;
     let amplitude = args.amplitude.map(|height| match args.kind {
         // The kind's own amplitude is a slope.
         Kind::Plane => height / Synth::new(Kind::Plane, 0, 1.0).rise(columns, rows),
@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rows,
         cell_m: args.cell,
     };
-    partial_files::tell([args.out.as_path()]);
+    partial_files::report([args.out.as_path()]);
     let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
     let written = write(&args.out, &synth, &grid, &mut || {

@@ -88,7 +88,7 @@ fn run_taps(
     let mut script = Script::start([x, y, ground + START_HEIGHT_MM]);
     for _ in 0..TAPS {
         for above in [-TARGET_DEPTH_MM, START_HEIGHT_MM] {
-            script = script.go([x, y, ground + above], speed_mm_s);
+            script = script.line_to([x, y, ground + above], speed_mm_s);
         }
     }
     let arm_and_hand = HeldPhantom::new(
@@ -109,7 +109,7 @@ fn run_taps(
     };
     let (mut before, mut parts) = (([0.0; 3], [0.0; 3]), Vec::with_capacity(2 * ticks));
     for _ in 0..ticks {
-        let outcome = haptics.tick(&arm_and_hand.sense(), true);
+        let outcome = haptics.tick(&arm_and_hand.guard_inputs(), true);
         let to_f64 = |v: hapterra_core::Vec3| v.to_array().map(f64::from);
         let now = (
             to_f64(outcome.drive.currents_a),

@@ -99,7 +99,7 @@ pub(super) fn run(
                 let _ = haptics.accept(Command::Clutch(hold));
             }
         }
-        let inputs = arm.sense();
+        let inputs = arm.guard_inputs();
         let encoder_height_mm = encoder_height_mm(&arm, inputs.counts);
         let outcome = haptics.tick(&inputs, true);
         let sample = outcome.sample;

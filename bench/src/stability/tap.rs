@@ -57,7 +57,7 @@ impl Setting {
         let mut script = Script::start([east, north, above]);
         for _ in 0..TAPS {
             for up_mm in [below, above] {
-                script = script.go([east, north, up_mm], target_mm_s);
+                script = script.line_to([east, north, up_mm], target_mm_s);
             }
             script = script.wait(PAUSE_S);
         }

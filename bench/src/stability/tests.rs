@@ -12,8 +12,8 @@ use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{PressOutcome, Setting, Trial, Verdict};
 use hapterra::phantom::PhantomModel;
 use hapterra::stability::{
-    ENTERS_LATE_N_PER_MM, ENTERS_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LEFT_WITH_TEXTURE, LONG_US,
-    SHORT_US, STILL_LATE_N_PER_MM, STILL_N_PER_MM,
+    LONG_US, RAMP_UP_N_PER_MM, RAMP_UP_N_PER_MM_LONG, SHORT_US, STABLE_N_PER_MM,
+    STABLE_N_PER_MM_LONG, TEXTURE_FACTOR, TEXTURE_FACTOR_LONG,
 };
 
 const UNDAMPED: Damping = Damping {
@@ -227,7 +227,7 @@ fn warning_before_a_surface_agrees_with_the_trials() {
         _ => 12.0,
     };
     let count_mm = AtTip::new(&PhantomModel::premium_1_5()).count_mm;
-    for (table, delay_s) in [(STILL_N_PER_MM, SHORT_S), (STILL_LATE_N_PER_MM, LONG_S)] {
+    for (table, delay_s) in [(STABLE_N_PER_MM, SHORT_S), (STABLE_N_PER_MM_LONG, LONG_S)] {
         for (hz, without, with) in table {
             for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
                 let at = |stiffness| {
@@ -258,8 +258,8 @@ fn textured_surface_is_still_up_to_a_share_of_the_stiffness() {
         verdict(&trial)
     };
     for (table, share_left, delay_s) in [
-        (STILL_N_PER_MM, LEFT_WITH_TEXTURE, SHORT_S),
-        (STILL_LATE_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LONG_S),
+        (STABLE_N_PER_MM, TEXTURE_FACTOR, SHORT_S),
+        (STABLE_N_PER_MM_LONG, TEXTURE_FACTOR_LONG, LONG_S),
     ] {
         for (hz, without, with) in table {
             for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
@@ -273,7 +273,7 @@ fn textured_surface_is_still_up_to_a_share_of_the_stiffness() {
         }
     }
     // The limit of an even surface is too much here: the texture rocks a hand that slides.
-    let (hz, without, _) = STILL_N_PER_MM[0];
+    let (hz, without, _) = STABLE_N_PER_MM[0];
     let whole = at(hz, without.into(), SHORT_S, UNDAMPED);
     assert_eq!(whole, Verdict::Unstable);
 }
@@ -382,7 +382,7 @@ fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
         (10_000, 1.0, 0.5),
     ];
     check_entry_limits(0.1, LONG_S, late);
-    for (table, expected) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
+    for (table, expected) in [(little, RAMP_UP_N_PER_MM), (late, RAMP_UP_N_PER_MM_LONG)] {
         for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(expected) {
             assert_eq!((hz, ramp.min(clutch)), (of_hz, f64::from(n_per_mm)));
         }

@@ -149,7 +149,7 @@ impl<'t> Chain<'t> {
         let result = self.client.receive(now, &received, &mut out, &mut on);
         let spent = started.elapsed();
         result
-            .and_then(|()| self.client.due(now, &mut out, &mut on))
+            .and_then(|()| self.client.append_due(now, &mut out, &mut on))
             .map_err(|error| MeasureError(format!("the session ended: {error}")))?;
         if self.count_tiles(&out) > 0 {
             self.host.push(spent);

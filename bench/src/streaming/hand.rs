@@ -66,7 +66,7 @@ impl Hand {
             LateTile::NoData => scene,
             LateTile::Fallback => {
                 let reach = Reach::of(&Calibration::PREMIUM_1_5);
-                terrain.underlaid(scene, reach.sides_mm())
+                terrain.with_fallback(scene, reach.sides_mm())
             }
         })
     }

@@ -41,7 +41,7 @@ struct Image {
 impl Relief {
     /// Creates mountains with heights in whole centimetres.
     pub(super) fn new() -> Self {
-        let cells = Kind::Fractal.usual_amplitude_cells();
+        let cells = Kind::Fractal.default_amplitude_cells();
         let synth = Synth::new(Kind::Fractal, 17, cells * CELL_M);
         let places = (0..PERIOD).flat_map(|row| (0..PERIOD).map(move |column| (column, row)));
         let whole = |height: f32| ((f64::from(height) / STEP_M).round() * STEP_M) as f32;

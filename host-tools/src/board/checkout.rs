@@ -68,8 +68,8 @@ impl Checkout {
                 program: cargo.to_string_lossy().into_owned(),
                 source,
             })?;
-        let stated = String::from_utf8_lossy(&output.stdout);
-        match stated.lines().last() {
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        match stdout.lines().last() {
             Some(path) if output.status.success() => Ok(path.into()),
             _ => Err(BuildError::Failed {
                 board: board.name,

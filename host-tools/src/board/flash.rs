@@ -40,12 +40,12 @@ pub enum FlashError {
     #[error("no debug probe: looked for ST-LINK, CMSIS-DAP, J-Link and other probes on USB")]
     NoProbe,
     /// No probe matches the requested name.
-    #[error("no debug probe is {wanted}: there is {}", there.join(", "))]
+    #[error("no debug probe is {requested}: there is {}", connected.join(", "))]
     NoSuchProbe {
         /// The requested name.
-        wanted: String,
+        requested: String,
         /// The names of the connected probes.
-        there: Vec<String>,
+        connected: Vec<String>,
     },
     /// Several probes are connected, and none was named.
     #[error("several debug probes: {}", .0.join(", "))]
@@ -139,8 +139,8 @@ pub fn flash(
     })
 }
 
-fn choose(lister: &Lister, wanted: Option<&str>) -> Result<DebugProbeInfo, FlashError> {
-    let selector = wanted.map(|text| {
+fn choose(lister: &Lister, requested: Option<&str>) -> Result<DebugProbeInfo, FlashError> {
+    let selector = requested.map(|text| {
         text.parse::<DebugProbeSelector>()
             .map_err(|_| FlashError::Selector(text.to_owned()))
     });
@@ -149,11 +149,11 @@ fn choose(lister: &Lister, wanted: Option<&str>) -> Result<DebugProbeInfo, Flash
     let names = || here.iter().map(|item| name(&item.info)).collect::<Vec<_>>();
     let fits = |info: &DebugProbeInfo| selector.as_ref().is_none_or(|s| s.matches_probe(info));
     let mut chosen = here.iter().filter(|item| fits(&item.info));
-    match (chosen.next(), chosen.next(), wanted) {
+    match (chosen.next(), chosen.next(), requested) {
         _ if here.is_empty() => Err(FlashError::NoProbe),
-        (None, _, wanted) => Err(FlashError::NoSuchProbe {
-            wanted: wanted.unwrap_or_default().to_owned(),
-            there: names(),
+        (None, _, requested) => Err(FlashError::NoSuchProbe {
+            requested: requested.unwrap_or_default().to_owned(),
+            connected: names(),
         }),
         (Some(_), Some(_), _) => Err(FlashError::ManyProbes(names())),
         (Some(item), None, _) if item.accessibility == Accessibility::PermissionDenied => {

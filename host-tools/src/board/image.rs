@@ -175,9 +175,9 @@ fn mark(header: &FileHeader32<LittleEndian>, elf: &[u8]) -> Option<String> {
 
 /// A loaded segment: its address at run time, its load address and its bytes.
 struct Segment {
-    runs: u64,
-    in_memory: u64,
-    loaded: u64,
+    run_address: u64,
+    memory_bytes: u64,
+    load_address: u64,
     bytes: Vec<u8>,
 }
 
@@ -194,9 +194,9 @@ fn segments(header: &FileHeader32<LittleEndian>, elf: &[u8]) -> Result<Vec<Segme
                 .data(LittleEndian, elf)
                 .map_err(|()| "it is cut off")?;
             Ok(Segment {
-                runs: segment.p_vaddr(LittleEndian).into(),
-                in_memory: segment.p_memsz(LittleEndian).into(),
-                loaded: segment.p_paddr(LittleEndian).into(),
+                run_address: segment.p_vaddr(LittleEndian).into(),
+                memory_bytes: segment.p_memsz(LittleEndian).into(),
+                load_address: segment.p_paddr(LittleEndian).into(),
                 bytes: bytes.to_vec(),
             })
         })
@@ -227,7 +227,7 @@ fn place(memories: Memories, segments: Vec<Segment>) -> Result<Image, Stray> {
             bytes,
             in_flash,
         };
-        let memory = memories.holding(address, bytes, in_flash).ok_or(stray)?;
+        let memory = memories.containing(address, bytes, in_flash).ok_or(stray)?;
         match placed.iter_mut().find(|place| place.memory == memory) {
             Some(place) => place.bytes += bytes,
             None => placed.push(Placed {
@@ -239,17 +239,17 @@ fn place(memories: Memories, segments: Vec<Segment>) -> Result<Image, Stray> {
         Ok(())
     };
     for segment in &segments {
-        take(segment.loaded, segment.bytes.len() as u64, true)?;
+        take(segment.load_address, segment.bytes.len() as u64, true)?;
         // A segment that runs at its load address is already in flash.
-        if segment.runs != segment.loaded || segment.bytes.is_empty() {
-            take(segment.runs, segment.in_memory, false)?;
+        if segment.run_address != segment.load_address || segment.bytes.is_empty() {
+            take(segment.run_address, segment.memory_bytes, false)?;
         }
     }
     let parts = segments.into_iter().filter(|s| !s.bytes.is_empty());
     Ok(Image {
         parts: parts
             .map(|s| Part {
-                address: s.loaded,
+                address: s.load_address,
                 bytes: s.bytes,
             })
             .collect(),
@@ -262,11 +262,11 @@ fn place(memories: Memories, segments: Vec<Segment>) -> Result<Image, Stray> {
 mod tests {
     use super::*;
 
-    fn segment(runs: u64, loaded: u64, bytes: usize, in_memory: u64) -> Segment {
+    fn segment(run_address: u64, load_address: u64, bytes: usize, memory_bytes: u64) -> Segment {
         Segment {
-            runs,
-            in_memory,
-            loaded,
+            run_address,
+            memory_bytes,
+            load_address,
             bytes: vec![1; bytes],
         }
     }
@@ -279,13 +279,13 @@ mod tests {
         let code = segment(FLASH, FLASH, 1000, 1000);
         let data = segment(RAM, FLASH + 1000, 40, 240);
         let image = place(Memories::G474, vec![code, data]).ok().expect("fits");
-        let taken: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
-        assert_eq!(taken, [(true, 1040), (false, 240)]);
+        let ranges: Vec<_> = image.placed.iter().map(|p| (p.is_flash, p.bytes)).collect();
+        assert_eq!(ranges, [(true, 1040), (false, 240)]);
         assert_eq!(image.parts.len(), 2);
     }
 
     #[test]
-    fn data_may_lie_across_the_chips_blocks_of_ram() {
+    fn segment_may_span_adjacent_ram_blocks() {
         // SRAM1, SRAM2 and CCM of the G474, 128 KiB end to end.
         let data = segment(RAM + 0x1000, FLASH, 8, 0x1_F000);
         assert!(place(Memories::G474, vec![data]).is_ok());
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_of_another_chip_is_refused() {
+    fn image_of_another_chip_is_refused() {
         // The H743's data RAM, and flash past the G474's 512 KiB.
         for stray in [
             segment(0x2400_0000, FLASH, 8, 8),

@@ -67,7 +67,7 @@ impl Memories {
 
     /// Returns the memory that contains a whole range, if one does.
     #[must_use]
-    pub fn holding(&self, address: u64, bytes: u64, in_flash: bool) -> Option<Range<u64>> {
+    pub fn containing(&self, address: u64, bytes: u64, in_flash: bool) -> Option<Range<u64>> {
         let end = address.checked_add(bytes)?;
         let holds = |memory: &Range<u64>| memory.start <= address && end <= memory.end;
         if in_flash {
@@ -84,7 +84,7 @@ mod tests {
     use probe_rs::config::{MemoryRegion, Registry};
 
     #[test]
-    fn the_memories_are_those_of_probe_rs_registry() {
+    fn memories_match_probe_rs_registry() {
         let registry = Registry::from_builtin_families();
         for (chip, memories) in [
             ("STM32G474RETx", Memories::G474),

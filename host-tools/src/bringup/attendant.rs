@@ -7,7 +7,7 @@ use crate::calibrate::Direction;
 /// The user's side of a bring-up: acts, measures and answers.
 pub trait Attendant {
     /// Receives a message.
-    fn hear(&mut self, line: &str);
+    fn notify(&mut self, line: &str);
 
     /// Requests an action that the board detects by itself.
     fn begin(&mut self, task: Task);
@@ -28,11 +28,11 @@ pub trait Attendant {
     ///
     /// # Errors
     /// [`Stopped`].
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped>;
+    fn confirm(&mut self, question: Question) -> Result<bool, Stopped>;
 
     /// Returns a function that is true if the attendant wants to stop; it is called before each
     /// status request.
-    fn stops(&self) -> fn() -> bool {
+    fn stop_check(&self) -> fn() -> bool {
         || false
     }
 
@@ -79,9 +79,9 @@ pub enum Task {
     /// Hold the tip in the zero pose with a spring scale, against the push of an axis (0 to 2).
     HoldWithScale(usize),
     /// Read the scale now; the question follows later.
-    LookAtScale,
+    ReadScale,
     /// Release the tip, with a hand near it.
-    LetGoOfTip,
+    ReleaseTip,
     /// Hold the tip again.
     HoldTip,
     /// Lower the tip slowly through the plane.
@@ -120,8 +120,8 @@ impl fmt::Display for Task {
                 "hook a spring scale to the tip and hold the tip with it in the zero pose, the scale pulling {}",
                 against(*axis)
             ),
-            Self::LookAtScale => f.write_str("read the scale now"),
-            Self::LetGoOfTip => f.write_str("let the tip go, a hand near it; keep the switch pressed"),
+            Self::ReadScale => f.write_str("read the scale now"),
+            Self::ReleaseTip => f.write_str("let the tip go, a hand near it; keep the switch pressed"),
             Self::HoldTip => f.write_str("hold the tip again"),
             Self::LowerTip => f.write_str(
                 "lower the tip slowly: a soft floor begins some 20 mm below; push 10 mm into it",
@@ -144,7 +144,7 @@ const fn against(axis: usize) -> &'static str {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reading {
     /// The enable line at the amplifiers, V.
-    EnableVolts(BoardIs),
+    EnableVolts(BoardState),
     /// A command output (0 to 2) that the board holds at a fraction of full scale.
     Output {
         /// The output.
@@ -165,7 +165,7 @@ pub enum Reading {
 
 /// State of the board while the enable line is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BoardIs {
+pub enum BoardState {
     /// The board runs, disarmed.
     Running,
     /// The reset button is held down.
@@ -179,9 +179,9 @@ impl fmt::Display for Reading {
         match self {
             Self::EnableVolts(when) => {
                 let when = match when {
-                    BoardIs::Running => "the board running",
-                    BoardIs::InReset => "the board's reset button held down",
-                    BoardIs::Unplugged => "the board unplugged",
+                    BoardState::Running => "the board running",
+                    BoardState::InReset => "the board's reset button held down",
+                    BoardState::Unplugged => "the board unplugged",
                 };
                 write!(f, "volts on the enable line at the amplifiers, {when}?")
             }
@@ -212,7 +212,7 @@ pub enum Question {
     /// Are the amplifiers' ready outputs wired to the board?
     ReadyIsWired,
     /// Does the pressed stop cut the amplifiers' power?
-    StopTakesPower,
+    StopCutsPower,
     /// Did the floor push the tip back up?
     PushedBack,
 }
@@ -223,7 +223,7 @@ impl fmt::Display for Question {
             Self::ReadyIsWired => f.write_str(
                 "are the amplifiers' ready outputs wired to the board, their logic supplied?",
             ),
-            Self::StopTakesPower => f.write_str(
+            Self::StopCutsPower => f.write_str(
                 "the stop still pressed: are the amplifiers' power stages without power?",
             ),
             Self::PushedBack => f.write_str("did the floor push the tip up, and only up?"),

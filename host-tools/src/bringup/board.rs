@@ -15,30 +15,30 @@ use super::finding::Finding;
 use super::halt::Halt;
 use crate::link::{ControlSession, LinkError};
 
-/// Duration of a look, the interval of status requests, ms of the board's time.
-const LOOK_MS: u32 = 100;
-/// Time limit for the board to detect a user's action, in looks.
-const LOOKS: usize = 600;
-/// Looks within which a board must remove the force after a disarm command.
-const LOOKS_TO_DISARM: usize = 20;
-/// Largest change between two looks of an encoder at rest.
+/// Interval of status requests, ms of the board's time.
+const STATUS_INTERVAL_MS: u32 = 100;
+/// Time limit for the board to detect a user's action, in status requests.
+const MAX_POLLS: usize = 600;
+/// Status requests within which a board must remove the force after a disarm command.
+const MAX_POLLS_TO_DISARM: usize = 20;
+/// Largest change between two status requests of an encoder at rest.
 const STILL_COUNTS: u32 = 3;
 
 /// A board on the link.
 pub(super) struct Board<'d, 't> {
     control: &'d mut ControlSession<'t>,
     /// True if the attendant wants to stop.
-    stops: fn() -> bool,
+    stop_requested: fn() -> bool,
     /// True from a request that drives the arm until the board confirms that it is disarmed.
     may_be_armed: bool,
 }
 
 impl<'d, 't> Board<'d, 't> {
-    /// Wraps the session of a board. `stops` returns true if the attendant wants to stop.
-    pub(super) fn new(control: &'d mut ControlSession<'t>, stops: fn() -> bool) -> Self {
+    /// Wraps the session of a board. `stop_requested` returns true if the attendant wants to stop.
+    pub(super) fn new(control: &'d mut ControlSession<'t>, stop_requested: fn() -> bool) -> Self {
         Self {
             control,
-            stops,
+            stop_requested,
             may_be_armed: false,
         }
     }
@@ -57,95 +57,104 @@ impl<'d, 't> Board<'d, 't> {
         Ok(self.control.calibration()?)
     }
 
-    /// Returns the status after `LOOK_MS` (one look), or as soon as `on` returns true for a sample.
+    /// Returns the status after `STATUS_INTERVAL_MS`, or as soon as `on` returns true for a sample.
     /// Sends the flat tiles that the board requests.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
-    pub(super) fn look_until(
+    pub(super) fn poll_status_until(
         &mut self,
         on: &mut dyn FnMut(&TickRecord) -> bool,
     ) -> Result<Status, Halt> {
-        if (self.stops)() {
+        if (self.stop_requested)() {
             return Err(Stopped.into());
         }
-        let is_enough = Cell::new(false);
-        let enough = || is_enough.get();
-        let passed = self
-            .control
-            .pass(LOOK_MS, &enough, &mut |message| match message {
-                ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
-                    epoch: *epoch,
-                    key: *key,
-                    heights: Heights::Flat {
-                        base: 0,
-                        height: 0.0,
-                    },
-                })),
-                ToHost::Telemetry(telemetry) => {
-                    for sample in &telemetry.samples {
-                        is_enough.set(is_enough.get() | on(sample));
+        let done = Cell::new(false);
+        let check_done = || done.get();
+        let passed =
+            self.control.run_for(
+                STATUS_INTERVAL_MS,
+                &check_done,
+                &mut |message| match message {
+                    ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
+                        epoch: *epoch,
+                        key: *key,
+                        heights: Heights::Flat {
+                            base: 0,
+                            height: 0.0,
+                        },
+                    })),
+                    ToHost::Telemetry(telemetry) => {
+                        for sample in &telemetry.samples {
+                            done.set(done.get() | on(sample));
+                        }
+                        None
                     }
-                    None
-                }
-                _ => None,
-            });
+                    _ => None,
+                },
+            );
         Ok(passed?)
     }
 
-    /// Returns the status after one look; calls `on` for each sample.
+    /// Returns the status after one interval; calls `on` for each sample.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
-    pub(super) fn look_with(&mut self, on: &mut dyn FnMut(&TickRecord)) -> Result<Status, Halt> {
-        self.look_until(&mut |sample| {
+    pub(super) fn poll_status_with(
+        &mut self,
+        on: &mut dyn FnMut(&TickRecord),
+    ) -> Result<Status, Halt> {
+        self.poll_status_until(&mut |sample| {
             on(sample);
             false
         })
     }
 
-    /// Returns the status after one look.
+    /// Returns the status after one interval.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
-    pub(super) fn look(&mut self) -> Result<Status, Halt> {
-        self.look_with(&mut |_| {})
+    pub(super) fn poll_status(&mut self) -> Result<Status, Halt> {
+        self.poll_status_with(&mut |_| {})
     }
 
     /// Requests an action of the attendant and waits until the board detects it.
     ///
     /// # Errors
-    /// [`Finding::NotSeen`], [`Halt::Link`].
-    pub(super) fn see(
+    /// [`Finding::NotDetected`], [`Halt::Link`].
+    pub(super) fn wait_for_task(
         &mut self,
         attendant: &mut dyn Attendant,
         task: Task,
-        seen: impl Fn(&Status) -> bool,
+        is_done: impl Fn(&Status) -> bool,
     ) -> Result<Status, Halt> {
         attendant.begin(task);
-        for _ in 0..LOOKS {
-            let status = self.look()?;
-            if seen(&status) {
+        for _ in 0..MAX_POLLS {
+            let status = self.poll_status()?;
+            if is_done(&status) {
                 return Ok(status);
             }
         }
-        Err(Finding::NotSeen(task).into())
+        Err(Finding::NotDetected(task).into())
     }
 
     /// Waits until the encoders are at rest; returns their counts.
     ///
     /// # Errors
     /// [`Halt::Link`].
-    pub(super) fn still(&mut self, attendant: &mut dyn Attendant) -> Result<[i32; 3], Halt> {
-        let mut before = self.look()?.health.sense.counts;
-        for look in 0.. {
-            let now = self.look()?.health.sense.counts;
+    pub(super) fn wait_for_rest(
+        &mut self,
+        attendant: &mut dyn Attendant,
+    ) -> Result<[i32; 3], Halt> {
+        let mut before = self.poll_status()?.health.sense.counts;
+        for poll in 0.. {
+            let now = self.poll_status()?.health.sense.counts;
             if (0..3).all(|i| now[i].abs_diff(before[i]) <= STILL_COUNTS) {
                 return Ok(now);
             }
             before = now;
-            if look == LOOKS / 10 {
-                attendant.hear("the arm moves: hold it still");
+            if poll == MAX_POLLS / 10 {
+                attendant.notify("the arm moves: hold it still");
             }
         }
         Ok(before)
@@ -155,7 +164,7 @@ impl<'d, 't> Board<'d, 't> {
     ///
     /// # Errors
     /// [`Finding::NotReady`], [`Finding::Refused`], [`Halt::Link`].
-    pub(super) fn ask(&mut self, request: &Request) -> Result<(), Halt> {
+    pub(super) fn request(&mut self, request: &Request) -> Result<(), Halt> {
         match self.control.request(request)? {
             Ok(()) => Ok(()),
             Err(Refusal::Blocked(why)) => Err(Finding::NotReady(why).into()),
@@ -166,7 +175,7 @@ impl<'d, 't> Board<'d, 't> {
     /// Sends a request that drives the arm, once the user presses the switch.
     ///
     /// # Errors
-    /// As [`Board::ask`].
+    /// As [`Board::request`].
     pub(super) fn drive(
         &mut self,
         attendant: &mut dyn Attendant,
@@ -174,14 +183,14 @@ impl<'d, 't> Board<'d, 't> {
     ) -> Result<(), Halt> {
         self.may_be_armed = true;
         attendant.may_be_armed(true);
-        self.ask(request)
+        self.request(request)
     }
 
     /// Activates a scene.
     ///
     /// # Errors
     /// [`Halt::Link`].
-    pub(super) fn put(&mut self, scene: Scene) -> Result<(), Halt> {
+    pub(super) fn put_scene(&mut self, scene: Scene) -> Result<(), Halt> {
         Ok(self.control.put_scene(scene)?)
     }
 
@@ -195,7 +204,7 @@ impl<'d, 't> Board<'d, 't> {
             let report = &status.health.report;
             report.mode == Mode::Armed || report.fault.is_some()
         };
-        let status = self.see(attendant, Task::PressDeadMan, ends)?;
+        let status = self.wait_for_task(attendant, Task::PressDeadMan, ends)?;
         match status.health.report.fault {
             Some(fault) => Err(Finding::Fault(fault).into()),
             None => Ok(()),
@@ -205,14 +214,14 @@ impl<'d, 't> Board<'d, 't> {
     /// Requests an action of the attendant that must cause a fault, and clears the fault.
     ///
     /// # Errors
-    /// [`Finding::NotSeen`]; another fault.
-    pub(super) fn trips(
+    /// [`Finding::NotDetected`]; another fault.
+    pub(super) fn expect_fault(
         &mut self,
         attendant: &mut dyn Attendant,
         task: Task,
         fault: Fault,
     ) -> Result<(), Halt> {
-        let status = self.see(attendant, task, |s| s.health.report.fault.is_some())?;
+        let status = self.wait_for_task(attendant, task, |s| s.health.report.fault.is_some())?;
         match status.health.report.fault {
             Some(found) if found != fault => Err(Finding::Fault(found).into()),
             _ => Ok(()),
@@ -224,7 +233,7 @@ impl<'d, 't> Board<'d, 't> {
     /// # Errors
     /// [`LinkError::NotConfirmed`] if the board received a request to drive the arm and does not
     /// confirm that it is disarmed.
-    pub(super) fn leave(&mut self) -> Result<(), LinkError> {
+    pub(super) fn disarm_and_clear(&mut self) -> Result<(), LinkError> {
         match self.disarm() {
             Ok(true) => self.may_be_armed = false,
             _ if self.may_be_armed => return Err(LinkError::NotConfirmed),
@@ -243,8 +252,10 @@ impl<'d, 't> Board<'d, 't> {
     /// Sends the disarm command and returns true if the board confirms it.
     fn disarm(&mut self) -> Result<bool, LinkError> {
         let answer = self.control.request(&Request::Disarm)?;
-        for _ in 0..LOOKS_TO_DISARM {
-            let status = self.control.pass(LOOK_MS, &|| false, &mut |_| None)?;
+        for _ in 0..MAX_POLLS_TO_DISARM {
+            let status = self
+                .control
+                .run_for(STATUS_INTERVAL_MS, &|| false, &mut |_| None)?;
             if status.health.report.mode == Mode::Disarmed {
                 return Ok(answer.is_ok());
             }

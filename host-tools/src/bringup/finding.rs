@@ -17,13 +17,13 @@ pub enum Finding {
     NotReady(Blockers),
     /// The board's tick rate differs by another clock.
     #[error(
-        "the board ticks {hz:.0} times a second by this computer's clock where it says {stated_hz:.0}"
+        "the board ticks {hz:.0} times a second by this computer's clock where it says {nominal_hz:.0}"
     )]
     WrongTickRate {
         /// The counted rate.
         hz: f64,
         /// The rate that the board reports.
-        stated_hz: f64,
+        nominal_hz: f64,
     },
     /// The board's USB oscillator is not locked to the host's.
     #[error("the board's USB clock does not follow this computer's")]
@@ -33,7 +33,7 @@ pub enum Finding {
     Refused(Refusal),
     /// The user's action was not detected.
     #[error("the board did not see it: {0}")]
-    NotSeen(Task),
+    NotDetected(Task),
     /// The enable line is not low.
     #[error("the enable line is at {0:.2} V where it has to be low")]
     EnableHigh(f64),
@@ -172,7 +172,7 @@ pub enum Finding {
 impl Finding {
     /// Returns the remedy, in the imperative.
     #[must_use]
-    pub fn what_to_do(&self) -> String {
+    pub fn remedy(&self) -> String {
         match self {
             Self::Fault(fault) => return fault.remedy().into(),
             Self::InvertedMotor { motor, right } => {
@@ -186,10 +186,10 @@ impl Finding {
             Self::NotReady(_) | Self::Refused(_) => "look at hapterra status",
             Self::WrongTickRate { .. } => "do not go on: every limit in seconds would be wrong; flash the image of this very board again, and report it if it stays so",
             Self::UsbClockUnlocked => "try another USB port without a hub; if it stays so, report it with the board's name and revision",
-            Self::NotSeen(Task::PullReadyWire(_) | Task::ConnectReadyWire(_)) => {
+            Self::NotDetected(Task::PullReadyWire(_) | Task::ConnectReadyWire(_)) => {
                 "check that the amplifier is there, that its logic has power, and that its ready output is low while it is ready; an input that is tied to ground belongs to an amplifier without such an output"
             }
-            Self::NotSeen(_) => "check the switch's wires against the board's page",
+            Self::NotDetected(_) => "check the switch's wires against the board's page",
             Self::EnableHigh(_) => "add the pull-down at the amplifiers; go no further before it is low",
             Self::Output { .. } => "check the output's wire and its offset stage, which gets 1.65 V for no current from a G474; no amplifier is switched on before it is right",
             Self::DeadEncoder { .. } => "check the encoder's supply, both its channels, and its plug",

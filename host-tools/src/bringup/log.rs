@@ -124,7 +124,7 @@ impl Log {
     ///
     /// # Errors
     /// [`LogError::NoHome`].
-    pub fn place(device: &DeviceHello) -> Result<PathBuf, LogError> {
+    pub fn path_of(device: &DeviceHello) -> Result<PathBuf, LogError> {
         let strategy = choose_app_strategy(AppStrategyArgs {
             app_name: "hapterra".into(),
             ..AppStrategyArgs::default()
@@ -183,7 +183,7 @@ impl Log {
     /// Sets the current board and record, and removes entries that are no longer valid: all of them
     /// if the board or firmware changed, those that depend on the calibration if the record
     /// changed. Returns the reason if any was removed.
-    pub fn meet(&mut self, now: Identity) -> Option<&'static str> {
+    pub fn update_identity(&mut self, now: Identity) -> Option<&'static str> {
         let was = std::mem::replace(&mut self.identity, now);
         let before = self.entries.len();
         let now = &self.identity;
@@ -209,7 +209,7 @@ impl Log {
     }
 
     /// Adds the outcome of a step. Later steps are removed, because they depend on this one.
-    pub fn take(&mut self, step: Step, passed: bool, result: String) {
+    pub fn add(&mut self, step: Step, passed: bool, result: String) {
         self.entries.retain(|entry| entry.step < step);
         self.entries.push(Entry {
             step,
@@ -242,7 +242,7 @@ mod tests {
         };
         for step in Step::ALL {
             assert_eq!(log.next(), Some(step));
-            log.take(step, true, format!("{step:?}: \"fine\""));
+            log.add(step, true, format!("{step:?}: \"fine\""));
         }
         assert_eq!(log.next(), None);
         log
@@ -263,27 +263,27 @@ mod tests {
     #[test]
     fn changed_calibration_voids_its_steps_and_new_firmware_all() {
         let mut log = complete();
-        assert_eq!(log.meet(identity("0badcafe")), None);
+        assert_eq!(log.update_identity(identity("0badcafe")), None);
         assert_eq!(log.next(), None);
-        assert!(log.meet(identity("deadbeef")).is_some());
+        assert!(log.update_identity(identity("deadbeef")).is_some());
         assert_eq!(log.next(), Some(Step::Calibration));
         let mut flashed = identity("deadbeef");
         flashed.firmware = "0.2.0".into();
-        assert!(log.meet(flashed).is_some());
+        assert!(log.update_identity(flashed).is_some());
         assert_eq!(log.next(), Some(Step::Board));
     }
 
     #[test]
     fn repeated_step_voids_later_steps() {
         let mut log = complete();
-        log.take(Step::Encoders, false, "dead".into());
+        log.add(Step::Encoders, false, "dead".into());
         assert_eq!(log.next(), Some(Step::Encoders));
-        log.take(Step::Encoders, true, "alive".into());
+        log.add(Step::Encoders, true, "alive".into());
         assert_eq!(log.next(), Some(Step::Calibration));
     }
 
     #[test]
-    fn records_have_fingerprints() {
+    fn fingerprint_differs_between_records() {
         let one = fingerprint(&Calibration::PREMIUM_1_5);
         let mut other = Calibration::PREMIUM_1_5;
         other.motor_sign.y = -1.0;
@@ -292,10 +292,10 @@ mod tests {
     }
 
     #[test]
-    fn two_boards_of_a_kind_have_a_log_each() {
+    fn boards_of_one_kind_have_separate_logs() {
         let mut device = crate::link::hello();
         device.board = "../evil/board".try_into().expect("fits");
-        let place = |device: &DeviceHello| Log::place(device).expect("a home");
+        let place = |device: &DeviceHello| Log::path_of(device).expect("a home");
         let without = place(&device);
         assert!(
             without.ends_with("bringup/---evil-board.toml"),
@@ -311,20 +311,20 @@ mod tests {
         // A log under the other board's name is not valid for it.
         let mut log = complete();
         log.identity = Identity::of(&device, None);
-        assert_eq!(log.meet(Identity::of(&device, None)), None);
-        assert!(log.meet(Identity::of(&other, None)).is_some());
+        assert_eq!(log.update_identity(Identity::of(&device, None)), None);
+        assert!(log.update_identity(Identity::of(&other, None)).is_some());
         assert_eq!(log.next(), Some(Step::Board));
     }
 
     #[test]
-    fn a_log_that_names_no_board_counts_for_none_with_a_number() {
+    fn log_without_serial_is_void_for_a_board_with_one() {
         let text = complete().text().expect("in words");
         let old: String = text
             .lines()
             .filter(|line| !line.starts_with("serial"))
             .fold(String::new(), |text, line| text + line + "\n");
         let mut log: Log = toml::from_str(&old).expect("a log");
-        assert!(log.meet(identity("0badcafe")).is_some());
+        assert!(log.update_identity(identity("0badcafe")).is_some());
         assert_eq!(log.next(), Some(Step::Board));
     }
 }

@@ -1,8 +1,8 @@
 //! The bring-up of a board and its arm, step by step; no step is skipped.
 //!
 //! ```text
-//! Step (in order) ─▶ steps/ ─ asks ─▶ Attendant (a terminal, or a VirtualUser)
-//!                       │     looks, asks ─▶ Board (over the link)
+//! Step (in order) ─▶ steps/ ─ tasks ─▶ Attendant (a terminal, or a VirtualUser)
+//!                       │     requests ─▶ Board (over the link)
 //!                       ▼
 //!           result, or a Finding that names what is wrong ─▶ Log (TOML)
 //! ```
@@ -18,18 +18,18 @@ mod board;
 mod finding;
 mod halt;
 mod log;
+mod sequence;
 mod step;
 mod steps;
 mod utc;
 mod virtual_bench;
 mod virtual_user;
-mod walk;
 
-pub use attendant::{Attendant, BoardIs, Question, Reading, Stopped, Task};
+pub use attendant::{Attendant, BoardState, Question, Reading, Stopped, Task};
 pub use finding::Finding;
 pub use halt::Halt;
 pub use log::{Entry, Identity, Log, LogError};
+pub use sequence::{BringupError, SequenceEnd, run_sequence};
 pub use step::Step;
 pub use virtual_bench::{BenchMistakes, VirtualBench};
 pub use virtual_user::VirtualUser;
-pub use walk::{BringupError, Walked, walk};

@@ -8,8 +8,8 @@ use crate::calibrate::N_PER_GRAM;
 use crate::phantom::{HandModel, PhantomModel, Plant, Wiring, kinematics};
 
 /// Speed of a hand that leads the tip, and of one that searches for the surface, m/s.
-const LEAD_M_S: f64 = 0.1;
-const SLOW_M_S: f64 = 0.02;
+const GUIDE_M_S: f64 = 0.1;
+const APPROACH_M_S: f64 = 0.02;
 /// Length of a tick, s.
 const TICK_S: f64 = 1e-3;
 /// Voltage of an output at full scale, V.
@@ -46,7 +46,7 @@ pub(super) enum Grip {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BenchMistakes {
     /// Error of a command at its amplifier's input, V.
-    pub output_off_v: [f64; 3],
+    pub output_offset_v: [f64; 3],
     /// The enable line has no pull-down: it is high unless it is driven low.
     pub enable_floats: bool,
     /// The stop is normally open: its contact closes if it is pressed, and a disconnected wire
@@ -81,8 +81,8 @@ pub struct VirtualBench {
     mistakes: BenchMistakes,
     drive: GuardOutputs,
     /// Maximum speed of each joint, rad/s, while the amplifiers are on and for 0.1 s after.
-    fastest_rad_s: [f64; 3],
-    since_on_ticks: u32,
+    max_rate_rad_s: [f64; 3],
+    ticks_since_on: u32,
 }
 
 impl VirtualBench {
@@ -93,19 +93,19 @@ impl VirtualBench {
         plant.power_up();
         let at_m = DVec3::from(plant.tip_m());
         Self {
-            plant: plant.held_by(FIRM),
+            plant: plant.with_hand(FIRM),
             wiring,
             goal_m: at_m,
             at_m,
-            speed_m_s: LEAD_M_S,
+            speed_m_s: GUIDE_M_S,
             dead_man: false,
             stop: false,
             stop_wire_off: false,
             ready_wire_off: [false; 3],
             mistakes: BenchMistakes::default(),
             drive: GuardOutputs::default(),
-            fastest_rad_s: [0.0; 3],
-            since_on_ticks: u32::MAX,
+            max_rate_rad_s: [0.0; 3],
+            ticks_since_on: u32::MAX,
         }
     }
 
@@ -124,7 +124,7 @@ impl VirtualBench {
         let step = left.clamp_length_max(self.speed_m_s * TICK_S);
         self.at_m += step;
         self.plant
-            .aim(self.at_m.to_array(), (step / TICK_S).to_array());
+            .set_target(self.at_m.to_array(), (step / TICK_S).to_array());
         let mut commands_a = match drive.enabled {
             true => drive.currents_a.to_array().map(f64::from),
             false => [0.0; 3],
@@ -158,13 +158,13 @@ impl VirtualBench {
     }
 
     fn watch(&mut self, on: bool) {
-        self.since_on_ticks = match on {
+        self.ticks_since_on = match on {
             true => 0,
-            false => self.since_on_ticks.saturating_add(1),
+            false => self.ticks_since_on.saturating_add(1),
         };
-        if self.since_on_ticks <= 100 {
+        if self.ticks_since_on <= 100 {
             let rates = self.plant.rate_rad_s();
-            for (fastest, rate) in self.fastest_rad_s.iter_mut().zip(rates) {
+            for (fastest, rate) in self.max_rate_rad_s.iter_mut().zip(rates) {
                 *fastest = fastest.max(rate.abs());
             }
         }
@@ -173,8 +173,8 @@ impl VirtualBench {
     /// Returns the maximum speed of each joint, rad/s, while the amplifiers are on and for 0.1 s
     /// after.
     #[must_use]
-    pub fn fastest_rad_s(&self) -> [f64; 3] {
-        self.fastest_rad_s
+    pub fn max_rate_rad_s(&self) -> [f64; 3] {
+        self.max_rate_rad_s
     }
 
     /// Returns the true time, s, for a time on the board's clock.
@@ -209,22 +209,22 @@ impl VirtualBench {
         };
         self.at_m = self.tip_m();
         self.goal_m = self.at_m;
-        self.plant = self.plant.held_by(hand);
+        self.plant = self.plant.with_hand(hand);
     }
 
     /// Starts to lead the tip to a point.
     pub(super) fn lead(&mut self, to_m: DVec3) {
-        (self.goal_m, self.speed_m_s) = (to_m, LEAD_M_S);
+        (self.goal_m, self.speed_m_s) = (to_m, GUIDE_M_S);
     }
 
     /// Starts to move slowly to a point, in search of the surface.
-    pub(super) fn step(&mut self, to_m: DVec3) {
-        (self.goal_m, self.speed_m_s) = (to_m, SLOW_M_S);
+    pub(super) fn approach(&mut self, to_m: DVec3) {
+        (self.goal_m, self.speed_m_s) = (to_m, APPROACH_M_S);
     }
 
     /// Releases the tip.
-    pub(super) fn let_go(&mut self) {
-        self.plant = self.plant.let_go();
+    pub(super) fn release(&mut self) {
+        self.plant = self.plant.without_hand();
     }
 
     /// Returns the reading of a scale that pulls against a push along `direction`, grams.
@@ -234,7 +234,7 @@ impl VirtualBench {
 
     /// Returns the voltage of an output, V.
     pub(super) fn output_v(&self, axis: usize) -> f64 {
-        FULL_V * f64::from(self.drive.held[axis]) + self.mistakes.output_off_v[axis]
+        FULL_V * f64::from(self.drive.held[axis]) + self.mistakes.output_offset_v[axis]
     }
 
     /// Returns the voltage of the enable line, V. `driven` is true if the board drives it.

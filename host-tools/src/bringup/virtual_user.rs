@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use glam::DVec3;
 
-use super::attendant::{Attendant, BoardIs, Question, Reading, Stopped, Task};
+use super::attendant::{Attendant, BoardState, Question, Reading, Stopped, Task};
 use super::virtual_bench::{Grip, VirtualBench};
 use crate::calibrate::Direction;
 use crate::link::Native;
@@ -18,9 +18,9 @@ use hapterra_firmware::store::Stored;
 /// Depth below the tip to which the hand pushes into the soft plane, m.
 const PUSH_M: f64 = 0.035;
 /// Upward force from which the user notices a push, N.
-const FELT_N: f64 = 0.1;
+const MIN_NOTICED_N: f64 = 0.1;
 /// Interval at which the virtual device returns to its host, ms.
-const LOOK_MS: u32 = 25;
+const HOST_INTERVAL_MS: u32 = 25;
 
 /// Follows the instructions at a virtual bench, and reads the exact values.
 pub struct VirtualUser {
@@ -32,7 +32,7 @@ pub struct VirtualUser {
     /// Maximum upward force while the tip was lowered, N.
     force_n: f64,
     /// Receives the output, a line at a time.
-    pub says: fn(&str),
+    pub print: fn(&str),
 }
 
 impl VirtualUser {
@@ -50,7 +50,7 @@ impl VirtualUser {
             bench: Rc::new(RefCell::new(bench)),
             scale: (DVec3::ZERO, 0.0),
             force_n: 0.0,
-            says: |line| tracing::info!("{line}"),
+            print: |line| tracing::info!("{line}"),
         }
     }
 
@@ -67,11 +67,11 @@ impl VirtualUser {
         let bench = self.bench();
         let stored = Stored::Found(record);
         Native::started(StoppedClock, None, stored, BootReport::default())
-            .meddled_with(Box::new(move |_, sense, drive| {
+            .with_fault_injector(Box::new(move |_, sense, drive| {
                 *sense = bench.borrow_mut().tick(drive);
             }))
-            .restless()
-            .in_steps_of(LOOK_MS)
+            .free_running()
+            .with_ticks_per_call(HOST_INTERVAL_MS)
             .with_usb_clock(self.bench.borrow().usb_clock())
     }
 
@@ -99,27 +99,27 @@ impl VirtualUser {
             Task::HoldLoosely | Task::HoldTip => bench.hold(Grip::Loose),
             Task::HoldWithScale(axis) => {
                 bench.hold(Grip::Scale);
-                self.scale.0 = pushed_along(axis);
+                self.scale.0 = push_direction(axis);
             }
-            Task::LookAtScale => self.scale.1 = bench.scale_grams(self.scale.0),
-            Task::LetGoOfTip => bench.let_go(),
+            Task::ReadScale => self.scale.1 = bench.scale_grams(self.scale.0),
+            Task::ReleaseTip => bench.release(),
             Task::LowerTip => {
                 let tip_m = bench.tip_m();
                 self.before_m = tip_m;
-                bench.step(tip_m - PUSH_M * DVec3::Z);
+                bench.approach(tip_m - PUSH_M * DVec3::Z);
             }
             Task::LiftTip => {
                 // The hand balances the floor's push, so the floor's force is its reaction.
                 self.force_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
-                bench.step(self.before_m);
+                bench.approach(self.before_m);
             }
         }
     }
 
-    fn reads(&self, reading: Reading) -> f64 {
+    fn measure(&self, reading: Reading) -> f64 {
         let bench = self.bench.borrow();
         match reading {
-            Reading::EnableVolts(is) => bench.enable_v(is == BoardIs::Running),
+            Reading::EnableVolts(is) => bench.enable_v(is == BoardState::Running),
             Reading::Output { axis, .. } => bench.output_v(axis),
             Reading::MovedMm(direction, _) => {
                 1e3 * direction.unit().dot(bench.tip_m() - self.before_m)
@@ -131,18 +131,18 @@ impl VirtualUser {
 }
 
 /// Returns the direction in which an axis pushes the tip in the zero pose as its angle grows.
-fn pushed_along(axis: usize) -> DVec3 {
+fn push_direction(axis: usize) -> DVec3 {
     let direction = Direction::ALL.get(axis).copied();
     direction.unwrap_or(Direction::Up).unit()
 }
 
 impl Attendant for VirtualUser {
-    fn hear(&mut self, line: &str) {
-        (self.says)(line);
+    fn notify(&mut self, line: &str) {
+        (self.print)(line);
     }
 
     fn begin(&mut self, task: Task) {
-        (self.says)(&format!("  > {task}"));
+        (self.print)(&format!("  > {task}"));
         self.act(task);
     }
 
@@ -153,18 +153,18 @@ impl Attendant for VirtualUser {
 
     fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
         // Round to the meter's digit; `+ 0.0` removes a negative zero.
-        let value = (self.reads(reading) * 10.0).round() / 10.0 + 0.0;
-        (self.says)(&format!("  ? {reading} {value:.1}"));
+        let value = (self.measure(reading) * 10.0).round() / 10.0 + 0.0;
+        (self.print)(&format!("  ? {reading} {value:.1}"));
         Ok(value)
     }
 
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+    fn confirm(&mut self, question: Question) -> Result<bool, Stopped> {
         let yes = match question {
             Question::ReadyIsWired => true,
-            Question::StopTakesPower => !self.bench.borrow().has_power(),
-            Question::PushedBack => self.force_n > FELT_N,
+            Question::StopCutsPower => !self.bench.borrow().has_power(),
+            Question::PushedBack => self.force_n > MIN_NOTICED_N,
         };
-        (self.says)(&format!(
+        (self.print)(&format!(
             "  ? {question} {}",
             if yes { "yes" } else { "no" }
         ));

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_binary_file_of_an_earlier_version_is_read_too() {
+    fn binary_file_of_an_earlier_version_is_read() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("old.cal");
         let mut buffer = [0; RECORD_BYTES];
@@ -375,14 +375,14 @@ mod tests {
             ("l1_mm = 209.55", "l1_mm = nan", "does not make sense"),
             ("[links]", "[links", "no calibration file"),
         ] {
-            let stated = message(&good.replacen(from, to, 1));
-            assert!(stated.contains(expected), "{from}: {stated}");
+            let message = message(&good.replacen(from, to, 1));
+            assert!(message.contains(expected), "{from}: {message}");
         }
         assert!(message("").contains("hapterra-calibration"));
     }
 
     #[test]
-    fn a_file_is_written_and_read() {
+    fn calibration_file_round_trips() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("arm.toml");
         write(&path, &Calibration::PREMIUM_1_5).expect("written");

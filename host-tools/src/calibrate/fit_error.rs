@@ -14,10 +14,10 @@ pub enum FitError {
         counts: u32,
     },
     /// No ratios fit the checks.
-    #[error("no ratios explain the checks: they are off by {off_mm:.1} mm at best")]
+    #[error("no ratios explain the checks: they are off by {residual_mm:.1} mm at best")]
     NoRatios {
         /// Root mean square of the residuals, mm.
-        off_mm: f64,
+        residual_mm: f64,
     },
     /// No pose shows a joint's gravity.
     #[error("no pose shows the weight on joint {joint}")]

@@ -12,7 +12,7 @@ pub const N_PER_GRAM: f64 = 9.806_65e-3;
 
 /// An arm held still, the motors off.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Still {
+pub struct StaticPose {
     /// Joint angles, rad.
     pub q_rad: [f64; 3],
     /// The holding force at the tip, N, device frame.
@@ -27,7 +27,7 @@ pub struct GravityFit {
     /// As [`Calibration::gravity_3_nm`].
     pub gravity_3_nm: f64,
     /// Root mean square of the residuals, Nm: the joints' friction.
-    pub off_nm: f64,
+    pub residual_nm: f64,
 }
 
 impl GravityFit {
@@ -43,11 +43,11 @@ impl GravityFit {
 ///
 /// # Errors
 /// [`FitError::NoWeight`]: all poses have joint 2 upright, or joint 3 hanging.
-pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, FitError> {
+pub fn fit_gravity(record: &Calibration, poses: &[StaticPose]) -> Result<GravityFit, FitError> {
     let arm = Arm::of(record);
     // For each pose: the factor of the weight, and the torque.
-    let torque_of = |still: &Still| {
-        let (q_rad, force_n) = (DVec3::from(still.q_rad), DVec3::from(still.force_n));
+    let torque_of = |pose: &StaticPose| {
+        let (q_rad, force_n) = (DVec3::from(pose.q_rad), DVec3::from(pose.force_n));
         let torque = arm.torques_nm(q_rad, force_n);
         [
             (libm::cos(q_rad.y), torque.y),
@@ -67,7 +67,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
     };
     let (gravity_2_nm, gravity_3_nm) = (weight(0)?, weight(1)?);
     let weights = [gravity_2_nm, gravity_3_nm];
-    let left: f64 = torque_of
+    let sum_of_squares: f64 = torque_of
         .iter()
         .flat_map(|pose| pose.iter().zip(weights))
         .map(|((share, torque), weight)| (torque - weight * share).powi(2))
@@ -75,7 +75,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
     Ok(GravityFit {
         gravity_2_nm,
         gravity_3_nm,
-        off_nm: libm::sqrt(left / (2 * torque_of.len()) as f64),
+        residual_nm: libm::sqrt(sum_of_squares / (2 * torque_of.len()) as f64),
     })
 }
 
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     /// Returns the force at the tip that holds the weights in a pose with q1 = 0.
-    fn holding(q: [f64; 3], weights: [f64; 2]) -> Still {
+    fn holding(q: [f64; 3], weights: [f64; 2]) -> StaticPose {
         let record = Calibration::PREMIUM_1_5;
         let (l1, l2) = (
             1e-3 * f64::from(record.l1_mm),
@@ -95,7 +95,7 @@ mod tests {
         let (a, b) = (-l1 * libm::sin(q[1]), l1 * libm::cos(q[1]));
         let (c, d) = (l2 * libm::cos(q[2]), l2 * libm::sin(q[2]));
         let whole = a * d - b * c;
-        Still {
+        StaticPose {
             q_rad: q,
             force_n: [
                 (two * d - b * three) / whole,
@@ -113,7 +113,7 @@ mod tests {
         let fit = fit_gravity(&Calibration::PREMIUM_1_5, &poses).expect("a fit");
         assert!((fit.gravity_2_nm - 0.07).abs() < 1e-6, "{fit:?}");
         assert!((fit.gravity_3_nm + 0.02).abs() < 1e-6, "{fit:?}");
-        assert!(fit.off_nm < 1e-6);
+        assert!(fit.residual_nm < 1e-6);
     }
 
     #[test]

@@ -9,22 +9,22 @@
 //! ```
 //!
 //! The motors stay off throughout, so that an error in a record cannot hurt the user during the
-//! measurement. [`walk`] runs the steps; the [`Attendant`] that answers is a terminal or a
+//! measurement. [`run_procedure`] runs the steps; the [`Attendant`] that answers is a terminal or a
 //! [`VirtualUser`].
 
 mod arm;
 pub mod file;
 mod fit_error;
 mod gravity;
+mod procedure;
 mod ratios;
 mod review;
 mod virtual_user;
-mod walk;
 
 pub use arm::Arm;
 pub use fit_error::FitError;
-pub use gravity::{GravityFit, N_PER_GRAM, Still, fit_gravity};
-pub use ratios::{Check, Direction, RatioFit, fit_ratios};
+pub use gravity::{GravityFit, N_PER_GRAM, StaticPose, fit_gravity};
+pub use procedure::{Attendant, Plan, ProcedureError, Stopped, run_procedure};
+pub use ratios::{Direction, RatioFit, RulerMove, fit_ratios};
 pub use review::Review;
 pub use virtual_user::VirtualUser;
-pub use walk::{Attendant, Plan, Stopped, WalkError, walk};

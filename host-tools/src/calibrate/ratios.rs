@@ -10,7 +10,7 @@ use super::fit_error::FitError;
 
 /// A move of the tip along a ruler.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Check {
+pub struct RulerMove {
     /// Counts from the zero pose to the move's start.
     pub from: [i32; 3],
     /// Counts from the zero pose to the move's end.
@@ -65,7 +65,7 @@ pub struct RatioFit {
     /// +1 if counts increase with the joint's angle, −1 if they decrease.
     pub sign: DVec3,
     /// Root mean square of the residuals, mm.
-    pub off_mm: f64,
+    pub residual_mm: f64,
 }
 
 impl RatioFit {
@@ -78,13 +78,13 @@ impl RatioFit {
 }
 
 /// Counts that each joint must move in one of the checks.
-const ENOUGH_COUNTS: u32 = 400;
+const MIN_COUNTS: u32 = 400;
 /// Largest residual of a fit, mm; a ruler is read to 1 mm.
-const ENOUGH_MM: f64 = 4.0;
+const MAX_RESIDUAL_MM: f64 = 4.0;
 /// Weight of a move's component across its direction, because a hand leads it.
-const ACROSS: f64 = 0.25;
+const CROSS_WEIGHT: f64 = 0.25;
 /// Maximum Gauss-Newton steps; usually three or four are enough.
-const STEPS: usize = 20;
+const MAX_STEPS: usize = 20;
 
 /// Fits the ratios to the checks by least squares. Starts at a record's ratios and tries all signs.
 ///
@@ -93,11 +93,11 @@ const STEPS: usize = 20;
 ///
 /// # Errors
 /// [`FitError::NotMoved`], [`FitError::NoRatios`].
-pub fn fit_ratios(record: &Calibration, checks: &[Check]) -> Result<RatioFit, FitError> {
+pub fn fit_ratios(record: &Calibration, moves: &[RulerMove]) -> Result<RatioFit, FitError> {
     for joint in 0..3 {
-        let moved = |check: &Check| check.from[joint].abs_diff(check.to[joint]);
-        let counts = checks.iter().map(moved).max().unwrap_or(0);
-        if counts < ENOUGH_COUNTS {
+        let moved = |ruler_move: &RulerMove| ruler_move.from[joint].abs_diff(ruler_move.to[joint]);
+        let counts = moves.iter().map(moved).max().unwrap_or(0);
+        if counts < MIN_COUNTS {
             return Err(FitError::NotMoved {
                 joint: joint + 1,
                 counts,
@@ -107,33 +107,33 @@ pub fn fit_ratios(record: &Calibration, checks: &[Check]) -> Result<RatioFit, Fi
     let arm = Arm::of(record);
     let per_turn = f64::from(record.counts_per_turn);
     let begin = TAU / (per_turn * record.ratio.as_dvec3());
-    let tries = (0..8).map(|signs| {
+    let candidates = (0..8).map(|signs| {
         let sign = |joint: u32| if signs >> joint & 1 == 0 { 1.0 } else { -1.0 };
-        descend(&arm, checks, begin * DVec3::new(sign(0), sign(1), sign(2)))
+        descend(&arm, moves, begin * DVec3::new(sign(0), sign(1), sign(2)))
     });
-    let best = tries.reduce(|best, next| if next.1 < best.1 { next } else { best });
+    let best = candidates.reduce(|best, next| if next.1 < best.1 { next } else { best });
     let (rad_per_count, square) = best.unwrap_or((begin, f64::INFINITY));
-    let off_mm = libm::sqrt(square / checks.len() as f64);
-    if off_mm.is_nan() || off_mm > ENOUGH_MM {
-        return Err(FitError::NoRatios { off_mm });
+    let residual_mm = libm::sqrt(square / moves.len() as f64);
+    if residual_mm.is_nan() || residual_mm > MAX_RESIDUAL_MM {
+        return Err(FitError::NoRatios { residual_mm });
     }
     Ok(RatioFit {
         ratio: TAU / (per_turn * rad_per_count.abs()),
         sign: rad_per_count.signum(),
-        off_mm,
+        residual_mm,
     })
 }
 
 /// Runs Gauss-Newton from a starting point; returns the result and its sum of squares.
-fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
+fn descend(arm: &Arm, moves: &[RulerMove], start: DVec3) -> (DVec3, f64) {
     let mut at = start;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_STEPS {
         let (mut normal, mut gradient) = (DMat3::ZERO, DVec3::ZERO);
-        for check in checks {
-            let here = left_over(arm, check, at);
+        for ruler_move in moves {
+            let here = residual(arm, ruler_move, at);
             let slope = |joint: DVec3| {
                 let h = 1e-6 * start.dot(joint);
-                (left_over(arm, check, at + h * joint) - here) / h
+                (residual(arm, ruler_move, at + h * joint) - here) / h
             };
             let slopes =
                 DMat3::from_cols_array_2d(&DVec3::AXES.map(|joint| slope(joint).to_array()));
@@ -145,25 +145,28 @@ fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
             break;
         }
         // A step changes no value by more than half, so that none reaches zero.
-        let longest = (step / at).abs().max_element();
-        at -= step * f64::min(1.0, 0.5 / longest.max(1e-300));
-        if longest < 1e-12 {
+        let largest_change = (step / at).abs().max_element();
+        at -= step * f64::min(1.0, 0.5 / largest_change.max(1e-300));
+        if largest_change < 1e-12 {
             break;
         }
     }
-    let squares = checks
+    let squares = moves
         .iter()
-        .map(|check| left_over(arm, check, at).length_squared());
+        .map(|ruler_move| residual(arm, ruler_move, at).length_squared());
     (at, squares.sum())
 }
 
 /// Returns the difference of the move by the encoders and by the ruler, mm. Components across the
 /// ruler have less weight.
-fn left_over(arm: &Arm, check: &Check, rad_per_count: DVec3) -> DVec3 {
+fn residual(arm: &Arm, ruler_move: &RulerMove, rad_per_count: DVec3) -> DVec3 {
     let tip = |counts| arm.tip_mm(arm.angles(rad_per_count, counts));
-    let (moved, unit) = (tip(check.to) - tip(check.from), check.direction.unit());
+    let (moved, unit) = (
+        tip(ruler_move.to) - tip(ruler_move.from),
+        ruler_move.direction.unit(),
+    );
     let along = moved.dot(unit);
-    ACROSS * (moved - along * unit) + (along - check.mm) * unit
+    CROSS_WEIGHT * (moved - along * unit) + (along - ruler_move.mm) * unit
 }
 
 #[cfg(test)]
@@ -172,37 +175,37 @@ mod tests {
 
     /// Returns the counts from the zero pose to a tip position, for an arm with ratios other than
     /// the preset's.
-    fn counts(arm: &Arm, rad_per_count: DVec3, wanted_mm: DVec3) -> [i32; 3] {
+    fn counts(arm: &Arm, rad_per_count: DVec3, target_mm: DVec3) -> [i32; 3] {
         let mut q = arm.zero_rad;
         for _ in 0..100 {
             let at = arm.tip_mm(q);
             let slope = |along: DVec3| (arm.tip_mm(q + 1e-7 * along) - at) / 1e-7;
             let slopes = DMat3::from_cols(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
-            q += slopes.inverse() * (wanted_mm - at);
+            q += slopes.inverse() * (target_mm - at);
         }
         let turned = ((q - arm.zero_rad) / rad_per_count).round();
         turned.to_array().map(|counts| counts as i32)
     }
 
-    fn checks(factor: [f64; 3], error_mm: f64) -> Vec<Check> {
+    fn moves(factor: [f64; 3], error_mm: f64) -> Vec<RulerMove> {
         let record = Calibration::PREMIUM_1_5;
         let arm = Arm::of(&record);
         let k = TAU / (4096.0 * record.ratio.as_dvec3() * DVec3::from(factor));
         let home = arm.tip_mm(arm.zero_rad);
-        let check = |direction: Direction| Check {
+        let ruler_move = |direction: Direction| RulerMove {
             from: [0; 3],
             to: counts(&arm, k, home + 80.0 * direction.unit()),
             direction,
             mm: 80.0 + error_mm,
         };
-        Direction::ALL.map(check).to_vec()
+        Direction::ALL.map(ruler_move).to_vec()
     }
 
     #[test]
     fn fit_recovers_ratios_and_signs() {
         let preset = Calibration::PREMIUM_1_5.ratio.to_array().map(f64::from);
         for factor in [[1.0, 1.0, 1.0], [1.07, -0.94, 1.02], [-0.9, -1.1, -1.0]] {
-            let found = fit_ratios(&Calibration::PREMIUM_1_5, &checks(factor, 0.0));
+            let found = fit_ratios(&Calibration::PREMIUM_1_5, &moves(factor, 0.0));
             let found = found.expect("a fit");
             for joint in 0..3 {
                 let truth = preset[joint] * factor[joint].abs();
@@ -210,17 +213,17 @@ mod tests {
                 assert!(error < 1e-3, "joint {}: {error}", joint + 1);
                 assert_eq!(found.sign[joint], factor[joint].signum());
             }
-            assert!(found.off_mm < 0.1, "{}", found.off_mm);
+            assert!(found.residual_mm < 0.1, "{}", found.residual_mm);
         }
     }
 
     #[test]
-    fn a_joint_that_did_not_move_is_named() {
-        let mut checks = checks([1.0; 3], 0.0);
-        checks
+    fn unmoved_joint_is_named() {
+        let mut moves = moves([1.0; 3], 0.0);
+        moves
             .iter_mut()
-            .for_each(|check| check.to[1] = check.from[1] + 10);
-        let error = fit_ratios(&Calibration::PREMIUM_1_5, &checks).expect_err("too little");
+            .for_each(|ruler_move| ruler_move.to[1] = ruler_move.from[1] + 10);
+        let error = fit_ratios(&Calibration::PREMIUM_1_5, &moves).expect_err("too little");
         assert_eq!(
             error,
             FitError::NotMoved {
@@ -231,11 +234,11 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_no_fit() {
-        let mut checks = checks([1.0; 3], 0.0);
-        checks[0].to = [400, -4_000, 5_000];
-        checks[1].mm = -300.0;
-        let error = fit_ratios(&Calibration::PREMIUM_1_5, &checks).expect_err("nonsense");
+    fn inconsistent_moves_give_no_fit() {
+        let mut moves = moves([1.0; 3], 0.0);
+        moves[0].to = [400, -4_000, 5_000];
+        moves[1].mm = -300.0;
+        let error = fit_ratios(&Calibration::PREMIUM_1_5, &moves).expect_err("nonsense");
         assert!(matches!(error, FitError::NoRatios { .. }), "{error}");
     }
 }

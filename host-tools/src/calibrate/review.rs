@@ -40,7 +40,7 @@ impl fmt::Display for Review {
                     "joint {number}        {is:.3} motor turns a joint turn (was {was:.3}), counts {counts} with the angle"
                 )?;
             }
-            writeln!(f, "left over      {:.2} mm a move", fit.off_mm)?;
+            writeln!(f, "left over      {:.2} mm a move", fit.residual_mm)?;
         } else {
             writeln!(f, "ratios         not measured: {}", after.ratio)?;
         }
@@ -50,7 +50,7 @@ impl fmt::Display for Review {
             Some(fit) => writeln!(
                 f,
                 "gravity        {two:.4} Nm (was {:.4}), {three:.4} Nm (was {:.4}), left over {:.4} Nm",
-                before.gravity_2_nm, before.gravity_3_nm, fit.off_nm
+                before.gravity_2_nm, before.gravity_3_nm, fit.residual_nm
             ),
         }
     }

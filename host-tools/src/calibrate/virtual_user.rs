@@ -6,9 +6,9 @@ use std::rc::Rc;
 use glam::DVec3;
 
 use super::gravity::N_PER_GRAM;
+use super::procedure::{Attendant, Stopped};
 use super::ratios::Direction;
 use super::review::Review;
-use super::walk::{Attendant, Stopped};
 use crate::link::FaultInjector;
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
@@ -28,9 +28,9 @@ pub struct VirtualUser {
     /// Encoder counts, shared with the device's driver.
     counts: Rc<Cell<[i32; 3]>>,
     /// Error of each ruler reading, mm.
-    pub ruler_off_mm: f64,
+    pub ruler_error_mm: f64,
     /// Receives the user's output, a line at a time.
-    pub says: fn(&str),
+    pub print: fn(&str),
 }
 
 impl VirtualUser {
@@ -41,17 +41,17 @@ impl VirtualUser {
         plant.power_up();
         let counts = Rc::new(Cell::new(plant.counts()));
         Self {
-            plant: plant.held_by(HandModel::default()),
+            plant: plant.with_hand(HandModel::default()),
             counts,
-            ruler_off_mm: 0.0,
-            says: |line| tracing::info!("{line}"),
+            ruler_error_mm: 0.0,
+            print: |line| tracing::info!("{line}"),
         }
     }
 
     /// Returns the user of a Premium 1.5 that differs from its preset: two ratios by a few per
     /// cent, one encoder's direction, a stylus of 40 g.
     #[must_use]
-    pub fn with_a_stylus() -> Self {
+    pub fn with_stylus() -> Self {
         let mut model = PhantomModel::premium_1_5();
         model.drive[0].ratio *= 1.03;
         model.drive[1].ratio *= 0.97;
@@ -92,7 +92,7 @@ impl VirtualUser {
             // The motion ends after a quarter of the time; then the tip is held.
             let share = f64::min(1.0, 4.0 * f64::from(tick) / f64::from(ticks));
             let at = from.lerp(DVec3::from(to_m), share);
-            self.plant.aim(at.to_array(), [0.0; 3]);
+            self.plant.set_target(at.to_array(), [0.0; 3]);
             self.plant.step([0.0; 3], 1e-3);
         }
         self.counts.set(self.plant.counts());
@@ -100,12 +100,12 @@ impl VirtualUser {
 }
 
 impl Attendant for VirtualUser {
-    fn hear(&mut self, line: &str) {
-        (self.says)(&format!("  {line}"));
+    fn notify(&mut self, line: &str) {
+        (self.print)(&format!("  {line}"));
     }
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
-        (self.says)("into the zero pose");
+        (self.print)("into the zero pose");
         // Exactly the zero pose; no hand is as precise.
         self.plant.put([0.0; 3]);
         self.counts.set(self.plant.counts());
@@ -116,8 +116,8 @@ impl Attendant for VirtualUser {
         let (before, unit) = (DVec3::from(self.plant.tip_m()), direction.unit());
         self.lead((before + 1e-3 * about_mm * unit).to_array());
         let moved = unit.dot(DVec3::from(self.plant.tip_m()) - before);
-        let read_mm = 1e3 * moved + self.ruler_off_mm;
-        (self.says)(&format!("{read_mm:.1} mm {}", direction.words()));
+        let read_mm = 1e3 * moved + self.ruler_error_mm;
+        (self.print)(&format!("{read_mm:.1} mm {}", direction.words()));
         Ok(read_mm)
     }
 
@@ -129,15 +129,15 @@ impl Attendant for VirtualUser {
         self.lead((home + 1e-3 * DVec3::from(*from_home)).to_array());
         let [towards, _, up] = self.plant.hand_force_n();
         let grams = [up, towards].map(|newtons| newtons / N_PER_GRAM);
-        (self.says)(&format!(
+        (self.print)(&format!(
             "pose {number}: {:.1} g upwards, {:.1} g towards the user",
             grams[0], grams[1]
         ));
         Ok(Some([up, towards]))
     }
 
-    fn agrees(&mut self, review: &Review) -> Result<bool, Stopped> {
-        (self.says)(review.to_string().trim_end());
+    fn confirm_record(&mut self, review: &Review) -> Result<bool, Stopped> {
+        (self.print)(review.to_string().trim_end());
         Ok(true)
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::failure::{Failure, OrHint};
 use super::options::terrain_file::TerrainFile;
-use crate::output::{Output, OutputError, OutputFolder, keep_apart};
+use crate::output::{Output, OutputError, OutputFolder, check_distinct};
 use crate::terrain::HapticGrid;
 
 /// The file of heights and its description.
@@ -56,7 +56,7 @@ struct About {
 /// The terrain cannot be opened, or the folder cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let heights = args.out.join(HEIGHTS);
-    keep_apart(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
+    check_distinct(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
     let raster = args.terrain.open()?;
     let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
     let of = [grid.columns(), grid.rows()];
@@ -72,9 +72,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         unit_m: raster.metres_per_vertical_unit(),
     };
     let _folder = OutputFolder::create(&args.out).or_hint(HINT)?;
-    written(&heights, |out| write_npy(out, &grid, level, size(level))).or_hint(HINT)?;
+    write_output(&heights, |out| write_npy(out, &grid, level, size(level))).or_hint(HINT)?;
     raster.check_complete()?;
-    written(&args.out.join(ABOUT), |out| {
+    write_output(&args.out.join(ABOUT), |out| {
         Ok(serde_json::to_writer_pretty(out, &about)?)
     })
     .or_hint(HINT)?;
@@ -88,7 +88,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-fn written(
+fn write_output(
     path: &Path,
     write: impl FnOnce(&mut Output) -> io::Result<()>,
 ) -> Result<(), OutputError> {
@@ -128,7 +128,7 @@ mod tests {
     use heightfield::{OpenOptions, Raster};
 
     #[test]
-    fn every_second_sample_is_written_and_read_again() {
+    fn npy_of_level_1_has_every_second_sample() {
         let height = |column: u32, row: u32| {
             if (column, row) == (2, 4) {
                 f32::NAN
@@ -140,7 +140,7 @@ mod tests {
         let grid = HapticGrid::new(&raster, HapticCells::Square);
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(HEIGHTS);
-        written(&path, |out| write_npy(out, &grid, 1, [4, 3])).expect("written");
+        write_output(&path, |out| write_npy(out, &grid, 1, [4, 3])).expect("written");
         let again = Raster::open(&path, &OpenOptions::default()).expect("read");
         assert_eq!((again.columns(), again.rows()), (4, 3));
         for (column, row) in (0..4).flat_map(|column| (0..3).map(move |row| (column, row))) {

@@ -18,15 +18,15 @@ use super::session_summary::{self, SessionSummary};
 use super::settings::SettingsOption;
 use super::terminal::waiting::shown_planning;
 use super::terminal::{interrupt, partial_files, progress, writer};
-use super::viewing::{Shown, ToBeShown, Viewing};
+use super::viewing::{PreparedViewer, ViewerSession, Viewing};
 use crate::events::{Event as Reported, Watcher};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Session, Timeouts, Transport, move_arm_while,
 };
 use crate::materials::Materials;
-use crate::output::{Output, OutputError, OutputFolder, keep_apart};
+use crate::output::{Output, OutputError, OutputFolder, check_distinct};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
-use crate::place::{Laid, Placement};
+use crate::place::{PlacedSurface, Placement};
 use crate::replay::settings::{Device, PlacementSettings};
 use crate::replay::{LoopColumns, Mark, Record, Recording, Rule, Settings};
 use crate::stability;
@@ -104,18 +104,18 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
-    outputs.keep_apart(args)?;
+    outputs.check_distinct(args)?;
     let options = &args.rendering.surface;
     let surface = options.load()?;
     let params = surface.params;
     let materials = surface.materials(options, (&name, &raster), &args.reading)?;
     let cells = args.reading.cells();
-    let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
-    asked.grid = asked.grid.with_materials(materials.as_ref());
-    asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
+    let mut request = args.placing.of((&args.rendering, cells), &raster)?;
+    request.grid = request.grid.with_materials(materials.as_ref());
+    request.grid = request.grid.with_tip(args.rendering.tip_of_hand_mm());
     // The virtual arm is a Premium 1.5.
-    let view = asked.view(&Calibration::PREMIUM_1_5)?;
-    let terrain = view.terrain(asked.grid)?;
+    let view = request.view(&Calibration::PREMIUM_1_5)?;
+    let terrain = view.terrain(request.grid)?;
     let placed = shown_planning(&name, &raster, || {
         PlacedTerrain::in_view(&terrain, view.home_mm, params, &|| !interrupt::requested())
     })?;
@@ -136,7 +136,7 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
 
 /// Returns the demo's own terrain: [`OWN_TERRAIN`].
 pub(super) fn own_terrain() -> Result<Raster, Failure> {
-    let amplitude = Kind::Fractal.usual_amplitude_cells();
+    let amplitude = Kind::Fractal.default_amplitude_cells();
     let raster = Synth::new(Kind::Fractal, 1, amplitude).raster(OWN_SIZE, OWN_SIZE);
     raster.map_err(Failure::new)
 }
@@ -163,12 +163,12 @@ impl Outputs {
         }
     }
 
-    fn keep_apart(&self, args: &Args) -> Result<(), Failure> {
+    fn check_distinct(&self, args: &Args) -> Result<(), Failure> {
         let mut inputs = args.file.as_deref().map_or(vec![], files_read_with);
         inputs.extend(args.commands.file());
         inputs.extend(args.rendering.surface.inputs());
         inputs.extend(args.settings.file());
-        keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
+        check_distinct(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
     }
 }
 
@@ -186,36 +186,36 @@ fn show(
         "terrain        {name}: {}",
         session_summary::in_words(terrain)
     );
-    print!("{}", placing::reported(view, terrain));
+    print!("{}", placing::describe(view, terrain));
     if let Some(line) = session_summary::materials(terrain) {
         println!("{line}");
     }
-    partial_files::tell([outputs.recording.as_path(), &outputs.picture]);
+    partial_files::report([outputs.recording.as_path(), &outputs.picture]);
     let server = args.events.listen()?;
     let (runs_on, mut control) = (device(args), control(args, placed, view)?);
     if let Some(line) = control.listen(&args.commands) {
-        writer::put(std::io::stderr(), &format!("{line}\n"));
+        writer::write_text(std::io::stderr(), &format!("{line}\n"));
     }
     let arm = placed.held_phantom();
     let stop_s = args.duration.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
     let viewer = args.viewing.program()?;
-    let shown = viewer.map(|program| ToBeShown::new(program, terrain, view, name));
+    let viewer = viewer.map(|program| PreparedViewer::new(program, terrain, view, name));
     terrain.check_complete()?;
     let tour = Tour {
         placed,
         stop_s,
         control: &mut control,
-        shown,
+        viewer,
         events: server.as_ref().map(|server| args.events.watcher(server, 1)),
     };
-    let (toured, shown) = match runs_on {
+    let (tour_result, viewer) = match runs_on {
         VirtualDevice::Native => {
             let mut device = Native::new(HostClock::default(), Some(Box::new(arm)));
             if args.viewing.view || args.events.events.is_some() {
                 device = device.in_real_time();
             }
-            tour.go(Box::new(device), Timeouts::EMULATED)?
+            tour.run(Box::new(device), Timeouts::EMULATED)?
         }
         VirtualDevice::Emulated(board) => tour_emulated(&board, tour, arm)?,
     };
@@ -224,17 +224,17 @@ fn show(
     drop(control);
     let file = args.file.as_ref();
     let file = file.map_or(OWN_TERRAIN.into(), |file| without_key(file));
-    let device = Device::of(&toured.summary.device);
+    let device = Device::of(&tour_result.summary.device);
     let params = (placed.params(), Rule::Swept);
     let settings = Settings::new(&file, terrain, params, Some(placed.home_mm()), device);
-    write(&toured, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
-    let summary = &toured.summary;
+    write(&tour_result, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
+    let summary = &tour_result.summary;
     print!("{}", summary.text());
-    draw(&toured, view, name, &outputs.picture)?;
+    draw(&tour_result, view, name, &outputs.picture)?;
     println!("recording      {}", outputs.recording.display());
     println!("picture        {}", outputs.picture.display());
-    if let Some(shown) = shown {
-        shown.end(|line| println!("{line}"));
+    if let Some(viewer) = viewer {
+        viewer.end(|line| println!("{line}"));
     }
     match summary.figures.fault {
         None => Ok(()),
@@ -268,12 +268,12 @@ fn control<'t>(
 ) -> Result<PlacementControl<'t>, Failure> {
     let (params, view) = (placed.params(), *view);
     let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
-    let served = (placed.terrain(), Laid { view, params });
+    let served = (placed.terrain(), PlacedSurface { view, params });
     Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
 
 /// Result of a tour.
-struct Toured<'t> {
+struct TourResult<'t> {
     /// The rows of the recording, with the loop's columns.
     rows: Vec<(Record, LoopColumns)>,
     marks: Vec<Mark>,
@@ -283,20 +283,31 @@ struct Toured<'t> {
 
 /// Draws only the last placement's samples, because another placement's coordinates are other
 /// positions of the hand.
-fn draw(toured: &Toured<'_>, first: &Placement, name: &str, path: &Path) -> Result<(), Failure> {
-    let last = toured.rows.last().map_or(0, |(_, of_loop)| of_loop.view());
-    let in_last = toured
+fn draw(
+    tour_result: &TourResult<'_>,
+    first: &Placement,
+    name: &str,
+    path: &Path,
+) -> Result<(), Failure> {
+    let last = tour_result
+        .rows
+        .last()
+        .map_or(0, |(_, of_loop)| of_loop.view());
+    let in_last = tour_result
         .rows
         .iter()
         .filter(|(_, of_loop)| of_loop.view() == last);
     let records: Vec<Record> = in_last.map(|(record, _)| *record).collect();
-    let placement = toured.views.get(last as usize);
-    let view = placement.laid.as_ref().map_or(*first, |laid| laid.view);
+    let placement = tour_result.views.get(last as usize);
+    let view = placement
+        .placed_surface
+        .as_ref()
+        .map_or(*first, |placed_surface| placed_surface.view);
     let title = match (last, records.first()) {
         (0, _) | (_, None) => name.to_owned(),
         (_, Some(began)) => format!("{name}, view {last}, from {:.1} s on", began.t_s),
     };
-    let summary = &toured.summary;
+    let summary = &tour_result.summary;
     summary.draw(path, (&placement.terrain, &view), &title, &records)
 }
 
@@ -305,14 +316,14 @@ fn tour_emulated<'t>(
     board: &EmulatedBoard,
     tour: Tour<'_, 't>,
     mut arm: HeldPhantom,
-) -> Result<(Toured<'t>, Option<Shown<'t>>), Failure> {
+) -> Result<(TourResult<'t>, Option<ViewerSession<'t>>), Failure> {
     let (emulator, mut lines) = board.start()?;
     let report = "please report it with the file";
     move_arm_while(&mut lines.plant, &mut arm, || {
-        match tour.go(Box::new(lines.link), Timeouts::EMULATED) {
-            Ok(toured) => {
+        match tour.run(Box::new(lines.link), Timeouts::EMULATED) {
+            Ok(tour_result) => {
                 // The arm must run until the board has reduced its force to zero.
-                let ended = emulator.finish().map(|()| toured);
+                let ended = emulator.finish().map(|()| tour_result);
                 ended
                     .map_err(|why| format!("the emulated board did not end well: {why}"))
                     .or_hint(report)
@@ -321,7 +332,7 @@ fn tour_emulated<'t>(
             Err(_) if interrupt::requested() => Err("interrupted").or_hint("nothing was written"),
             // If the link broke because the board ended, the board's failure is reported.
             Err(error) => match emulator.failure() {
-                Some(stated) => Err(format!("the emulated board failed: {stated}")).or_hint(report),
+                Some(output) => Err(format!("the emulated board failed: {output}")).or_hint(report),
                 None => Err(error.into()),
             },
         }
@@ -334,79 +345,79 @@ struct Tour<'p, 't> {
     stop_s: f64,
     control: &'p mut PlacementControl<'t>,
     /// Its viewer.
-    shown: Option<ToBeShown<'t>>,
+    viewer: Option<PreparedViewer<'t>>,
     events: Option<Watcher>,
 }
 
 impl<'t> Tour<'_, 't> {
     /// Serves the terrain until the tour ends.
-    fn go(
+    fn run(
         self,
         transport: Box<dyn Transport + 't>,
         timeouts: Timeouts,
-    ) -> Result<(Toured<'t>, Option<Shown<'t>>), LinkError> {
+    ) -> Result<(TourResult<'t>, Option<ViewerSession<'t>>), LinkError> {
         let (terrain, scene) = (self.placed.terrain(), self.placed.scene());
         let (control, mut events) = (self.control, self.events);
         let arming = Some(Arming::VIRTUAL);
         let (mut session, device) = Session::open(terrain, scene, arming, transport, timeouts)?;
         let line = format!("device         {}\n", session_summary::device(&device));
-        writer::put(std::io::stdout(), &line);
+        writer::write_text(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
-        stability::warn_of(&scene.params, materials.map(Materials::table), &device);
-        let tell = |line: String| writer::put(std::io::stderr(), &(line + "\n"));
-        let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
+        stability::warn_for_materials(&scene.params, materials.map(Materials::table), &device);
+        let notify = |line: String| writer::write_text(std::io::stderr(), &(line + "\n"));
+        let mut viewer = self.viewer.and_then(|viewer| viewer.start(&device, notify));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;
         let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
         let progress = progress::bar(Some(stop_tick), template);
         let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
         let mut marks = Vec::new();
-        let mut toured = Ok(());
-        while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
-            toured = session.poll(Duration::from_millis(100), &mut |event| {
+        let mut polled = Ok(());
+        while polled.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
+            polled = session.poll(Duration::from_millis(100), &mut |event| {
                 control.on_event(&event);
                 log.views().on_event(&event);
-                if let Some(shown) = &mut shown {
-                    shown.on_event(&event);
+                if let Some(viewer) = &mut viewer {
+                    viewer.on_event(&event);
                 }
                 if let Event::Sample(sample) = event {
-                    let record = log.take(sample);
-                    if let Some(shown) = &mut shown {
-                        shown.take(sample, &record, log.view());
+                    let record = log.add(sample);
+                    if let Some(viewer) = &mut viewer {
+                        viewer.on_sample(sample, &record, log.view());
                     }
                     if let Some(events) = &mut events {
                         let (view, placement) = log.view();
-                        events.take(sample, &record, (view, &placement.terrain));
+                        events.on_sample(sample, &record, (view, &placement.terrain));
                     }
                     rows.push((record, LoopColumns::of(sample, log.view().0)));
                 }
             });
-            let say = |line: String| progress.suspend(|| tell(line));
+            let print_line = |line: String| progress.suspend(|| notify(line));
             let refuse = |text: String| {
                 if let Some(events) = &events {
-                    events.say(&Reported::Refused { text: &text });
+                    events.send_now(&Reported::Refused { text: &text });
                 }
-                say(text);
+                print_line(text);
             };
-            control.look(log.t_s(), &mut |text| refuse(text));
+            control.update(log.t_s(), &mut |text| refuse(text));
             if control.entered().is_some() {
                 refuse("a virtual arm has asked nothing that `enter` answers".into());
             }
             for mark in control.marks(&log, false) {
-                say(steering::marked(&mark));
+                print_line(steering::mark_text(&mark));
                 if let Some(events) = &events {
                     events.mark(&mark);
                 }
                 marks.push(mark);
             }
-            for ask in control.asks() {
-                session.ask(ask);
+            for request in control.requests() {
+                session.enqueue(request);
             }
-            if let Some(put) = control.put(log.views()) {
-                toured = toured.and(session.put_view(put.view, put.terrain));
+            if let Some(update) = control.take_update(log.views()) {
+                polled = polled.and(session.put_view(update.view, update.terrain));
             }
             progress.set_position(log.ticks());
-            if let Some(shown) = &mut shown {
-                shown.look(session.stats());
+            if let Some(viewer) = &mut viewer {
+                viewer.send_due(session.stats());
             }
         }
         progress.finish_and_clear();
@@ -414,42 +425,53 @@ impl<'t> Tour<'_, 't> {
         let figures = log.figures();
         let ticks = log.ticks();
         // The device is always notified of the end; its samples after the tour are not shown.
-        let left = session.say_goodbye(&mut |_| {});
+        let closed = session.close(&mut |_| {});
         if let Some(events) = &events {
-            let disarmed = left.is_ok();
-            events.say(&Reported::End { disarmed });
+            let disarmed = closed.is_ok();
+            events.send_now(&Reported::End { disarmed });
         }
-        toured.and(left)?;
+        polled.and(closed)?;
         let summary = SessionSummary {
             ticks,
             device,
             figures,
             stats: session.stats().clone(),
         };
-        let toured = Toured {
+        let tour_result = TourResult {
             rows,
             marks,
             views: log.into_views(),
             summary,
         };
-        Ok((toured, shown))
+        Ok((tour_result, viewer))
     }
 }
 
-fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), OutputError> {
+fn write(
+    tour_result: &TourResult<'_>,
+    settings: &Settings,
+    path: &Path,
+) -> Result<(), OutputError> {
     let mut recording = Recording::new(Output::create(path)?, &LoopColumns::COLUMNS)?;
     recording.describe(settings);
-    let (mut described, mut marks) = (0, toured.marks.iter().peekable());
-    for (record, columns) in &toured.rows {
+    let (mut described_view, mut marks) = (0, tour_result.marks.iter().peekable());
+    for (record, columns) in &tour_result.rows {
         while let Some(mark) = marks.next_if(|mark| mark.t_s <= record.t_s) {
             recording.mark(mark);
         }
-        let (number, placement) = (columns.view(), toured.views.get(columns.view() as usize));
-        if number > described
-            && let Some(laid) = &placement.laid
+        let (number, placement) = (
+            columns.view(),
+            tour_result.views.get(columns.view() as usize),
+        );
+        if number > described_view
+            && let Some(placed_surface) = &placement.placed_surface
         {
-            described = number;
-            recording.view(&PlacementSettings::new(number, &placement.terrain, laid))?;
+            described_view = number;
+            recording.view(&PlacementSettings::new(
+                number,
+                &placement.terrain,
+                placed_surface,
+            ))?;
         }
         recording.write(record, &columns.values())?;
     }

@@ -14,15 +14,15 @@ use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 /// No device, no reply, or an unusable calibration.
 pub(super) fn calibration_of(
     address: &DeviceAddress,
-    tell: &dyn Fn(String),
+    notify: &dyn Fn(String),
 ) -> Result<Calibration, Failure> {
     let transport = address.connect(|| Native::new(HostClock::default(), None))?;
-    let mut control = ControlSession::look(transport, TIMEOUT)?;
+    let mut control = ControlSession::open_read_only(transport, TIMEOUT)?;
     let calibration = match control.calibration()? {
         Some(calibration) => calibration,
         None => {
             let model = control.status()?.model.unwrap_or(Model::Premium15);
-            tell(format!(
+            notify(format!(
                 "the device has no calibration: the terrain is placed for a {}",
                 file::model_name(model)
             ));

@@ -88,6 +88,6 @@ impl Failure {
     /// Prints the failure on standard error, after all earlier output.
     pub fn report(&self) {
         writer::finish();
-        writer::put(std::io::stderr(), &format!("{}\n", self.text()));
+        writer::write_text(std::io::stderr(), &format!("{}\n", self.text()));
     }
 }

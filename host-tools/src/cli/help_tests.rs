@@ -37,7 +37,7 @@ fn options_are_few() {
 }
 
 #[test]
-fn list_of_formats_stands_alone() {
+fn formats_option_excludes_others() {
     let parsed = |words: &[&str]| Cli::try_parse_from([&["hapterra", "info"], words].concat());
     assert!(parsed(&["--formats"]).is_ok());
     for words in [

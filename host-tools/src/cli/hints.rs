@@ -9,7 +9,7 @@ use super::options::surface::table::TableError;
 use crate::board::ImageError;
 use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::file::FileError;
-use crate::calibrate::{FitError, WalkError};
+use crate::calibrate::{FitError, ProcedureError};
 use crate::link::{EmulatorError, LinkError};
 use crate::materials::GroundError;
 use crate::phantom::PlacingError;
@@ -54,7 +54,7 @@ impl Hint for GroundError {
             Self::NoSystem { unplaced, .. } => {
                 format!("give it one: gdal_translate -a_srs EPSG:CODE {unplaced} OUT.tif")
             }
-            Self::NoWay { .. } => {
+            Self::NoConversion { .. } => {
                 "bring the classes into the terrain's reference system: gdalwarp -t_srs EPSG:CODE -r near IN OUT.tif"
                     .into()
             }
@@ -173,12 +173,12 @@ impl Hint for OtherTerrain {
 impl Hint for LinkError {
     fn hint(&self) -> String {
         let hint = match self {
-            Self::Absent { looked_for, .. } if looked_for.contains("USB") => {
+            Self::Absent { searched_for, .. } if searched_for.contains("USB") => {
                 "plug the board in, check its cable and that you may open it (on Linux the udev rule host-tools/udev/70-hapterra.rules); or try --device native"
             }
             Self::Absent { .. } => "start the emulated board there, or try --device native",
             Self::Several(_) => "name one: --device usb:SERIAL",
-            Self::Gone(_) | Self::Silent(_) | Self::LetGo | Self::Restarted => {
+            Self::Disconnected(_) | Self::Silent(_) | Self::HostSilent | Self::Restarted => {
                 "check the device and its cable, then start again"
             }
             Self::Version { ours, theirs } if theirs < ours => {
@@ -214,7 +214,7 @@ impl Hint for EmulatorError {
     }
 }
 
-impl Hint for WalkError<LinkError> {
+impl Hint for ProcedureError<LinkError> {
     fn hint(&self) -> String {
         let hint = match self {
             Self::Counts(error) => return error.hint(),
@@ -284,9 +284,10 @@ impl Hint for UpdateError {
             Self::Calibrations { .. } | Self::NoVectors(_) => {
                 "nothing was touched: `cargo xtask image BOARD` builds an image that fits"
             }
-            Self::Gone { .. } | Self::Refused { .. } | Self::Endless(_) | Self::Differs(_) => {
-                "press the board's reset button and try again"
-            }
+            Self::Disconnected { .. }
+            | Self::Refused { .. }
+            | Self::Endless(_)
+            | Self::Differs(_) => "press the board's reset button and try again",
         };
         hint.into()
     }

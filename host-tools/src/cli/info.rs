@@ -22,7 +22,7 @@ use heightfield::printable_text::printable_json;
 use heightfield::without_key;
 use heightfield::{CellSize, CellUnit, Certainty, Fill, RasterType, ReferenceSystem};
 use link::LinkFigures;
-use place::{Rectangle, Vertical, from, reported};
+use place::{Rectangle, Vertical, from, source_text};
 
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
@@ -334,7 +334,7 @@ impl FileReport {
 
     /// Returns text such as `EPSG:26911 NAD83 / UTM zone 11N (stated)`.
     fn reference_system(&self) -> String {
-        let from = self.crs_from.map(reported).unwrap_or_default();
+        let from = self.crs_from.map(source_text).unwrap_or_default();
         match (&self.crs, &self.crs_name) {
             (Some(code), Some(name)) => format!("{code} {name} ({from})"),
             (None, Some(name)) => format!("{name} ({from}, without a code)"),
@@ -385,7 +385,7 @@ impl Cell {
             self.east,
             self.north,
             self.unit,
-            reported(self.unit_from)
+            source_text(self.unit_from)
         );
         let hint = match self.distorted {
             false => "",

@@ -8,19 +8,19 @@ const WINDOW: Duration = Duration::from_secs(1);
 /// Allows a number of lines a second and counts the omitted ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineLimit {
-    most: u32,
+    max_lines: u32,
     /// Start of the current interval, and the lines allowed in it.
     window: Option<(Instant, u32)>,
-    left_out: u64,
+    omitted: u64,
 }
 
 impl LineLimit {
-    /// Creates a limit of `most` lines a second.
-    pub(super) const fn new(most: u32) -> Self {
+    /// Creates a limit of `max_lines` lines a second.
+    pub(super) const fn new(max_lines: u32) -> Self {
         Self {
-            most,
+            max_lines,
             window: None,
-            left_out: 0,
+            omitted: 0,
         }
     }
 
@@ -29,19 +29,19 @@ impl LineLimit {
     pub(super) fn admit(&mut self, now: Instant) -> Option<u64> {
         let open = self
             .window
-            .filter(|(began, _)| now.saturating_duration_since(*began) < WINDOW);
-        let (began, stated) = open.unwrap_or((now, 0));
-        if stated >= self.most {
-            self.left_out += 1;
+            .filter(|(start, _)| now.saturating_duration_since(*start) < WINDOW);
+        let (start, shown) = open.unwrap_or((now, 0));
+        if shown >= self.max_lines {
+            self.omitted += 1;
             return None;
         }
-        self.window = Some((began, stated + 1));
-        Some(std::mem::take(&mut self.left_out))
+        self.window = Some((start, shown + 1));
+        Some(std::mem::take(&mut self.omitted))
     }
 
     /// Returns the number of lines omitted since the last allowed one.
-    pub(super) const fn left_out(&self) -> u64 {
-        self.left_out
+    pub(super) const fn omitted(&self) -> u64 {
+        self.omitted
     }
 }
 
@@ -51,19 +51,19 @@ mod tests {
 
     #[test]
     fn lines_over_the_rate_limit_are_counted_and_reported_once() {
-        let began = Instant::now();
-        let at = |ms: u64| began + Duration::from_millis(ms);
+        let start = Instant::now();
+        let at = |ms: u64| start + Duration::from_millis(ms);
         let mut one = LineLimit::new(1);
         assert_eq!(one.admit(at(0)), Some(0));
         for ms in 1..1000 {
             assert_eq!(one.admit(at(ms)), None);
         }
-        assert_eq!(one.left_out(), 999);
+        assert_eq!(one.omitted(), 999);
         assert_eq!(one.admit(at(1000)), Some(999));
         assert_eq!(one.admit(at(1001)), None);
         assert_eq!(one.admit(at(2500)), Some(1));
         let mut three = LineLimit::new(3);
-        let stated = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
-        assert_eq!((stated, three.left_out()), (3, 7));
+        let shown = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
+        assert_eq!((shown, three.omitted()), (3, 7));
     }
 }

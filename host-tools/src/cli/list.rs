@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::failure::{Failure, Hint};
 use super::session_summary;
-use crate::board::update::plugged;
+use crate::board::update::connected_devices;
 use crate::board::{BOARDS, probes};
 use crate::link::{ControlSession, LinkError, Tcp, Transport, Usb, tcp_address};
 use heightfield::printable_text::printable;
@@ -18,7 +18,7 @@ pub struct Args {
 }
 
 /// Default address of an emulated board's link.
-const USUAL_ADDRESS: &str = "localhost:4000";
+const DEFAULT_ADDRESS: &str = "localhost:4000";
 /// Time limit for a board's introduction.
 const TIMEOUT: Duration = Duration::from_millis(1500);
 
@@ -46,20 +46,20 @@ fn list_usb() {
     if found.is_empty() {
         println!(
             "  none: looked for {} among {looked_at} USB devices",
-            Usb::looked_for()
+            Usb::searched_for()
         );
         println!("  check that the board's own USB connector is plugged in, not only its ST-LINK,");
         println!("  that the cable carries data, and that the board runs hapterra's firmware");
     }
     for info in found {
         let place = printable(&Usb::place(&info));
-        let known = Usb::open(&info).and_then(|link| who(Box::new(link)));
+        let known = Usb::open(&info).and_then(|link| describe(Box::new(link)));
         println!(
             "  {place}: {}",
-            known.unwrap_or_else(|error| reported(&error))
+            known.unwrap_or_else(|error| error_text(&error))
         );
     }
-    for loader in plugged().iter().filter(|device| device.is_loader) {
+    for loader in connected_devices().iter().filter(|device| device.is_loader) {
         let serial = loader.serial.as_deref().unwrap_or("(no serial number)");
         println!("  usb:{serial} at {}: an STM32 in its loader", loader.place);
         println!("  `hapterra flash --dfu` writes firmware to it; its reset button ends it");
@@ -88,32 +88,32 @@ fn list_probes() {
 
 fn list_emulated(args: &Args) {
     println!("emulated boards");
-    let usual = [USUAL_ADDRESS.to_owned()];
+    let default = [DEFAULT_ADDRESS.to_owned()];
     let addresses = if args.addresses.is_empty() {
-        &usual[..]
+        &default[..]
     } else {
         &args.addresses
     };
     for address in addresses {
-        match Tcp::connect(address).and_then(|link| who(Box::new(link))) {
-            Ok(who) => println!("  tcp:{address}: {who}"),
+        match Tcp::connect(address).and_then(|link| describe(Box::new(link))) {
+            Ok(description) => println!("  tcp:{address}: {description}"),
             Err(LinkError::Absent { why, .. }) => {
                 println!("  none at tcp:{address}: {why}");
                 println!(
                     "  name another place with --tcp HOST:PORT; `hapterra demo` starts a board of its own"
                 );
             }
-            Err(error) => println!("  tcp:{address}: {}", reported(&error)),
+            Err(error) => println!("  tcp:{address}: {}", error_text(&error)),
         }
     }
 }
 
 /// Returns a description of the device behind a link.
-fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
-    let control = ControlSession::look(link, TIMEOUT)?;
+fn describe(link: Box<dyn Transport>) -> Result<String, LinkError> {
+    let control = ControlSession::open_read_only(link, TIMEOUT)?;
     Ok(session_summary::device(control.device()))
 }
 
-fn reported(error: &LinkError) -> String {
+fn error_text(error: &LinkError) -> String {
     format!("{error}; {}", error.hint())
 }

@@ -22,7 +22,7 @@ use heightfield::printable_text::printable;
 const BY_DEVICE: &str = "hapterra::link";
 
 /// Starts the log. `RUST_LOG` overrides the `-v` count.
-pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
+pub(super) fn to_stderr(verbose: u8) -> Log<StderrLines> {
     let level = match verbose {
         // A probe library warns of each kind of probe that it cannot search for; the error reports
         // the result.
@@ -32,7 +32,7 @@ pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
         _ => "trace",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let log = Log::to(|| Spoken);
+    let log = Log::to(|| StderrLines);
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(log.clone())
@@ -47,12 +47,12 @@ pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
 
 /// Sends lines to the thread that writes to standard error. The logging thread, perhaps with an
 /// armed arm on its link, never waits for a terminal.
-pub(super) struct Spoken;
+pub(super) struct StderrLines;
 
-impl Write for Spoken {
+impl Write for StderrLines {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(bytes);
-        writer::tell(text.trim_end_matches('\n'));
+        writer::notify(text.trim_end_matches('\n'));
         Ok(bytes.len())
     }
 
@@ -100,15 +100,15 @@ impl<W: Write> Log<W> {
     /// Reports the number of lines omitted at the end.
     pub(super) fn end(&self) {
         let kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
-        let left_out: u64 = kinds.values().map(LineLimit::left_out).sum();
-        if left_out > 0 {
+        let omitted: u64 = kinds.values().map(LineLimit::omitted).sum();
+        if omitted > 0 {
             // There is no channel left to report this.
-            let _ = writeln!((self.open)(), "{}", left_out_text(left_out));
+            let _ = writeln!((self.open)(), "{}", omitted_text(omitted));
         }
     }
 }
 
-fn left_out_text(count: u64) -> String {
+fn omitted_text(count: u64) -> String {
     format!("({count} lines about the device were left out)")
 }
 
@@ -121,7 +121,7 @@ impl<W: Write> MakeWriter<'_> for Log<W> {
 
     fn make_writer_for(&self, about: &Metadata<'_>) -> Line<W> {
         match self.admit(about, Instant::now()) {
-            Some(left_out) => Line(Some((self.open)()), left_out),
+            Some(omitted) => Line(Some((self.open)()), omitted),
             None => Line(None, 0),
         }
     }
@@ -132,13 +132,13 @@ pub(super) struct Line<W>(Option<W>, u64);
 
 impl<W: Write> Write for Line<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if let Line(Some(out), left_out) = self {
+        if let Line(Some(out), omitted) = self {
             let text = String::from_utf8_lossy(bytes);
             let mut line = printable(text.trim_end_matches('\n'));
-            let left_out = std::mem::take(left_out);
-            if left_out > 0 {
+            let omitted = std::mem::take(omitted);
+            if omitted > 0 {
                 line += " ";
-                line += &left_out_text(left_out);
+                line += &omitted_text(omitted);
             }
             line.push('\n');
             // A write error is ignored: its report would go to standard error too, and would panic.
@@ -177,8 +177,8 @@ mod tests {
         }
     }
 
-    /// Returns the log of `say` and of its end.
-    fn written(say: impl FnOnce()) -> String {
+    /// Returns the log of `log_lines` and of its end.
+    fn log_of(log_lines: impl FnOnce()) -> String {
         let page = Page::default();
         let copy = page.clone();
         let log = Log::to(move || copy.clone());
@@ -187,32 +187,32 @@ mod tests {
             .with_ansi(false)
             .without_time()
             .finish();
-        tracing::subscriber::with_default(subscriber, say);
+        tracing::subscriber::with_default(subscriber, log_lines);
         log.end();
         page.text()
     }
 
     #[test]
     fn flooding_device_gets_one_log_line_a_second() {
-        let text = written(|| {
+        let text = log_of(|| {
             for tile in 0..100_000 {
                 tracing::warn!(target: "hapterra::link::client", tile, "no such tile");
             }
         });
-        let stated = text.lines().filter(|line| line.contains("no such tile"));
+        let logged = text.lines().filter(|line| line.contains("no such tile"));
         // One line for each second of the test, and the final number.
-        let (stated, lines) = (stated.count(), text.lines().count());
-        assert!((1..60).contains(&stated) && lines == stated + 1, "{text}");
-        let left_out = text.lines().filter_map(|line| {
+        let (logged, lines) = (logged.count(), text.lines().count());
+        assert!((1..60).contains(&logged) && lines == logged + 1, "{text}");
+        let omitted = text.lines().filter_map(|line| {
             let (_, rest) = line.split_once('(')?;
             rest.split(' ').next()?.parse::<usize>().ok()
         });
-        assert_eq!(stated + left_out.sum::<usize>(), 100_000, "{text}");
+        assert_eq!(logged + omitted.sum::<usize>(), 100_000, "{text}");
     }
 
     #[test]
-    fn a_device_that_floods_the_log_leaves_no_line_of_another_out() {
-        let text = written(|| {
+    fn flooding_device_omits_no_line_of_another_device() {
+        let text = log_of(|| {
             let subscriber = tracing::dispatcher::get_default(Clone::clone);
             let flood = |device: &'static str, lines: u32| {
                 let subscriber = subscriber.clone();
@@ -232,8 +232,8 @@ mod tests {
     }
 
     #[test]
-    fn host_lines_are_never_left_out_and_contain_no_controls() {
-        let text = written(|| {
+    fn host_log_lines_are_never_omitted_and_have_no_controls() {
+        let text = log_of(|| {
             for row in 0..10 {
                 tracing::warn!(target: "hapterra::replay", row, "odd");
             }

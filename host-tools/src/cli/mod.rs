@@ -95,10 +95,10 @@ pub enum Command {
 
 /// Runs the command with this process's arguments: 0 on success, 1 on failure, 2 on wrong usage.
 pub fn main() -> ExitCode {
-    let mut words = std::env::args_os();
-    let name = words.next().unwrap_or_default();
+    let mut arguments = std::env::args_os();
+    let name = arguments.next().unwrap_or_default();
     let own = std::env::current_exe().map_or(name, OsString::from);
-    ExitCode::from(command_line(&[own], words))
+    ExitCode::from(command_line(&[own], arguments))
 }
 
 /// Runs the command with these arguments and returns its exit code, as [`main`] does. `program`
@@ -140,20 +140,21 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
 pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
     let command = P::command();
     let name = command.get_name().to_owned().into();
-    let words = [name].into_iter().chain(arguments).collect();
-    let Completed { words, line } = settings::complete(&command, words).map_err(|failure| {
-        failure.report();
-        1
-    })?;
+    let arguments = [name].into_iter().chain(arguments).collect();
+    let Completed { arguments, line } =
+        settings::complete(&command, arguments).map_err(|failure| {
+            failure.report();
+            1
+        })?;
     // The guardian has already printed it.
     if let Some(line) = line.filter(|_| !guardian::is_worker()) {
         eprintln!("{line}");
     }
-    P::try_parse_from(&words).map_err(|mut error| {
+    P::try_parse_from(&arguments).map_err(|mut error| {
         match error.use_stderr() {
             // The message repeats the arguments, which may contain text from elsewhere.
             true => {
-                let option = || old_options::hint(&words, &error);
+                let option = || old_options::hint(&arguments, &error);
                 let moved = old_subcommands::hint(&error)
                     .or_else(option)
                     .unwrap_or_default();
@@ -162,7 +163,7 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
                     error.remove(ContextKind::Suggested);
                     error.remove(ContextKind::SuggestedArg);
                 }
-                writer::put(std::io::stderr(), &format!("{}{moved}", error.render()));
+                writer::write_text(std::io::stderr(), &format!("{}{moved}", error.render()));
             }
             // A closed pipe while help is printed is no error.
             false => _ = error.print(),

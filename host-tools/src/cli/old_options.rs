@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// A removed option.
-struct Old {
+struct RemovedOption {
     /// The commands that had the option.
     commands: &'static [&'static str],
     /// The option's name.
@@ -33,8 +33,8 @@ const fn old(
     name: &'static str,
     now: &'static str,
     within: &'static str,
-) -> Old {
-    Old {
+) -> RemovedOption {
+    RemovedOption {
         commands,
         name,
         now,
@@ -43,7 +43,7 @@ const fn old(
 }
 
 /// Options of `hapterra`.
-const OLD: &[Old] = &[
+const OLD: &[RemovedOption] = &[
     old(&["run"], "--record", "-o FILE", ""),
     old(PLACING, "--seconds", "--duration 60s", ""),
     old(&["run"], "--silence-s", "--silence 10s", ""),
@@ -179,14 +179,14 @@ const OLD: &[Old] = &[
 ];
 
 /// Options of `hapterra-lab`.
-const OLD_IN_LAB: &[Old] = &[
+const OLD_IN_LAB: &[RemovedOption] = &[
     old(&["stability"], "--delay-us", "--delay 200us", ""),
     old(&["streaming"], "--latencies", "--latency 20ms,50ms", ""),
     old(&["synth"], "--cell-m", "--cell 10m", ""),
 ];
 
 /// Returns a hint with the replacement if the error is an option of earlier versions.
-pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
+pub(super) fn hint(arguments: &[OsString], error: &clap::Error) -> Option<String> {
     if error.kind() != ErrorKind::UnknownArgument {
         return None;
     }
@@ -194,8 +194,8 @@ pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
         return None;
     };
     let name = argument.split('=').next()?;
-    let is_typed = |command: &&str| words.iter().skip(1).any(|word| word == *command);
-    let of_command = |old: &&Old| old.name == name && old.commands.iter().any(is_typed);
+    let is_typed = |command: &&str| arguments.iter().skip(1).any(|word| word == *command);
+    let of_command = |old: &&RemovedOption| old.name == name && old.commands.iter().any(is_typed);
     let old = OLD.iter().chain(OLD_IN_LAB).find(of_command)?;
     let within = match old.within {
         "" => String::new(),
@@ -212,7 +212,7 @@ mod tests {
     use crate::cli::Cli;
 
     /// Returns a command with its required arguments.
-    fn words(command: &str) -> Vec<&str> {
+    fn arguments(command: &str) -> Vec<&str> {
         let rest: &[&str] = match command {
             "replay" => &["t.tif", "path.csv"],
             "status" | "calibrate" | "demo" => &[],
@@ -222,12 +222,12 @@ mod tests {
     }
 
     fn parse(command: &str, option: &str) -> Result<Cli, clap::Error> {
-        let mut words = words(command);
-        words.extend(option.split_whitespace());
+        let mut arguments = arguments(command);
+        arguments.extend(option.split_whitespace());
         if ["replay", "cut"].contains(&command) && !option.starts_with("-o") {
-            words.extend(["-o", "out"]);
+            arguments.extend(["-o", "out"]);
         }
-        Cli::try_parse_from(words)
+        Cli::try_parse_from(arguments)
     }
 
     #[test]
@@ -235,7 +235,7 @@ mod tests {
         for old in OLD {
             for command in old.commands {
                 let error = parse(command, &format!("{}=1", old.name)).expect_err(old.name);
-                let typed: Vec<_> = words(command).iter().map(OsString::from).collect();
+                let typed: Vec<_> = arguments(command).iter().map(OsString::from).collect();
                 let line = hint(&typed, &error).expect(old.name);
                 let now = format!("{} is now {}", old.name, old.now);
                 assert!(line.contains(&now), "{command}: {line}");

@@ -18,7 +18,7 @@ use super::terminal::{interrupt, partial_files, progress};
 use super::viewing::{self, Viewing};
 use crate::link::{Timeouts, Transport};
 use crate::materials::Materials;
-use crate::output::{Output, keep_apart};
+use crate::output::{Output, check_distinct};
 use crate::replay::settings::{Device, PlacementSettings};
 use crate::replay::{
     Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Ticks, Trajectory,
@@ -83,21 +83,21 @@ pub struct Args {
 /// # Errors
 /// The terrain, the trajectory, the device or the output fails.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    run_by(args, None)
+    run_with_rule(args, None)
 }
 
 /// Replays the trajectory with a contact rule; by default the recording's, else that of devices.
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
+pub fn run_with_rule(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let mut inputs = args.terrain.inputs();
     inputs.push(args.trajectory.clone());
     let of_surface = args.rendering.surface.inputs();
     inputs.extend(of_surface);
     inputs.extend(args.settings.file());
-    keep_apart(&[&args.out], &inputs).or_hint("name another file with -o")?;
-    partial_files::tell([args.out.as_path()]);
+    check_distinct(&[&args.out], &inputs).or_hint("name another file with -o")?;
+    partial_files::report([args.out.as_path()]);
     let viewer = args.viewing.program()?;
     let trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
     let recorded = trajectory
@@ -208,7 +208,7 @@ struct Inputs<'t> {
 }
 
 impl<'t> Inputs<'t> {
-    fn shown(&self, replayer: &OfflineDevice<'_>) -> Result<Option<ViewFeed<'t>>, Failure> {
+    fn viewer_feed(&self, replayer: &OfflineDevice<'_>) -> Result<Option<ViewFeed<'t>>, Failure> {
         let Some(program) = &self.viewer else {
             return Ok(None);
         };
@@ -323,7 +323,7 @@ fn emulated(
     let link: Box<dyn Transport> = Box::new(lines.link);
     let mut replayer = OfflineDevice::open(replayed.terrain, params, link, Timeouts::EMULATED)?;
     let replayed = replay(args, replayed, trajectory, &mut replayer)?;
-    replayer.say_goodbye()?;
+    replayer.close()?;
     if let Err(why) = emulator.finish() {
         tracing::info!("the emulated board did not end well: {why}");
     }
@@ -364,7 +364,7 @@ fn replay<'t>(
     interrupt::listen();
     let materials = replayed.terrain.grid().materials();
     let table = materials.map(Materials::table);
-    stability::warn_of(&replayed.params.0, table, replayer.device());
+    stability::warn_for_materials(&replayed.params.0, table, replayer.device());
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(
         &replayed.file,
@@ -376,7 +376,7 @@ fn replay<'t>(
     settings.views.clone_from(&replayed.views);
     settings.marks.clone_from(&replayed.marks);
     let output = Output::create_or_standard_output(&args.out).map_err(ReplayError::from)?;
-    let mut feed = replayed.shown(replayer)?;
+    let mut feed = replayed.viewer_feed(replayer)?;
     let mut shown = 0;
     let mut show = |sample: &TickRecord, record: &Record, (view, terrain): (u32, &Terrain<'t>)| {
         let Some(feed) = &mut feed else {
@@ -386,10 +386,10 @@ fn replay<'t>(
             shown = view;
             let settings = replayed.views.iter().find(|known| known.number == view);
             let home_mm = settings.map(|settings| settings.home_mm);
-            feed.go_over(replayed.picture(terrain, home_mm));
+            feed.change_placement(replayed.picture(terrain, home_mm));
         }
-        feed.detail(record);
-        feed.take(sample, record);
+        feed.keep_detailed(record);
+        feed.on_sample(sample, record);
     };
     let summary = replay_trajectory(
         replayer,

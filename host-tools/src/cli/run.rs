@@ -35,10 +35,10 @@ use super::options::terrain_file::TerrainFile;
 use super::settings::SettingsOption;
 use super::terminal::device_console::DeviceConsole;
 use super::terminal::shared_keyboard::{self, DeviceKeys};
-use super::terminal::writer::tell;
+use super::terminal::writer::notify;
 use super::terminal::{interrupt, partial_files};
-use super::viewing::{ToBeShown, Viewing};
-use crate::output::keep_apart;
+use super::viewing::{PreparedViewer, Viewing};
+use crate::output::check_distinct;
 use crate::steering::keys::KEYS;
 use devices::{OneDevice, ServedDevice};
 use placed::{InReach, Placed};
@@ -46,7 +46,7 @@ use session::{Serving, recording};
 use together::serve_each;
 
 /// Maximum stiffness that `hapterra-lab stability` tests by default, N/mm.
-const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
+const MAX_TESTED_N_PER_MM: f32 = 20.0;
 
 /// Hint for a recording that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
@@ -130,8 +130,8 @@ pub(super) fn duration(text: &str) -> Result<f64, String> {
 
 /// Parses the time without a message after which a device disarms, whole seconds.
 fn silence(text: &str) -> Result<u16, String> {
-    let [least, most] = [SILENCE_S.0, SILENCE_S.1].map(f64::from);
-    let seconds = TIME.read_within(text, [least, most])?;
+    let [min, max] = [SILENCE_S.0, SILENCE_S.1].map(f64::from);
+    let seconds = TIME.read_within(text, [min, max])?;
     match seconds.fract() == 0.0 {
         true => Ok(seconds as u16),
         false => Err("whole seconds, as 10s".to_owned()),
@@ -152,8 +152,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     inputs.extend(args.commands.file());
     inputs.extend(args.rendering.surface.inputs());
     inputs.extend(args.settings.file());
-    keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
-    partial_files::tell(outputs.iter().map(PathBuf::as_path));
+    check_distinct(&outputs, &inputs).or_hint(OTHER_FILE)?;
+    partial_files::report(outputs.iter().map(PathBuf::as_path));
     let events = args.events.listen()?;
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
@@ -164,37 +164,41 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     check_stiffness(params.stiffness_n_per_mm)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
     let cells = reading.cells();
-    let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
-    asked.grid = asked.grid.with_materials(materials.as_ref());
-    asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
+    let mut request = args.placing.of((&args.rendering, cells), &raster)?;
+    request.grid = request.grid.with_materials(materials.as_ref());
+    request.grid = request.grid.with_tip(args.rendering.tip_of_hand_mm());
     // Errors of recordings are found before any device is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
     interrupt::listen();
-    let (arms, met): (Vec<_>, Vec<_>) = devices.iter().map(OneDevice::meet).unzip();
-    let laid = of_each(devices.iter().zip(arms), |(device, arm)| {
-        InReach::of(&asked, arm).map_err(|failure| failure.about(device.device_console.name()))
+    let (arms, calibration_read): (Vec<_>, Vec<_>) =
+        devices.iter().map(OneDevice::read_calibration).unzip();
+    let placed_surface = of_each(devices.iter().zip(arms), |(device, arm)| {
+        InReach::of(&request, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
-    let placed = of_each(devices.iter().zip(&laid), |(device, laid)| {
-        Placed::new(device, (&name, laid), params)
-            .map_err(|failure| failure.about(device.device_console.name()))
-    })?;
+    let placed = of_each(
+        devices.iter().zip(&placed_surface),
+        |(device, placed_surface)| {
+            Placed::new(device, (&name, placed_surface), params)
+                .map_err(|failure| failure.about(device.device_console.name()))
+        },
+    )?;
     // The coarse levels are read before any device is armed. A viewer shows one device.
-    let shown = viewer
+    let viewer = viewer
         .zip(placed.first())
-        .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &name));
+        .map(|(program, of)| PreparedViewer::new(program, of.terrain, &of.view, &name));
     raster.check_complete()?;
     materials
         .as_ref()
         .map_or(Ok(()), |it| it.classes().check_complete())?;
     // No read of terrain may wait while an arm may be armed.
-    let mut shown = shown.map(ToBeShown::non_blocking);
+    let mut viewer = viewer.map(PreparedViewer::non_blocking);
     let terrains: Vec<_> = placed.iter().map(|of| of.terrain.non_blocking()).collect();
     let placed: Vec<_> = (placed.into_iter().zip(&terrains))
         .map(|(placed, terrain)| Placed { terrain, ..placed })
         .collect();
     let mut device_keys = share_keyboard(args, &devices).into_iter();
-    let each = devices.iter().zip(&placed).zip(met);
+    let each = devices.iter().zip(&placed).zip(calibration_read);
     let servings = each.zip(recordings.into_iter().zip(commands));
     let watchers = (1..).map(|number| {
         let server = events.as_ref();
@@ -202,15 +206,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     });
     let servings = servings.zip(watchers);
     let servings = servings.map(
-        |((((device, placed), met), (recording, commands)), events)| Serving {
+        |((((device, placed), calibration_read), (recording, commands)), events)| Serving {
             args,
             device,
             placed,
-            met,
+            calibration_read,
             recording,
             commands,
             device_keys: device_keys.next(),
-            shown: shown.take(),
+            viewer: viewer.take(),
             events,
         },
     );
@@ -221,11 +225,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// Checks that a stiffness is plausible for an arm.
 fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
-    if n_per_mm <= STIFFEST_TRIED_N_PER_MM {
+    if n_per_mm <= MAX_TESTED_N_PER_MM {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "a stiffness of {n_per_mm} N/mm: no arm renders more than {STIFFEST_TRIED_N_PER_MM} N/mm"
+        "a stiffness of {n_per_mm} N/mm: no arm renders more than {MAX_TESTED_N_PER_MM} N/mm"
     ))
     .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }
@@ -250,10 +254,10 @@ fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
         .first()
         .is_some_and(|device_keys| device_keys.has_keys())
     {
-        true => tell(format!(
+        true => notify(format!(
             "keys           1 to {last} choose the device that keys go to, and come before each Enter: {KEYS}"
         )),
-        false => tell(format!(
+        false => notify(format!(
             "Enter          goes to the device whose number, 1 to {last}, is right before it"
         )),
     }
@@ -266,7 +270,7 @@ mod tests {
     use crate::link::Timeouts;
 
     #[test]
-    fn the_default_of_silence_is_the_sessions() {
+    fn default_silence_is_that_of_the_session() {
         assert_eq!(silence("30s"), Ok(Timeouts::REAL_SILENCE_S));
     }
 }

@@ -46,7 +46,7 @@ impl SessionSummary {
             figures.late,
             stats.tiles,
             stats.tile_bytes,
-            stats.again,
+            stats.repeated,
             stats.samples,
             stats.lost,
             stats.dropped,
@@ -113,7 +113,8 @@ impl SessionSummary {
         title: &str,
         records: &[Record],
     ) -> Result<(), Failure> {
-        let height_mm = |east: f64, north: f64, apart: f64| terrain.seen_mm(east, north, apart);
+        let height_mm =
+            |east: f64, north: f64, apart: f64| terrain.picture_height_mm(east, north, apart);
         let file = terrain.raster().georeference();
         let cell_mm = view.scale.cell_mm();
         let place_of = |east: f64, north: f64| {
@@ -206,7 +207,7 @@ fn kind_of_device(hello: &DeviceHello) -> String {
 pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
     let grid = terrain.grid();
     let materials = grid.materials()?;
-    Some(format!("materials      {}", materials.reported(grid)))
+    Some(format!("materials      {}", materials.describe(grid)))
 }
 
 #[cfg(test)]
@@ -217,7 +218,7 @@ mod tests {
 
     /// A cell of level 3 is eight cells of the file wide, and its height is scaled equally.
     #[test]
-    fn a_level_changes_no_proportion() {
+    fn level_keeps_proportions() {
         let raster = Raster::from_fn(65, 65, |column, row| (column + row) as f32);
         let raster = raster.expect("a field");
         for level in [0, 3] {

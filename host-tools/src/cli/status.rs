@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::options::device::{Device, DeviceChoice};
 use super::report::put;
 use super::session_summary;
-use super::terminal::writer::{say, show};
+use super::terminal::writer::{print_line, show};
 use crate::calibrate::file::model_name;
 use crate::link::{DeviceAddress, EMULATED};
 use heightfield::printable_text::printable;
@@ -37,16 +37,18 @@ pub struct Args {
 /// No device, no reply, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
-        let status = args.device.look(|control| Ok(control.fresh_status()?))?;
+        let status = args
+            .device
+            .with_read_only_session(|control| Ok(control.fresh_status()?))?;
         put(&text(&status))?;
-        if args.device.device == DeviceChoice::There(DeviceAddress::Native) {
-            say(
+        if args.device.device == DeviceChoice::Connected(DeviceAddress::Native) {
+            print_line(
                 "note           each command starts a new native device, without a calibrated zero pose",
             );
         }
         return Ok(());
     }
-    args.device.talk(|control| {
+    args.device.with_session(|control| {
         if args.disarm {
             control.request(&Request::Disarm)?.map_err(Failure::new)?;
         }
@@ -60,7 +62,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 None => "no fault is latched any more".to_owned(),
                 Some(fault) => format!("but {fault:?} is there again: {}", fault.remedy()),
             };
-            say(format!("cleared        {cleared}"));
+            print_line(format!("cleared        {cleared}"));
         }
         Ok(())
     })
@@ -262,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_shown_with_its_number_meaning_and_what_to_do() {
+    fn fault_is_shown_with_number_meaning_and_remedy() {
         let mut status = status();
         status.health.report.fault = Some(Fault::EncoderJump);
         status.health.report.blockers = Blockers::FAULT_LATCHED | Blockers::NOT_ZEROED;
@@ -302,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hostile_device_cannot_write_past_its_line() {
+    fn hostile_device_text_has_no_control_characters() {
         let mut status = status();
         status.device.board = "\x1b[2J\x1b[H".try_into().expect("fits");
         status.device.version = "1\r\nfault none".try_into().expect("fits");
@@ -325,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crash_before_is_shown() {
+    fn previous_crash_is_shown() {
         let mut status = status();
         status.boot = BootReport {
             cause: ResetCause::Watchdog,

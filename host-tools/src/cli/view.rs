@@ -11,14 +11,14 @@ use super::options::rendering::Rendering;
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::terminal::interrupt;
 use super::viewing;
-use crate::output::keep_apart;
+use crate::output::check_distinct;
 use crate::replay::{RecordingRows, ReplayError, Settings, terrain_of};
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 use heightfield::{Raster, files_read_with};
 
 /// Rows between two checks that the viewer still reads.
-const LOOK_EVERY: u64 = 10_000;
+const CHECK_INTERVAL_ROWS: u64 = 10_000;
 
 /// Arguments of `hapterra view`.
 #[derive(Debug, clap::Args)]
@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut inputs = files_read_with(&path);
     inputs.push(args.recording.clone());
     let outputs = Vec::from_iter(args.rrd.as_deref());
-    keep_apart(&outputs, &inputs).or_hint("name another file with --rrd")?;
+    check_distinct(&outputs, &inputs).or_hint("name another file with --rrd")?;
     let program = Program::find()?;
     let file = TerrainFile {
         file: path.clone(),
@@ -116,11 +116,11 @@ fn show<'t>(
             && let Some(recorded) = recorded
         {
             shown = row.view;
-            go_over(&mut feed, terrain, title, (shown, recorded))?;
+            change_placement(&mut feed, terrain, title, (shown, recorded))?;
         }
-        feed.detail(&row.record);
+        feed.keep_detailed(&row.record);
         feed.row(&row.record, None);
-        let is_read = count % LOOK_EVERY != 0 || feed.wait_for_room();
+        let is_read = count % CHECK_INTERVAL_ROWS != 0 || feed.wait_for_room();
         if !is_read || interrupt::requested() {
             break;
         }
@@ -129,7 +129,7 @@ fn show<'t>(
     Ok(rows.was_cut())
 }
 
-fn go_over<'t>(
+fn change_placement<'t>(
     feed: &mut ViewFeed<'t>,
     first: &Terrain<'t>,
     title: &str,
@@ -140,7 +140,7 @@ fn go_over<'t>(
         Some(view) => terrain_of(first, view)?,
         None => first.clone(),
     };
-    feed.go_over(Picture {
+    feed.change_placement(Picture {
         terrain: &terrain,
         title,
         facts: vec![],

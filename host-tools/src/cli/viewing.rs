@@ -16,7 +16,7 @@ use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Prepared, Program, ProgramError, VARIABLE, ViewFeed};
 
 /// Interval of checks whether the viewer has ended.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The viewer.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -61,19 +61,19 @@ fn picture<'p, 't>(terrain: &'p Terrain<'t>, view: &Placement, title: &'p str) -
         title,
         facts: placing::picture_lines(view, &file),
         home_mm: Some(view.home_mm),
-        laid_mm: Some(view.laid_mm),
+        laid_mm: Some(view.extent_mm),
         is_live: true,
     }
 }
 
 /// A viewer that starts once there is something to show.
-pub(in crate::cli) struct ToBeShown<'t> {
+pub(in crate::cli) struct PreparedViewer<'t> {
     program: Program,
     prepared: Prepared<'t>,
     title: String,
 }
 
-impl<'t> ToBeShown<'t> {
+impl<'t> PreparedViewer<'t> {
     /// Reads the coarse levels of a terrain in front of an arm.
     pub(in crate::cli) fn new(
         program: Program,
@@ -100,16 +100,16 @@ impl<'t> ToBeShown<'t> {
     pub(in crate::cli) fn start(
         self,
         device: &DeviceHello,
-        tell: impl FnOnce(String),
-    ) -> Option<Shown<'t>> {
+        notify: impl FnOnce(String),
+    ) -> Option<ViewerSession<'t>> {
         match ViewFeed::start(&self.program, self.prepared, Some(device)) {
-            Ok(feed) => Some(Shown {
+            Ok(feed) => Some(ViewerSession {
                 feed,
                 title: self.title,
                 view: 0,
             }),
             Err(why) => {
-                tell(format!("not shown: {why}"));
+                notify(format!("not shown: {why}"));
                 None
             }
         }
@@ -117,21 +117,21 @@ impl<'t> ToBeShown<'t> {
 }
 
 /// Sends a session to a viewer.
-pub(in crate::cli) struct Shown<'t> {
+pub(in crate::cli) struct ViewerSession<'t> {
     feed: ViewFeed<'t>,
     title: String,
     /// Placement of the latest sample.
     view: usize,
 }
 
-impl<'t> Shown<'t> {
+impl<'t> ViewerSession<'t> {
     /// Processes an event of the session.
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         self.feed.on_event(event);
     }
 
     /// Processes a sample with its row and its placement.
-    pub(in crate::cli) fn take(
+    pub(in crate::cli) fn on_sample(
         &mut self,
         sample: &TickRecord,
         record: &Record,
@@ -139,31 +139,31 @@ impl<'t> Shown<'t> {
     ) {
         if view != self.view {
             self.view = view;
-            if let Some(laid) = &placement.laid {
-                let picture = picture(&placement.terrain, &laid.view, &self.title);
-                self.feed.go_over(picture);
+            if let Some(placed_surface) = &placement.placed_surface {
+                let picture = picture(&placement.terrain, &placed_surface.view, &self.title);
+                self.feed.change_placement(picture);
             }
         }
-        self.feed.take(sample, record);
+        self.feed.on_sample(sample, record);
     }
 
-    /// As [`ViewFeed::look`].
-    pub(in crate::cli) fn look(&mut self, stats: &LinkStats) {
-        self.feed.look(stats);
+    /// As [`ViewFeed::send_due`].
+    pub(in crate::cli) fn send_due(&mut self, stats: &LinkStats) {
+        self.feed.send_due(stats);
     }
 
     /// As [`end`].
-    pub(in crate::cli) fn end(self, say: impl Fn(String)) {
-        end(self.feed, say);
+    pub(in crate::cli) fn end(self, print_line: impl Fn(String)) {
+        end(self.feed, print_line);
     }
 }
 
 /// Ends the stream, reports what was not sent to the viewer, and waits until no page is open or the
 /// user interrupts.
-pub(in crate::cli) fn end(feed: ViewFeed<'_>, say: impl Fn(String)) {
+pub(in crate::cli) fn end(feed: ViewFeed<'_>, print_line: impl Fn(String)) {
     let (dropped, viewer) = feed.finish();
     if dropped.messages > 0 {
-        say(format!(
+        print_line(format!(
             "view           {} messages with {} samples were not shown: the viewer was slow, or gone",
             dropped.messages, dropped.samples
         ));
@@ -172,6 +172,6 @@ pub(in crate::cli) fn end(feed: ViewFeed<'_>, say: impl Fn(String)) {
         return;
     };
     while !interrupt::requested() && matches!(viewer.try_wait(), Ok(None)) {
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }

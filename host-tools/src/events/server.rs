@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 use super::event::{Event, FORMAT, Line};
 
 /// Maximum lines in the queue to the thread.
-const WAITING: usize = 4096;
+const MAX_QUEUED_LINES: usize = 4096;
 /// Maximum bytes buffered for a reader, in addition to the system's buffer.
-const FOR_A_READER: usize = 256 << 10;
+const MAX_READER_BYTES: usize = 256 << 10;
 /// Maximum number of readers; further connections are closed.
-const READERS: usize = 16;
+const MAX_READERS: usize = 16;
 /// Interval of checks for new readers and of retries to slow ones.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time for readers to receive the last lines.
-const AT_THE_END: Duration = Duration::from_secs(1);
+const END_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// State that the senders and the thread share.
 #[derive(Debug, Default)]
@@ -40,9 +40,9 @@ pub struct Sender {
 
 impl Sender {
     /// Returns the number of readers that have ever connected; `None` if none is connected now.
-    pub(super) fn readers_so_far(&self) -> Option<u64> {
-        let reads = self.shared.readers.load(Ordering::Acquire) > 0;
-        reads.then(|| self.shared.joined.load(Ordering::Acquire))
+    pub(super) fn readers_joined(&self) -> Option<u64> {
+        let has_readers = self.shared.readers.load(Ordering::Acquire) > 0;
+        has_readers.then(|| self.shared.joined.load(Ordering::Acquire))
     }
 
     /// Queues a line; it is dropped and counted if the queue is full.
@@ -71,7 +71,7 @@ impl Server {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
-        let (lines, waiting) = sync_channel(WAITING);
+        let (lines, waiting) = sync_channel(MAX_QUEUED_LINES);
         let shared = Arc::<Shared>::default();
         let readers = Readers {
             listener,
@@ -115,32 +115,32 @@ impl Server {
 /// A reader and its unsent lines.
 struct Reader {
     stream: TcpStream,
-    waiting: Vec<u8>,
+    unsent: Vec<u8>,
     dropped: u64,
 }
 
 impl Reader {
     /// Adds a line if there is room, after the number of lines dropped before it.
-    fn take(&mut self, line: &[u8]) {
-        let stated = match self.dropped {
+    fn push_line(&mut self, line: &[u8]) {
+        let notice = match self.dropped {
             0 => String::new(),
-            lines => of_reader(&Event::Dropped { lines }),
+            lines => reader_line(&Event::Dropped { lines }),
         };
-        if self.waiting.len() + stated.len() + line.len() > FOR_A_READER {
+        if self.unsent.len() + notice.len() + line.len() > MAX_READER_BYTES {
             self.dropped += 1;
             return;
         }
         self.dropped = 0;
-        self.waiting.extend(stated.bytes());
-        self.waiting.extend(line);
+        self.unsent.extend(notice.bytes());
+        self.unsent.extend(line);
     }
 
     /// Writes as much as the reader accepts now. Returns false if it is disconnected.
     fn write(&mut self) -> bool {
-        while !self.waiting.is_empty() {
-            match self.stream.write(&self.waiting) {
+        while !self.unsent.is_empty() {
+            match self.stream.write(&self.unsent) {
                 Ok(0) => return false,
-                Ok(written) => drop(self.waiting.drain(..written)),
+                Ok(written) => drop(self.unsent.drain(..written)),
                 Err(why) if why.kind() == ErrorKind::WouldBlock => return true,
                 Err(why) if why.kind() == ErrorKind::Interrupted => {}
                 Err(_) => return false,
@@ -151,7 +151,7 @@ impl Reader {
 }
 
 /// Returns a line that belongs to no device.
-fn of_reader(event: &Event<'_>) -> String {
+fn reader_line(event: &Event<'_>) -> String {
     Line { event, at: None }.text()
 }
 
@@ -168,29 +168,29 @@ impl Readers {
     fn run(mut self, lines: &Receiver<String>) -> u64 {
         loop {
             self.accept();
-            match lines.recv_timeout(LOOK) {
-                Ok(line) => self.take(&line),
+            match lines.recv_timeout(POLL_INTERVAL) {
+                Ok(line) => self.push_line(&line),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
-            for line in lines.try_iter().take(WAITING) {
-                self.take(&line);
+            for line in lines.try_iter().take(MAX_QUEUED_LINES) {
+                self.push_line(&line);
             }
             self.write();
         }
-        let until = Instant::now() + AT_THE_END;
-        while self.readers.iter().any(|reader| !reader.waiting.is_empty()) && Instant::now() < until
+        let until = Instant::now() + END_TIMEOUT;
+        while self.readers.iter().any(|reader| !reader.unsent.is_empty()) && Instant::now() < until
         {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
             self.write();
         }
         self.dropped
     }
 
-    fn take(&mut self, line: &str) {
+    fn push_line(&mut self, line: &str) {
         for reader in &mut self.readers {
             let before = reader.dropped;
-            reader.take(line.as_bytes());
+            reader.push_line(line.as_bytes());
             self.dropped += u64::from(reader.dropped > before);
         }
     }
@@ -204,7 +204,7 @@ impl Readers {
     /// Accepts new readers. An error affects only its own reader.
     fn accept(&mut self) {
         while let Ok((stream, _)) = self.listener.accept() {
-            if self.readers.len() >= READERS || stream.set_nonblocking(true).is_err() {
+            if self.readers.len() >= MAX_READERS || stream.set_nonblocking(true).is_err() {
                 continue;
             }
             let _ = stream.set_nodelay(true);
@@ -214,7 +214,7 @@ impl Readers {
             };
             self.readers.push(Reader {
                 stream,
-                waiting: of_reader(&hello).into_bytes(),
+                unsent: reader_line(&hello).into_bytes(),
                 dropped: 0,
             });
             self.write();
@@ -250,10 +250,10 @@ mod tests {
     fn readers_receive_every_line_in_order_until_the_end() {
         let server = Server::listen(0).expect("listens");
         assert!(server.address().ip().is_loopback());
-        assert_eq!(server.sender().readers_so_far(), None);
+        assert_eq!(server.sender().readers_joined(), None);
         let streams = [connected(&server), connected(&server)];
         let sender = server.sender();
-        assert_eq!(sender.readers_so_far(), Some(2));
+        assert_eq!(sender.readers_joined(), Some(2));
         for n in 0..1000 {
             sender.offer(format!("{{\"n\":{n}}}\n"));
         }
@@ -280,33 +280,33 @@ mod tests {
         let server = Server::listen(0).expect("listens");
         let (stuck, quick) = (connected(&server), connected(&server));
         let sender = server.sender();
-        let seen = Arc::new(AtomicU64::new(0));
-        let sees = Arc::clone(&seen);
+        let latest = Arc::new(AtomicU64::new(0));
+        let seen_by_thread = Arc::clone(&latest);
         read(quick, move |line| {
             assert!(!line.contains("dropped"), "{line}");
-            sees.fetch_max(number(line).unwrap_or(0), Ordering::AcqRel);
+            seen_by_thread.fetch_max(number(line).unwrap_or(0), Ordering::AcqRel);
         });
         // More than the buffers of system and reader can store.
         let spaces = " ".repeat(1000);
         for n in 1..=20_000 {
             sender.offer(format!("{{\"n\":{n}}}{spaces}\n"));
             if n % 100 == 0 {
-                wait_until("the other reader", || seen.load(Ordering::Acquire) == n);
+                wait_until("the other reader", || latest.load(Ordering::Acquire) == n);
             }
         }
-        let stated = Arc::new(AtomicU64::new(0));
-        let says = Arc::clone(&stated);
+        let notice = Arc::new(AtomicU64::new(0));
+        let notice_of_thread = Arc::clone(&notice);
         read(stuck, move |line| {
             let rest = line.strip_prefix("{\"event\":\"dropped\",\"lines\":");
             let lines = rest.and_then(|rest| rest.strip_suffix('}')?.parse().ok());
-            says.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
+            notice_of_thread.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
         });
         wait_until("what it missed is said", || {
             sender.offer("{}\n".to_owned());
-            stated.load(Ordering::Acquire) > 0
+            notice.load(Ordering::Acquire) > 0
         });
         drop(sender);
-        assert!(server.end() >= stated.load(Ordering::Acquire));
+        assert!(server.end() >= notice.load(Ordering::Acquire));
     }
 
     #[test]
@@ -330,10 +330,10 @@ mod tests {
         let sender = server.sender();
         wait_until("nobody reads", || {
             sender.offer("{}\n".to_owned());
-            sender.readers_so_far().is_none()
+            sender.readers_joined().is_none()
         });
-        let taken = Server::listen(server.address().port());
-        assert_eq!(taken.expect_err("taken").kind(), ErrorKind::AddrInUse);
+        let second = Server::listen(server.address().port());
+        assert_eq!(second.expect_err("taken").kind(), ErrorKind::AddrInUse);
         drop(sender);
         assert_eq!(server.end(), 0);
     }

@@ -12,11 +12,11 @@ use crate::terrain::Terrain;
 use heightfield::ReadStatus;
 
 /// Interval of reported positions, s of the device's time.
-const PLACE_EVERY_S: f64 = 0.1;
+const PLACE_INTERVAL_S: f64 = 0.1;
 /// Interval of material checks, s of the device's time.
-const MATERIAL_EVERY_S: f64 = 0.01;
+const MATERIAL_INTERVAL_S: f64 = 0.01;
 /// Maximum interval between samples for an estimate of the HIP's speed, s.
-const SPEED_WITHIN_S: f64 = 0.005;
+const MAX_SPEED_INTERVAL_S: f64 = 0.005;
 
 /// Last reported state.
 #[derive(Debug, Default)]
@@ -41,7 +41,7 @@ pub struct Watcher {
     /// Number of readers connected before the last event.
     readers: u64,
     /// The previous sample's record, with its placement.
-    before: Option<(usize, Record)>,
+    previous: Option<(usize, Record)>,
     /// The last lines about arming, and the number of readers at that time.
     arming: (Vec<String>, u64),
     /// Interval of reported samples.
@@ -65,7 +65,7 @@ impl Watcher {
             at,
             reported: Reported::default(),
             readers: 0,
-            before: None,
+            previous: None,
             arming: (vec![], 0),
             every: None,
             samples: 0,
@@ -79,14 +79,14 @@ impl Watcher {
     }
 
     /// Processes a sample, its row and its placement.
-    pub fn take(
+    pub fn on_sample(
         &mut self,
         sample: &TickRecord,
         record: &Record,
         (view, terrain): (usize, &Terrain<'_>),
     ) {
-        let Some(readers) = self.sender.readers_so_far() else {
-            self.before = None;
+        let Some(readers) = self.sender.readers_joined() else {
+            self.previous = None;
             return;
         };
         // A new reader receives the whole state.
@@ -99,32 +99,32 @@ impl Watcher {
             t_s: record.t_s,
         };
         if self.reported.view.replace(view) != Some(view) {
-            self.tell(&view_of(view, terrain));
+            self.send(&view_of(view, terrain));
         }
         let limits = (sample.limits, sample.mode, sample.fault);
         if self.reported.limits.replace(limits) != Some(limits) {
-            self.tell(&limits_of(limits));
+            self.send(&limits_of(limits));
         }
         let touching = record.contact;
-        let changes = self.reported.contact.replace(touching) != Some(touching);
+        let has_changed = self.reported.contact.replace(touching) != Some(touching);
         if touching {
             // The material of a contact is reported before the contact.
-            self.tell_material(record, terrain, changes);
+            self.send_material(record, terrain, has_changed);
         }
-        if changes {
-            self.tell_contact(record, (view, terrain));
+        if has_changed {
+            self.send_contact(record, (view, terrain));
         } else if touching {
-            self.tell_place(record, terrain);
+            self.send_place(record, terrain);
         }
-        self.before = Some((view, *record));
+        self.previous = Some((view, *record));
         if let Some(every) = self.every {
-            self.tell_sample(every, sample, record, view);
+            self.send_sample(every, sample, record, view);
         }
     }
 
     /// Reports a mark.
     pub fn mark(&self, mark: &Mark) {
-        self.say(&Event::Mark {
+        self.send_now(&Event::Mark {
             marked_tick: mark.tick,
             marked_t_s: mark.t_s,
             host_unix_s: mark.host_unix_s,
@@ -135,7 +135,7 @@ impl Watcher {
     /// Reports new lines about arming, if any, and the open question. Later readers receive them
     /// too.
     pub fn arming(&mut self, new: Vec<String>, asks: Option<u32>) {
-        let Some(readers) = self.sender.readers_so_far() else {
+        let Some(readers) = self.sender.readers_joined() else {
             if !new.is_empty() {
                 self.arming = (new, 0);
             }
@@ -149,17 +149,17 @@ impl Watcher {
         }
         self.arming.1 = readers;
         let lines = &self.arming.0;
-        self.tell(&Event::Arming { lines, asks });
+        self.send(&Event::Arming { lines, asks });
     }
 
     /// Reports an event that no sample shows, at the latest tick.
-    pub fn say(&self, event: &Event<'_>) {
-        if self.sender.readers_so_far().is_some() {
-            self.tell(event);
+    pub fn send_now(&self, event: &Event<'_>) {
+        if self.sender.readers_joined().is_some() {
+            self.send(event);
         }
     }
 
-    fn tell_sample(
+    fn send_sample(
         &mut self,
         every: NonZeroU32,
         sample: &TickRecord,
@@ -171,7 +171,7 @@ impl Watcher {
             return;
         }
         self.samples = 0;
-        self.tell(&Event::Sample {
+        self.send(&Event::Sample {
             hip_mm: record.hip_mm,
             proxy_mm: record.proxy_mm,
             force_n: record.force_n,
@@ -181,16 +181,16 @@ impl Watcher {
         });
     }
 
-    fn tell(&self, event: &Event<'_>) {
+    fn send(&self, event: &Event<'_>) {
         let at = Some(self.at);
         self.sender.offer(Line { event, at }.text());
     }
 
-    fn tell_contact(&mut self, record: &Record, (view, terrain): (usize, &Terrain<'_>)) {
-        let before = self.before.filter(|(of, _)| *of == view);
-        let speed = before.and_then(|(_, before)| speed_into(&before, record));
-        self.told_place(record);
-        self.tell(&Event::Contact {
+    fn send_contact(&mut self, record: &Record, (view, terrain): (usize, &Terrain<'_>)) {
+        let previous = self.previous.filter(|(of, _)| *of == view);
+        let speed = previous.and_then(|(_, previous)| speed_into(&previous, record));
+        self.mark_place_sent(record);
+        self.send(&Event::Contact {
             touching: record.contact,
             speed_mm_s: speed.filter(|_| record.contact),
             force_n: record.force_n,
@@ -198,20 +198,20 @@ impl Watcher {
         });
     }
 
-    fn told_place(&mut self, record: &Record) {
+    fn mark_place_sent(&mut self, record: &Record) {
         self.reported.proxy_mm = Some(record.proxy_mm);
-        self.reported.place_due_s = record.t_s + PLACE_EVERY_S;
+        self.reported.place_due_s = record.t_s + PLACE_INTERVAL_S;
     }
 
-    fn tell_place(&mut self, record: &Record, terrain: &Terrain<'_>) {
+    fn send_place(&mut self, record: &Record, terrain: &Terrain<'_>) {
         let moved = self.reported.proxy_mm != Some(record.proxy_mm);
         if moved && record.t_s >= self.reported.place_due_s {
-            self.told_place(record);
-            self.tell(&Event::Place(place_of(record, terrain)));
+            self.mark_place_sent(record);
+            self.send(&Event::Place(place_of(record, terrain)));
         }
     }
 
-    fn tell_material(&mut self, record: &Record, terrain: &Terrain<'_>, at_once: bool) {
+    fn send_material(&mut self, record: &Record, terrain: &Terrain<'_>, at_once: bool) {
         let Some(materials) = terrain.grid().materials() else {
             return;
         };
@@ -223,12 +223,12 @@ impl Watcher {
             // The material is reported once it is known.
             return;
         };
-        self.reported.material_due_s = record.t_s + MATERIAL_EVERY_S;
+        self.reported.material_due_s = record.t_s + MATERIAL_INTERVAL_S;
         let class = usize::from(index).checked_sub(1);
-        let class = class.and_then(|at| materials.looks().class.get(at));
+        let class = class.and_then(|at| materials.class_materials().class.get(at));
         let number = class.map(|class| class.class);
         if self.reported.class.replace(number) != Some(number) {
-            self.tell(&Event::Material {
+            self.send(&Event::Material {
                 class: number,
                 name: class.and_then(|class| class.name.as_deref()),
             });
@@ -275,9 +275,9 @@ fn place_of(record: &Record, terrain: &Terrain<'_>) -> Place {
 
 /// Returns the speed of the HIP into the surface, mm/s, along the direction from proxy to HIP;
 /// `None` if the samples are too far apart.
-fn speed_into(before: &Record, now: &Record) -> Option<f64> {
-    let dt_s = now.t_s - before.t_s;
-    if !(dt_s > 0.0 && dt_s <= SPEED_WITHIN_S) {
+fn speed_into(previous: &Record, now: &Record) -> Option<f64> {
+    let dt_s = now.t_s - previous.t_s;
+    if !(dt_s > 0.0 && dt_s <= MAX_SPEED_INTERVAL_S) {
         return None;
     }
     let along = |axis: usize| now.hip_mm[axis] - now.proxy_mm[axis];
@@ -285,7 +285,7 @@ fn speed_into(before: &Record, now: &Record) -> Option<f64> {
     if depth_mm == 0.0 {
         return None;
     }
-    let moved = |axis: usize| now.hip_mm[axis] - before.hip_mm[axis];
+    let moved = |axis: usize| now.hip_mm[axis] - previous.hip_mm[axis];
     let into: f64 = (0..3).map(|axis| moved(axis) * along(axis)).sum();
     Some(into / depth_mm / dt_s)
 }
@@ -294,7 +294,7 @@ fn speed_into(before: &Record, now: &Record) -> Option<f64> {
 mod tests {
     use super::super::Server;
     use super::*;
-    use crate::materials::{ClassMaterial, Looks, Materials};
+    use crate::materials::{ClassMaterial, ClassMaterials, Materials};
     use crate::terrain::in_file::in_file;
     use crate::terrain::{HapticCells, HapticGrid, Scale};
     use crate::timeouts::wait_until;
@@ -316,11 +316,12 @@ mod tests {
             name: None,
             material: default,
         };
-        let looks = Looks {
+        let class_materials = ClassMaterials {
             default,
             class: vec![class],
         };
-        let materials = Materials::over(("t", &raster), ("c", classes), looks).expect("overlap");
+        let materials =
+            Materials::over(("t", &raster), ("c", classes), class_materials).expect("overlap");
         let grid = HapticGrid::new(&raster, HapticCells::Stored).with_materials(Some(&materials));
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::over(grid, scale, 0)
@@ -335,13 +336,13 @@ mod tests {
         };
         let server = Server::listen(0).expect("listens");
         let mut watcher = Watcher::new(server.sender(), 1);
-        watcher.tell_material(&record, &terrain, true);
+        watcher.send_material(&record, &terrain, true);
         assert_eq!(
             watcher.reported.class, None,
             "neither waited nor the default"
         );
         wait_until("the class", || {
-            watcher.tell_material(&record, &terrain, true);
+            watcher.send_material(&record, &terrain, true);
             watcher.reported.class.is_some()
         });
         assert_eq!(watcher.reported.class, Some(Some(7)));
@@ -354,7 +355,7 @@ mod tests {
         watcher.arming(vec!["press Enter".into()], Some(7));
         let reader = TcpStream::connect(server.address()).expect("connected");
         wait_until("the reader is seen", || {
-            watcher.sender.readers_so_far().is_some()
+            watcher.sender.readers_joined().is_some()
         });
         for asks in [Some(7), Some(7), None] {
             watcher.arming(vec![], asks);

@@ -23,29 +23,32 @@ pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
 
 /// Reason why no board on USB is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotOne {
+pub enum SelectionError {
     /// No board matches.
     None,
     /// Several boards match.
     Several,
 }
 
-/// Returns the index of the board with the serial number `wanted`, or of the only board. It never
+/// Returns the index of the board with the serial number `requested`, or of the only board. It never
 /// chooses between two boards, because each has an arm.
 ///
 /// # Errors
-/// [`NotOne`].
-pub fn the_one(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize, NotOne> {
-    let fits = |serial: &Option<String>| match (serial, wanted) {
+/// [`SelectionError`].
+pub fn select(
+    serials: &[Option<String>],
+    requested: Option<&str>,
+) -> Result<usize, SelectionError> {
+    let fits = |serial: &Option<String>| match (serial, requested) {
         (_, None) => true,
-        (Some(serial), Some(wanted)) => serial.eq_ignore_ascii_case(wanted),
+        (Some(serial), Some(requested)) => serial.eq_ignore_ascii_case(requested),
         (None, Some(_)) => false,
     };
     let mut fitting = (0..serials.len()).filter(|i| fits(&serials[*i]));
     match (fitting.next(), fitting.next()) {
         (Some(only), None) => Ok(only),
-        (None, _) => Err(NotOne::None),
-        (Some(_), Some(_)) => Err(NotOne::Several),
+        (None, _) => Err(SelectionError::None),
+        (Some(_), Some(_)) => Err(SelectionError::Several),
     }
 }
 
@@ -148,20 +151,26 @@ mod tests {
     #[test]
     fn selection_among_several_boards_needs_a_unique_serial() {
         let serials = ["0039001A", "0039001B"].map(|serial| Some(serial.to_owned()));
-        assert_eq!(the_one(&serials, None), Err(NotOne::Several));
-        assert_eq!(the_one(&serials, Some("0039001b")), Ok(1));
-        assert_eq!(the_one(&serials, Some("0039001")), Err(NotOne::None));
-        assert_eq!(the_one(&serials[..1], None), Ok(0));
-        assert_eq!(the_one(&serials[..1], Some("0039001B")), Err(NotOne::None));
-        assert_eq!(the_one(&[None], None), Ok(0));
-        assert_eq!(the_one(&[None], Some("")), Err(NotOne::None));
-        assert_eq!(the_one(&[], None), Err(NotOne::None));
+        assert_eq!(select(&serials, None), Err(SelectionError::Several));
+        assert_eq!(select(&serials, Some("0039001b")), Ok(1));
+        assert_eq!(select(&serials, Some("0039001")), Err(SelectionError::None));
+        assert_eq!(select(&serials[..1], None), Ok(0));
+        assert_eq!(
+            select(&serials[..1], Some("0039001B")),
+            Err(SelectionError::None)
+        );
+        assert_eq!(select(&[None], None), Ok(0));
+        assert_eq!(select(&[None], Some("")), Err(SelectionError::None));
+        assert_eq!(select(&[], None), Err(SelectionError::None));
         let twins = [&serials[0], &serials[0]].map(Clone::clone);
-        assert_eq!(the_one(&twins, Some("0039001A")), Err(NotOne::Several));
+        assert_eq!(
+            select(&twins, Some("0039001A")),
+            Err(SelectionError::Several)
+        );
     }
 
     #[test]
-    fn a_serial_number_reaches_no_terminal_raw() {
+    fn serial_number_is_sanitised_for_the_terminal() {
         assert_eq!(printable("00\u{1b}[2J3A\r\n"), "00[2J3A");
         assert_eq!(printable(&"F".repeat(500)).len(), 64);
     }

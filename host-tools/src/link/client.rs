@@ -49,11 +49,11 @@ pub enum Event<'e> {
     Guard(&'e Report),
     /// A scene change ([`Client::put_view`]) is in force, or failed: the device refused it, did not
     /// answer, or was restarted meanwhile.
-    Viewed {
+    SceneChangeResult {
         /// The scene change.
         view: &'e SceneChange,
         /// True if it is in force.
-        taken: bool,
+        accepted: bool,
     },
     /// The answer to a status query.
     Status(&'e Status),
@@ -93,30 +93,30 @@ impl Arming {
 
 /// Samples after which the host sends a sign of life: half a second of a device whose time runs
 /// faster than the host's.
-const SAMPLES_A_SIGN: u32 = 500;
+const HEARTBEAT_SAMPLES: u32 = 500;
 /// Max bytes sent for each reception; the last tile may exceed them. A device has at most four
 /// requests pending, of 4.5 KiB each, and repeats requests that were not answered.
-const SAID_AT_ONCE: usize = 32 * 1024;
+const MAX_BYTES_AT_ONCE: usize = 32 * 1024;
 /// Max tiles withheld, or sent for one reception.
-const WITHHELD: usize = 16;
+const MAX_WITHHELD: usize = 16;
 /// Time for which the client waits for a tile from another source and sends it on arrival: after
 /// that, a device repeats its request if it still needs the tile ([`hapterra_core::terrain`]).
-const AWAITED_FOR: Duration = Duration::from_secs(1);
+const AWAIT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Max tiles awaited at once.
-const AWAITED: usize = 64;
+const MAX_AWAITED: usize = 64;
 /// Time between two log lines about requests for tiles that do not exist.
-const LOG_EVERY: Duration = Duration::from_secs(1);
+const LOG_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Serves one terrain to one device. [`Client::receive`] processes bytes from the device; it and
-/// [`Client::due`], which must be called regularly, append bytes for the device. `now` is the time
+/// [`Client::append_due`], which must be called regularly, append bytes for the device. `now` is the time
 /// since any fixed moment.
 pub struct Client<'t> {
-    terrain: Lent<'t>,
+    terrain: ServedTerrain<'t>,
     /// The terrain of a scene change that is not in force yet.
     next: Option<(SceneChange, Terrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
-    talk: HostProtocol,
+    protocol: HostProtocol,
     reader: Box<FrameReader<MAX_FRAME>>,
     tile: TileBuffer,
     materials: MaterialBuffer,
@@ -139,23 +139,23 @@ pub struct Client<'t> {
     /// The pending point of a replay, and the time at which it was sent.
     point: Option<(HipCommand, Duration)>,
     stats: LinkStats,
-    samples_since_sign: u32,
-    logged: Option<Duration>,
+    samples_since_heartbeat: u32,
+    logged_at: Option<Duration>,
 }
 
 /// The served terrain: the borrowed one, or the one of a scene change.
-enum Lent<'t> {
-    Whole(&'t Terrain<'t>),
-    SceneChange(Box<Terrain<'t>>),
+enum ServedTerrain<'t> {
+    Borrowed(&'t Terrain<'t>),
+    Changed(Box<Terrain<'t>>),
 }
 
-impl<'t> Deref for Lent<'t> {
+impl<'t> Deref for ServedTerrain<'t> {
     type Target = Terrain<'t>;
 
     fn deref(&self) -> &Terrain<'t> {
         match self {
-            Self::Whole(terrain) => terrain,
-            Self::SceneChange(terrain) => terrain,
+            Self::Borrowed(terrain) => terrain,
+            Self::Changed(terrain) => terrain,
         }
     }
 }
@@ -183,11 +183,11 @@ impl<'t> Client<'t> {
         seed: u64,
     ) -> Self {
         Self {
-            terrain: Lent::Whole(terrain),
+            terrain: ServedTerrain::Borrowed(terrain),
             next: None,
             scene,
             arming,
-            talk: HostProtocol::new(Some(scene), timeouts, fastrand::Rng::with_seed(seed))
+            protocol: HostProtocol::new(Some(scene), timeouts, fastrand::Rng::with_seed(seed))
                 .with_materials(terrain.grid().materials().map(Materials::table)),
             reader: Box::default(),
             tile: TileBuffer::default(),
@@ -202,8 +202,8 @@ impl<'t> Client<'t> {
             zeroing: false,
             point: None,
             stats: LinkStats::default(),
-            samples_since_sign: 0,
-            logged: None,
+            samples_since_heartbeat: 0,
+            logged_at: None,
         }
     }
 
@@ -222,19 +222,19 @@ impl<'t> Client<'t> {
     /// Returns the state of the conversation.
     #[must_use]
     pub const fn state(&self) -> State {
-        self.talk.state()
+        self.protocol.state()
     }
 
     /// Returns the number of the present or next session.
     #[must_use]
     pub const fn session(&self) -> SessionNumber {
-        self.talk.session()
+        self.protocol.session()
     }
 
     /// Returns the time-outs.
     #[must_use]
     pub const fn timeouts(&self) -> &Timeouts {
-        self.talk.timeouts()
+        self.protocol.timeouts()
     }
 
     /// Begins a session, the first or another: appends the open message to `out`.
@@ -245,24 +245,24 @@ impl<'t> Client<'t> {
         self.awaited.clear();
         self.prefetch.forget();
         self.zeroing = false;
-        if self.talk.greet(now, out) {
-            self.stats.drawn();
+        if self.protocol.greet(now, out) {
+            self.stats.begin_session();
         }
     }
 
     /// Ends the session: appends the close message to `out`. The device has confirmed that it is
     /// disarmed when the state is [`State::Closed`].
     pub fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
-        self.talk.leave(now, out);
+        self.protocol.leave(now, out);
     }
 
     /// Adds a request after the earlier ones.
-    pub fn ask(&mut self, ask: HostRequest) {
-        self.talk.ask(ask);
+    pub fn enqueue(&mut self, request: HostRequest) {
+        self.protocol.enqueue(request);
     }
 
     /// Puts a scene change in force, with its terrain: repeats it until it is answered
-    /// ([`Event::Viewed`]). The clutch has to be open ([`Request::Clutch`]). Meanwhile the tiles
+    /// ([`Event::SceneChangeResult`]). The clutch has to be open ([`Request::Clutch`]). Meanwhile the tiles
     /// around the new HIP position are read.
     pub fn put_view(
         &mut self,
@@ -271,33 +271,36 @@ impl<'t> Client<'t> {
         terrain: Terrain<'t>,
         out: &mut Vec<u8>,
     ) {
-        prefetch::read_around(&terrain, &view.hip);
+        prefetch::prefetch_around(&terrain, &view.hip);
         self.next = Some((view, terrain));
-        self.talk.put_view(view, now, out);
+        self.protocol.put_view(view, now, out);
     }
 
     /// Ends the pending scene change if the protocol reports that it is in force, or if it has
     /// failed (`over`), and reports the result.
-    fn settle_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
-        let epoch = self.talk.scene().map(|scene| scene.epoch);
-        let taken = |view: &SceneChange| epoch == Some(view.scene.epoch);
-        let settled = self.next.take_if(|(view, _)| over || taken(view));
+    fn resolve_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
+        let epoch = self.protocol.scene().map(|scene| scene.epoch);
+        let accepted = |view: &SceneChange| epoch == Some(view.scene.epoch);
+        let settled = self.next.take_if(|(view, _)| over || accepted(view));
         if let Some((view, terrain)) = settled {
-            let taken = taken(&view);
-            if taken {
+            let accepted = accepted(&view);
+            if accepted {
                 self.scene = view.scene;
                 self.awaited.clear();
                 self.prefetch.forget();
-                self.terrain = Lent::SceneChange(Box::new(terrain));
+                self.terrain = ServedTerrain::Changed(Box::new(terrain));
             }
-            on(Event::Viewed { view: &view, taken });
+            on(Event::SceneChangeResult {
+                view: &view,
+                accepted,
+            });
         }
     }
 
     /// Renders a point: sends it until it is answered.
     pub fn step(&mut self, now: Duration, point: HipCommand, out: &mut Vec<u8>) {
         self.point = Some((point, now));
-        self.talk.say(&ToDevice::Hip(point), out);
+        self.protocol.append_message(&ToDevice::Hip(point), out);
     }
 
     /// Appends the messages that are due to `out`.
@@ -305,40 +308,40 @@ impl<'t> Client<'t> {
     /// # Errors
     /// When a deadline has passed: [`LinkError::Silent`], [`LinkError::Taken`],
     /// [`LinkError::NotConfirmed`].
-    pub fn due(
+    pub fn append_due(
         &mut self,
         now: Duration,
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<(), LinkError> {
-        if self.samples_since_sign >= SAMPLES_A_SIGN {
-            self.samples_since_sign = 0;
-            self.talk.hasten_alive();
+        if self.samples_since_heartbeat >= HEARTBEAT_SAMPLES {
+            self.samples_since_heartbeat = 0;
+            self.protocol.make_heartbeat_due();
         }
-        let checked = self.talk.due(now, out);
-        if self.talk.take_lost_view(now).is_some() {
-            self.settle_view(true, on);
+        let checked = self.protocol.append_due(now, out);
+        if self.protocol.take_unanswered_view(now).is_some() {
+            self.resolve_view(true, on);
         }
         self.repeat_point(now, out);
-        for ask in self.talk.take_unanswered() {
+        for request in self.protocol.take_unanswered() {
             self.stats.unanswered += 1;
-            if matches!(ask, HostRequest::Request(Request::Zero { .. })) {
-                self.hand_over_withheld(out, on);
+            if matches!(request, HostRequest::Request(Request::Zero { .. })) {
+                self.send_withheld(out, on);
             }
-            on(Event::Unanswered(&ask));
+            on(Event::Unanswered(&request));
         }
         checked
     }
 
     fn repeat_point(&mut self, now: Duration, out: &mut Vec<u8>) {
-        let again = self.talk.timeouts().again;
+        let again = self.protocol.timeouts().retry;
         let is_open = self.state() == State::Open;
-        if let Some((point, stated)) = &mut self.point
+        if let Some((point, sent_at)) = &mut self.point
             && is_open
-            && now.saturating_sub(*stated) >= again
+            && now.saturating_sub(*sent_at) >= again
         {
-            *stated = now;
-            self.talk.say(&ToDevice::Hip(*point), out);
+            *sent_at = now;
+            self.protocol.append_message(&ToDevice::Hip(*point), out);
         }
     }
 
@@ -347,7 +350,7 @@ impl<'t> Client<'t> {
     ///
     /// # Errors
     /// [`LinkError::Version`] and [`LinkError::SceneRefused`]; [`LinkError::Taken`] and
-    /// [`LinkError::LetGo`] if the device reports that the session is over.
+    /// [`LinkError::HostSilent`] if the device reports that the session is over.
     pub fn receive(
         &mut self,
         now: Duration,
@@ -358,12 +361,12 @@ impl<'t> Client<'t> {
         self.sent.clear();
         while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
             match frame {
-                Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
+                Ok(FromDevice::Version(check)) => self.protocol.on_version_check(check)?,
                 Ok(FromDevice::Message(message)) => {
-                    if message.session != self.talk.session() {
+                    if message.session != self.protocol.session() {
                         self.stats.foreign_frames += 1;
                     }
-                    if let Some(event) = self.talk.hear(now, message, out)? {
+                    if let Some(event) = self.protocol.on_frame(now, message, out)? {
                         self.on_protocol_event(now, event, out, on);
                     }
                 }
@@ -373,7 +376,7 @@ impl<'t> Client<'t> {
                 }
             }
         }
-        self.say_awaited(now, out, on);
+        self.send_awaited(now, out, on);
         Ok(())
     }
 
@@ -385,23 +388,25 @@ impl<'t> Client<'t> {
         on: &mut dyn FnMut(Event<'_>),
     ) {
         match event {
-            ProtocolEvent::Greeted { device, restarted } => {
-                self.on_greeted(device, restarted);
-                self.settle_view(true, on);
+            ProtocolEvent::HelloReceived { device, restarted } => {
+                self.on_hello(device, restarted);
+                self.resolve_view(true, on);
             }
-            ProtocolEvent::SceneChange => self.settle_view(true, on),
-            ProtocolEvent::SceneAck => self.on_scene_taken(now, out, on),
-            ProtocolEvent::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
+            ProtocolEvent::SceneChange => self.resolve_view(true, on),
+            ProtocolEvent::SceneAck => self.on_scene_ack(now, out, on),
+            ProtocolEvent::Answered(request, message) => {
+                self.on_answered(now, request, &message, out, on)
+            }
             ProtocolEvent::Other(message) => self.on_message(now, message, out, on),
         }
     }
 
-    fn on_greeted(&mut self, device: DeviceHello, restarted: bool) {
+    fn on_hello(&mut self, device: DeviceHello, restarted: bool) {
         if restarted {
             self.is_new = true;
             self.withheld.clear();
             self.zeroing = false;
-            self.stats.restarted();
+            self.stats.on_restarted();
         } else {
             // After a restart, only the session's last part is known.
             let LastSession {
@@ -410,14 +415,14 @@ impl<'t> Client<'t> {
                 count,
                 ..
             } = device.last;
-            let ours = self.talk.previous();
+            let ours = self.protocol.previous();
             let whole = ours.is_some_and(|ours| (ours.0.get(), ours.1) == (session, opened_by));
-            self.stats.opened(whole.then_some(count));
+            self.stats.on_opened(whole.then_some(count));
         }
         self.device = Some(device);
     }
 
-    fn on_scene_taken(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
+    fn on_scene_ack(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
         if !std::mem::take(&mut self.is_new) {
             return;
         }
@@ -427,11 +432,11 @@ impl<'t> Client<'t> {
         if let Some(Arming { zero }) = self.arming.filter(|a| !again || a.zero.is_some()) {
             if let Some(counts) = zero {
                 self.zeroing = true;
-                self.talk
-                    .ask(HostRequest::Request(Request::Zero { counts }));
+                self.protocol
+                    .enqueue(HostRequest::Request(Request::Zero { counts }));
             }
-            self.talk.ask(HostRequest::Request(Request::Arm));
-            self.talk.say_pending(now, out);
+            self.protocol.enqueue(HostRequest::Request(Request::Arm));
+            self.protocol.append_pending(now, out);
         }
         if let Some(device) = &self.device {
             let resumed = device.epoch == Some(self.scene.epoch);
@@ -442,17 +447,17 @@ impl<'t> Client<'t> {
     fn on_answered(
         &mut self,
         now: Duration,
-        ask: HostRequest,
+        request: HostRequest,
         message: &ToHost,
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
         // Send the next request at once.
-        self.talk.say_pending(now, out);
-        if matches!(ask, HostRequest::Request(Request::Zero { .. })) {
-            self.hand_over_withheld(out, on);
+        self.protocol.append_pending(now, out);
+        if matches!(request, HostRequest::Request(Request::Zero { .. })) {
+            self.send_withheld(out, on);
         }
-        match (ask, message) {
+        match (request, message) {
             (HostRequest::Request(request), ToHost::Answer(answer)) => on(Event::Answered {
                 request: &request,
                 result: answer.result,
@@ -481,17 +486,17 @@ impl<'t> Client<'t> {
                     true => &mut self.withheld,
                     false => &mut self.sent,
                 };
-                let has_room = out.len() < SAID_AT_ONCE && known.len() < WITHHELD;
+                let has_room = out.len() < MAX_BYTES_AT_ONCE && known.len() < MAX_WITHHELD;
                 if has_room && !known.contains(&key) {
                     known.push(key);
                     if !self.zeroing {
-                        self.on_need(now, key, out, on);
+                        self.on_tile_request(now, key, out, on);
                     }
                 }
             }
             ToHost::Telemetry(telemetry) => {
                 let samples = telemetry.samples.len() as u32;
-                self.samples_since_sign = self.samples_since_sign.saturating_add(samples);
+                self.samples_since_heartbeat = self.samples_since_heartbeat.saturating_add(samples);
                 // Until the scene is accepted, the samples belong to another scene or to none.
                 if self.stats.received(&telemetry) && !self.is_new {
                     if let (Some(device), Some(last)) = (&self.device, telemetry.samples.last()) {
@@ -511,23 +516,23 @@ impl<'t> Client<'t> {
             }
             ToHost::Guard(report) => on(Event::Guard(&report)),
             ToHost::Heartbeat { count, report, .. } => {
-                self.stats.reported(count);
+                self.stats.set_reported(count);
                 on(Event::Guard(&report));
             }
-            ToHost::Goodbye(count) => self.stats.reported(count),
+            ToHost::Goodbye(count) => self.stats.set_reported(count),
             // A repeated message, or one about a scene that is not served any more.
             _ => {}
         }
     }
 
-    fn hand_over_withheld(&mut self, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
+    fn send_withheld(&mut self, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
         self.zeroing = false;
         for key in std::mem::take(&mut self.withheld) {
-            self.on_need(Duration::ZERO, key, out, on);
+            self.on_tile_request(Duration::ZERO, key, out, on);
         }
     }
 
-    fn on_need(
+    fn on_tile_request(
         &mut self,
         now: Duration,
         key: TileKey,
@@ -544,7 +549,7 @@ impl<'t> Client<'t> {
         };
         let of_materials = materials.as_ref().map(|(_, status)| *status);
         if !status.and(of_materials.unwrap_or_default()).is_complete() {
-            return self.wait_for(now, key);
+            return self.await_tile(now, key);
         }
         let tile = TileMessage {
             epoch: self.scene.epoch,
@@ -556,7 +561,7 @@ impl<'t> Client<'t> {
             None => ToDevice::Tile(tile),
         };
         let before = out.len();
-        self.talk.say(&message, out);
+        self.protocol.append_message(&message, out);
         let bytes = out.len() - before;
         if key.level != self.scene.level {
             // Each placement has its own fallback, but all have the same key.
@@ -567,21 +572,21 @@ impl<'t> Client<'t> {
     }
 
     /// Registers a tile to be sent when its heights arrive.
-    fn wait_for(&mut self, asked: Duration, key: TileKey) {
+    fn await_tile(&mut self, requested_at: Duration, key: TileKey) {
         self.awaited.retain(|(other, _)| *other != key);
-        if self.awaited.len() < AWAITED {
-            self.awaited.push((key, asked));
+        if self.awaited.len() < MAX_AWAITED {
+            self.awaited.push((key, requested_at));
         }
     }
 
     /// Sends the awaited tiles whose heights have arrived.
-    fn say_awaited(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
-        for (key, asked) in std::mem::take(&mut self.awaited) {
-            let is_wanted = now.saturating_sub(asked) <= AWAITED_FOR;
-            if is_wanted && out.len() < SAID_AT_ONCE {
-                self.on_need(asked, key, out, on);
-            } else if is_wanted {
-                self.wait_for(asked, key);
+    fn send_awaited(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
+        for (key, requested_at) in std::mem::take(&mut self.awaited) {
+            let is_fresh = now.saturating_sub(requested_at) <= AWAIT_TIMEOUT;
+            if is_fresh && out.len() < MAX_BYTES_AT_ONCE {
+                self.on_tile_request(requested_at, key, out, on);
+            } else if is_fresh {
+                self.await_tile(requested_at, key);
             }
         }
     }
@@ -590,9 +595,9 @@ impl<'t> Client<'t> {
     /// repeat such requests at any rate.
     fn on_no_tile(&mut self, now: Duration, key: TileKey) {
         self.stats.no_tiles += 1;
-        let due = |at: Duration| now.saturating_sub(at) >= LOG_EVERY;
-        if self.logged.is_none_or(due) {
-            self.logged = Some(now);
+        let due = |at: Duration| now.saturating_sub(at) >= LOG_INTERVAL;
+        if self.logged_at.is_none_or(due) {
+            self.logged_at = Some(now);
             let so_far = self.stats.no_tiles;
             tracing::warn!(
                 ?key,

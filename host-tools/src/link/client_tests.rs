@@ -65,32 +65,32 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
 }
 
 impl Bench<'_> {
-    fn hear_in(&mut self, session: SessionNumber, message: &ToHost) -> Result<(), LinkError> {
+    fn deliver_in(&mut self, session: SessionNumber, message: &ToHost) -> Result<(), LinkError> {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
         let (opened, reported, viewed) = (&mut self.opened, &mut self.reported, &mut self.viewed);
         let mut on = |event: Event<'_>| match event {
             Event::Opened { .. } => *opened += 1,
             Event::Calibration(calibration) => reported.push(calibration.copied()),
-            Event::Viewed { view, taken } => viewed.push((view.number, taken)),
+            Event::SceneChangeResult { view, accepted } => viewed.push((view.number, accepted)),
             _ => {}
         };
         self.client.receive(self.now, bytes, &mut self.out, &mut on)
     }
 
-    fn hear(&mut self, message: &ToHost) {
+    fn deliver(&mut self, message: &ToHost) {
         let session = self.client.session();
-        self.hear_in(session, message).expect("understood");
+        self.deliver_in(session, message).expect("understood");
     }
 
-    fn taken(&self) -> ToHost {
+    fn scene_ack(&self) -> ToHost {
         ToHost::SceneAck {
             epoch: self.client.scene().epoch,
             accepted: true,
         }
     }
 
-    fn alive(&self) -> ToHost {
+    fn heartbeat(&self) -> ToHost {
         ToHost::Heartbeat {
             count: SampleCount::default(),
             epoch: Some(self.client.scene().epoch),
@@ -99,8 +99,8 @@ impl Bench<'_> {
     }
 
     fn open(&mut self) {
-        self.hear(&ToHost::Hello(hello()));
-        self.hear(&self.taken());
+        self.deliver(&ToHost::Hello(hello()));
+        self.deliver(&self.scene_ack());
         assert_eq!(self.client.state(), State::Open);
     }
 
@@ -122,26 +122,27 @@ impl Bench<'_> {
     }
 
     /// Lets time pass; messages stay in `out` meanwhile.
-    fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
+    fn advance(&mut self, time: Duration) -> Result<(), LinkError> {
         let end = self.now + time;
         while self.now < end {
             self.now += ms(10);
             let (unanswered, viewed) = (&mut self.unanswered, &mut self.viewed);
-            let mut keep = |event: Event<'_>| match event {
-                Event::Unanswered(ask) => unanswered.push(*ask),
-                Event::Viewed { view, taken } => viewed.push((view.number, taken)),
+            let mut record = |event: Event<'_>| match event {
+                Event::Unanswered(request) => unanswered.push(*request),
+                Event::SceneChangeResult { view, accepted } => viewed.push((view.number, accepted)),
                 _ => {}
             };
-            self.client.due(self.now, &mut self.out, &mut keep)?;
+            self.client
+                .append_due(self.now, &mut self.out, &mut record)?;
         }
         Ok(())
     }
 
     /// Returns the lines since the last call.
-    fn stated(&mut self) -> Vec<String> {
+    fn drain_sent(&mut self) -> Vec<String> {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let out = std::mem::take(&mut self.out);
-        let (mut bytes, mut stated) = (out.as_slice(), vec![]);
+        let (mut bytes, mut sent) = (out.as_slice(), vec![]);
         let read = |content: &[u8]| {
             if VersionCheck::is_in(content) {
                 return Ok("Version".to_owned());
@@ -159,23 +160,23 @@ impl Bench<'_> {
             })
         };
         while let Some(Ok(name)) = next_frame(&mut reader, &mut bytes, read) {
-            stated.push(name);
+            sent.push(name);
         }
-        stated
+        sent
     }
 }
 
-fn count_of(stated: &[String], what: &str) -> usize {
-    stated.iter().filter(|name| *name == what).count()
+fn count_of(sent: &[String], what: &str) -> usize {
+    sent.iter().filter(|name| *name == what).count()
 }
 
 #[test]
 fn repeated_device_messages_open_one_session() {
     on_bench(None, |bench| {
         let hello = ToHost::Hello(hello());
-        let taken = bench.taken();
-        for message in [&taken, &hello, &hello, &taken, &taken, &hello] {
-            bench.hear(message);
+        let ack = bench.scene_ack();
+        for message in [&ack, &hello, &hello, &ack, &ack, &hello] {
+            bench.deliver(message);
         }
         assert_eq!((bench.opened, bench.client.stats().sessions), (1, 1));
         assert_eq!(bench.client.state(), State::Open);
@@ -183,26 +184,26 @@ fn repeated_device_messages_open_one_session() {
 }
 
 #[test]
-fn hello_is_repeated_whatever_else_arrives_and_then_given_up() {
+fn hello_is_repeated_despite_noise_until_it_times_out() {
     on_bench(None, |bench| {
         let foreign = SessionNumber::new(7);
         let mut noise = 0;
         let error = loop {
-            let _ = bench.hear_in(foreign, &ToHost::Telemetry(Default::default()));
+            let _ = bench.deliver_in(foreign, &ToHost::Telemetry(Default::default()));
             let mut none = |_: Event<'_>| {};
             let _ = bench
                 .client
                 .receive(bench.now, &[5, 0, 9], &mut bench.out, &mut none);
             noise += 1;
-            if let Err(error) = bench.pass(ms(50)) {
+            if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
             assert!(noise < 200, "for ever");
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
-        let stated = bench.stated();
+        let sent = bench.drain_sent();
         assert_eq!(
-            (count_of(&stated, "Hello"), count_of(&stated, "Version")),
+            (count_of(&sent, "Hello"), count_of(&sent, "Version")),
             (10, 10)
         );
     });
@@ -211,33 +212,33 @@ fn hello_is_repeated_whatever_else_arrives_and_then_given_up() {
 #[test]
 fn scene_without_ack_times_out_after_ten_attempts() {
     on_bench(None, |bench| {
-        bench.hear(&ToHost::Hello(hello()));
+        bench.deliver(&ToHost::Hello(hello()));
         let error = loop {
-            bench.hear(&ToHost::Telemetry(Default::default()));
-            if let Err(error) = bench.pass(ms(50)) {
+            bench.deliver(&ToHost::Telemetry(Default::default()));
+            if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
-        assert_eq!(count_of(&bench.stated(), "Scene"), 10);
+        assert_eq!(count_of(&bench.drain_sent(), "Scene"), 10);
     });
 }
 
 #[test]
-fn telemetry_alone_is_no_answer() {
+fn telemetry_does_not_count_as_answer() {
     on_bench(None, |bench| {
         bench.open();
-        bench.stated();
+        bench.drain_sent();
         let error = loop {
-            bench.hear(&ToHost::Telemetry(Default::default()));
-            if let Err(error) = bench.pass(ms(50)) {
+            bench.deliver(&ToHost::Telemetry(Default::default()));
+            if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
-        let stated = bench.stated();
-        assert_eq!(count_of(&stated, "Heartbeat"), 8);
-        assert_eq!(count_of(&stated, "Hello"), 9, "from 0.75 s on");
+        let sent = bench.drain_sent();
+        assert_eq!(count_of(&sent, "Heartbeat"), 8);
+        assert_eq!(count_of(&sent, "Hello"), 9, "from 0.75 s on");
     });
 }
 
@@ -246,33 +247,33 @@ fn unanswered_arm_is_retried_reported_and_then_disarmed() {
     on_bench(Some(Arming::default()), |bench| {
         bench.open();
         for _ in 0..80 {
-            bench.hear(&bench.alive());
-            bench.pass(ms(50)).expect("alive");
+            bench.deliver(&bench.heartbeat());
+            bench.advance(ms(50)).expect("alive");
         }
-        let stated = bench.stated();
-        assert_eq!(count_of(&stated, "1 Arm"), 10);
+        let sent = bench.drain_sent();
+        assert_eq!(count_of(&sent, "1 Arm"), 10);
         assert_eq!(bench.unanswered, [HostRequest::Request(Request::Arm)]);
         assert_eq!(bench.client.stats().unanswered, 1);
-        assert_eq!(count_of(&stated, "2 Disarm"), 1);
+        assert_eq!(count_of(&sent, "2 Disarm"), 1);
     });
 }
 
 #[test]
-fn an_answer_ends_the_repeating_and_brings_the_next_request() {
+fn answer_ends_repetition_and_sends_next_request() {
     on_bench(Some(Arming::VIRTUAL), |bench| {
         bench.open();
         assert_eq!(
-            bench.stated().last().map(|s| s.starts_with("1 Zero")),
+            bench.drain_sent().last().map(|s| s.starts_with("1 Zero")),
             Some(true)
         );
         for number in [7, 1, 1] {
             let result = Ok(());
-            bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
+            bench.deliver(&ToHost::Answer(hapterra_core::wire::request::Answer {
                 number,
                 result,
             }));
         }
-        assert_eq!(bench.stated(), ["2 Arm"]);
+        assert_eq!(bench.drain_sent(), ["2 Arm"]);
     });
 }
 
@@ -286,22 +287,22 @@ fn late_answer_to_an_earlier_query_is_ignored() {
         };
         let (old, new) = (Calibration::OMNI, Calibration::PREMIUM_3_0);
         for _ in 0..300 {
-            bench.stated();
-            bench.client.ask(HostRequest::Calibration);
-            bench.pass(ms(10)).expect("patient");
-            let stated = bench.stated();
-            let number = stated
+            bench.drain_sent();
+            bench.client.enqueue(HostRequest::Calibration);
+            bench.advance(ms(10)).expect("patient");
+            let sent = bench.drain_sent();
+            let number = sent
                 .iter()
-                .find_map(|stated| stated.strip_suffix(" GetCalibration"));
+                .find_map(|sent| sent.strip_suffix(" GetCalibration"));
             let number: u8 = number.expect("asked").parse().expect("a number");
             // Repeated after 0.4 s: the second answer is still in transit.
-            bench.hear(&reported(number, Some(old)));
-            bench.client.ask(HostRequest::Calibration);
-            bench.pass(ms(10)).expect("patient");
+            bench.deliver(&reported(number, Some(old)));
+            bench.client.enqueue(HostRequest::Calibration);
+            bench.advance(ms(10)).expect("patient");
             bench.reported.clear();
-            bench.hear(&reported(number, Some(old)));
+            bench.deliver(&reported(number, Some(old)));
             assert_eq!(bench.reported, [], "question {number}");
-            bench.hear(&reported(number.wrapping_add(1), Some(new)));
+            bench.deliver(&reported(number.wrapping_add(1), Some(new)));
             assert_eq!(bench.reported, [Some(new)], "question {number}");
         }
     });
@@ -311,21 +312,25 @@ fn late_answer_to_an_earlier_query_is_ignored() {
 fn repeated_query_keeps_its_number() {
     on_bench(None, |bench| {
         bench.open();
-        bench.stated();
-        bench.client.ask(HostRequest::Status);
-        bench.client.ask(HostRequest::Request(Request::Disarm));
+        bench.drain_sent();
+        bench.client.enqueue(HostRequest::Status);
+        bench.client.enqueue(HostRequest::Request(Request::Disarm));
         for _ in 0..40 {
-            bench.hear(&bench.alive());
-            bench.pass(ms(50)).expect("alive");
+            bench.deliver(&bench.heartbeat());
+            bench.advance(ms(50)).expect("alive");
         }
-        let stated = bench.stated();
-        assert_eq!(count_of(&stated, "1 Status"), 5);
-        bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
+        let sent = bench.drain_sent();
+        assert_eq!(count_of(&sent, "1 Status"), 5);
+        bench.deliver(&ToHost::Answer(hapterra_core::wire::request::Answer {
             number: 1,
             result: Ok(()),
         }));
-        bench.pass(ms(300)).expect("alive");
-        assert_eq!(count_of(&bench.stated(), "1 Status"), 1, "no answer to it");
+        bench.advance(ms(300)).expect("alive");
+        assert_eq!(
+            count_of(&bench.drain_sent(), "1 Status"),
+            1,
+            "no answer to it"
+        );
     });
 }
 
@@ -334,22 +339,22 @@ fn tile_requests_wait_for_the_answer_to_zero() {
     on_bench(Some(Arming::VIRTUAL), |bench| {
         bench.open();
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
-        bench.stated();
+        bench.drain_sent();
         for _ in 0..3 {
-            bench.hear(&ToHost::TileRequest { epoch, key });
+            bench.deliver(&ToHost::TileRequest { epoch, key });
         }
-        assert_eq!(bench.stated(), Vec::<String>::new());
+        assert_eq!(bench.drain_sent(), Vec::<String>::new());
         let (number, result) = (1, Ok(()));
-        bench.hear(&ToHost::Answer(hapterra_core::wire::request::Answer {
+        bench.deliver(&ToHost::Answer(hapterra_core::wire::request::Answer {
             number,
             result,
         }));
-        assert_eq!(bench.stated(), ["2 Arm", "Tile"]);
+        assert_eq!(bench.drain_sent(), ["2 Arm", "Tile"]);
     });
 }
 
 #[test]
-fn a_refusal_in_mid_session_or_of_the_own_protocol_is_noise() {
+fn late_or_same_protocol_version_refusal_is_ignored() {
     on_bench(None, |bench| {
         let refuse = |bench: &mut Bench<'_>, protocol| {
             let mut frame = [0; 16];
@@ -372,12 +377,12 @@ fn a_refusal_in_mid_session_or_of_the_own_protocol_is_noise() {
 }
 
 #[test]
-fn a_device_that_was_restarted_gets_its_scene_again() {
+fn restarted_device_gets_the_scene_again() {
     on_bench(None, |bench| {
         bench.open();
-        bench.pass(ms(800)).expect("patient");
+        bench.advance(ms(800)).expect("patient");
         assert_eq!(
-            count_of(&bench.stated(), "Hello"),
+            count_of(&bench.drain_sent(), "Hello"),
             2,
             "the first, and after silence"
         );
@@ -387,27 +392,27 @@ fn a_device_that_was_restarted_gets_its_scene_again() {
             ..hello()
         };
         // The late answer to the first open message reports an old state.
-        bench.hear(&ToHost::Hello(hello()));
+        bench.deliver(&ToHost::Hello(hello()));
         assert_eq!(bench.client.state(), State::Open);
-        bench.hear(&ToHost::Hello(again.clone()));
+        bench.deliver(&ToHost::Hello(again.clone()));
         assert_eq!(bench.client.state(), State::SceneSent);
-        bench.hear(&bench.taken());
-        bench.hear(&ToHost::Hello(again));
+        bench.deliver(&bench.scene_ack());
+        bench.deliver(&ToHost::Hello(again));
         assert_eq!((bench.opened, bench.client.state()), (2, State::Open));
         assert_eq!(bench.client.stats().uncertain, 1);
     });
 }
 
 #[test]
-fn another_host_is_noticed() {
+fn frames_of_another_host_end_the_session() {
     on_bench(None, |bench| {
         bench.open();
         let other = SessionNumber::new(7);
         let error = loop {
             bench
-                .hear_in(other, &ToHost::Telemetry(Default::default()))
+                .deliver_in(other, &ToHost::Telemetry(Default::default()))
                 .expect("passed over");
-            if let Err(error) = bench.pass(ms(50)) {
+            if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
         };
@@ -420,10 +425,10 @@ fn another_host_is_noticed() {
         for _ in 0..200 {
             let other = SessionNumber::new(7);
             bench
-                .hear_in(other, &ToHost::Telemetry(Default::default()))
+                .deliver_in(other, &ToHost::Telemetry(Default::default()))
                 .expect("passed over");
-            bench.hear(&bench.alive());
-            bench.pass(ms(50)).expect("it is ours");
+            bench.deliver(&bench.heartbeat());
+            bench.advance(ms(50)).expect("it is ours");
         }
     });
 }
@@ -435,7 +440,7 @@ const fn over(number: u8, end: SessionEnd) -> ToHost {
 
 #[test]
 fn session_closed_by_device_ends_client_with_its_reason() {
-    for (end, is_passing) in [
+    for (end, is_transient) in [
         (SessionEnd::Replaced, false),
         (SessionEnd::HostSilent, true),
     ] {
@@ -444,21 +449,21 @@ fn session_closed_by_device_ends_client_with_its_reason() {
             on_bench(None, |bench| {
                 let session = bench.client.session();
                 if steps > 0 {
-                    bench.hear(&ToHost::Hello(hello()));
+                    bench.deliver(&ToHost::Hello(hello()));
                 }
                 if steps > 1 {
-                    bench.hear(&bench.taken());
+                    bench.deliver(&bench.scene_ack());
                 }
                 if steps > 0 {
-                    bench.pass(ms(800)).expect("patient");
-                    assert!(count_of(&bench.stated(), "Hello") > 1);
+                    bench.advance(ms(800)).expect("patient");
+                    assert!(count_of(&bench.drain_sent(), "Hello") > 1);
                 }
                 let number = if steps > 0 { 2 } else { 1 };
-                let reported = bench.hear_in(session, &over(number, end));
+                let reported = bench.deliver_in(session, &over(number, end));
                 let error = reported.expect_err("over");
                 let is_taken = matches!(error, LinkError::Taken);
-                assert!(is_taken != is_passing, "{error}");
-                assert_eq!(error.is_passing(), is_passing, "{error}");
+                assert!(is_taken != is_transient, "{error}");
+                assert_eq!(error.is_transient(), is_transient, "{error}");
                 // The next session has another number.
                 bench.client.greet(bench.now, &mut bench.out);
                 assert_ne!(bench.client.session(), session);
@@ -468,35 +473,35 @@ fn session_closed_by_device_ends_client_with_its_reason() {
 }
 
 #[test]
-fn an_old_word_that_a_session_is_over_ends_no_other() {
+fn late_session_closed_message_ends_no_other_session() {
     let ends = [SessionEnd::Replaced, SessionEnd::HostSilent];
     on_bench(None, |bench| {
         let first = bench.client.session();
         bench.open();
         bench.client.greet(bench.now, &mut bench.out);
         let second = bench.client.session();
-        bench.hear(&ToHost::Hello(DeviceHello {
+        bench.deliver(&ToHost::Hello(DeviceHello {
             number: 2,
             ..hello()
         }));
-        bench.hear(&bench.taken());
+        bench.deliver(&bench.scene_ack());
         let other = SessionNumber::new(7);
         // For earlier sessions, for others, and in answer to an open message that was already
         // answered or replaced by a later one.
         for end in ends {
             for (session, number) in [(first, 1), (first, 2), (other, 2), (second, 1), (second, 2)]
             {
-                let received = bench.hear_in(session, &over(number, end));
+                let received = bench.deliver_in(session, &over(number, end));
                 received.expect("passed over");
             }
         }
         // The device has no other host, so it is silent.
         let error = loop {
             for session in [first, other] {
-                let received = bench.hear_in(session, &over(2, SessionEnd::Replaced));
+                let received = bench.deliver_in(session, &over(2, SessionEnd::Replaced));
                 received.expect("passed over");
             }
-            if let Err(error) = bench.pass(ms(50)) {
+            if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
         };
@@ -515,13 +520,13 @@ fn leaving_client_fails_only_if_session_was_replaced() {
     };
     leaving(|bench| {
         let session = bench.client.session();
-        let error = bench.hear_in(session, &over(2, SessionEnd::Replaced));
+        let error = bench.deliver_in(session, &over(2, SessionEnd::Replaced));
         assert!(matches!(error, Err(LinkError::Taken)), "{error:?}");
     });
     leaving(|bench| {
-        bench.hear(&over(2, SessionEnd::HostSilent));
+        bench.deliver(&over(2, SessionEnd::HostSilent));
         assert_eq!(bench.client.state(), State::Leaving);
-        bench.hear(&ToHost::Goodbye(SampleCount::default()));
+        bench.deliver(&ToHost::Goodbye(SampleCount::default()));
         assert_eq!(bench.client.state(), State::Closed);
     });
 }
@@ -530,17 +535,17 @@ fn leaving_client_fails_only_if_session_was_replaced() {
 fn close_request_is_retried_until_confirmed_or_times_out() {
     on_bench(None, |bench| {
         bench.open();
-        bench.stated();
+        bench.drain_sent();
         bench.client.leave(bench.now, &mut bench.out);
-        bench.pass(ms(1_000)).expect("patient");
-        assert_eq!(count_of(&bench.stated(), "Bye"), 3);
+        bench.advance(ms(1_000)).expect("patient");
+        assert_eq!(count_of(&bench.drain_sent(), "Bye"), 3);
         let count = SampleCount {
             sent: 9,
             dropped: 2,
         };
-        bench.hear(&ToHost::Goodbye(count));
+        bench.deliver(&ToHost::Goodbye(count));
         assert_eq!(bench.client.state(), State::Closed);
-        assert_eq!(bench.stated(), ["Close"]);
+        assert_eq!(bench.drain_sent(), ["Close"]);
         let stats = bench.client.stats();
         assert_eq!((stats.lost, stats.dropped), (9, 2));
     });
@@ -548,8 +553,8 @@ fn close_request_is_retried_until_confirmed_or_times_out() {
         bench.open();
         bench.client.leave(bench.now, &mut bench.out);
         let error = loop {
-            bench.hear(&bench.alive());
-            if let Err(error) = bench.pass(ms(50)) {
+            bench.deliver(&bench.heartbeat());
+            if let Err(error) = bench.advance(ms(50)) {
                 break error;
             }
         };
@@ -558,12 +563,12 @@ fn close_request_is_retried_until_confirmed_or_times_out() {
 }
 
 #[test]
-fn new_line_draws_a_new_session_number() {
+fn new_line_begins_a_new_session_number() {
     on_bench(None, |bench| {
         let first = bench.client.session();
         bench.client.greet(bench.now, &mut bench.out);
         assert_eq!(bench.client.session(), first);
-        bench.hear(&ToHost::Hello(DeviceHello {
+        bench.deliver(&ToHost::Hello(DeviceHello {
             number: 2,
             ..hello()
         }));
@@ -579,7 +584,7 @@ fn new_line_draws_a_new_session_number() {
             },
             ..LastSession::default()
         };
-        bench.hear(&ToHost::Hello(DeviceHello {
+        bench.deliver(&ToHost::Hello(DeviceHello {
             number: 3,
             last,
             ..hello()
@@ -594,13 +599,13 @@ fn nonexistent_tile_requests_are_counted_and_rarely_logged() {
     on_bench(None, |bench| {
         bench.open();
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 77, 0));
-        bench.stated();
+        bench.drain_sent();
         for _ in 0..1_000 {
-            bench.hear(&ToHost::TileRequest { epoch, key });
+            bench.deliver(&ToHost::TileRequest { epoch, key });
         }
         assert_eq!(bench.client.stats().no_tiles, 1_000);
-        assert_eq!(bench.client.logged, Some(bench.now));
-        assert_eq!(bench.stated(), Vec::<String>::new());
+        assert_eq!(bench.client.logged_at, Some(bench.now));
+        assert_eq!(bench.drain_sent(), Vec::<String>::new());
     });
 }
 
@@ -609,24 +614,24 @@ fn reconnected_physical_arm_is_not_rearmed_automatically() {
     for (arming, again) in [(Arming::default(), 0), (Arming::VIRTUAL, 1)] {
         on_bench(Some(arming), |bench| {
             let arms = |bench: &mut Bench<'_>| {
-                let stated = bench.stated();
-                let arm = |stated: &&String| stated.contains("Zero") || stated.ends_with("Arm");
-                usize::from(stated.iter().any(|s| arm(&s)))
+                let sent = bench.drain_sent();
+                let arm = |sent: &&String| sent.contains("Zero") || sent.ends_with("Arm");
+                usize::from(sent.iter().any(|s| arm(&s)))
             };
             bench.open();
             assert_eq!(arms(bench), 1);
             // The device disarmed the arm because its host was silent.
             bench.client.greet(bench.now, &mut bench.out);
-            bench.hear(&ToHost::Hello(DeviceHello {
+            bench.deliver(&ToHost::Hello(DeviceHello {
                 number: 2,
                 ..hello()
             }));
-            let taken = bench.taken();
-            bench.hear(&taken);
+            let ack = bench.scene_ack();
+            bench.deliver(&ack);
             assert_eq!(bench.opened, 2);
             assert_eq!(arms(bench), again, "{arming:?}");
-            bench.client.ask(HostRequest::Request(Request::Arm));
-            bench.pass(ms(50)).expect("answered");
+            bench.client.enqueue(HostRequest::Request(Request::Arm));
+            bench.advance(ms(50)).expect("answered");
             assert_eq!(arms(bench), 1 - again, "{arming:?}");
         });
     }
@@ -636,7 +641,7 @@ fn reconnected_physical_arm_is_not_rearmed_automatically() {
 fn repeated_tile_requests_in_one_read_get_one_tile() {
     on_bench(None, |bench| {
         bench.open();
-        bench.stated();
+        bench.drain_sent();
         let session = bench.client.session();
         let epoch = bench.client.scene().epoch;
         let mut bytes = vec![];
@@ -651,13 +656,13 @@ fn repeated_tile_requests_in_one_read_get_one_tile() {
             .client
             .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
         received.expect("understood");
-        assert_eq!(count_of(&bench.stated(), "Tile"), 1);
+        assert_eq!(count_of(&bench.drain_sent(), "Tile"), 1);
         // The next reception may request it again.
         let received = bench
             .client
             .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
         received.expect("understood");
-        assert_eq!(count_of(&bench.stated(), "Tile"), 1);
+        assert_eq!(count_of(&bench.drain_sent(), "Tile"), 1);
     });
 }
 
@@ -668,21 +673,21 @@ fn placement_is_resent_until_acknowledged_then_applied() {
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
         // A device that already has the scene, and whose answer was lost, gets no scene again.
         bench.out.clear();
-        bench.hear(&ToHost::Heartbeat {
+        bench.deliver(&ToHost::Heartbeat {
             count: SampleCount::default(),
             epoch: Some(epoch),
             report: Report::default(),
         });
-        bench.pass(ms(500)).expect("in time");
-        let stated = bench.stated();
+        bench.advance(ms(500)).expect("in time");
+        let sent = bench.drain_sent();
         assert_eq!(
-            (count_of(&stated, "SceneChange"), count_of(&stated, "Scene")),
+            (count_of(&sent, "SceneChange"), count_of(&sent, "Scene")),
             (1, 0),
-            "{stated:?}"
+            "{sent:?}"
         );
         assert_eq!(bench.client.scene().epoch, before);
         for _ in 0..2 {
-            bench.hear(&ToHost::SceneAck {
+            bench.deliver(&ToHost::SceneAck {
                 epoch,
                 accepted: true,
             });
@@ -690,13 +695,13 @@ fn placement_is_resent_until_acknowledged_then_applied() {
         assert_eq!(bench.viewed, [(1, true)]);
         assert_eq!(bench.client.scene().epoch, epoch);
         bench.out.clear();
-        bench.hear(&bench.alive());
-        bench.pass(ms(600)).expect("in time");
-        let stated = bench.stated();
+        bench.deliver(&bench.heartbeat());
+        bench.advance(ms(600)).expect("in time");
+        let sent = bench.drain_sent();
         assert_eq!(
-            (count_of(&stated, "SceneChange"), count_of(&stated, "Scene")),
+            (count_of(&sent, "SceneChange"), count_of(&sent, "Scene")),
             (0, 0),
-            "{stated:?}"
+            "{sent:?}"
         );
     });
 }
@@ -707,12 +712,12 @@ fn refused_or_unanswered_placement_keeps_the_scene() {
         bench.open();
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
         let accepted = false;
-        bench.hear(&ToHost::SceneAck { epoch, accepted });
+        bench.deliver(&ToHost::SceneAck { epoch, accepted });
         assert_eq!(bench.viewed, [(1, false)]);
         bench.put_view(2);
         for _ in 0..9 {
-            bench.pass(ms(500)).expect("in time");
-            bench.hear(&bench.alive());
+            bench.advance(ms(500)).expect("in time");
+            bench.deliver(&bench.heartbeat());
         }
         assert_eq!(bench.viewed, [(1, false), (2, false)]);
         assert_eq!(bench.client.scene().epoch, before);
@@ -729,7 +734,7 @@ fn epoch_after_reconnect_resolves_pending_placement() {
             let epoch = bench.put_view(1);
             bench.client.greet(bench.now, &mut bench.out);
             let held = if took { epoch } else { before };
-            bench.hear(&ToHost::Hello(DeviceHello {
+            bench.deliver(&ToHost::Hello(DeviceHello {
                 number: 2,
                 epoch: Some(held),
                 ..hello()

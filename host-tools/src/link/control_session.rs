@@ -14,13 +14,13 @@ use hapterra_core::wire::status::Status;
 use super::error::LinkError;
 use super::host_protocol::{HostProtocol, ProtocolEvent, State};
 use super::host_request::HostRequest;
-use super::line::{LOOK, Line};
+use super::line::{Line, POLL_INTERVAL};
 use super::messages::{FromDevice, from_device, next_frame};
 use super::timeouts::Timeouts;
 use super::transport::Transport;
 
 /// A device sends its telemetry at least once in this time.
-const MOMENT: Duration = Duration::from_millis(150);
+const TELEMETRY_INTERVAL: Duration = Duration::from_millis(150);
 
 /// Handler of an unrequested message; the returned message is sent in answer.
 type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
@@ -38,10 +38,10 @@ pub struct ControlSession<'t> {
 /// Messages both ways, and their end.
 struct Exchange<'t> {
     line: Line<'t>,
-    talk: HostProtocol,
+    protocol: HostProtocol,
     reader: Box<FrameReader<MAX_FRAME>>,
     /// True if the session has put a scene in force, or sent a request that drives the arm.
-    drives: bool,
+    has_driven: bool,
     /// True if its end was sent, or the other end is gone.
     is_over: bool,
 }
@@ -52,7 +52,7 @@ impl<'t> ControlSession<'t> {
     /// # Errors
     /// [`LinkError`]: no answer within `timeout`, or a different protocol.
     pub fn open(transport: Box<dyn Transport + 't>, timeout: Duration) -> Result<Self, LinkError> {
-        Self::with(transport, Timeouts::of_a_dialogue(timeout))
+        Self::with(transport, Timeouts::for_control(timeout))
     }
 
     /// Opens a read-only session: the device answers status and calibration queries, ignores
@@ -60,8 +60,11 @@ impl<'t> ControlSession<'t> {
     ///
     /// # Errors
     /// As [`ControlSession::open`].
-    pub fn look(transport: Box<dyn Transport + 't>, timeout: Duration) -> Result<Self, LinkError> {
-        Self::with(transport, Timeouts::of_a_look(timeout))
+    pub fn open_read_only(
+        transport: Box<dyn Transport + 't>,
+        timeout: Duration,
+    ) -> Result<Self, LinkError> {
+        Self::with(transport, Timeouts::read_only(timeout))
     }
 
     fn with(transport: Box<dyn Transport + 't>, timeouts: Timeouts) -> Result<Self, LinkError> {
@@ -69,15 +72,15 @@ impl<'t> ControlSession<'t> {
         let is_over = timeouts.silence_s == READ_ONLY_SILENCE_S;
         let mut exchange = Exchange {
             line: Line::new(transport),
-            talk: HostProtocol::new(None, timeouts, fastrand::Rng::new()),
+            protocol: HostProtocol::new(None, timeouts, fastrand::Rng::new()),
             reader: Box::default(),
-            drives: false,
+            has_driven: false,
             is_over,
         };
         let line = &mut exchange.line;
-        exchange.talk.greet(line.now(), &mut line.out);
+        exchange.protocol.greet(line.now(), &mut line.out);
         let device = exchange.wait_for(|event| match event {
-            ProtocolEvent::Greeted { device, .. } => Some(device),
+            ProtocolEvent::HelloReceived { device, .. } => Some(device),
             _ => None,
         })?;
         Ok(Self { exchange, device })
@@ -103,7 +106,7 @@ impl<'t> ControlSession<'t> {
     /// # Errors
     /// As [`ControlSession::end`].
     pub fn disarm(mut self) -> Result<(), LinkError> {
-        self.exchange.drives = true;
+        self.exchange.has_driven = true;
         self.end()
     }
 
@@ -113,7 +116,7 @@ impl<'t> ControlSession<'t> {
     /// [`LinkError`].
     pub fn status(&mut self) -> Result<Status, LinkError> {
         self.exchange
-            .ask(HostRequest::Status, |message| match message {
+            .query(HostRequest::Status, |message| match message {
                 ToHost::Status { status, .. } => Some(status),
                 _ => None,
             })
@@ -125,7 +128,7 @@ impl<'t> ControlSession<'t> {
     /// # Errors
     /// [`LinkError`].
     pub fn fresh_status(&mut self) -> Result<Status, LinkError> {
-        self.exchange.listen(MOMENT)?;
+        self.exchange.receive_for(TELEMETRY_INTERVAL)?;
         self.status()
     }
 
@@ -135,7 +138,7 @@ impl<'t> ControlSession<'t> {
     /// [`LinkError`].
     pub fn calibration(&mut self) -> Result<Option<Calibration>, LinkError> {
         self.exchange
-            .ask(HostRequest::Calibration, |message| match message {
+            .query(HostRequest::Calibration, |message| match message {
                 ToHost::Calibration { calibration, .. } => Some(calibration),
                 _ => None,
             })
@@ -147,11 +150,11 @@ impl<'t> ControlSession<'t> {
     /// [`LinkError`].
     pub fn request(&mut self, request: &Request) -> Result<Result<(), Refusal>, LinkError> {
         if matches!(request, Request::DropScene | Request::Jog(_)) {
-            self.exchange.talk.forget_scene();
+            self.exchange.protocol.forget_scene();
         }
-        self.exchange.drives |= drives(request);
+        self.exchange.has_driven |= is_driving(request);
         self.exchange
-            .ask(HostRequest::Request(*request), |message| match message {
+            .query(HostRequest::Request(*request), |message| match message {
                 ToHost::Answer(Answer { result, .. }) => Some(result),
                 _ => None,
             })
@@ -167,39 +170,39 @@ impl<'t> ControlSession<'t> {
     /// [`LinkError`].
     pub fn put_scene(&mut self, scene: Scene) -> Result<(), LinkError> {
         let exchange = &mut self.exchange;
-        exchange.drives = true;
+        exchange.has_driven = true;
         let now = exchange.line.now();
-        exchange.talk.listen_from(now);
+        exchange.protocol.reset_silence(now);
         let out = &mut exchange.line.out;
-        exchange.talk.put_scene(scene, now, out);
+        exchange.protocol.put_scene(scene, now, out);
         exchange.wait_for(|event| matches!(event, ProtocolEvent::SceneAck).then_some(()))
     }
 
-    /// Lets `ms` of the device's time pass, or less if `enough` returns true; calls `on` for each
+    /// Lets `ms` of the device's time pass, or less if `is_done` returns true; calls `on` for each
     /// unrequested message, and sends the message that `on` returns. Returns the last state of the
     /// device.
     ///
     /// # Errors
     /// [`LinkError`]; also if the device's time stands still.
-    pub fn pass(
+    pub fn run_for(
         &mut self,
         ms: u32,
-        enough: &dyn Fn() -> bool,
+        is_done: &dyn Fn() -> bool,
         on: OnMessage<'_>,
     ) -> Result<Status, LinkError> {
         let exchange = &mut self.exchange;
-        let began = exchange.line.now();
-        exchange.talk.listen_from(began);
+        let start = exchange.line.now();
+        exchange.protocol.reset_silence(start);
         let first = exchange.status(on)?;
         let ticks = ms * (first.device.tick_hz / 1000).max(1);
-        let timeout = exchange.talk.timeouts().give_up + Duration::from_millis(u64::from(ms));
+        let timeout = exchange.protocol.timeouts().give_up + Duration::from_millis(u64::from(ms));
         loop {
-            exchange.converse(&mut |_| {}, on)?;
+            exchange.exchange_messages(&mut |_| {}, on)?;
             let status = exchange.status(on)?;
-            if enough() || status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
+            if is_done() || status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
                 return Ok(status);
             }
-            let waited = exchange.line.now().saturating_sub(began);
+            let waited = exchange.line.now().saturating_sub(start);
             if waited > timeout {
                 return Err(LinkError::Silent(waited));
             }
@@ -220,23 +223,25 @@ impl<'t> ControlSession<'t> {
 
 impl Exchange<'_> {
     /// Sends a request and waits for the answer.
-    fn ask<T>(
+    fn query<T>(
         &mut self,
-        ask: HostRequest,
+        request: HostRequest,
         mut read: impl FnMut(ToHost) -> Option<T>,
     ) -> Result<T, LinkError> {
         // The line is not read between two queries: the user may think for a while.
-        self.talk.listen_from(self.line.now());
-        self.talk.ask(ask);
+        self.protocol.reset_silence(self.line.now());
+        self.protocol.enqueue(request);
         self.wait_for(|event| match event {
-            ProtocolEvent::Answered(asked, message) if asked.is_like(&ask) => read(message),
+            ProtocolEvent::Answered(answered, message) if answered.is_like(&request) => {
+                read(message)
+            }
             _ => None,
         })
     }
 
     /// Queries the status and runs the conversation until the answer arrives.
     fn status(&mut self, on: OnMessage<'_>) -> Result<Status, LinkError> {
-        self.talk.ask(HostRequest::Status);
+        self.protocol.enqueue(HostRequest::Status);
         loop {
             let mut found = None;
             let mut answered = |event| {
@@ -246,7 +251,7 @@ impl Exchange<'_> {
                     found = Some(status);
                 }
             };
-            self.converse(&mut answered, on)?;
+            self.exchange_messages(&mut answered, on)?;
             if let Some(status) = found {
                 return Ok(status);
             }
@@ -254,18 +259,18 @@ impl Exchange<'_> {
     }
 
     /// Processes received messages, and sends the answers that `on` returns for unrequested ones.
-    fn converse(
+    fn exchange_messages(
         &mut self,
         answered: &mut dyn FnMut(ProtocolEvent),
         on: OnMessage<'_>,
     ) -> Result<(), LinkError> {
         let mut replies = vec![];
-        self.poll(LOOK, &mut |event| match event {
+        self.poll(POLL_INTERVAL, &mut |event| match event {
             ProtocolEvent::Other(message) => replies.extend(on(&message)),
             event => answered(event),
         })?;
         for reply in replies {
-            self.talk.say(&reply, &mut self.line.out);
+            self.protocol.append_message(&reply, &mut self.line.out);
         }
         self.line.flush()
     }
@@ -276,7 +281,7 @@ impl Exchange<'_> {
     ) -> Result<T, LinkError> {
         loop {
             let mut found = None;
-            self.poll(LOOK, &mut |event| {
+            self.poll(POLL_INTERVAL, &mut |event| {
                 found = found.take().or_else(|| read(event));
             })?;
             if let Some(found) = found {
@@ -286,11 +291,11 @@ impl Exchange<'_> {
     }
 
     /// Processes the device's messages for `time`.
-    fn listen(&mut self, time: Duration) -> Result<(), LinkError> {
-        self.talk.listen_from(self.line.now());
+    fn receive_for(&mut self, time: Duration) -> Result<(), LinkError> {
+        self.protocol.reset_silence(self.line.now());
         let end = self.line.now() + time;
         while self.line.now() < end {
-            self.poll(LOOK, &mut |_| {})?;
+            self.poll(POLL_INTERVAL, &mut |_| {})?;
         }
         Ok(())
     }
@@ -308,18 +313,18 @@ impl Exchange<'_> {
         on: &mut dyn FnMut(ProtocolEvent),
     ) -> Result<(), LinkError> {
         let line = &mut self.line;
-        self.talk.due(line.now(), &mut line.out)?;
-        if let Some(ask) = self.talk.take_unanswered().pop() {
-            tracing::debug!(?ask, "given up");
-            return Err(LinkError::Silent(self.talk.timeouts().give_up));
+        self.protocol.append_due(line.now(), &mut line.out)?;
+        if let Some(request) = self.protocol.take_unanswered().pop() {
+            tracing::debug!(?request, "given up");
+            return Err(LinkError::Silent(self.protocol.timeouts().give_up));
         }
         line.flush()?;
         let (now, mut bytes, out) = line.receive(wait)?;
         while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
             match frame {
-                Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
+                Ok(FromDevice::Version(check)) => self.protocol.on_version_check(check)?,
                 Ok(FromDevice::Message(message)) => {
-                    if let Some(event) = self.talk.hear(now, message, out)? {
+                    if let Some(event) = self.protocol.on_frame(now, message, out)? {
                         on(event);
                     }
                 }
@@ -335,23 +340,23 @@ impl Exchange<'_> {
         if std::mem::replace(&mut self.is_over, true) {
             return Ok(());
         }
-        let has_opened = self.talk.state() != State::Greeting;
+        let has_opened = self.protocol.state() != State::Greeting;
         let line = &mut self.line;
-        match self.drives {
-            true => self.talk.leave(line.now(), &mut line.out),
-            false => self.talk.detach(line.now(), &mut line.out),
+        match self.has_driven {
+            true => self.protocol.leave(line.now(), &mut line.out),
+            false => self.protocol.detach(line.now(), &mut line.out),
         }
         if !has_opened {
             // The delivery is unknown, but a second wait would not help.
             return line.flush();
         }
-        while self.talk.state() != State::Closed {
-            let polled = self.poll(LOOK, &mut |_| {});
+        while self.protocol.state() != State::Closed {
+            let polled = self.poll(POLL_INTERVAL, &mut |_| {});
             polled.map_err(|error| {
                 tracing::debug!(%error, "while closing the session");
                 match error {
                     LinkError::Taken => error,
-                    _ if self.drives => LinkError::NotConfirmed,
+                    _ if self.has_driven => LinkError::NotConfirmed,
                     _ => error,
                 }
             })?;
@@ -361,7 +366,7 @@ impl Exchange<'_> {
 }
 
 /// Returns true if a request may drive the arm.
-const fn drives(request: &Request) -> bool {
+const fn is_driving(request: &Request) -> bool {
     matches!(
         request,
         Request::Arm | Request::Jog(_) | Request::HoldOutputs(Some(_))
@@ -398,7 +403,7 @@ mod tests {
 
     #[test]
     fn device_reports_board_status_and_calibration() {
-        let device = Box::new(Native::for_replay().restless());
+        let device = Box::new(Native::for_replay().free_running());
         let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");
         assert_eq!(control.device().board.as_str(), "native");
         let status = control.fresh_status().expect("it answers");
@@ -409,22 +414,27 @@ mod tests {
 
     #[test]
     fn read_only_session_is_not_recorded_as_a_host() {
-        let mut device = Native::for_replay().restless();
-        let mut looks = ControlSession::look(Box::new(&mut device), TIMEOUT).expect("it answers");
-        let known = looks.calibration().expect("it answers");
+        let mut device = Native::for_replay().free_running();
+        let mut control =
+            ControlSession::open_read_only(Box::new(&mut device), TIMEOUT).expect("it answers");
+        let known = control.calibration().expect("it answers");
         assert_eq!(known, Some(Calibration::PREMIUM_1_5));
-        let status = looks.fresh_status().expect("it answers");
+        let status = control.fresh_status().expect("it answers");
         assert!(!status.health.report.blockers.is_empty());
-        drop(looks);
+        drop(control);
         let host = ControlSession::open(Box::new(&mut device), TIMEOUT).expect("it answers");
         let before = host.device().last.end;
         assert_eq!(before, SessionEnd::None, "nobody was its host before");
     }
 
     #[test]
-    fn a_calibration_is_taken_stored_and_refused_with_a_reason() {
+    fn calibration_is_stored_or_refused_with_a_reason() {
         let press: FaultInjector = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
-        let device = Box::new(Native::for_replay().restless().meddled_with(press));
+        let device = Box::new(
+            Native::for_replay()
+                .free_running()
+                .with_fault_injector(press),
+        );
         let mut control = ControlSession::open(device, TIMEOUT).expect("it answers");
         let mut calibration = Calibration::OMNI;
         assert_eq!(control.store(calibration).expect("it answers"), Ok(()));
@@ -450,30 +460,30 @@ mod tests {
 
         fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
             let again = self.1.len().min(into.len() / 2);
-            let (before, rest) = into.split_at_mut(again);
-            before.copy_from_slice(&self.1[self.1.len() - again..]);
-            let new = self.0.receive(rest, wait)?;
-            self.1.extend(&rest[..new]);
+            let (repeated, fresh) = into.split_at_mut(again);
+            repeated.copy_from_slice(&self.1[self.1.len() - again..]);
+            let new = self.0.receive(fresh, wait)?;
+            self.1.extend(&fresh[..new]);
             Ok(again + new)
         }
     }
 
     #[test]
     fn repeated_old_answers_are_not_mistaken_for_new_ones() {
-        let device = Late(Native::for_replay().restless(), vec![]);
+        let device = Late(Native::for_replay().free_running(), vec![]);
         let mut control = ControlSession::open(Box::new(device), TIMEOUT).expect("it answers");
-        let look = |control: &mut ControlSession<'_>, expected: Calibration| {
+        let check_record = |control: &mut ControlSession<'_>, expected: Calibration| {
             let known = control.calibration().expect("it answers");
             assert_eq!(known, Some(expected));
             let status = control.status().expect("it answers");
             assert_eq!(status.model, Some(expected.model));
         };
-        look(&mut control, Calibration::PREMIUM_1_5);
+        check_record(&mut control, Calibration::PREMIUM_1_5);
         let calibration = Calibration::OMNI;
         let request = Request::SetCalibration { calibration };
-        let taken = control.request(&request).expect("it answers");
-        assert_eq!(taken, Ok(()));
-        look(&mut control, calibration);
+        let result = control.request(&request).expect("it answers");
+        assert_eq!(result, Ok(()));
+        check_record(&mut control, calibration);
     }
 
     /// Returns a scene for the arm.
@@ -491,13 +501,13 @@ mod tests {
 
     #[test]
     fn recorded_session_end_ignores_sessions_that_only_query() {
-        let mut device = Native::for_replay().restless();
+        let mut device = Native::for_replay().free_running();
         open(&mut device).put_scene(scene()).expect("taken");
         for _ in 0..3 {
-            let mut looking = open(&mut device);
-            let (last, epoch) = (looking.device().last, looking.device().epoch);
+            let mut reading = open(&mut device);
+            let (last, epoch) = (reading.device().last, reading.device().epoch);
             assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
-            assert!(looking.status().is_ok());
+            assert!(reading.status().is_ok());
         }
         // A session that has requested arming, even in vain, closes, so the device records it.
         let before = open(&mut device).device().last.session;
@@ -512,7 +522,7 @@ mod tests {
 
     #[test]
     fn query_session_keeps_the_scene_and_recorded_session_end() {
-        let mut device = Native::for_replay().restless();
+        let mut device = Native::for_replay().free_running();
         let held = scene();
         let mut vanishes = open(&mut device);
         vanishes.put_scene(held).expect("taken");
@@ -520,11 +530,11 @@ mod tests {
         vanishes.exchange.is_over = true;
         drop(vanishes);
         for _ in 0..3 {
-            let looking = open(&mut device);
-            let (last, epoch) = (looking.device().last, looking.device().epoch);
-            let kept = (SessionEnd::Replaced, Some(held.epoch));
-            assert_eq!((last.end, epoch), kept);
-            looking.end().expect("confirmed");
+            let reading = open(&mut device);
+            let (last, epoch) = (reading.device().last, reading.device().epoch);
+            let expected = (SessionEnd::Replaced, Some(held.epoch));
+            assert_eq!((last.end, epoch), expected);
+            reading.end().expect("confirmed");
         }
     }
 
@@ -555,30 +565,30 @@ mod tests {
         let timeout = Duration::from_millis(300);
         let time = Rc::new(Cell::new(Duration::ZERO));
         let open = || {
-            let deaf = Deaf(Native::for_replay().restless(), 3, Rc::clone(&time));
+            let deaf = Deaf(Native::for_replay().free_running(), 3, Rc::clone(&time));
             ControlSession::open(Box::new(deaf), timeout).expect("it answers")
         };
-        let within = |began: Duration| {
-            let took = time.get() - began;
+        let within = |start: Duration| {
+            let took = time.get() - start;
             assert!(took >= timeout && took < 10 * timeout, "{took:?}");
         };
         let mut control = open();
         assert!(control.request(&Request::Arm).is_ok(), "the second send");
-        let began = time.get();
+        let start = time.get();
         let end = control.end();
         assert!(matches!(end, Err(LinkError::NotConfirmed)), "{end:?}");
-        within(began);
+        within(start);
         let mut control = open();
         assert!(control.status().is_ok());
-        let began = time.get();
+        let start = time.get();
         drop(control);
-        within(began);
+        within(start);
     }
 
     /// A transport that sends one message, then only receives.
-    struct Says(Vec<u8>);
+    struct OneMessage(Vec<u8>);
 
-    impl Transport for Says {
+    impl Transport for OneMessage {
         fn send(&mut self, _: &[u8]) -> io::Result<()> {
             Ok(())
         }
@@ -593,18 +603,19 @@ mod tests {
 
     #[test]
     fn protocol_mismatch_is_distinguished_from_silence() {
-        let ask = |stated: Vec<u8>| {
-            let opened = ControlSession::open(Box::new(Says(stated)), Duration::from_millis(5));
+        let open_after = |bytes: Vec<u8>| {
+            let opened =
+                ControlSession::open(Box::new(OneMessage(bytes)), Duration::from_millis(5));
             opened.map(|_| ())
         };
-        assert!(matches!(ask(vec![]), Err(LinkError::Silent(_))));
+        assert!(matches!(open_after(vec![]), Err(LinkError::Silent(_))));
         let nonsense = b"HTTP/1.1 400\0\0".to_vec();
-        assert!(matches!(ask(nonsense), Err(LinkError::Silent(_))));
+        assert!(matches!(open_after(nonsense), Err(LinkError::Silent(_))));
         let mut frame = [0; MAX_FRAME];
         let refused = VersionCheck::Refused { protocol: 77 };
         let bytes = encode(&refused, &mut frame).expect("fits").to_vec();
         assert!(matches!(
-            ask(bytes),
+            open_after(bytes),
             Err(LinkError::Version { theirs: 77, .. })
         ));
     }

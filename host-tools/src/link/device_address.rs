@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_devices() {
+    fn device_addresses_are_parsed() {
         assert_eq!("usb".parse(), Ok(DeviceAddress::Usb(None)));
         let named = "usb:0039001A".parse::<DeviceAddress>();
         assert_eq!(named, Ok(DeviceAddress::Usb(Some("0039001A".into()))));

@@ -21,12 +21,12 @@ pub const QEMU_VARIABLE: &str = "HAPTERRA_QEMU";
 /// QEMU's name when no option says otherwise.
 pub const QEMU: &str = "qemu-system-arm";
 /// Max time for QEMU to connect its lines.
-const START: Duration = Duration::from_secs(60);
+const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// Max time for the board to end after a close message, on a shared machine.
-const END: Duration = Duration::from_secs(60);
+const END_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Max bytes of a report.
-const STATED: u64 = 16 << 10;
+const MAX_REPORT_BYTES: u64 = 16 << 10;
 
 /// The name of the board whose clock counts instructions.
 pub const EMULATED: &str = "mps2-an386";
@@ -59,12 +59,12 @@ pub enum EmulatorError {
         source: io::Error,
     },
     /// QEMU ended, or did not connect.
-    #[error("{} did not bring the board up: {stated}", path.display())]
+    #[error("{} did not bring the board up: {reports}", path.display())]
     NotUp {
         /// The program.
         path: PathBuf,
         /// Its output, or its exit status.
-        stated: String,
+        reports: String,
     },
     /// A socket for the lines cannot be opened.
     #[error("cannot listen on the loopback address")]
@@ -101,7 +101,7 @@ impl Emulator {
             Ok(child) => Self { child, path },
             Err(source) => return Err(EmulatorError::Qemu { path, source }),
         };
-        let deadline = Instant::now() + START;
+        let deadline = Instant::now() + START_TIMEOUT;
         let [link, plant] = lines.map(|line| emulator.accept(&line, deadline));
         let (link, plant) = (link?, plant?);
         Ok((emulator, Lines { link, plant }))
@@ -112,7 +112,7 @@ impl Emulator {
     /// # Errors
     /// When it has to be ended, or reports a failure.
     pub fn finish(mut self) -> io::Result<()> {
-        let deadline = Instant::now() + END;
+        let deadline = Instant::now() + END_TIMEOUT;
         while Instant::now() < deadline {
             if let Some(status) = self.child.try_wait()? {
                 // A board that ended without an error has an empty report.
@@ -121,13 +121,15 @@ impl Emulator {
                     true => Ok(()),
                     false => Err(io::Error::other(format!(
                         "{status}; {report} {}",
-                        self.complaint()
+                        self.stderr_text()
                     ))),
                 };
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        Err(io::Error::other(format!("it still ran after {END:?}")))
+        Err(io::Error::other(format!(
+            "it still ran after {END_TIMEOUT:?}"
+        )))
     }
 
     /// Returns the output of the board or QEMU if it has ended by itself; ends it otherwise.
@@ -136,7 +138,7 @@ impl Emulator {
         // The link breaks a moment before the process ends.
         std::thread::sleep(Duration::from_millis(200));
         let status = self.child.try_wait().ok().flatten()?;
-        Some(format!("{status}; {}", self.stated()))
+        Some(format!("{status}; {}", self.reports()))
     }
 
     fn accept(&mut self, line: &TcpListener, deadline: Instant) -> Result<Tcp, EmulatorError> {
@@ -147,12 +149,12 @@ impl Emulator {
                 Err(error) => return Err(EmulatorError::Listen(error)),
             }
             if let Some(status) = self.child.try_wait().ok().flatten() {
-                return Err(self.not_up(status.to_string()));
+                return Err(self.startup_error(status.to_string()));
             }
             if Instant::now() > deadline {
                 // Its output can be read to the end only after it has ended.
                 let _ = self.child.kill();
-                return Err(self.not_up(format!("no connection in {START:?}")));
+                return Err(self.startup_error(format!("no connection in {START_TIMEOUT:?}")));
             }
             std::thread::sleep(Duration::from_millis(2));
         }
@@ -160,10 +162,10 @@ impl Emulator {
 
     /// Returns the reports of the board on its third line, which is QEMU's standard output, and
     /// QEMU's errors.
-    fn stated(&mut self) -> String {
+    fn reports(&mut self) -> String {
         let report = self.report();
-        let complaint = self.complaint();
-        [report, complaint].join(" ").trim().to_owned()
+        let stderr_text = self.stderr_text();
+        [report, stderr_text].join(" ").trim().to_owned()
     }
 
     /// Returns the board's report, read to its end: QEMU has ended.
@@ -172,17 +174,17 @@ impl Emulator {
     }
 
     /// Returns the standard error of QEMU, read to its end: QEMU has ended.
-    fn complaint(&mut self) -> String {
+    fn stderr_text(&mut self) -> String {
         self.child.stderr.take().map_or(String::new(), text)
     }
 
-    fn not_up(&mut self, how: String) -> EmulatorError {
-        let stated = match self.stated() {
+    fn startup_error(&mut self, how: String) -> EmulatorError {
+        let reports = match self.reports() {
             nothing if nothing.is_empty() => how,
             words => words,
         };
         let path = self.path.clone();
-        EmulatorError::NotUp { path, stated }
+        EmulatorError::NotUp { path, reports }
     }
 }
 
@@ -197,9 +199,9 @@ impl Drop for Emulator {
 /// Returns the printable text of a stream: the beginning of an endless one, and nothing if it
 /// cannot be read.
 fn text(from: impl Read) -> String {
-    let mut stated = Vec::new();
-    let _ = from.take(STATED).read_to_end(&mut stated);
-    printable_lines(String::from_utf8_lossy(&stated).trim())
+    let mut reports = Vec::new();
+    let _ = from.take(MAX_REPORT_BYTES).read_to_end(&mut reports);
+    printable_lines(String::from_utf8_lossy(&reports).trim())
 }
 
 fn listen() -> Result<TcpListener, EmulatorError> {

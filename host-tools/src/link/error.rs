@@ -9,10 +9,10 @@ use hapterra_core::wire::hello::PROTOCOL;
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// No device was found.
-    #[error("no device: looked for {looked_for}: {why}")]
+    #[error("no device: looked for {searched_for}: {why}")]
     Absent {
         /// The searched device and place.
-        looked_for: String,
+        searched_for: String,
         /// The finding in its place.
         why: String,
     },
@@ -21,7 +21,7 @@ pub enum LinkError {
     Several(Vec<String>),
     /// The transport broke while the device was in use.
     #[error("the device is gone")]
-    Gone(#[source] io::Error),
+    Disconnected(#[source] io::Error),
     /// The transport is open, but the device does not answer.
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
@@ -30,7 +30,7 @@ pub enum LinkError {
     Taken,
     /// The device has not received a message of this host for too long, and has disarmed the arm.
     #[error("the device has not heard this computer for too long, and has disarmed the arm")]
-    LetGo,
+    HostSilent,
     /// The close message was not answered.
     #[error("the board did not confirm that it is disarmed: switch the amplifiers off")]
     NotConfirmed,
@@ -69,10 +69,10 @@ impl LinkError {
 
     /// Returns true if a later try can succeed.
     #[must_use]
-    pub const fn is_passing(&self) -> bool {
+    pub const fn is_transient(&self) -> bool {
         matches!(
             self,
-            Self::Absent { .. } | Self::Gone(_) | Self::Silent(_) | Self::LetGo
+            Self::Absent { .. } | Self::Disconnected(_) | Self::Silent(_) | Self::HostSilent
         )
     }
 }

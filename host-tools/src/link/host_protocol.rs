@@ -40,7 +40,7 @@ pub enum State {
 pub(super) enum ProtocolEvent {
     /// The device has introduced itself: its samples are numbered from zero. `restarted` is set if
     /// it was in this session before and has lost its state.
-    Greeted {
+    HelloReceived {
         device: DeviceHello,
         restarted: bool,
     },
@@ -75,17 +75,17 @@ pub(super) struct HostProtocol {
     state: State,
     /// The time when the state began, and when its message was last sent.
     since: Duration,
-    stated: Duration,
+    sent_at: Duration,
     /// Time of the last answer.
     received: Duration,
-    alive_said: Duration,
-    alive_is_due: bool,
+    heartbeat_at: Duration,
+    heartbeat_due: bool,
     /// Time of the last frame of another session.
     foreign: Option<Duration>,
     /// The number of the last open message; true if it was answered.
-    hello: u8,
+    hello_number: u8,
     hello_answered: bool,
-    asking: RequestQueue,
+    requests: RequestQueue,
 }
 
 impl HostProtocol {
@@ -107,14 +107,14 @@ impl HostProtocol {
             timeouts,
             state: State::Closed,
             since: Duration::ZERO,
-            stated: Duration::ZERO,
+            sent_at: Duration::ZERO,
             received: Duration::ZERO,
-            alive_said: Duration::ZERO,
-            alive_is_due: false,
+            heartbeat_at: Duration::ZERO,
+            heartbeat_due: false,
             foreign: None,
-            hello: 0,
+            hello_number: 0,
             hello_answered: true,
-            asking: RequestQueue::default(),
+            requests: RequestQueue::default(),
         }
     }
 
@@ -148,38 +148,38 @@ impl HostProtocol {
     /// drawn: an unanswered session keeps its number, so that the device opens no session that the
     /// host has forgotten.
     pub(super) fn greet(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
-        let draws = self.confirmed || self.foreign.is_some();
-        if draws {
+        let is_new = self.confirmed || self.foreign.is_some();
+        if is_new {
             self.previous = Some((self.session, self.opened_by));
             self.session = SessionNumber::new(self.numbers.u32(..));
             self.confirmed = false;
             self.opened_by = 0;
         }
         self.foreign = None;
-        self.asking.begin_session();
+        self.requests.begin_session();
         self.enter(State::Greeting, now);
-        self.say_state(now, out);
-        draws
+        self.append_state(now, out);
+        is_new
     }
 
     /// Ends the session; the device disarms.
     pub(super) fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
-        self.end_by(State::Leaving, now, out);
+        self.begin_ending(State::Leaving, now, out);
     }
 
     /// Ends the session, and leaves the arm and the scene as they are.
     pub(super) fn detach(&mut self, now: Duration, out: &mut Vec<u8>) {
-        self.end_by(State::Detaching, now, out);
+        self.begin_ending(State::Detaching, now, out);
     }
 
-    fn end_by(&mut self, state: State, now: Duration, out: &mut Vec<u8>) {
+    fn begin_ending(&mut self, state: State, now: Duration, out: &mut Vec<u8>) {
         if self.state == State::Closed || self.is_ending() {
             return;
         }
-        self.asking.give_up();
-        self.asking.take_unanswered();
+        self.requests.give_up();
+        self.requests.take_unanswered();
         self.enter(state, now);
-        self.say_state(now, out);
+        self.append_state(now, out);
     }
 
     /// Returns true if the close or detach message was sent and is not answered.
@@ -191,19 +191,19 @@ impl HostProtocol {
     pub(super) fn put_scene(&mut self, scene: Scene, now: Duration, out: &mut Vec<u8>) {
         self.scene = Some(scene);
         self.enter(State::SceneSent, now);
-        self.say_state(now, out);
+        self.append_state(now, out);
     }
 
     /// Sends a scene change until it is answered; it replaces an unanswered one.
     pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
         self.view = Some((view, now, now));
         if self.state == State::Open {
-            self.say(&ToDevice::SceneChange(view), out);
+            self.append_message(&ToDevice::SceneChange(view), out);
         }
     }
 
     /// Removes and returns the scene change if it is still unanswered after `give_up`.
-    pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
+    pub(super) fn take_unanswered_view(&mut self, now: Duration) -> Option<SceneChange> {
         let give_up = self.timeouts.give_up;
         let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
         let lost = self.view.take_if(|(_, since, _)| is_lost(*since));
@@ -212,16 +212,16 @@ impl HostProtocol {
 
     /// Repeats the scene change if it is due.
     fn repeat_view(&mut self, now: Duration, out: &mut Vec<u8>) {
-        if let Some((view, since, stated)) = self.view
-            && self.is_due(stated, now)
+        if let Some((view, since, sent_at)) = self.view
+            && self.is_due(sent_at, now)
         {
             self.view = Some((view, since, now));
-            self.say(&ToDevice::SceneChange(view), out);
+            self.append_message(&ToDevice::SceneChange(view), out);
         }
     }
 
     /// Determines from the device's scene whether the unanswered placement is in force.
-    fn settle_view(&mut self, epoch: Option<u32>) {
+    fn resolve_view(&mut self, epoch: Option<u32>) {
         if let Some((view, _, _)) = self.view.take()
             && epoch == Some(view.scene.epoch)
         {
@@ -240,26 +240,26 @@ impl HostProtocol {
     }
 
     /// Adds a request after the earlier ones.
-    pub(super) fn ask(&mut self, ask: HostRequest) {
-        self.asking.ask(ask);
+    pub(super) fn enqueue(&mut self, request: HostRequest) {
+        self.requests.enqueue(request);
     }
 
     /// Restarts the silence time-out, after a time in which the line was not read.
-    pub(super) fn listen_from(&mut self, now: Duration) {
+    pub(super) fn reset_silence(&mut self, now: Duration) {
         self.received = now;
-        self.alive_said = now;
+        self.heartbeat_at = now;
     }
 
     /// Returns the requests that were given up without an answer since the last call.
     pub(super) fn take_unanswered(&mut self) -> Vec<HostRequest> {
-        self.asking.take_unanswered()
+        self.requests.take_unanswered()
     }
 
     /// Appends the messages that are due.
     ///
     /// # Errors
     /// When a deadline has passed.
-    pub(super) fn due(&mut self, now: Duration, out: &mut Vec<u8>) -> Result<(), LinkError> {
+    pub(super) fn append_due(&mut self, now: Duration, out: &mut Vec<u8>) -> Result<(), LinkError> {
         let in_state = now.saturating_sub(self.since);
         match self.state {
             State::Closed => return Ok(()),
@@ -275,14 +275,14 @@ impl HostProtocol {
             State::Open => self.check_silence(now)?,
             _ => {}
         }
-        let is_quiet = now.saturating_sub(self.received) >= self.timeouts.greet_again;
-        if self.is_due(self.stated, now) && (self.state != State::Open || is_quiet) {
-            self.say_state(now, out);
+        let is_quiet = now.saturating_sub(self.received) >= self.timeouts.hello_retry;
+        if self.is_due(self.sent_at, now) && (self.state != State::Open || is_quiet) {
+            self.append_state(now, out);
         }
         if self.state == State::Open {
-            self.say_alive(now, out);
+            self.append_heartbeat(now, out);
             self.repeat_view(now, out);
-            self.say_pending(now, out);
+            self.append_pending(now, out);
         }
         Ok(())
     }
@@ -290,9 +290,9 @@ impl HostProtocol {
     fn check_silence(&self, now: Duration) -> Result<(), LinkError> {
         let quiet = now.saturating_sub(self.received);
         // A frame right after the last answer may have been in transit before it.
-        let late = self.received + self.timeouts.greet_again;
+        let late = self.received + self.timeouts.hello_retry;
         let others = self.foreign.is_some_and(|at| at > late);
-        if others && quiet >= 2 * self.timeouts.greet_again {
+        if others && quiet >= 2 * self.timeouts.hello_retry {
             return Err(LinkError::Taken);
         }
         match quiet >= self.timeouts.give_up {
@@ -301,103 +301,103 @@ impl HostProtocol {
         }
     }
 
-    fn is_due(&self, stated: Duration, now: Duration) -> bool {
-        now.saturating_sub(stated) >= self.timeouts.again
+    fn is_due(&self, sent_at: Duration, now: Duration) -> bool {
+        now.saturating_sub(sent_at) >= self.timeouts.retry
     }
 
     fn enter(&mut self, state: State, now: Duration) {
         self.state = state;
-        (self.since, self.stated) = (now, now);
+        (self.since, self.sent_at) = (now, now);
     }
 
     /// Appends the messages that the state repeats.
-    fn say_state(&mut self, now: Duration, out: &mut Vec<u8>) {
-        self.stated = now;
+    fn append_state(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.sent_at = now;
         match self.state {
             State::Closed => {}
             State::Greeting => {
                 // A zero ends any incomplete frame.
                 out.push(0);
                 append(&VersionCheck::Query { protocol: PROTOCOL }, out);
-                self.say_hello(out);
+                self.append_hello(out);
             }
             State::SceneSent => {
                 if let Some(scene) = self.scene {
-                    self.say_scene(scene, out);
+                    self.append_scene(scene, out);
                 }
-                if now.saturating_sub(self.received) >= self.timeouts.greet_again {
-                    self.say_hello(out);
+                if now.saturating_sub(self.received) >= self.timeouts.hello_retry {
+                    self.append_hello(out);
                 }
             }
-            State::Open => self.say_hello(out),
+            State::Open => self.append_hello(out),
             State::Leaving => {
                 // A device that was restarted, or has not received this session's open message yet,
                 // has to receive it before the close message.
-                self.say_hello(out);
-                self.say(&ToDevice::Bye, out);
+                self.append_hello(out);
+                self.append_message(&ToDevice::Bye, out);
             }
             State::Detaching => {
-                self.say_hello(out);
-                self.say(&ToDevice::Detach, out);
+                self.append_hello(out);
+                self.append_message(&ToDevice::Detach, out);
             }
         }
     }
 
     /// Appends a scene, with its materials if it has some.
-    fn say_scene(&self, scene: Scene, out: &mut Vec<u8>) {
+    fn append_scene(&self, scene: Scene, out: &mut Vec<u8>) {
         let Some(table) = self
             .materials
             .as_ref()
             .filter(|_| scene.materials.is_some())
         else {
-            return self.say(&ToDevice::Scene(scene), out);
+            return self.append_message(&ToDevice::Scene(scene), out);
         };
         let mut room = [0; MAX_TABLE_BYTES];
         let table = table_bytes(table, &mut room);
-        self.say(
+        self.append_message(
             &ToDevice::MaterialScene(MaterialScene { scene, table }),
             out,
         );
     }
 
-    fn say_hello(&mut self, out: &mut Vec<u8>) {
+    fn append_hello(&mut self, out: &mut Vec<u8>) {
         // Zero stands for an open message that was never answered.
-        self.hello = self.hello.checked_add(1).unwrap_or(1);
+        self.hello_number = self.hello_number.checked_add(1).unwrap_or(1);
         self.hello_answered = false;
         out.push(0);
         let hello = HostHello {
             protocol: PROTOCOL,
-            number: self.hello,
+            number: self.hello_number,
             silence_s: self.timeouts.silence_s,
         };
-        self.say(&ToDevice::Hello(hello), out);
+        self.append_message(&ToDevice::Hello(hello), out);
     }
 
     /// Appends a sign of life if it is due.
-    fn say_alive(&mut self, now: Duration, out: &mut Vec<u8>) {
-        if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.timeouts.alive {
-            (self.alive_is_due, self.alive_said) = (false, now);
-            self.say(&ToDevice::Heartbeat, out);
+    fn append_heartbeat(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if self.heartbeat_due || now.saturating_sub(self.heartbeat_at) >= self.timeouts.heartbeat {
+            (self.heartbeat_due, self.heartbeat_at) = (false, now);
+            self.append_message(&ToDevice::Heartbeat, out);
         }
     }
 
     /// Makes the next sign of life due at once: time has passed on the device.
-    pub(super) const fn hasten_alive(&mut self) {
-        self.alive_is_due = true;
+    pub(super) const fn make_heartbeat_due(&mut self) {
+        self.heartbeat_due = true;
     }
 
     /// Appends the pending request if it is due.
-    pub(super) fn say_pending(&mut self, now: Duration, out: &mut Vec<u8>) {
+    pub(super) fn append_pending(&mut self, now: Duration, out: &mut Vec<u8>) {
         if self.state != State::Open {
             return;
         }
-        if let Some(message) = self.asking.due(now, &self.timeouts) {
-            self.say(&message, out);
+        if let Some(message) = self.requests.next_message(now, &self.timeouts) {
+            self.append_message(&message, out);
         }
     }
 
     /// Appends a message of this session.
-    pub(super) fn say(&self, message: &ToDevice<'_>, out: &mut Vec<u8>) {
+    pub(super) fn append_message(&self, message: &ToDevice<'_>, out: &mut Vec<u8>) {
         let session = self.session;
         append(&InSession { session, message }, out);
     }
@@ -415,29 +415,29 @@ impl HostProtocol {
     }
 
     /// Processes a frame; returns `None` if it belongs to another session or nothing waits for it.
-    pub(super) fn hear(
+    pub(super) fn on_frame(
         &mut self,
         now: Duration,
         frame: InSession<ToHost>,
         out: &mut Vec<u8>,
     ) -> Result<Option<ProtocolEvent>, LinkError> {
         if frame.session != self.session || self.state == State::Closed {
-            self.notice(now, &frame);
+            self.note_foreign_frame(now, &frame);
             return Ok(None);
         }
         self.confirmed = true;
         Ok(match frame.message {
             ToHost::Hello(device) => self.on_hello(now, device, out)?,
-            ToHost::SessionClosed { number, end } => self.on_over(now, number, end)?,
-            ToHost::SceneAck { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
+            ToHost::SessionClosed { number, end } => self.on_session_closed(now, number, end)?,
+            ToHost::SceneAck { epoch, accepted } => self.on_scene_ack(now, epoch, accepted)?,
             message @ (ToHost::Answer(Answer { number, .. }) | ToHost::Marked { number, .. }) => {
                 self.on_answer(now, number, message)
             }
             message @ ToHost::Status { number, .. } => {
-                self.on_told(now, (HostRequest::Status, number), message)
+                self.on_query_answer(now, (HostRequest::Status, number), message)
             }
             message @ ToHost::Calibration { number, .. } => {
-                self.on_told(now, (HostRequest::Calibration, number), message)
+                self.on_query_answer(now, (HostRequest::Calibration, number), message)
             }
             ToHost::Goodbye(count) => self
                 .on_goodbye(now, out)
@@ -447,7 +447,7 @@ impl HostProtocol {
                 None
             }
             message @ ToHost::Heartbeat { .. } => {
-                self.on_alive(now, &message, out);
+                self.on_heartbeat(now, &message, out);
                 Some(ProtocolEvent::Other(message))
             }
             message @ ToHost::PointAnswer { .. } => {
@@ -460,7 +460,7 @@ impl HostProtocol {
 
     /// Records a frame of another session as a sign of another host, unless it reports that its
     /// session is over or belongs to the session before.
-    fn notice(&mut self, now: Duration, frame: &InSession<ToHost>) {
+    fn note_foreign_frame(&mut self, now: Duration, frame: &InSession<ToHost>) {
         let previous = self.previous.map(|(session, _)| session);
         let is_over = matches!(frame.message, ToHost::SessionClosed { .. });
         if !is_over && previous != Some(frame.session) {
@@ -470,18 +470,18 @@ impl HostProtocol {
 
     /// Returns true if a message is the first answer to the last open message. Answers to earlier
     /// ones, and repeated answers, report an old state.
-    fn answers_hello(&mut self, number: u8) -> bool {
-        number == self.hello && !std::mem::replace(&mut self.hello_answered, true)
+    fn accept_hello_answer(&mut self, number: u8) -> bool {
+        number == self.hello_number && !std::mem::replace(&mut self.hello_answered, true)
     }
 
     /// Processes the device's report that it has ended this session.
-    fn on_over(
+    fn on_session_closed(
         &mut self,
         now: Duration,
         number: u8,
         end: SessionEnd,
     ) -> Result<Option<ProtocolEvent>, LinkError> {
-        if !self.answers_hello(number) {
+        if !self.accept_hello_answer(number) {
             return Ok(None);
         }
         self.received = now;
@@ -489,7 +489,7 @@ impl HostProtocol {
             (State::Detaching, _) => self.enter(State::Closed, now),
             // The close message after the open message is answered with it.
             (State::Leaving, SessionEnd::HostSilent) => {}
-            (_, SessionEnd::HostSilent) => return Err(LinkError::LetGo),
+            (_, SessionEnd::HostSilent) => return Err(LinkError::HostSilent),
             _ => return Err(LinkError::Taken),
         }
         Ok(None)
@@ -501,7 +501,7 @@ impl HostProtocol {
         device: DeviceHello,
         out: &mut Vec<u8>,
     ) -> Result<Option<ProtocolEvent>, LinkError> {
-        if !self.answers_hello(device.number) {
+        if !self.accept_hello_answer(device.number) {
             return Ok(None);
         }
         self.received = now;
@@ -515,13 +515,13 @@ impl HostProtocol {
         self.opened_by = device.opened_by;
         // A new session, or a restarted device: the epoch of its scene shows whether the scene
         // change is in force.
-        self.settle_view(device.epoch);
+        self.resolve_view(device.epoch);
         let restarted = !is_first;
         if self.is_ending() {
-            return Ok(Some(ProtocolEvent::Greeted { device, restarted }));
+            return Ok(Some(ProtocolEvent::HelloReceived { device, restarted }));
         }
         if restarted {
-            self.asking.give_up();
+            self.requests.give_up();
         }
         let next = match self.scene {
             Some(_) => State::SceneSent,
@@ -531,9 +531,9 @@ impl HostProtocol {
             self.enter(next, now);
         }
         if next == State::SceneSent {
-            self.say_state(now, out);
+            self.append_state(now, out);
         }
-        Ok(Some(ProtocolEvent::Greeted { device, restarted }))
+        Ok(Some(ProtocolEvent::HelloReceived { device, restarted }))
     }
 
     /// Returns true if a scene is to be rendered and the device has another epoch.
@@ -541,15 +541,15 @@ impl HostProtocol {
         self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
     }
 
-    fn on_scene_taken(
+    fn on_scene_ack(
         &mut self,
         now: Duration,
         epoch: u32,
         accepted: bool,
     ) -> Result<Option<ProtocolEvent>, LinkError> {
-        let is_views = |(view, _, _): &mut (SceneChange, _, _)| view.scene.epoch == epoch;
+        let is_this = |(view, _, _): &mut (SceneChange, _, _)| view.scene.epoch == epoch;
         if self.state == State::Open
-            && let Some((view, _, _)) = self.view.take_if(is_views)
+            && let Some((view, _, _)) = self.view.take_if(is_this)
         {
             self.received = now;
             if accepted {
@@ -569,23 +569,23 @@ impl HostProtocol {
     }
 
     fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<ProtocolEvent> {
-        let ask = self.asking.request_answered(number)?;
+        let request = self.requests.request_answered(number)?;
         self.received = now;
-        Some(ProtocolEvent::Answered(ask, message))
+        Some(ProtocolEvent::Answered(request, message))
     }
 
-    fn on_told(
+    fn on_query_answer(
         &mut self,
         now: Duration,
-        (asked, number): (HostRequest, u8),
+        (query, number): (HostRequest, u8),
         message: ToHost,
     ) -> Option<ProtocolEvent> {
-        let ask = self.asking.question_answered(asked, number)?;
+        let request = self.requests.query_answered(query, number)?;
         self.received = now;
-        Some(ProtocolEvent::Answered(ask, message))
+        Some(ProtocolEvent::Answered(request, message))
     }
 
-    fn on_alive(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
+    fn on_heartbeat(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
         self.received = now;
         if let ToHost::Heartbeat { epoch, .. } = message
             && self.state == State::Open
@@ -595,7 +595,7 @@ impl HostProtocol {
         {
             // The device has no scene, or lost it, and the message about that was lost.
             self.enter(State::SceneSent, now);
-            self.say_state(now, out);
+            self.append_state(now, out);
         }
     }
 
@@ -611,7 +611,7 @@ impl HostProtocol {
         if leaves {
             self.received = now;
             self.enter(State::Closed, now);
-            self.say(&ToDevice::Close, out);
+            self.append_message(&ToDevice::Close, out);
         }
         leaves
     }

@@ -7,9 +7,9 @@ use super::error::LinkError;
 use super::transport::{NoLine, Transport};
 
 /// Time between two checks of the clock during a wait.
-pub(super) const LOOK: Duration = Duration::from_millis(50);
+pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Max time for a device to read the bytes of one message before it counts as gone.
-const TAKES: Duration = Duration::from_secs(5);
+const SEND_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Line of a [`Session`](super::Session) or [`ControlSession`](super::ControlSession).
 pub(super) struct Line<'t> {
@@ -44,7 +44,7 @@ impl<'t> Line<'t> {
 
     /// Closes the line. Some devices can be opened only once: another line to them can be opened
     /// after this call.
-    pub(super) fn hang_up(&mut self) {
+    pub(super) fn close(&mut self) {
         self.replace(Box::new(NoLine(self.now())));
         self.is_open = false;
     }
@@ -60,27 +60,27 @@ impl<'t> Line<'t> {
     }
 
     /// Sends the pending bytes. A device that reads none of them for a while, or has not read all
-    /// by `until`, counts as gone; if `goes_on` returns false, the rest is not sent.
+    /// by `until`, counts as gone; if `should_continue` returns false, the rest is not sent.
     pub(super) fn flush_while(
         &mut self,
         until: Option<Duration>,
-        goes_on: &dyn Fn() -> bool,
+        should_continue: &dyn Fn() -> bool,
     ) -> Result<(), LinkError> {
-        let until = until.unwrap_or_else(|| self.now() + TAKES);
+        let until = until.unwrap_or_else(|| self.now() + SEND_TIMEOUT);
         let mut sent = 0;
-        while let Some(rest) = self.out.get(sent..).filter(|rest| !rest.is_empty()) {
-            let taken = match self.now() < until {
-                true => self.transport.send_some(rest, LOOK),
+        while let Some(unsent) = self.out.get(sent..).filter(|unsent| !unsent.is_empty()) {
+            let accepted = match self.now() < until {
+                true => self.transport.send_some(unsent, POLL_INTERVAL),
                 false => Err(io::ErrorKind::TimedOut.into()),
             };
-            match taken {
-                Ok(taken) => sent += taken,
+            match accepted {
+                Ok(accepted) => sent += accepted,
                 Err(error) => {
                     self.out.clear();
-                    return Err(LinkError::Gone(error));
+                    return Err(LinkError::Disconnected(error));
                 }
             }
-            if !goes_on() {
+            if !should_continue() {
                 break;
             }
         }
@@ -94,7 +94,7 @@ impl<'t> Line<'t> {
         wait: Duration,
     ) -> Result<(Duration, &[u8], &mut Vec<u8>), LinkError> {
         let received = self.transport.receive(self.incoming.as_mut_slice(), wait);
-        let received = received.map_err(LinkError::Gone)?;
+        let received = received.map_err(LinkError::Disconnected)?;
         let now = self.now();
         let bytes = self.incoming.get(..received).unwrap_or(&[]);
         Ok((now, bytes, &mut self.out))

@@ -14,7 +14,7 @@ pub struct LinkStats {
     pub tiles: u64,
     /// Tiles among them that were sent before: lost in transit, or requested again after the window
     /// had moved away and back.
-    pub again: u64,
+    pub repeated: u64,
     /// Bytes of the sent tiles, with framing.
     pub tile_bytes: u64,
     /// Telemetry samples received.
@@ -40,9 +40,9 @@ pub struct LinkStats {
     sent: HashSet<TileKey>,
     /// Samples lost before the last one that was received, and in sessions that ended.
     gaps: u64,
-    now: Numbering,
+    current: Numbering,
     /// The session before, until the device has reported its last count.
-    before: Option<Numbering>,
+    previous: Option<Numbering>,
 }
 
 /// The samples of one session.
@@ -57,73 +57,73 @@ struct Numbering {
 impl Numbering {
     /// Returns the number of sent samples that are missing after the last received one.
     fn tail(&self) -> u64 {
-        u64::from(ahead(self.expected, self.reported.sent))
+        u64::from(lead_of(self.expected, self.reported.sent))
     }
 
     /// Stores the device's count; returns the number of samples dropped since the last count. A
     /// late count changes nothing.
-    fn reported(&mut self, count: SampleCount) -> u64 {
+    fn set_reported(&mut self, count: SampleCount) -> u64 {
         self.reported.sent = self
             .reported
             .sent
-            .wrapping_add(ahead(self.reported.sent, count.sent));
-        let newly = ahead(self.reported.dropped, count.dropped);
+            .wrapping_add(lead_of(self.reported.sent, count.sent));
+        let newly = lead_of(self.reported.dropped, count.dropped);
         self.reported.dropped = self.reported.dropped.wrapping_add(newly);
         u64::from(newly)
     }
 }
 
 /// Returns the lead of `later` over `earlier`; zero if it is behind.
-fn ahead(earlier: u32, later: u32) -> u32 {
+fn lead_of(earlier: u32, later: u32) -> u32 {
     match later.wrapping_sub(earlier) {
         behind if behind > u32::MAX / 2 => 0,
-        ahead => ahead,
+        lead => lead,
     }
 }
 
 impl LinkStats {
     /// Begins a new session: its samples are numbered from zero.
-    pub(super) fn drawn(&mut self) {
-        if self.now != Numbering::default() || self.sessions > 0 {
+    pub(super) fn begin_session(&mut self) {
+        if self.current != Numbering::default() || self.sessions > 0 {
             self.settle(None);
-            self.before = Some(std::mem::take(&mut self.now));
+            self.previous = Some(std::mem::take(&mut self.current));
         }
         self.count_lost();
     }
 
     /// Counts an opened session. `last` is the sample count of the session before, if the device
     /// still has it.
-    pub(super) fn opened(&mut self, last: Option<SampleCount>) {
+    pub(super) fn on_opened(&mut self, last: Option<SampleCount>) {
         self.sessions += 1;
         self.settle(last);
         self.count_lost();
     }
 
     /// Counts a restart of the device: samples are numbered from zero again.
-    pub(super) fn restarted(&mut self) {
+    pub(super) fn on_restarted(&mut self) {
         self.sessions += 1;
-        self.before = Some(std::mem::take(&mut self.now));
+        self.previous = Some(std::mem::take(&mut self.current));
         self.settle(None);
         self.count_lost();
     }
 
     /// Completes the counts of the session before.
     fn settle(&mut self, last: Option<SampleCount>) {
-        let Some(mut before) = self.before.take() else {
+        let Some(mut previous) = self.previous.take() else {
             return;
         };
         match last {
-            Some(count) => self.dropped += before.reported(count),
+            Some(count) => self.dropped += previous.set_reported(count),
             None => self.uncertain += 1,
         }
-        self.gaps += before.tail();
+        self.gaps += previous.tail();
     }
 
     pub(super) fn sent_tile(&mut self, key: TileKey, bytes: usize) {
         self.tiles += 1;
         self.tile_bytes += bytes as u64;
         if !self.sent.insert(key) {
-            self.again += 1;
+            self.repeated += 1;
         }
     }
 
@@ -136,29 +136,29 @@ impl LinkStats {
     /// lost.
     pub(super) fn received(&mut self, telemetry: &Telemetry) -> bool {
         let count = telemetry.samples.len() as u32;
-        let gap = telemetry.first.wrapping_sub(self.now.expected);
+        let gap = telemetry.first.wrapping_sub(self.current.expected);
         if gap > u32::MAX / 2 {
             return false;
         }
         self.gaps += u64::from(gap);
         self.samples += u64::from(count);
-        self.now.expected = telemetry.first.wrapping_add(count);
-        self.reported(SampleCount {
-            sent: self.now.expected,
+        self.current.expected = telemetry.first.wrapping_add(count);
+        self.set_reported(SampleCount {
+            sent: self.current.expected,
             dropped: telemetry.dropped,
         });
         true
     }
 
     /// Stores the device's own count of this session.
-    pub(super) fn reported(&mut self, count: SampleCount) {
-        self.dropped += self.now.reported(count);
+    pub(super) fn set_reported(&mut self, count: SampleCount) {
+        self.dropped += self.current.set_reported(count);
         self.count_lost();
     }
 
     fn count_lost(&mut self) {
-        let before = self.before.map_or(0, |before| before.tail());
-        self.lost = self.gaps + before + self.now.tail();
+        let previous = self.previous.map_or(0, |previous| previous.tail());
+        self.lost = self.gaps + previous + self.current.tail();
     }
 }
 
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn gaps_are_loss_and_repeats_are_not_counted_twice() {
         let mut stats = LinkStats::default();
-        stats.opened(None);
+        stats.on_opened(None);
         assert!(stats.received(&batch(0, 0)));
         assert!(!stats.received(&batch(0, 0)));
         assert!(stats.received(&batch(12, 3)));
@@ -199,25 +199,25 @@ mod tests {
     #[test]
     fn loss_at_the_start_and_at_the_end_is_counted() {
         let mut stats = LinkStats::default();
-        stats.opened(None);
-        stats.reported(count(16, 1));
+        stats.on_opened(None);
+        stats.set_reported(count(16, 1));
         assert_eq!(counted(&stats), (0, 16, 1));
         assert!(stats.received(&batch(8, 1)));
         assert_eq!(counted(&stats), (4, 12, 1));
-        stats.reported(count(12, 1));
-        stats.reported(count(36, 2));
-        stats.reported(count(36, 2));
+        stats.set_reported(count(12, 1));
+        stats.set_reported(count(36, 2));
+        stats.set_reported(count(36, 2));
         assert_eq!(counted(&stats), (4, 32, 2));
     }
 
     #[test]
     fn losses_at_session_end_are_counted_by_the_next_session() {
         let mut stats = LinkStats::default();
-        stats.opened(None);
+        stats.on_opened(None);
         assert!(stats.received(&batch(0, 0)));
-        stats.drawn();
+        stats.begin_session();
         assert_eq!(counted(&stats), (4, 0, 0));
-        stats.opened(Some(count(20, 7)));
+        stats.on_opened(Some(count(20, 7)));
         assert_eq!(counted(&stats), (4, 16, 7));
         assert!(stats.received(&batch(0, 0)));
         assert!(stats.received(&batch(4, 2)));
@@ -227,10 +227,10 @@ mod tests {
     #[test]
     fn restart_counts_the_session_as_uncertain() {
         let mut stats = LinkStats::default();
-        stats.opened(None);
+        stats.on_opened(None);
         assert!(stats.received(&batch(0, 0)));
-        stats.reported(count(12, 1));
-        stats.restarted();
+        stats.set_reported(count(12, 1));
+        stats.on_restarted();
         assert!(stats.received(&batch(0, 1)));
         assert_eq!((counted(&stats), stats.uncertain), ((8, 8, 2), 1));
     }
@@ -241,7 +241,7 @@ mod tests {
             expected: u32::MAX - 3,
             reported: count(u32::MAX - 3, 0),
         };
-        assert_eq!(numbering.reported(count(4, 0)), 0);
+        assert_eq!(numbering.set_reported(count(4, 0)), 0);
         assert_eq!(numbering.tail(), 8);
     }
 }

@@ -32,8 +32,8 @@ pub(super) fn next_frame<T>(
     read: impl Fn(&[u8]) -> Result<T, FrameError>,
 ) -> Option<Result<T, FrameError>> {
     while !bytes.is_empty() {
-        let (taken, frame) = reader.push(bytes);
-        *bytes = bytes.get(taken..).unwrap_or(&[]);
+        let (consumed, frame) = reader.push(bytes);
+        *bytes = bytes.get(consumed..).unwrap_or(&[]);
         if let Some(frame) = frame {
             return Some(frame.and_then(&read));
         }

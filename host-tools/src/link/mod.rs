@@ -41,7 +41,7 @@ mod timeouts;
 mod transport;
 mod usb;
 
-pub use bulk::{Bulk, BulkEndpoints, NotOne, Pipes, is_hapterra, printable, the_one};
+pub use bulk::{Bulk, BulkEndpoints, Pipes, SelectionError, is_hapterra, printable, select};
 #[cfg(test)]
 pub(crate) use client::tests::hello;
 pub use client::{Arming, Client, Event};

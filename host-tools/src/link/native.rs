@@ -19,14 +19,14 @@ use crate::phantom::HeldPhantom;
 /// Tiles along the side of the window, as on the emulated board.
 const WINDOW: usize = 16;
 /// Max ticks run while the host waits for a message.
-const TICKS_A_CALL: u32 = 1000;
+const MAX_TICKS_PER_CALL: u32 = 1000;
 
 /// Max lead of a device in real time over the clock before it waits, and the lag above which it
 /// restarts its schedule.
-const AHEAD: Duration = Duration::from_millis(4);
-const BEHIND: Duration = Duration::from_millis(100);
+const MAX_LEAD: Duration = Duration::from_millis(4);
+const MAX_LAG: Duration = Duration::from_millis(100);
 /// Ticks between two returns of such a device to its host.
-const STEPS_IN_REAL_TIME: u32 = 16;
+const REAL_TIME_TICKS_PER_CALL: u32 = 16;
 
 /// Host time as the device's clock: ticks are never late, and their cost is measured on this
 /// machine.
@@ -72,12 +72,12 @@ impl TickClock for HostClock {
 pub struct Native<C: TickClock = StoppedClock> {
     device: Device<C, WINDOW>,
     arm: Option<Box<HeldPhantom>>,
-    sense: GuardInputs,
-    drive: GuardOutputs,
-    meddler: Option<FaultInjector>,
-    restless: bool,
+    inputs: GuardInputs,
+    outputs: GuardOutputs,
+    fault_injector: Option<FaultInjector>,
+    free_running: bool,
     /// Max ticks run while the host waits for a message.
-    ticks_a_call: u32,
+    ticks_per_call: u32,
     ticks: u64,
     /// Bytes from the device that arrived during a send.
     pending: VecDeque<u8>,
@@ -140,11 +140,11 @@ impl<C: TickClock> Native<C> {
         let mut native = Self {
             device: Device::new(tiles, memory, clock, stored, boot),
             arm,
-            sense: GuardInputs::default(),
-            drive: GuardOutputs::default(),
-            meddler: None,
-            restless: false,
-            ticks_a_call: TICKS_A_CALL,
+            inputs: GuardInputs::default(),
+            outputs: GuardOutputs::default(),
+            fault_injector: None,
+            free_running: false,
+            ticks_per_call: MAX_TICKS_PER_CALL,
             ticks: 0,
             pending: VecDeque::new(),
         };
@@ -154,8 +154,8 @@ impl<C: TickClock> Native<C> {
 
     /// Adds a fault injector between the device and its arm.
     #[must_use]
-    pub fn meddled_with(mut self, meddler: FaultInjector) -> Self {
-        self.meddler = Some(meddler);
+    pub fn with_fault_injector(mut self, fault_injector: FaultInjector) -> Self {
+        self.fault_injector = Some(fault_injector);
         self.read_sensors();
         self
     }
@@ -163,8 +163,8 @@ impl<C: TickClock> Native<C> {
     /// Lets time pass whenever the line is read, as on a board: also while the device waits only
     /// for the host.
     #[must_use]
-    pub fn restless(mut self) -> Self {
-        self.restless = true;
+    pub fn free_running(mut self) -> Self {
+        self.free_running = true;
         self
     }
 
@@ -177,8 +177,8 @@ impl<C: TickClock> Native<C> {
 
     /// Sets the ticks that the device runs before it returns to its host.
     #[must_use]
-    pub fn in_steps_of(mut self, ticks: u32) -> Self {
-        self.ticks_a_call = ticks;
+    pub fn with_ticks_per_call(mut self, ticks: u32) -> Self {
+        self.ticks_per_call = ticks;
         self
     }
 
@@ -192,14 +192,15 @@ impl<C: TickClock> Native<C> {
             due += tick;
             let now = Instant::now();
             let early = due.saturating_duration_since(now);
-            if early > AHEAD {
+            if early > MAX_LEAD {
                 std::thread::sleep(early);
             }
-            if now.saturating_duration_since(due) > BEHIND {
+            if now.saturating_duration_since(due) > MAX_LAG {
                 due = now;
             }
         });
-        self.meddled_with(pace).in_steps_of(STEPS_IN_REAL_TIME)
+        self.with_fault_injector(pace)
+            .with_ticks_per_call(REAL_TIME_TICKS_PER_CALL)
     }
 
     /// Returns the virtual arm, if the device has one.
@@ -210,8 +211,8 @@ impl<C: TickClock> Native<C> {
 
     /// Returns the commands to the amplifiers in the last tick.
     #[must_use]
-    pub const fn drive(&self) -> GuardOutputs {
-        self.drive
+    pub const fn outputs(&self) -> GuardOutputs {
+        self.outputs
     }
 
     /// Returns the memory that the device would find after a restart.
@@ -221,21 +222,21 @@ impl<C: TickClock> Native<C> {
     }
 
     /// Lets time pass while the line is not read, as on a board whose host is gone.
-    pub fn pass(&mut self, ticks: u32) {
+    pub fn run_ticks(&mut self, ticks: u32) {
         for _ in 0..ticks {
             self.tick();
         }
     }
 
     fn tick(&mut self) {
-        self.drive = self.device.tick(self.sense);
+        self.outputs = self.device.tick(self.inputs);
         self.ticks += 1;
         if let Some(arm) = self
             .arm
             .as_mut()
             .filter(|_| self.device.link.is_arm_in_use())
         {
-            let currents_a = self.drive.currents_a.to_array().map(f64::from);
+            let currents_a = self.outputs.currents_a.to_array().map(f64::from);
             arm.step(currents_a, f64::from(C::PERIOD) / f64::from(C::HZ));
         }
         self.read_sensors();
@@ -244,19 +245,19 @@ impl<C: TickClock> Native<C> {
     /// Reads encoders and switches, and applies the fault injector.
     fn read_sensors(&mut self) {
         if let Some(arm) = &self.arm {
-            self.sense = arm.sense();
+            self.inputs = arm.guard_inputs();
         }
-        if let Some(meddler) = &mut self.meddler {
-            meddler(self.ticks, &mut self.sense, &self.drive);
+        if let Some(fault_injector) = &mut self.fault_injector {
+            fault_injector(self.ticks, &mut self.inputs, &self.outputs);
         }
     }
 
     /// Runs the device until it can accept more bytes.
     fn make_room(&mut self) {
         let mut chunk = [0; 512];
-        let stated = self.device.link.transmit(&mut chunk);
-        self.pending.extend(chunk.iter().take(stated));
-        if stated == 0 {
+        let sent = self.device.link.transmit(&mut chunk);
+        self.pending.extend(chunk.iter().take(sent));
+        if sent == 0 {
             self.tick();
         }
     }
@@ -265,9 +266,9 @@ impl<C: TickClock> Native<C> {
 impl<C: TickClock> Transport for Native<C> {
     fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         while !bytes.is_empty() {
-            let taken = self.device.receive(bytes);
-            bytes = bytes.get(taken..).unwrap_or(&[]);
-            if taken == 0 {
+            let accepted = self.device.receive(bytes);
+            bytes = bytes.get(accepted..).unwrap_or(&[]);
+            if accepted == 0 {
                 self.make_room();
             }
         }
@@ -278,10 +279,10 @@ impl<C: TickClock> Transport for Native<C> {
         if !self.pending.is_empty() {
             return io::Read::read(&mut self.pending, into);
         }
-        for _ in 0..self.ticks_a_call {
-            let stated = self.device.link.transmit(into);
-            if stated > 0 || (self.device.link.may_stop_clock() && !self.restless) {
-                return Ok(stated);
+        for _ in 0..self.ticks_per_call {
+            let sent = self.device.link.transmit(into);
+            if sent > 0 || (self.device.link.may_stop_clock() && !self.free_running) {
+                return Ok(sent);
             }
             self.tick();
         }

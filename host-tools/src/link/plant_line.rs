@@ -24,7 +24,7 @@ pub fn serve_plant(
     let mut inbox = Inbox::default();
     let mut tick = 0;
     while !stop() {
-        let sense = arm.sense();
+        let sense = arm.guard_inputs();
         send(transport, &PlantState { tick, sense })?;
         let currents: Currents = loop {
             if let Some(currents) = inbox.next(transport, Duration::from_millis(100))? {
@@ -45,12 +45,12 @@ pub fn serve_plant(
     Ok(())
 }
 
-/// Moves the arm at a board's plant line in a separate thread while `talk` runs; returns the result
-/// of `talk`.
+/// Moves the arm at a board's plant line in a separate thread while `run` runs; returns the result
+/// of `run`.
 pub fn move_arm_while<T>(
     line: &mut (dyn Transport + Send),
     arm: &mut HeldPhantom,
-    talk: impl FnOnce() -> T,
+    run: impl FnOnce() -> T,
 ) -> T {
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -60,8 +60,8 @@ pub fn move_arm_while<T>(
                 tracing::debug!("the plant's line ended: {error}");
             }
         });
-        let talked = talk();
+        let result = run();
         done.store(true, Ordering::Relaxed);
-        talked
+        result
     })
 }

@@ -6,9 +6,9 @@ use hapterra_core::terrain::TILE_CELLS;
 use crate::terrain::Terrain;
 
 /// Time ahead of the HIP, seconds: longer than the response time of a distant server.
-const AHEAD_S: f64 = 0.5;
+const LOOKAHEAD_S: f64 = 0.5;
 /// Time between two positions, seconds: positions of adjacent ticks give no useful speed.
-const BETWEEN_S: f64 = 0.05;
+const MIN_INTERVAL_S: f64 = 0.05;
 /// Max distance from the HIP's tile, tiles. For a faster HIP nothing is prefetched: the tiles would
 /// arrive after it has passed them.
 const MAX_TILES: i32 = 8;
@@ -17,7 +17,7 @@ const MAX_TILES: i32 = 8;
 #[derive(Debug, Default)]
 pub(super) struct Prefetch {
     /// A tick, and the HIP's position in it.
-    was: Option<(u32, GridPoint)>,
+    previous: Option<(u32, GridPoint)>,
     /// First and last prefetched tile, east and north.
     prefetched: Option<[[i32; 2]; 2]>,
 }
@@ -36,16 +36,16 @@ impl Prefetch {
         hip: &GridPoint,
         tick_hz: f64,
     ) {
-        let Some((then, was)) = self.was else {
-            self.was = Some((tick, *hip));
+        let Some((then, previous)) = self.previous else {
+            self.previous = Some((tick, *hip));
             return;
         };
         let since = f64::from(tick.wrapping_sub(then)) / tick_hz;
-        if since < BETWEEN_S {
+        if since < MIN_INTERVAL_S {
             return;
         }
-        self.was = Some((tick, *hip));
-        let Some(tiles) = tiles(&was, hip, AHEAD_S / since) else {
+        self.previous = Some((tick, *hip));
+        let Some(tiles) = tiles(&previous, hip, LOOKAHEAD_S / since) else {
             return;
         };
         if self.prefetched.replace(tiles) != Some(tiles) {
@@ -58,7 +58,7 @@ impl Prefetch {
 }
 
 /// Prefetches the tiles around a HIP's next position.
-pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
+pub(super) fn prefetch_around(terrain: &Terrain<'_>, hip: &GridPoint) {
     let [east, north, _] = hip.cell();
     let tile = TILE_CELLS as i32;
     let (from, to) = (
@@ -69,11 +69,11 @@ pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
 }
 
 /// Returns the first and last tile, east and north, between the HIP and its extrapolated position;
-/// `times` is the extrapolation time over the time since `was`. `None` if the HIP is too fast.
-fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
+/// `times` is the extrapolation time over the time since `previous`. `None` if the HIP is too fast.
+fn tiles(previous: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
     let along = |axis: usize| {
         let at = |point: &GridPoint| f64::from(point.cell()[axis]) + f64::from(point.frac()[axis]);
-        let (from, moved) = (at(is), at(is) - at(was));
+        let (from, moved) = (at(is), at(is) - at(previous));
         let tile = |cells: f64| (cells / f64::from(TILE_CELLS as u32)).floor() as i32;
         let (from, to) = (tile(from), tile(from + moved * times));
         let is_near = to.saturating_sub(from).saturating_abs() <= MAX_TILES;

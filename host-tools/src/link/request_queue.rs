@@ -13,10 +13,10 @@ use super::timeouts::Timeouts;
 /// Pending request.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
-    ask: HostRequest,
+    request: HostRequest,
     number: u8,
     since: Duration,
-    stated: Duration,
+    sent_at: Duration,
 }
 
 /// The pending request, the waiting ones, and the unanswered ones.
@@ -26,26 +26,26 @@ pub(super) struct RequestQueue {
     waiting: VecDeque<HostRequest>,
     /// Numbers of the last request and of the last query, counted apart: a hundred queries between
     /// two requests would otherwise make the second look older than the first.
-    request: u8,
-    question: u8,
+    request_number: u8,
+    query_number: u8,
     unanswered: Vec<HostRequest>,
 }
 
 impl RequestQueue {
     /// Adds a request at the end of the queue.
-    pub(super) fn ask(&mut self, ask: HostRequest) {
-        self.waiting.push_back(ask);
+    pub(super) fn enqueue(&mut self, request: HostRequest) {
+        self.waiting.push_back(request);
     }
 
     /// Begins a session: numbers start again, and the requests of the session before are given up.
     pub(super) fn begin_session(&mut self) {
-        self.request = 0;
+        self.request_number = 0;
         self.give_up();
     }
 
     /// Gives up the pending request and the waiting ones.
     pub(super) fn give_up(&mut self) {
-        let under_way = self.pending.take().map(|pending| pending.ask);
+        let under_way = self.pending.take().map(|pending| pending.request);
         self.unanswered.extend(under_way);
         self.unanswered.extend(self.waiting.drain(..));
     }
@@ -56,31 +56,39 @@ impl RequestQueue {
     }
 
     /// Returns the message to send now: the pending request if it is due again, or the next one.
-    pub(super) fn due(&mut self, now: Duration, timeouts: &Timeouts) -> Option<ToDevice<'static>> {
-        self.give_up_late(now, timeouts);
+    pub(super) fn next_message(
+        &mut self,
+        now: Duration,
+        timeouts: &Timeouts,
+    ) -> Option<ToDevice<'static>> {
+        self.give_up_overdue(now, timeouts);
         match &mut self.pending {
-            Some(pending) if now.saturating_sub(pending.stated) < timeouts.again => return None,
-            Some(pending) => pending.stated = now,
+            Some(pending) if now.saturating_sub(pending.sent_at) < timeouts.retry => return None,
+            Some(pending) => pending.sent_at = now,
             None => {
-                let ask = self.waiting.pop_front()?;
-                self.pending = Some(self.begin(ask, now));
+                let request = self.waiting.pop_front()?;
+                self.pending = Some(self.begin(request, now));
             }
         }
-        self.pending.map(|Pending { ask, number, .. }| match ask {
-            HostRequest::Request(request) => ToDevice::Request { number, request },
-            HostRequest::Status => ToDevice::Status { number },
-            HostRequest::Calibration => ToDevice::GetCalibration { number },
-        })
+        self.pending.map(
+            |Pending {
+                 request, number, ..
+             }| match request {
+                HostRequest::Request(request) => ToDevice::Request { number, request },
+                HostRequest::Status => ToDevice::Status { number },
+                HostRequest::Calibration => ToDevice::GetCalibration { number },
+            },
+        )
     }
 
-    fn give_up_late(&mut self, now: Duration, timeouts: &Timeouts) {
+    fn give_up_overdue(&mut self, now: Duration, timeouts: &Timeouts) {
         let is_late = |pending: &mut Pending| {
-            now.saturating_sub(pending.since) >= timeouts.with(&pending.ask)
+            now.saturating_sub(pending.since) >= timeouts.answer_timeout(&pending.request)
         };
         if let Some(pending) = self.pending.take_if(is_late) {
-            self.unanswered.push(pending.ask);
+            self.unanswered.push(pending.request);
             if matches!(
-                pending.ask,
+                pending.request,
                 HostRequest::Request(Request::Arm | Request::Jog(_))
             ) {
                 // Its number makes the device ignore the first one, even if that arrives later.
@@ -90,41 +98,40 @@ impl RequestQueue {
         }
     }
 
-    fn begin(&mut self, ask: HostRequest, now: Duration) -> Pending {
-        let number = match ask {
-            HostRequest::Request(_) => &mut self.request,
-            HostRequest::Status | HostRequest::Calibration => &mut self.question,
+    fn begin(&mut self, request: HostRequest, now: Duration) -> Pending {
+        let number = match request {
+            HostRequest::Request(_) => &mut self.request_number,
+            HostRequest::Status | HostRequest::Calibration => &mut self.query_number,
         };
         *number = number.wrapping_add(1);
         Pending {
-            ask,
+            request,
             number: *number,
             since: now,
-            stated: now,
+            sent_at: now,
         }
     }
 
     /// Returns the pending request if the answer has its number.
     pub(super) fn request_answered(&mut self, number: u8) -> Option<HostRequest> {
-        self.answered(number, |ask| matches!(ask, HostRequest::Request(_)))
+        self.answered(number, |request| matches!(request, HostRequest::Request(_)))
     }
 
     /// Returns the pending query if the answer has its number.
-    pub(super) fn question_answered(
-        &mut self,
-        asked: HostRequest,
-        number: u8,
-    ) -> Option<HostRequest> {
-        self.answered(number, |ask| *ask == asked)
+    pub(super) fn query_answered(&mut self, query: HostRequest, number: u8) -> Option<HostRequest> {
+        self.answered(number, |request| *request == query)
     }
 
     /// Removes and returns the pending request if the answer is to it.
     fn answered(
         &mut self,
         number: u8,
-        is_it: impl Fn(&HostRequest) -> bool,
+        is_match: impl Fn(&HostRequest) -> bool,
     ) -> Option<HostRequest> {
-        let is_it = |pending: &mut Pending| pending.number == number && is_it(&pending.ask);
-        self.pending.take_if(is_it).map(|pending| pending.ask)
+        let is_match =
+            |pending: &mut Pending| pending.number == number && is_match(&pending.request);
+        self.pending
+            .take_if(is_match)
+            .map(|pending| pending.request)
     }
 }

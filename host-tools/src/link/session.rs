@@ -10,7 +10,7 @@ use super::client::{Arming, Client, Event};
 use super::error::LinkError;
 use super::host_protocol::State;
 use super::host_request::HostRequest;
-use super::line::{LOOK, Line};
+use super::line::{Line, POLL_INTERVAL};
 use super::link_stats::LinkStats;
 use super::timeouts::Timeouts;
 use super::transport::Transport;
@@ -21,9 +21,9 @@ pub struct Session<'t> {
     client: Client<'t>,
     line: Line<'t>,
     /// Returns false if the session should stop waiting for the device to read.
-    goes_on: &'t dyn Fn() -> bool,
+    should_continue: &'t dyn Fn() -> bool,
     /// Deadline for the close message and its answer.
-    leaves_by: Option<Duration>,
+    close_deadline: Option<Duration>,
 }
 
 impl<'t> Session<'t> {
@@ -39,15 +39,15 @@ impl<'t> Session<'t> {
         Self {
             client: Client::new(terrain, scene, arming, timeouts),
             line: Line::new(transport),
-            goes_on: &|| true,
-            leaves_by: None,
+            should_continue: &|| true,
+            close_deadline: None,
         }
     }
 
-    /// Stops opening, and stops waiting for a slow device, when `goes_on` returns false.
+    /// Stops opening, and stops waiting for a slow device, when `should_continue` returns false.
     #[must_use]
-    pub fn heeding(mut self, goes_on: &'t dyn Fn() -> bool) -> Self {
-        self.goes_on = goes_on;
+    pub fn continuing_while(mut self, should_continue: &'t dyn Fn() -> bool) -> Self {
+        self.should_continue = should_continue;
         self
     }
 
@@ -72,10 +72,10 @@ impl<'t> Session<'t> {
     /// # Errors
     /// As [`Session::open`]; [`LinkError::Interrupted`].
     pub fn begin(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<DeviceHello, LinkError> {
-        self.shake_hands(self.goes_on, on)
+        self.handshake(self.should_continue, on)
     }
 
-    /// Continues over a new transport after the old one was lost, as long as `go_on` returns true.
+    /// Continues over a new transport after the old one was lost, as long as `should_continue` returns true.
     /// Returns the device, whose `epoch` is that of the scene it still had.
     ///
     /// # Errors
@@ -83,22 +83,22 @@ impl<'t> Session<'t> {
     pub fn resume(
         &mut self,
         transport: Box<dyn Transport + 't>,
-        go_on: &dyn Fn() -> bool,
+        should_continue: &dyn Fn() -> bool,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<DeviceHello, LinkError> {
-        self.go_over(transport);
-        self.shake_hands(go_on, on)
+        self.switch_line(transport);
+        self.handshake(should_continue, on)
     }
 
     /// Continues the present session over another line.
-    pub fn go_over(&mut self, transport: Box<dyn Transport + 't>) {
+    pub fn switch_line(&mut self, transport: Box<dyn Transport + 't>) {
         self.line.replace(transport);
     }
 
     /// Closes the line. Some devices can be opened only once: another line to them can be opened
     /// after this call.
-    pub fn hang_up(&mut self) {
-        self.line.hang_up();
+    pub fn close_line(&mut self) {
+        self.line.close();
     }
 
     /// Returns true if the line is open.
@@ -127,20 +127,20 @@ impl<'t> Session<'t> {
 
     /// Adds a request; an event reports its result. The request is sent in the next poll, or when
     /// the earlier ones are answered.
-    pub fn ask(&mut self, ask: HostRequest) {
-        self.client.ask(ask);
+    pub fn enqueue(&mut self, request: HostRequest) {
+        self.client.enqueue(request);
     }
 
-    /// Requests an action, as [`Session::ask`].
+    /// Requests an action, as [`Session::request`].
     pub fn request(&mut self, request: Request) {
-        self.ask(HostRequest::Request(request));
+        self.enqueue(HostRequest::Request(request));
     }
 
     /// Puts a scene change in force, with its terrain; the clutch has to be open. An
-    /// [`Event::Viewed`] reports the result.
+    /// [`Event::SceneChangeResult`] reports the result.
     ///
     /// # Errors
-    /// [`LinkError::Gone`].
+    /// [`LinkError::Disconnected`].
     pub fn put_view(&mut self, view: SceneChange, terrain: Terrain<'t>) -> Result<(), LinkError> {
         let line = &mut self.line;
         self.client
@@ -151,7 +151,7 @@ impl<'t> Session<'t> {
     /// Renders a point: an [`Event::Rendered`] reports the force there.
     ///
     /// # Errors
-    /// [`LinkError::Gone`].
+    /// [`LinkError::Disconnected`].
     pub fn step(&mut self, point: HipCommand) -> Result<(), LinkError> {
         self.client.step(self.line.now(), point, &mut self.line.out);
         self.flush()
@@ -164,7 +164,7 @@ impl<'t> Session<'t> {
     /// [`LinkError`]. After a passing one the session can continue with [`Session::resume`].
     pub fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         let line = &mut self.line;
-        self.client.due(line.now(), &mut line.out, on)?;
+        self.client.append_due(line.now(), &mut line.out, on)?;
         self.flush()?;
         let (now, bytes, out) = self.line.receive(wait)?;
         self.client.receive(now, bytes, out, on)?;
@@ -177,13 +177,13 @@ impl<'t> Session<'t> {
     /// # Errors
     /// [`LinkError::NotConfirmed`] if the device does not confirm in time; [`LinkError::Taken`] if
     /// another host controls the device.
-    pub fn say_goodbye(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
+    pub fn close(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         self.client.leave(self.line.now(), &mut self.line.out);
         // The user has ended the session, but the device must still receive the close message.
-        self.goes_on = &|| true;
-        self.leaves_by = Some(self.line.now() + self.client.timeouts().goodbye);
+        self.should_continue = &|| true;
+        self.close_deadline = Some(self.line.now() + self.client.timeouts().goodbye);
         while self.client.state() != State::Closed {
-            self.poll(LOOK, on).map_err(|error| {
+            self.poll(POLL_INTERVAL, on).map_err(|error| {
                 tracing::debug!(%error, "while closing the session");
                 match error {
                     LinkError::Taken => error,
@@ -194,28 +194,25 @@ impl<'t> Session<'t> {
         Ok(())
     }
 
-    /// As [`Session::say_goodbye`], for a device that was not opened yet: it disarms an arm that
+    /// As [`Session::close`], for a device that was not opened yet: it disarms an arm that
     /// another host has left armed.
     ///
     /// # Errors
-    /// As [`Session::say_goodbye`].
-    pub fn say_hello_and_goodbye(
-        &mut self,
-        on: &mut dyn FnMut(Event<'_>),
-    ) -> Result<(), LinkError> {
+    /// As [`Session::close`].
+    pub fn open_and_close(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         self.client.greet(self.line.now(), &mut self.line.out);
-        self.say_goodbye(on)
+        self.close(on)
     }
 
-    fn shake_hands(
+    fn handshake(
         &mut self,
-        go_on: &dyn Fn() -> bool,
+        should_continue: &dyn Fn() -> bool,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<DeviceHello, LinkError> {
         self.client.greet(self.line.now(), &mut self.line.out);
         let mut opened = None;
-        while go_on() {
-            self.poll(LOOK, &mut |event| {
+        while should_continue() {
+            self.poll(POLL_INTERVAL, &mut |event| {
                 if let Event::Opened { device, .. } = event {
                     opened = Some(device.clone());
                 }
@@ -229,6 +226,7 @@ impl<'t> Session<'t> {
     }
 
     fn flush(&mut self) -> Result<(), LinkError> {
-        self.line.flush_while(self.leaves_by, self.goes_on)
+        self.line
+            .flush_while(self.close_deadline, self.should_continue)
     }
 }

@@ -20,7 +20,7 @@ pub struct Tcp {
 /// gone.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// The shortest time-out: a socket rejects zero.
-const AT_LEAST: Duration = Duration::from_micros(1);
+const MIN_WAIT: Duration = Duration::from_micros(1);
 
 impl Tcp {
     /// Connects to `HOST:PORT`.
@@ -29,7 +29,7 @@ impl Tcp {
     /// [`LinkError::Absent`] names the searched address.
     pub fn connect(address: &str) -> Result<Self, LinkError> {
         let absent = |why: io::Error| LinkError::Absent {
-            looked_for: format!("a device at {address} (TCP)"),
+            searched_for: format!("a device at {address} (TCP)"),
             why: why.to_string(),
         };
         let mut failure = io::Error::other("the name has no address");
@@ -62,22 +62,22 @@ impl Tcp {
 
 impl Transport for Tcp {
     fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
-        let began = Instant::now();
+        let start = Instant::now();
         // The time-out holds for all bytes, so a device that reads a byte now and then also counts
         // as gone.
         while !bytes.is_empty() {
-            let left = TIMEOUT.saturating_sub(began.elapsed());
-            if left.is_zero() {
+            let remaining = TIMEOUT.saturating_sub(start.elapsed());
+            if remaining.is_zero() {
                 return Err(io::ErrorKind::TimedOut.into());
             }
-            let sent = self.send_some(bytes, left)?;
+            let sent = self.send_some(bytes, remaining)?;
             bytes = bytes.get(sent..).unwrap_or(&[]);
         }
         Ok(())
     }
 
     fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
-        let wait = wait.max(AT_LEAST);
+        let wait = wait.max(MIN_WAIT);
         if wait != self.write_wait {
             self.stream.set_write_timeout(Some(wait))?;
             self.write_wait = wait;
@@ -89,7 +89,7 @@ impl Transport for Tcp {
     }
 
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let wait = wait.max(AT_LEAST);
+        let wait = wait.max(MIN_WAIT);
         if wait != self.wait {
             self.stream.set_read_timeout(Some(wait))?;
             self.wait = wait;

@@ -12,12 +12,12 @@ use super::host_request::HostRequest;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeouts {
     /// Time between two tries to send a message.
-    pub again: Duration,
+    pub retry: Duration,
     /// Time between two signs of life.
-    pub alive: Duration,
+    pub heartbeat: Duration,
     /// Time without an answer after which the host sends the open message again. A restarted device
     /// needs it; otherwise it changes nothing.
-    pub greet_again: Duration,
+    pub hello_retry: Duration,
     /// Time without an answer after which the device counts as gone.
     pub give_up: Duration,
     /// Max time for the device to disarm and confirm it.
@@ -33,9 +33,9 @@ impl Timeouts {
 
     /// For a device that runs in real time.
     pub const REAL_TIME: Self = Self {
-        again: Duration::from_millis(400),
-        alive: Duration::from_millis(500),
-        greet_again: Duration::from_millis(750),
+        retry: Duration::from_millis(400),
+        heartbeat: Duration::from_millis(500),
+        hello_retry: Duration::from_millis(750),
         give_up: Duration::from_secs(4),
         goodbye: Duration::from_secs(3),
         silence_s: Self::REAL_SILENCE_S,
@@ -43,9 +43,9 @@ impl Timeouts {
 
     /// For an emulated board, or a device in this program, on a shared machine.
     pub const EMULATED: Self = Self {
-        again: Duration::from_secs(5),
-        alive: Duration::from_millis(500),
-        greet_again: Duration::from_secs(20),
+        retry: Duration::from_secs(5),
+        heartbeat: Duration::from_millis(500),
+        hello_retry: Duration::from_secs(20),
         give_up: Duration::from_secs(120),
         goodbye: Duration::from_secs(60),
         silence_s: DEFAULT_SILENCE_S,
@@ -53,9 +53,9 @@ impl Timeouts {
 
     /// Returns the time-out of an answer: storing a calibration waits for the user's dead-man
     /// press.
-    pub(super) fn with(&self, ask: &HostRequest) -> Duration {
+    pub(super) fn answer_timeout(&self, request: &HostRequest) -> Duration {
         const PRESS: Duration = Duration::from_millis(PRESS_TIMEOUT_MS as u64);
-        match ask {
+        match request {
             HostRequest::Request(Request::StoreCalibration) => self.give_up + PRESS,
             _ => self.give_up,
         }
@@ -63,19 +63,19 @@ impl Timeouts {
 
     /// Time-outs for a read-only session: all of it within `give_up`.
     #[must_use]
-    pub fn of_a_look(give_up: Duration) -> Self {
+    pub fn read_only(give_up: Duration) -> Self {
         Self {
             silence_s: READ_ONLY_SILENCE_S,
-            ..Self::of_a_dialogue(give_up)
+            ..Self::for_control(give_up)
         }
     }
 
     /// Time-outs for a session of queries and requests: all of it within `give_up`.
     #[must_use]
-    pub fn of_a_dialogue(give_up: Duration) -> Self {
+    pub fn for_control(give_up: Duration) -> Self {
         Self {
-            again: Self::REAL_TIME.again.min(give_up),
-            greet_again: Self::REAL_TIME.greet_again.min(give_up),
+            retry: Self::REAL_TIME.retry.min(give_up),
+            hello_retry: Self::REAL_TIME.hello_retry.min(give_up),
             give_up,
             goodbye: Self::REAL_TIME.goodbye.min(give_up),
             ..Self::REAL_TIME
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn silence_timeout_of_a_real_arm_is_5_to_30_seconds() {
-        let control = Timeouts::of_a_dialogue(Duration::from_secs(60));
+        let control = Timeouts::for_control(Duration::from_secs(60));
         for timeout in [Timeouts::REAL_TIME, control] {
             assert!((5..=30).contains(&timeout.silence_s), "{timeout:?}");
         }

@@ -8,7 +8,9 @@ use nusb::MaybeFuture;
 use nusb::io::{EndpointRead, EndpointWrite};
 use nusb::transfer::{self, In, Out};
 
-use super::bulk::{Bulk, BulkEndpoints, NotOne, Pipes, TRANSFER, is_hapterra, printable, the_one};
+use super::bulk::{
+    Bulk, BulkEndpoints, Pipes, SelectionError, TRANSFER, is_hapterra, printable, select,
+};
 use super::error::LinkError;
 
 /// Number of concurrent transfers from the device, so that none of its packets waits.
@@ -35,21 +37,21 @@ impl Usb {
     pub fn connect(serial: Option<&str>) -> Result<Self, LinkError> {
         let (found, looked_at) = Self::list();
         let serials: Vec<_> = found.iter().map(serial_of).collect();
-        match (the_one(&serials, serial), serial, looked_at) {
+        match (select(&serials, serial), serial, looked_at) {
             (Ok(i), ..) => Self::open(&found[i]),
-            (Err(NotOne::Several), ..) => {
+            (Err(SelectionError::Several), ..) => {
                 Err(LinkError::Several(found.iter().map(Self::place).collect()))
             }
-            (Err(NotOne::None), _, 0) => {
+            (Err(SelectionError::None), _, 0) => {
                 Err(absent("no USB devices at all are visible here".into()))
             }
-            (Err(NotOne::None), Some(wanted), _) if !found.is_empty() => {
+            (Err(SelectionError::None), Some(requested), _) if !found.is_empty() => {
                 let there: Vec<_> = found.iter().map(Self::place).collect();
-                let wanted = printable(wanted);
+                let requested = printable(requested);
                 let there = there.join(", ");
-                Err(absent(format!("none is usb:{wanted}; there is {there}")))
+                Err(absent(format!("none is usb:{requested}; there is {there}")))
             }
-            (Err(NotOne::None), _, n) => Err(absent(format!(
+            (Err(SelectionError::None), _, n) => Err(absent(format!(
                 "{n} USB devices, none of them a hapterra board"
             ))),
         }
@@ -75,7 +77,7 @@ impl Usb {
 
     /// Returns the description of the searched USB devices.
     #[must_use]
-    pub fn looked_for() -> String {
+    pub fn searched_for() -> String {
         format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")
     }
 
@@ -152,7 +154,7 @@ pub(crate) fn is_board(info: &nusb::DeviceInfo) -> bool {
 
 fn absent(why: String) -> LinkError {
     LinkError::Absent {
-        looked_for: Usb::looked_for(),
+        searched_for: Usb::searched_for(),
         why,
     }
 }

@@ -19,7 +19,7 @@ pub enum GroundError {
     #[error(
         "{file} is in a reference system without known longitudes and latitudes, which is not that of {other}"
     )]
-    NoWay {
+    NoConversion {
         /// The file in that system.
         file: String,
         /// The other file.

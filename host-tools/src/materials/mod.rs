@@ -26,7 +26,7 @@ use pixels::Pixels;
 /// Samples of a tile.
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 /// Places along each side of a terrain that are searched for its classes.
-const LOOKED_AT: u32 = 24;
+const SEARCHED_PLACES: u32 = 24;
 
 /// Material of a class of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,7 +42,7 @@ pub struct ClassMaterial {
 
 /// The materials of a scene, from a file of classes and a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Looks {
+pub struct ClassMaterials {
     /// Material where the file has no class, or a class without an entry here.
     pub default: Material,
     /// The classes with an entry, at most 15.
@@ -50,7 +50,7 @@ pub struct Looks {
     pub class: Vec<ClassMaterial>,
 }
 
-impl Looks {
+impl ClassMaterials {
     /// Returns the table for the device.
     fn table(&self) -> Option<MaterialTable> {
         let named = self.class.iter().map(|class| class.material);
@@ -71,7 +71,7 @@ impl Looks {
 pub struct Materials {
     file: String,
     pixels: Pixels,
-    looks: Looks,
+    class_materials: ClassMaterials,
     table: MaterialTable,
     fingerprint: OnceLock<u64>,
 }
@@ -84,18 +84,18 @@ impl Materials {
     pub fn over(
         terrain: (&str, &Raster),
         (file, classes): (&str, Raster),
-        looks: Looks,
+        class_materials: ClassMaterials,
     ) -> Result<Self, GroundError> {
         // The name is written to recordings and messages, so it must not contain a key.
         let file = without_key(Path::new(file));
         let pixels = Pixels::over(terrain, (&file, classes))?;
-        let table = looks
+        let table = class_materials
             .table()
-            .ok_or(GroundError::TooMany(looks.class.len()))?;
+            .ok_or(GroundError::TooMany(class_materials.class.len()))?;
         Ok(Self {
             file,
             pixels,
-            looks,
+            class_materials,
             table,
             fingerprint: OnceLock::new(),
         })
@@ -115,8 +115,8 @@ impl Materials {
 
     /// Returns the surfaces of the classes.
     #[must_use]
-    pub const fn looks(&self) -> &Looks {
-        &self.looks
+    pub const fn class_materials(&self) -> &ClassMaterials {
+        &self.class_materials
     }
 
     /// Returns the table for the device.
@@ -148,7 +148,7 @@ impl Materials {
     /// default material.
     #[must_use]
     pub const fn params(&self, params: &SurfaceParams) -> SurfaceParams {
-        self.looks.default.params(params)
+        self.class_materials.default.params(params)
     }
 
     /// Returns the table index of the material at a point of a grid, in the coordinates of the
@@ -156,7 +156,7 @@ impl Materials {
     pub fn index_at(&self, grid: &HapticGrid<'_>, ground: [f64; 2]) -> (u8, ReadStatus) {
         let on_terrain = grid.raster().georeference();
         let (value, status) = self.pixels.from(&on_terrain).value(ground, grid.wait());
-        (self.looks.index(value), status)
+        (self.class_materials.index(value), status)
     }
 
     /// Returns the materials of a tile over a grid, with samples `step` grid cells apart, as they
@@ -180,7 +180,7 @@ impl Materials {
             let row = place(first.y, i / TILE_SAMPLES, last[1]);
             let ground = grid.to_ground([column, row]);
             let value = reads.record(from_terrain.value(ground, grid.wait()));
-            *index = self.looks.index(value);
+            *index = self.class_materials.index(value);
         }
         (
             TileMaterials::pack(&buffer.indices, &mut buffer.bytes),
@@ -191,23 +191,24 @@ impl Materials {
     /// Describes the materials of a terrain in one line: those found at some hundred places, and
     /// the share of the default. Nothing is fetched if the file is at a URL.
     #[must_use]
-    pub fn reported(&self, grid: &HapticGrid<'_>) -> String {
-        let count = self.looks.class.len();
+    pub fn describe(&self, grid: &HapticGrid<'_>) -> String {
+        let count = self.class_materials.class.len();
         let unread = format!("{count} classes in the table; the file is read where it is touched");
         if is_url(&self.file) {
             return unread;
         }
         let mut found = [0_u32; MaterialTable::MAX];
-        let place =
-            |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(LOOKED_AT) * f64::from(count - 1);
-        for i in 0..LOOKED_AT * LOOKED_AT {
-            let (column, row) = (i % LOOKED_AT, i / LOOKED_AT);
+        let place = |i: u32, count: u32| {
+            (f64::from(i) + 0.5) / f64::from(SEARCHED_PLACES) * f64::from(count - 1)
+        };
+        for i in 0..SEARCHED_PLACES * SEARCHED_PLACES {
+            let (column, row) = (i % SEARCHED_PLACES, i / SEARCHED_PLACES);
             let ground = grid.to_ground([place(column, grid.columns()), place(row, grid.rows())]);
             if let (index, ReadStatus::Complete) = self.index_at(grid, ground) {
                 found[usize::from(index)] += 1;
             }
         }
-        let named = self.looks.class.iter().zip(&found[1..]);
+        let named = self.class_materials.class.iter().zip(&found[1..]);
         let mut named: Vec<_> = named.filter(|(_, count)| **count > 0).collect();
         named.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
         let names = named.iter().map(|(class, _)| match &class.name {

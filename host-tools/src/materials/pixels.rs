@@ -4,25 +4,25 @@ use super::ground::{GroundError, place_of};
 use heightfield::{Georeference, LonLat, Raster, ReadStatus, Wait};
 
 /// Places along each side of a raster that are tested for an overlap of two rasters.
-const TRIED: u32 = 33;
+const TESTED_PLACES: u32 = 33;
 
 /// A raster of classes, and the conversion of a terrain's points to its coordinates.
 #[derive(Debug)]
 pub(super) struct Pixels {
     raster: Raster,
-    way: Way,
+    conversion: Conversion,
 }
 
 /// Conversion from the coordinates of one raster to those of another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+enum Conversion {
     /// Both have the same coordinates.
     Same,
     /// Through longitude and latitude.
     LonLat,
 }
 
-impl Way {
+impl Conversion {
     fn between(
         (terrain, on_terrain): (&str, &Georeference<'_>),
         (classes, on_classes): (&str, &Georeference<'_>),
@@ -54,7 +54,7 @@ impl Way {
                     unplaced: file,
                     placed: other,
                 },
-                Some(_) => GroundError::NoWay { file, other },
+                Some(_) => GroundError::NoConversion { file, other },
             });
         }
         match radius_m(on_terrain) == radius_m(on_classes) {
@@ -66,7 +66,7 @@ impl Way {
         }
     }
 
-    fn lead(
+    fn convert(
         self,
         from: &Georeference<'_>,
         to: &Georeference<'_>,
@@ -99,7 +99,10 @@ impl From<'_> {
     /// Returns the value of the file's pixel at a point in the terrain's coordinates, NaN in
     /// no-data and beyond the file; and whether it is known.
     pub(super) fn value(&self, ground: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
-        let there = self.pixels.way.lead(self.terrain, &self.classes, ground);
+        let there = self
+            .pixels
+            .conversion
+            .convert(self.terrain, &self.classes, ground);
         let place = there.map(|at| self.classes.transform().to_samples(at));
         match place.and_then(|place| pixel(&self.pixels.raster, place)) {
             Some([column, row]) => self.pixels.raster.read_height(column, row, wait),
@@ -114,12 +117,12 @@ impl Pixels {
         (file, raster): (&str, Raster),
     ) -> Result<Self, GroundError> {
         let (on_terrain, on_classes) = (ground.georeference(), raster.georeference());
-        let way = Way::between((terrain, &on_terrain), (file, &on_classes))?;
+        let conversion = Conversion::between((terrain, &on_terrain), (file, &on_classes))?;
         // Tested in both directions, because either raster may be much larger than the other.
-        let overlap = has_place_on(way, (&on_terrain, ground), (&on_classes, &raster))
-            || has_place_on(way, (&on_classes, &raster), (&on_terrain, ground));
+        let overlap = overlaps(conversion, (&on_terrain, ground), (&on_classes, &raster))
+            || overlaps(conversion, (&on_classes, &raster), (&on_terrain, ground));
         match overlap {
-            true => Ok(Self { raster, way }),
+            true => Ok(Self { raster, conversion }),
             false => Err(GroundError::Apart {
                 classes: file.to_owned(),
                 terrain: terrain.to_owned(),
@@ -143,15 +146,19 @@ impl Pixels {
 }
 
 /// Returns true if one of the tested places of a raster lies on another.
-fn has_place_on(
-    way: Way,
+fn overlaps(
+    conversion: Conversion,
     (from, of): (&Georeference<'_>, &Raster),
     (to, on): (&Georeference<'_>, &Raster),
 ) -> bool {
-    let place = |i: u32, count: u32| f64::from(i) / f64::from(TRIED - 1) * f64::from(count - 1);
-    (0..TRIED * TRIED).any(|i| {
-        let sample = [place(i % TRIED, of.columns()), place(i / TRIED, of.rows())];
-        let there = way.lead(from, to, from.transform().to_ground(sample));
+    let place =
+        |i: u32, count: u32| f64::from(i) / f64::from(TESTED_PLACES - 1) * f64::from(count - 1);
+    (0..TESTED_PLACES * TESTED_PLACES).any(|i| {
+        let sample = [
+            place(i % TESTED_PLACES, of.columns()),
+            place(i / TESTED_PLACES, of.rows()),
+        ];
+        let there = conversion.convert(from, to, from.transform().to_ground(sample));
         let there = there.map(|at| to.transform().to_samples(at));
         there.is_some_and(|there| pixel(on, there).is_some())
     })

@@ -25,21 +25,25 @@ fn raster(
     raster.with_ground(ground, epsg)
 }
 
-fn looks(classes: &[i64]) -> Looks {
+fn class_materials(classes: &[i64]) -> ClassMaterials {
     let default = Material::of(&SurfaceParams::PREMIUM);
     let class = |class: &i64| ClassMaterial {
         class: *class,
         name: (*class == 10).then(|| "trees".to_owned()),
         material: default,
     };
-    Looks {
+    ClassMaterials {
         default,
         class: classes.iter().map(class).collect(),
     }
 }
 
-fn over(terrain: &Raster, classes: Raster, looks: Looks) -> Result<Materials, GroundError> {
-    Materials::over(("t.tif", terrain), ("c.tif", classes), looks)
+fn over(
+    terrain: &Raster,
+    classes: Raster,
+    class_materials: ClassMaterials,
+) -> Result<Materials, GroundError> {
+    Materials::over(("t.tif", terrain), ("c.tif", classes), class_materials)
 }
 
 /// Returns the index of the material at a point, which is in memory.
@@ -51,13 +55,13 @@ fn index_at(materials: &Materials, terrain: &Raster, ground: [f64; 2]) -> u8 {
 }
 
 #[test]
-fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
+fn point_has_the_class_of_its_pixel() {
     let utm = Some(32632);
     let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
     // Pixels of 37 m; the centre of the first lies 3 m west and 5 m south of the terrain.
     let class = |column, row| if (column + row) % 2 == 0 { 10.0 } else { 20.0 };
     let classes = raster((9, 9), [499_997.0, 4_999_995.0], 37.0, utm, class);
-    let materials = over(&terrain, classes, looks(&[20, 10])).expect("they overlap");
+    let materials = over(&terrain, classes, class_materials(&[20, 10])).expect("they overlap");
     for (x, y) in [
         (0.0, 0.0),
         (15.0, 4.0),
@@ -67,26 +71,26 @@ fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
     ] {
         let pixel = |off: f64| ((off / 37.0 + 0.5).floor()) as u32;
         let (column, row) = (pixel(x + 3.0), pixel(y + 5.0));
-        let wanted = if column < 9 && row < 9 {
+        let expected = if column < 9 && row < 9 {
             if (column + row) % 2 == 0 { 2 } else { 1 }
         } else {
             0
         };
         let index = index_at(&materials, &terrain, [500_000.0 + x, 5_000_000.0 + y]);
-        assert_eq!(index, wanted, "{x} {y}");
+        assert_eq!(index, expected, "{x} {y}");
     }
     // The default applies beyond the pixels and in no-data.
     assert_eq!(index_at(&materials, &terrain, [500_400.0, 5_000_100.0]), 0);
     let holes = raster((9, 9), [500_000.0, 5_000_000.0], 37.0, utm, |column, _| {
         if column == 4 { f32::NAN } else { 30.0 }
     });
-    let materials = over(&terrain, holes, looks(&[10, 30])).expect("they overlap");
+    let materials = over(&terrain, holes, class_materials(&[10, 30])).expect("they overlap");
     let at = |x: f64| index_at(&materials, &terrain, [500_000.0 + x, 5_000_100.0]);
     assert_eq!([at(100.0), at(148.0), at(190.0)], [2, 0, 2]);
 }
 
 #[test]
-fn classes_in_another_system_lie_where_they_are_on_the_globe() {
+fn classes_in_another_reference_system_are_converted() {
     // The border is a meridian: 9° east is the middle of zone 32.
     let terrain = raster(
         (101, 101),
@@ -100,12 +104,12 @@ fn classes_in_another_system_lie_where_they_are_on_the_globe() {
     let classes = raster((200, 200), origin, 1e-4, Some(4326), |column, _| {
         if column < 100 { 10.0 } else { 20.0 }
     });
-    let materials = over(&terrain, classes, looks(&[10, 20])).expect("they overlap");
+    let materials = over(&terrain, classes, class_materials(&[10, 20])).expect("they overlap");
     let at = |x: f64| index_at(&materials, &terrain, [x, 5_000_400.0]);
     assert_eq!([at(499_999.0), at(500_001.0)], [1, 2]);
     assert_eq!([at(499_900.0), at(500_100.0)], [1, 2]);
     let grid = HapticGrid::new(&terrain, HapticCells::Square).with_materials(Some(&materials));
-    let reported = materials.reported(&grid);
+    let reported = materials.describe(&grid);
     assert!(
         reported.contains("trees") && reported.contains("class 20"),
         "{reported}"
@@ -113,12 +117,12 @@ fn classes_in_another_system_lie_where_they_are_on_the_globe() {
 }
 
 #[test]
-fn a_tile_has_the_classes_of_its_level() {
+fn tile_has_the_classes_of_its_level() {
     let terrain = raster((101, 71), [0.0; 2], 1.0, None, |x, y| (x * y) as f32);
     let classes = raster((101, 71), [0.0; 2], 1.0, None, |x, y| {
         ((x / 7 + y / 5) % 3) as f32
     });
-    let materials = over(&terrain, classes, looks(&[1, 2])).expect("they overlap");
+    let materials = over(&terrain, classes, class_materials(&[1, 2])).expect("they overlap");
     let mut buffer = MaterialBuffer::default();
     for level in [0, 1] {
         let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_materials(Some(&materials));
@@ -133,7 +137,7 @@ fn a_tile_has_the_classes_of_its_level() {
         packed.fill(&mut tile, 3).expect("of the table");
         let class = |x: u32, y: u32| ((x / 7 + y / 5) % 3) as u8;
         let size = rendered.size();
-        let wanted: Vec<u8> = (0..SAMPLES)
+        let expected: Vec<u8> = (0..SAMPLES)
             .map(|i| {
                 let at = |first: i32, i: usize, last: i32| (first + i as i32).min(last) as u32;
                 let (column, row) = (
@@ -143,7 +147,7 @@ fn a_tile_has_the_classes_of_its_level() {
                 class(column << level, row << level)
             })
             .collect();
-        assert_eq!(buffer.indices.as_slice(), wanted, "level {level}");
+        assert_eq!(buffer.indices.as_slice(), expected, "level {level}");
         assert!(
             rendered
                 .materials_of(TileKey::new(level, 9, 0), &mut buffer)
@@ -162,8 +166,8 @@ fn scene_names_its_table_and_its_file_of_classes() {
         rendered.scene(SurfaceParams::PREMIUM, Source::Points, GridPoint::default())
     };
     let classes = |value| raster((41, 41), [0.0; 2], 1.0, None, move |_, _| value);
-    let one = over(&terrain, classes(1.0), looks(&[1])).expect("overlap");
-    let other = over(&terrain, classes(2.0), looks(&[1])).expect("overlap");
+    let one = over(&terrain, classes(1.0), class_materials(&[1])).expect("overlap");
+    let other = over(&terrain, classes(2.0), class_materials(&[1])).expect("overlap");
     let [none, one, other] = [scene(None), scene(Some(&one)), scene(Some(&other))];
     assert_eq!((none.materials, one.materials.is_some()), (None, true));
     assert_eq!(one.materials, other.materials);
@@ -179,11 +183,15 @@ fn class_raster_that_does_not_fit_terrain_is_refused() {
         unplaced: "c.tif".into(),
         placed: "t.tif".into(),
     };
-    let bad = over(&terrain, unplaced.clone(), looks(&[1])).expect_err("no system");
+    let bad = over(&terrain, unplaced.clone(), class_materials(&[1])).expect_err("no system");
     assert_eq!(bad, no_system);
-    let bad = over(&unplaced, utm([0.0; 2]), looks(&[1])).expect_err("no system");
+    let bad = over(&unplaced, utm([0.0; 2]), class_materials(&[1])).expect_err("no system");
     assert!(matches!(bad, GroundError::NoSystem { unplaced, .. } if unplaced == "t.tif"));
-    let elsewhere = over(&terrain, utm([510_000.0, 5_000_000.0]), looks(&[1]));
+    let elsewhere = over(
+        &terrain,
+        utm([510_000.0, 5_000_000.0]),
+        class_materials(&[1]),
+    );
     let reported = elsewhere.expect_err("apart").to_string();
     assert!(
         reported.contains("longitude 9.127") && reported.contains("longitude 8.999"),
@@ -192,11 +200,11 @@ fn class_raster_that_does_not_fit_terrain_is_refused() {
     // A small raster between the places that are tested first.
     let large = raster((4_001, 3), [0.0; 2], 1.0, None, |_, _| 1.0);
     let small = raster((2, 2), [61.0, 0.2], 0.1, None, |_, _| 1.0);
-    assert!(over(&large, small, looks(&[1])).is_ok());
+    assert!(over(&large, small, class_materials(&[1])).is_ok());
     // Neither has a reference system: both are placed by columns and rows.
-    assert!(over(&unplaced, unplaced.clone(), looks(&[1])).is_ok());
+    assert!(over(&unplaced, unplaced.clone(), class_materials(&[1])).is_ok());
     let many: Vec<i64> = (0..16).collect();
-    let bad = over(&unplaced, unplaced.clone(), looks(&many));
+    let bad = over(&unplaced, unplaced.clone(), class_materials(&many));
     assert!(matches!(bad, Err(GroundError::TooMany(16))));
 }
 
@@ -228,25 +236,25 @@ fn class_raster_of_another_body_is_refused() {
         classes: "c.tif".into(),
         terrain: "t.tif".into(),
     };
-    let bad = over(&earth, moon.clone(), looks(&[1])).expect_err("the Moon's");
+    let bad = over(&earth, moon.clone(), class_materials(&[1])).expect_err("the Moon's");
     assert_eq!(bad, other);
-    let bad = over(&moon, earth.clone(), looks(&[1])).expect_err("the Earth's");
+    let bad = over(&moon, earth.clone(), class_materials(&[1])).expect_err("the Earth's");
     assert_eq!(bad, other);
-    assert!(over(&moon, moon.clone(), looks(&[1])).is_ok());
+    assert!(over(&moon, moon.clone(), class_materials(&[1])).is_ok());
     // The same body in a system whose unit is half a degree.
     let halves = of_body(&system("Moon_2000", "\"Moon\",1737400.0,0.0", 0.5));
-    assert!(over(&moon, halves, looks(&[1])).is_ok());
-    assert!(over(&earth, earth.clone(), looks(&[1])).is_ok());
+    assert!(over(&moon, halves, class_materials(&[1])).is_ok());
+    assert!(over(&earth, earth.clone(), class_materials(&[1])).is_ok());
 }
 
 #[test]
-fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
+fn url_key_is_in_no_recording_and_no_message() {
     let utm = Some(32632);
     let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
     let at = |x: f64| {
         let classes = raster((9, 9), [x, 5_000_000.0], 37.0, utm, |_, _| 10.0);
         let url = "https://me:PASS@host/c.tif?sig=KEY";
-        Materials::over(("t.tif", &terrain), (url, classes), looks(&[10]))
+        Materials::over(("t.tif", &terrain), (url, classes), class_materials(&[10]))
     };
     let materials = at(500_000.0).expect("they overlap");
     assert_eq!(materials.file(), "https://host/c.tif");
@@ -254,7 +262,7 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
     let grid = HapticGrid::new(&terrain, HapticCells::Stored);
     assert!(
         materials
-            .reported(&grid)
+            .describe(&grid)
             .contains("read where it is touched")
     );
     let apart = at(900_000.0).expect_err("elsewhere").to_string();
@@ -262,13 +270,13 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
 }
 
 #[test]
-fn pending_class_is_no_answer_of_the_default() {
+fn pending_class_does_not_count_as_default() {
     let folder = tempfile::tempdir().expect("a folder");
     let utm = Some(32632);
     let terrain = raster((600, 600), [0.0, 0.0], 1.0, utm, |_, _| 1.0);
     let metres = GroundTransform::new([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]).expect("a map");
     let classes = in_file(folder.path(), [600, 600], |_, _| 10.0).with_ground(metres, utm);
-    let materials = over(&terrain, classes, looks(&[10])).expect("they overlap");
+    let materials = over(&terrain, classes, class_materials(&[10])).expect("they overlap");
     let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_wait(Wait::Never);
     let mut buffer = MaterialBuffer::default();
     let mut tile = |index| {

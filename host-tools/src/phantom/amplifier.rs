@@ -65,12 +65,12 @@ impl Amplifier {
 
     /// Moves the current towards the command for `h_s` seconds.
     pub fn advance(&mut self, h_s: f64) {
-        let aim_a = match self.fault {
+        let target_a = match self.fault {
             None => self.command_a,
             Some(AmplifierFault::Missing | AmplifierFault::MotorOpen) => 0.0,
         };
-        let keep = exp(-h_s / self.axis.motor.current_lag_s);
-        self.current_a = aim_a + (self.current_a - aim_a) * keep;
+        let decay = exp(-h_s / self.axis.motor.current_lag_s);
+        self.current_a = target_a + (self.current_a - target_a) * decay;
     }
 
     /// Returns the present current, A.
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn continuous_current_gives_the_published_tip_forces() {
+    fn continuous_current_yields_published_tip_forces() {
         let model = PhantomModel::premium_1_5();
         let jacobian = DMat3::from_cols_array_2d(&kinematics::jacobian(&model, [0.0; 3]));
         for (amperes, expected_n) in [(1.24, [1.84, 1.55, 1.92]), (5.5, [8.2, 6.9, 8.5])] {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn cuts_at_the_peak_and_reads_nonsense_as_zero() {
+    fn command_is_limited_to_peak_and_nan_is_zero() {
         let axis = PhantomModel::premium_1_5().drive[0];
         assert_eq!(settled(axis, 99.0).current_a(), 5.5);
         assert_eq!(settled(axis, f64::NEG_INFINITY).current_a(), -5.5);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn follows_a_step_with_the_current_loops_lag() {
+    fn current_follows_a_step_with_the_loop_lag() {
         let axis = PhantomModel::premium_1_5().drive[0];
         let mut amplifier = Amplifier::new(axis);
         amplifier.command(1.0);

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn home_is_home_and_there_and_back_is_the_same() {
+    fn frame_conversion_round_trips_and_maps_home() {
         let model = PhantomModel::premium_1_5();
         let place = ArmFrame {
             home_mm: [600.0, 400.0, 35.0],
@@ -109,14 +109,14 @@ mod tests {
     }
 
     #[test]
-    fn directions_turn_like_displacements() {
+    fn directions_rotate_like_displacements() {
         assert_eq!(ArmFrame::turn_to_terrain([1.0, 2.0, 3.0]), [2.0, -1.0, 3.0]);
         let back = ArmFrame::turn_to_device(ArmFrame::turn_to_terrain([1.0, 2.0, 3.0]));
         assert_eq!(back, [1.0, 2.0, 3.0]);
     }
 
     #[test]
-    fn reaches_a_hand_span_and_not_a_metre() {
+    fn hand_span_is_in_reach_but_a_metre_is_not() {
         let model = PhantomModel::premium_1_5();
         let place = ArmFrame { home_mm: [0.0; 3] };
         for corner in [

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_the_nearest_count_with_the_axis_sign() {
+    fn reading_is_the_nearest_count_with_the_axis_sign() {
         let mut axis = PhantomModel::premium_1_5().drive[0];
         let count = Encoder::new(&axis).angle_rad(1);
         assert_eq!(Encoder::new(&axis).counts(0.49 * count), 0);
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_start_at_zero_at_power_up() {
+    fn counts_are_zero_at_power_up() {
         let axis = PhantomModel::premium_1_5().drive[1];
         let mut encoder = Encoder::new(&axis);
         encoder.power_up(0.7);

@@ -26,8 +26,8 @@ pub(super) fn settle(free: DVec3, inverse_mass: &DMat3, coulomb_nm: DVec3, h_s: 
         let before = impulse;
         for joint in 0..3 {
             let column = inverse_mass.col(joint);
-            let wanted = impulse[joint] + rate[joint] / column[joint];
-            let allowed = wanted.clamp(-limit[joint], limit[joint]);
+            let required = impulse[joint] + rate[joint] / column[joint];
+            let allowed = required.clamp(-limit[joint], limit[joint]);
             rate -= column * (allowed - impulse[joint]);
             impulse[joint] = allowed;
         }
@@ -48,14 +48,14 @@ mod tests {
     }
 
     #[test]
-    fn a_small_push_is_held_exactly() {
+    fn small_push_is_held_exactly() {
         let push = inverse_mass() * DVec3::new(0.009, -0.009, 0.009) * 1e-4;
         let rate = settle(push, &inverse_mass(), DVec3::splat(0.01), 1e-4);
         assert_eq!(rate, DVec3::ZERO);
     }
 
     #[test]
-    fn a_large_push_slides_against_the_full_friction() {
+    fn large_push_slides_against_full_friction() {
         let torque = DVec3::new(0.02, 0.05, -0.04);
         let rate = settle(
             inverse_mass() * torque * 1e-4,

@@ -46,7 +46,7 @@ impl HandModel {
     /// Returns the compliance of arm and grip, m/N: the tip's lag behind the target for each
     /// newton.
     #[must_use]
-    pub fn give_m_per_n(&self) -> f64 {
+    pub fn compliance_m_per_n(&self) -> f64 {
         1.0 / self.arm_n_per_m + 1.0 / self.grip_n_per_m
     }
 }
@@ -76,7 +76,7 @@ impl Hand {
     }
 
     /// Sets the hand's target and its velocity, m and m/s.
-    pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
+    pub fn set_target(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         self.target = DVec3::from(target_m);
         self.target_speed = DVec3::from(speed_m_s);
     }

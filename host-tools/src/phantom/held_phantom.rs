@@ -41,7 +41,7 @@ impl HeldPhantom {
         let start_mm = script.target(0.0).position_mm;
         let q = placement.joints_at(&model, start_mm)?;
         Ok(Self {
-            plant: Plant::new(model, q).held_by(hand),
+            plant: Plant::new(model, q).with_hand(hand),
             placement,
             script,
             begin_s: 0.0,
@@ -94,7 +94,7 @@ impl HeldPhantom {
 
     /// Returns the present readings of encoders, switches and amplifiers.
     #[must_use]
-    pub fn sense(&self) -> GuardInputs {
+    pub fn guard_inputs(&self) -> GuardInputs {
         GuardInputs {
             counts: self.plant.counts(),
             dead_man: self.begin_s > 0.0 && self.t_s >= PRESS_S,
@@ -115,7 +115,7 @@ impl HeldPhantom {
             .placement
             .to_device_m(self.plant.model(), target.position_mm);
         let speed_m_s = ArmFrame::turn_to_device(target.speed_mm_s).map(|v| v * 1e-3);
-        self.plant.aim(at_m, speed_m_s);
+        self.plant.set_target(at_m, speed_m_s);
         self.t_s += dt_s;
         self.measured_ma = self.plant.monitors_ma();
         self.plant.step(currents_a, dt_s)

@@ -50,7 +50,7 @@ fn press_and_lift(model: PhantomModel) -> (HeldPhantom, f64) {
 }
 
 #[test]
-fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
+fn two_newtons_press_four_millimetres_deep() {
     let (mut arm, until) = press_and_lift(PhantomModel::premium_1_5().weightless());
     let mut last = Vec::new();
     run(&mut arm, until, |height, force| last.push((height, force)));
@@ -58,7 +58,7 @@ fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
     // Friction carries at most 0.01 N·m on an arm of 0.21 m, against the springs of wall and hand
     // together; the encoder's error is half a count.
     let friction_n = 0.01 / arm.plant().model().l1_m;
-    let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
+    let hand_n_per_mm = 1e-3 / HandModel::default().compliance_m_per_n();
     let bound_mm = friction_n / (WALL_N_PER_MM + hand_n_per_mm) + 0.015;
     for (height, force) in settled {
         assert!((height + 4.0).abs() < bound_mm, "{height} ± {bound_mm} mm");
@@ -77,7 +77,7 @@ fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
 }
 
 #[test]
-fn lifted_there_is_no_force() {
+fn lifted_hand_has_no_force() {
     let (mut arm, _) = press_and_lift(PhantomModel::premium_1_5().weightless());
     let end = arm.script.duration_s() + 0.5;
     run(&mut arm, end, |_, _| {});
@@ -91,7 +91,7 @@ fn lifted_there_is_no_force() {
 
 /// At tapping speed the loop remains stable.
 #[test]
-fn tapped_it_stays_stable() {
+fn tapping_stays_stable() {
     let hand = HandModel::default();
     let script = Touch::start(&|_, _| Some(0.0), &hand, WALL_N_PER_MM, [0.0; 2], 10.0)
         .tap(5, 3.0)
@@ -110,8 +110,8 @@ fn tapped_it_stays_stable() {
 }
 
 #[test]
-fn names_the_point_it_cannot_reach() {
-    let script = Script::start([0.0; 3]).go([0.0, 400.0, 0.0], 50.0);
+fn unreachable_script_point_is_named() {
+    let script = Script::start([0.0; 3]).line_to([0.0, 400.0, 0.0], 50.0);
     let placement = ArmFrame { home_mm: [0.0; 3] };
     let error = HeldPhantom::new(
         PhantomModel::premium_1_5(),

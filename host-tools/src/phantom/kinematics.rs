@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn inverse_undoes_forward_within_a_nanometre() {
         let model = PhantomModel::premium_1_5();
-        let mut seen = 0;
+        let mut count = 0;
         for q in poses().filter(|q| within_stops(&model, *q)) {
             let at = tip(&model, q);
             if at[0].hypot(at[1]) < 0.02 || q[0].cos() * at[0] < 0.0 {
@@ -128,9 +128,9 @@ mod tests {
             assert!(error.length() < 1e-9, "{q:?} {back:?}");
             let joints = DVec3::from(back) - DVec3::from(q);
             assert!(joints.abs().max_element() < 1e-6, "{q:?} {back:?}");
-            seen += 1;
+            count += 1;
         }
-        assert!(seen > 1000, "{seen}");
+        assert!(count > 1000, "{count}");
     }
 
     #[test]
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_links_there_is_no_pose() {
+    fn point_beyond_the_links_has_no_pose() {
         let model = PhantomModel::premium_1_5();
         assert_eq!(inverse(&model, [0.4, 0.0, 0.0]), None);
         assert_eq!(inverse(&model, [0.001, 0.0, 0.0]), None);

@@ -9,7 +9,7 @@ use crate::terrain::Terrain;
 /// Force of the hand's slide, N; presses and taps are 1.5 times as strong.
 const PUSH_N: f64 = 1.0;
 /// Distance between the points of the plan, mm: a hand cannot follow finer detail.
-const PLANNED_APART_MM: f64 = 0.5;
+const PLAN_SPACING_MM: f64 = 0.5;
 /// Rest after the tour, s.
 const REST_S: f64 = 0.25;
 
@@ -43,12 +43,12 @@ impl<'t> PlacedTerrain<'t> {
     /// # Errors
     /// [`PlacingError`].
     pub fn new(terrain: &'t Terrain<'t>, params: SurfaceParams) -> Result<Self, PlacingError> {
-        Self::toured(terrain, params, None, &|| true)
+        Self::with_tour(terrain, params, None, &|| true)
     }
 
     /// Keeps the terrain at its placement, with the point `home_mm` at the tip in the home pose
     /// (device millimetres), and plans a tour of the part that the arm reaches; planning ends if
-    /// `goes_on` returns false.
+    /// `should_continue` returns false.
     ///
     /// # Errors
     /// [`PlacingError`].
@@ -56,22 +56,22 @@ impl<'t> PlacedTerrain<'t> {
         terrain: &'t Terrain<'t>,
         home_mm: [f64; 3],
         params: SurfaceParams,
-        goes_on: &dyn Fn() -> bool,
+        should_continue: &dyn Fn() -> bool,
     ) -> Result<Self, PlacingError> {
-        Self::toured(terrain, params, Some(home_mm), goes_on)
+        Self::with_tour(terrain, params, Some(home_mm), should_continue)
     }
 
-    fn toured(
+    fn with_tour(
         terrain: &'t Terrain<'t>,
         params: SurfaceParams,
         home_mm: Option<[f64; 3]>,
-        goes_on: &dyn Fn() -> bool,
+        should_continue: &dyn Fn() -> bool,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
         // After an interrupt the surface has no heights: the plan ends quickly and is dropped.
         let surface = |east: f64, north: f64| {
-            let height = || terrain.planned_mm(east, north, PLANNED_APART_MM);
-            goes_on().then(height).flatten()
+            let height = || terrain.plan_height_mm(east, north, PLAN_SPACING_MM);
+            should_continue().then(height).flatten()
         };
         let plan = TourPlan {
             surface: &surface,
@@ -83,7 +83,7 @@ impl<'t> PlacedTerrain<'t> {
             home_mm,
         }
         .plan();
-        if !goes_on() {
+        if !should_continue() {
             return Err(PlacingError::Interrupted);
         }
         let tour = plan?;
@@ -161,22 +161,22 @@ mod tests {
         let scale = Scale::new(1.0, 0.1).expect("a scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
         let home_mm = [100.0, 100.0, 20.0];
-        let looks = Cell::new(0);
-        let plan = |most: u32| {
-            looks.set(0);
+        let calls = Cell::new(0);
+        let plan = |limit: u32| {
+            calls.set(0);
             PlacedTerrain::in_view(&terrain, home_mm, SurfaceParams::PREMIUM, &|| {
-                looks.set(looks.get() + 1);
-                looks.get() <= most
+                calls.set(calls.get() + 1);
+                calls.get() <= limit
             })
             .map(drop)
         };
         assert_eq!(plan(u32::MAX), Ok(()));
-        let all = looks.get();
-        for most in [0, 1, all / 2] {
+        let all = calls.get();
+        for limit in [0, 1, all / 2] {
             assert_eq!(
-                plan(most),
+                plan(limit),
                 Err(PlacingError::Interrupted),
-                "{most} of {all}"
+                "{limit} of {all}"
             );
         }
     }

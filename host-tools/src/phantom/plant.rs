@@ -53,14 +53,14 @@ impl Plant {
 
     /// Adds a hand at rest on the tip.
     #[must_use]
-    pub fn held_by(mut self, hand: HandModel) -> Self {
+    pub fn with_hand(mut self, hand: HandModel) -> Self {
         self.hand = Some(Hand::new(hand, self.tip_m()));
         self
     }
 
     /// Removes the hand.
     #[must_use]
-    pub fn let_go(mut self) -> Self {
+    pub fn without_hand(mut self) -> Self {
         self.hand = None;
         self
     }
@@ -80,15 +80,15 @@ impl Plant {
         if let Some(hand) = &mut self.hand {
             hand.at = DVec3::from(tip_m);
             hand.speed = DVec3::ZERO;
-            hand.aim(tip_m, [0.0; 3]);
+            hand.set_target(tip_m, [0.0; 3]);
         }
     }
 
     /// Sets the hand's target, m and m/s in the device frame. Within a step the target continues at
     /// that speed. Does nothing without a hand.
-    pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
+    pub fn set_target(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         if let Some(hand) = &mut self.hand {
-            hand.aim(target_m, speed_m_s);
+            hand.set_target(target_m, speed_m_s);
         }
     }
 

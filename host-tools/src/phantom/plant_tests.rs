@@ -37,7 +37,7 @@ fn coast(plant: &mut Plant, ms: u32) {
 }
 
 #[test]
-fn energy_is_kept_without_friction() {
+fn energy_is_conserved_without_friction() {
     let from = [0.1, 0.2, 0.1];
     for model in [
         premium().frictionless(),
@@ -60,7 +60,7 @@ fn energy_is_kept_without_friction() {
 }
 
 #[test]
-fn friction_takes_energy_until_the_arm_rests() {
+fn friction_dissipates_energy_until_rest() {
     let mut plant = Plant::new(premium().weightless(), [0.0; 3]).moving([2.0, -2.0, 2.0]);
     let mut energy = plant.energy_j();
     for _ in 0..2000 {
@@ -73,7 +73,7 @@ fn friction_takes_energy_until_the_arm_rests() {
 
 /// Coulomb friction alone stops a joint after ½·I·ω²/τ.
 #[test]
-fn a_joint_stops_after_the_angle_that_friction_allows() {
+fn joint_stops_after_the_coulomb_friction_angle() {
     let mut model = premium().weightless();
     model.viscous_nms_per_rad = [0.0; 3];
     let inertia = Dynamics::new(model).mass(&Pose::new(DVec3::ZERO)).x_axis.x;
@@ -88,7 +88,7 @@ fn a_joint_stops_after_the_angle_that_friction_allows() {
 }
 
 #[test]
-fn a_loaded_arm_under_its_friction_does_not_creep() {
+fn arm_loaded_below_friction_does_not_creep() {
     let level = [0.0, 1.0, 0.6];
     let model = premium();
     let held = Dynamics::new(model).gravity(&Pose::new(level.into()));
@@ -112,7 +112,7 @@ fn a_loaded_arm_under_its_friction_does_not_creep() {
 
 /// The firmware's own kinematics, in f32 and from counts, agree with the plant's true position.
 #[test]
-fn the_firmware_reads_the_counts_as_the_plant_means_them() {
+fn firmware_kinematics_agree_with_the_plant() {
     use hapterra_core::phantom::{Calibration, Kinematics};
     let device = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
     for joint in 0..60 {
@@ -120,15 +120,15 @@ fn the_firmware_reads_the_counts_as_the_plant_means_them() {
         let q = [0.8 * turn.sin(), 0.5 * turn.cos(), 0.4 * (2.0 * turn).sin()];
         let plant = Plant::new(premium(), q);
         let pose = device.pose(plant.counts(), [0; 3]);
-        let seen = pose.tip_mm().as_dvec3() * 1e-3;
-        let off = seen.distance(DVec3::from(plant.tip_m()));
+        let tip_m = pose.tip_mm().as_dvec3() * 1e-3;
+        let distance = tip_m.distance(DVec3::from(plant.tip_m()));
         // Half a count of each axis: 12, 15 and 12 µm at home, more stretched out.
-        assert!(off < 45e-6, "{off:e} m at {q:?}");
+        assert!(distance < 45e-6, "{distance:e} m at {q:?}");
     }
 }
 
 #[test]
-fn the_stops_catch_a_thrown_arm() {
+fn stops_catch_a_thrown_arm() {
     let mut plant = Plant::new(premium(), [0.0; 3]).moving([8.0, 8.0, 0.0]);
     for _ in 0..3000 {
         plant.step([5.5, 5.5, -5.5], 1e-3);
@@ -139,7 +139,7 @@ fn the_stops_catch_a_thrown_arm() {
 
 /// Moves the arm by a hand, with friction and with the current steps of a wall.
 fn dragged(substep_s: f64) -> DVec3 {
-    let mut plant = Plant::new(premium(), [0.0; 3]).held_by(HandModel::default());
+    let mut plant = Plant::new(premium(), [0.0; 3]).with_hand(HandModel::default());
     plant.substep_s = substep_s;
     let home = DVec3::from(plant.tip_m());
     for tick in 0..500 {
@@ -151,7 +151,7 @@ fn dragged(substep_s: f64) -> DVec3 {
                 7.0 * (7.0 * t).cos(),
                 11.0 * (11.0 * t).cos(),
             );
-        plant.aim(at.to_array(), speed.to_array());
+        plant.set_target(at.to_array(), speed.to_array());
         let square = if tick / 50 % 2 == 0 { 0.5 } else { -0.5 };
         plant.step([square, -square, square], 1e-3);
     }
@@ -169,14 +169,14 @@ fn max_substep_error_is_below_a_tenth_of_a_micrometre() {
 }
 
 #[test]
-fn the_same_inputs_give_the_same_bits() {
+fn plant_is_deterministic() {
     assert_eq!(dragged(MAX_SUBSTEP_S), dragged(MAX_SUBSTEP_S));
 }
 
 #[test]
 fn hand_force_balances_motor_force_at_rest() {
     let mut plant =
-        Plant::new(premium().weightless().frictionless(), [0.0; 3]).held_by(HandModel::default());
+        Plant::new(premium().weightless().frictionless(), [0.0; 3]).with_hand(HandModel::default());
     for _ in 0..3000 {
         plant.step([0.5, 0.3, -0.4], 1e-3);
     }

@@ -45,7 +45,7 @@ impl Script {
 
     /// Adds a straight line to a point, at up to `speed_mm_s`.
     #[must_use]
-    pub fn go(self, to_mm: [f64; 3], speed_mm_s: f64) -> Self {
+    pub fn line_to(self, to_mm: [f64; 3], speed_mm_s: f64) -> Self {
         self.along(&[to_mm], speed_mm_s)
     }
 
@@ -68,7 +68,7 @@ impl Script {
     pub fn repeated(self, times: u32) -> Self {
         let begin_mm = self.target(0.0).position_mm;
         let end_mm = self.end_mm;
-        let (whole, last_s) = (self.clone().go(begin_mm, BACK_MM_S), self.duration_s);
+        let (whole, last_s) = (self.clone().line_to(begin_mm, BACK_MM_S), self.duration_s);
         let mut legs = Vec::new();
         for round in 0..times.max(1) {
             let begin_s = f64::from(round) * whole.duration_s;
@@ -172,8 +172,8 @@ impl Leg {
     /// and falls as the smooth step 3u² − 2u³.
     fn progress(&self, t_s: f64) -> (f64, f64) {
         let ramp = |u: f64| {
-            let way = self.speed_mm_s * RAMP_S * u * u * u * (1.0 - 0.5 * u);
-            (way, self.speed_mm_s * u * u * (3.0 - 2.0 * u))
+            let distance = self.speed_mm_s * RAMP_S * u * u * u * (1.0 - 0.5 * u);
+            (distance, self.speed_mm_s * u * u * (3.0 - 2.0 * u))
         };
         let left_s = self.duration_s - t_s;
         if left_s <= 0.0 {
@@ -181,8 +181,8 @@ impl Leg {
         } else if t_s < RAMP_S {
             ramp(t_s.max(0.0) / RAMP_S)
         } else if left_s < RAMP_S {
-            let (way, speed) = ramp(left_s / RAMP_S);
-            (self.travelled[self.travelled.len() - 1] - way, speed)
+            let (distance, speed) = ramp(left_s / RAMP_S);
+            (self.travelled[self.travelled.len() - 1] - distance, speed)
         } else {
             let cruised = self.speed_mm_s * (t_s - 0.5 * RAMP_S);
             (cruised, self.speed_mm_s)
@@ -197,10 +197,10 @@ mod tests {
     fn plan() -> Script {
         Script::start([1.0, 2.0, 3.0])
             .wait(0.5)
-            .go([11.0, 2.0, 3.0], 40.0)
+            .line_to([11.0, 2.0, 3.0], 40.0)
             .along(&[[11.0, 12.0, 3.0], [11.0, 12.0, 8.0]], 25.0)
             .wait(0.25)
-            .go([11.0, 12.0, 9.0], 100.0)
+            .line_to([11.0, 12.0, 9.0], 100.0)
     }
 
     #[test]

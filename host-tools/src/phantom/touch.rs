@@ -16,14 +16,14 @@ const SLIDE_STEP_MM: f64 = 0.5;
 /// cliff.
 const SLIDE_SMOOTHING: usize = 4;
 /// Height of the hand above the rim of no-data while it crosses, mm.
-const OVER_HOLE_MM: f64 = 3.0;
+const NO_DATA_CLEARANCE_MM: f64 = 3.0;
 /// Speed of approach and tapping, mm/s.
 const APPROACH_MM_S: f64 = 60.0;
 
 /// Builds a [`Script`] that touches a surface.
 pub struct Touch<'a> {
     surface: Surface<'a>,
-    give_mm_per_n: f64,
+    compliance_mm_per_n: f64,
     script: Script,
 }
 
@@ -42,7 +42,7 @@ impl<'a> Touch<'a> {
         let ground = nearest_ground(surface, x, y).unwrap_or(0.0);
         Self {
             surface,
-            give_mm_per_n: 1.0 / wall_n_per_mm + 1e3 * hand.give_m_per_n(),
+            compliance_mm_per_n: 1.0 / wall_n_per_mm + 1e3 * hand.compliance_m_per_n(),
             script: Script::start([x, y, ground + above_mm]),
         }
     }
@@ -50,15 +50,15 @@ impl<'a> Touch<'a> {
     /// Presses straight down with a force and holds it for some seconds.
     #[must_use]
     pub fn press(mut self, newtons: f64, seconds: f64) -> Self {
-        let target = self.below(newtons);
-        self.script = self.script.go(target, APPROACH_MM_S).wait(seconds);
+        let target = self.press_target(newtons);
+        self.script = self.script.line_to(target, APPROACH_MM_S).wait(seconds);
         self
     }
 
     /// Slides along a line on the map (mm) while pressing with a force.
     #[must_use]
     pub fn slide(mut self, line_mm: &[[f64; 2]], newtons: f64, speed_mm_s: f64) -> Self {
-        let points = self.follow(&self.course(line_mm), newtons);
+        let points = self.follow(&self.route(line_mm), newtons);
         self.script = self.script.along(&points, speed_mm_s);
         self
     }
@@ -66,14 +66,14 @@ impl<'a> Touch<'a> {
     /// Returns the length of such a slide in three dimensions, mm.
     #[must_use]
     pub fn slide_length_mm(&self, line_mm: &[[f64; 2]], newtons: f64) -> f64 {
-        let points = self.follow(&self.course(line_mm), newtons);
+        let points = self.follow(&self.route(line_mm), newtons);
         let pairs = points.windows(2);
         let step = |a: [f64; 3], b: [f64; 3]| glam::DVec3::from(a).distance(b.into());
         pairs.map(|pair| step(pair[0], pair[1])).sum()
     }
 
     /// Returns closely spaced points from the hand's position along a line.
-    fn course(&self, line_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    fn route(&self, line_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let [x, y, _] = self.script.end_mm();
         let mut line = vec![[x, y]];
         line.extend_from_slice(line_mm);
@@ -94,7 +94,9 @@ impl<'a> Touch<'a> {
     pub fn lift(mut self, above_mm: f64) -> Self {
         let [x, y, z] = self.script.end_mm();
         let ground = nearest_ground(self.surface, x, y).unwrap_or(z);
-        self.script = self.script.go([x, y, ground + above_mm], APPROACH_MM_S);
+        self.script = self
+            .script
+            .line_to([x, y, ground + above_mm], APPROACH_MM_S);
         self
     }
 
@@ -110,10 +112,10 @@ impl<'a> Touch<'a> {
         self.script
     }
 
-    fn below(&self, newtons: f64) -> [f64; 3] {
+    fn press_target(&self, newtons: f64) -> [f64; 3] {
         let [x, y, z] = self.script.end_mm();
         match (self.surface)(x, y) {
-            Some(ground) => [x, y, ground - newtons * self.give_mm_per_n],
+            Some(ground) => [x, y, ground - newtons * self.compliance_mm_per_n],
             None => [x, y, z],
         }
     }
@@ -130,11 +132,11 @@ impl<'a> Touch<'a> {
             let known: Vec<f64> = near.iter().flatten().copied().collect();
             let z = if known.len() == near.len() {
                 let mean = known.iter().sum::<f64>() / known.len() as f64;
-                mean - newtons * self.give_mm_per_n
+                mean - newtons * self.compliance_mm_per_n
             } else {
                 let highest = known.iter().copied().reduce(f64::max);
                 rim = highest.or(rim);
-                rim.unwrap_or(0.0) + OVER_HOLE_MM
+                rim.unwrap_or(0.0) + NO_DATA_CLEARANCE_MM
             };
             points.push([*x, *y, z]);
         }
@@ -174,15 +176,15 @@ mod tests {
     const HAND: fn() -> HandModel = HandModel::default;
 
     #[test]
-    fn a_press_aims_below_by_what_the_springs_give() {
+    fn press_target_is_below_surface_by_spring_deflection() {
         let plan = Touch::start(&|_, _| Some(10.0), &HAND(), 0.5, [1.0, 2.0], 8.0)
             .press(2.0, 1.0)
             .finish();
         assert_eq!(plan.target(0.0).position_mm, [1.0, 2.0, 18.0]);
-        let give = 1.0 / 0.5 + 1.0 / 0.3 + 1.0 / 2.0;
+        let compliance_mm_per_n = 1.0 / 0.5 + 1.0 / 0.3 + 1.0 / 2.0;
         let [x, y, z] = plan.end_mm();
         assert_eq!((x, y), (1.0, 2.0));
-        assert!((z - (10.0 - 2.0 * give)).abs() < 1e-9);
+        assert!((z - (10.0 - 2.0 * compliance_mm_per_n)).abs() < 1e-9);
     }
 
     #[test]

@@ -12,21 +12,21 @@ use super::touch::{Surface, Touch};
 /// height.
 const HALF_MM: [f64; 2] = [70.0, 35.0];
 /// Max share of the terrain's half size that is used.
-const INSIDE: f64 = 0.84;
+const MAX_USED_SHARE: f64 = 0.84;
 /// Factors tried in order until the arm reaches all of the plan and there is hardly any no-data.
 const SHRINK: [f64; 5] = [1.0, 0.6, 0.35, 0.2, 0.1];
 /// Share of known ground at which no smaller place is searched.
-const HARDLY_ANY_HOLES: f64 = 0.97;
+const ENOUGH_KNOWN_SHARE: f64 = 0.97;
 /// Places tried in each direction.
 const PLACES: u32 = 11;
 /// Relief above which a place gets no higher score, mm.
 const ENOUGH_RELIEF_MM: f64 = 25.0;
 /// Force of presses and taps relative to the slide. With a slide of 1 N, all forces are below the
 /// 1.55 N that a Premium 1.5 can hold upwards continuously (1.24 A).
-const STRONG: f64 = 1.5;
+const PRESS_FACTOR: f64 = 1.5;
 /// Max distance of a plan's middle from a fixed home position along each axis, mm: about the
 /// sideways reach of a Premium 1.5.
-const FAR_MM: f64 = 250.0;
+const MAX_HOME_DISTANCE_MM: f64 = 250.0;
 /// Min and max speed of the slide, mm/s, and its intended duration, s.
 const SLIDE_MM_S: (f64, f64) = (45.0, 120.0);
 const SLIDE_S: f64 = 7.0;
@@ -71,10 +71,10 @@ impl TourPlan<'_> {
         let mut best: Option<(f64, Tour)> = None;
         let mut first_failure = None;
         for shrink in SHRINK {
-            let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * INSIDE * self.size_mm[i]);
+            let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * MAX_USED_SHARE * self.size_mm[i]);
             let half = [0, 1].map(|i| shrink * limit(i));
-            let line = winding(self.best_place(half), half);
-            let (known, tour) = (known(&self.heights(&line)), self.at(&line));
+            let line = wave_path(self.best_place(half), half);
+            let (known, tour) = (known_share(&self.heights(&line)), self.tour_along(&line));
             match tour.placement.check(&self.model, &tour.script) {
                 Ok(()) if best.as_ref().is_none_or(|best| known > best.0) => {
                     best = Some((known, tour));
@@ -82,7 +82,10 @@ impl TourPlan<'_> {
                 Ok(()) => {}
                 Err(far) => first_failure = first_failure.or(Some(far)),
             }
-            if best.as_ref().is_some_and(|best| best.0 >= HARDLY_ANY_HOLES) {
+            if best
+                .as_ref()
+                .is_some_and(|best| best.0 >= ENOUGH_KNOWN_SHARE)
+            {
                 break;
             }
         }
@@ -99,14 +102,14 @@ impl TourPlan<'_> {
         line.iter().map(|p| (self.surface)(p[0], p[1])).collect()
     }
 
-    fn at(&self, line: &[[f64; 2]]) -> Tour {
+    fn tour_along(&self, line: &[[f64; 2]]) -> Tour {
         let touch = Touch::start(self.surface, &self.hand, self.wall_n_per_mm, line[0], 12.0)
-            .press(STRONG * self.push_n, 0.6);
+            .press(PRESS_FACTOR * self.push_n, 0.6);
         let length = touch.slide_length_mm(line, self.push_n);
         let speed = (length / SLIDE_S).clamp(SLIDE_MM_S.0, SLIDE_MM_S.1);
         let script = touch
             .slide(line, self.push_n, speed)
-            .tap(3, STRONG * self.push_n)
+            .tap(3, PRESS_FACTOR * self.push_n)
             .lift(12.0)
             .finish();
         let home_mm = self.home_mm.unwrap_or_else(|| middle(&script));
@@ -116,31 +119,30 @@ impl TourPlan<'_> {
 
     fn best_place(&self, half: [f64; 2]) -> [f64; 2] {
         let along = |step: u32, axis: usize| {
-            let [low, high] = self.room(axis, half[axis]);
+            let [low, high] = self.middle_range(axis, half[axis]);
             low + (high - low) * f64::from(step) / f64::from(PLACES - 1)
         };
         let places = (0..PLACES * PLACES).map(|i| [along(i % PLACES, 0), along(i / PLACES, 1)]);
-        let scored = places.map(|place| (self.worth(place, half), place));
+        let scored = places.map(|place| (self.score(place, half), place));
         let best = scored.reduce(|best, next| if next.0 > best.0 { next } else { best });
         best.map_or(self.size_mm.map(|side| 0.5 * side), |best| best.1)
     }
 
     /// Returns the range for the middle of a plan along an axis: on the terrain and, if the home
-    /// position is fixed, within [`FAR_MM`] of it.
-    fn room(&self, axis: usize, half: f64) -> [f64; 2] {
-        let (middle, room) = (0.5 * self.size_mm[axis], half / INSIDE);
+    /// position is fixed, within [`MAX_HOME_DISTANCE_MM`] of it.
+    fn middle_range(&self, axis: usize, half: f64) -> [f64; 2] {
+        let (middle, room) = (0.5 * self.size_mm[axis], half / MAX_USED_SHARE);
         let room = (middle - room).max(0.0);
         let on_terrain = [middle - room, middle + room];
         match self.home_mm {
             None => on_terrain,
-            Some(home) => {
-                [-FAR_MM, FAR_MM].map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1]))
-            }
+            Some(home) => [-MAX_HOME_DISTANCE_MM, MAX_HOME_DISTANCE_MM]
+                .map(|far| (home[axis] + far).clamp(on_terrain[0], on_terrain[1])),
         }
     }
 
     /// Returns the share of a line beyond the arm's reach from a fixed home position.
-    fn beyond(&self, line: &[[f64; 2]], heights: &[Option<f64>]) -> f64 {
+    fn share_beyond_reach(&self, line: &[[f64; 2]], heights: &[Option<f64>]) -> f64 {
         let Some(home_mm) = self.home_mm else {
             return 0.0;
         };
@@ -153,8 +155,8 @@ impl TourPlan<'_> {
 
     /// Returns the score of a place: known ground counts most, then relief up to
     /// [`ENOUGH_RELIEF_MM`], then closeness to the centre.
-    fn worth(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
-        let line = winding(place, half);
+    fn score(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
+        let line = wave_path(place, half);
         let heights = self.heights(&line);
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         for height in heights.iter().flatten() {
@@ -164,16 +166,16 @@ impl TourPlan<'_> {
         let off = |axis: usize| (2.0 * place[axis] / self.size_mm[axis] - 1.0).abs();
         // The hand approaches at one end and taps at the other.
         let ends = [heights.first(), heights.last()];
-        let holes = ends.iter().flatten().filter(|height| height.is_none());
-        10.0 * known(&heights) + relief
+        let unknown = ends.iter().flatten().filter(|height| height.is_none());
+        10.0 * known_share(&heights) + relief
             - 0.2 * off(0).max(off(1))
-            - 4.0 * holes.count() as f64
-            - 30.0 * self.beyond(&line, &heights)
+            - 4.0 * unknown.count() as f64
+            - 30.0 * self.share_beyond_reach(&line, &heights)
     }
 }
 
 /// Returns the share of a line on known ground.
-fn known(heights: &[Option<f64>]) -> f64 {
+fn known_share(heights: &[Option<f64>]) -> f64 {
     heights.iter().flatten().count() as f64 / heights.len() as f64
 }
 
@@ -186,7 +188,7 @@ fn middle(script: &Script) -> [f64; 3] {
 }
 
 /// Returns one and a half waves from west to east.
-fn winding(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
+fn wave_path(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
     (0..=240)
         .map(|i| {
             let u = f64::from(i) / 240.0;

@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_mistake_is_where_it_was_made() {
+    fn wiring_mistakes_affect_only_their_axis() {
         let commands = [1.0, 2.0, 3.0];
         assert_eq!(Wiring::RIGHT.currents_a(commands), commands);
         let swapped = Wiring::RIGHT.swapped(1, 2);

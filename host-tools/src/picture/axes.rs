@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_as_written_by_hand() {
+    fn axis_numbers_have_no_superfluous_digits() {
         let cases = [
             (0.0, "0"),
             (-0.0, "0"),
@@ -164,7 +164,7 @@ mod tests {
 
     /// Test of a picture of run time against error.
     #[test]
-    fn logarithmic_axes_take_points_and_lines() {
+    fn logarithmic_axes_accept_points_and_lines() {
         use plotters::prelude::*;
         let mut canvas = super::super::Canvas::new(800, 600);
         let sheet = canvas.pen().into_drawing_area();
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_never_empty() {
+    fn range_is_never_empty() {
         assert_eq!(spread([].into_iter(), 0.1), 0.0..1.0);
         let flat = spread([3.0, 3.0].into_iter(), 0.1);
         assert!(flat.start < 3.0 && flat.end > 3.0);

@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rule_fills_whole_pixels_and_a_slanted_stroke_is_soft() {
+    fn ruled_line_is_sharp_and_slanted_line_is_smooth() {
         let mut canvas = Canvas::new(40, 40);
         {
             let area = canvas.pen().into_drawing_area();

@@ -23,8 +23,8 @@ pub struct GroundFacts<'a> {
 /// Max share of the map's width for the bar.
 const BAR_SHARE: f64 = 0.25;
 /// Distance of the marks from the map's sides, and padding around their text, finished pixels.
-const AWAY_PX: i32 = 10;
-const AIR_PX: i32 = 6;
+const MARK_MARGIN_PX: i32 = 10;
+const PADDING_PX: i32 = 6;
 /// Height of a line of text, and of the bar, finished pixels.
 const LINE_PX: i32 = 22;
 const BAR_PX: i32 = 6;
@@ -38,19 +38,19 @@ pub(super) fn draw(
     let (width, height) = area.dim_in_pixel();
     let (width, height) = (width.cast_signed(), height.cast_signed());
     let (east, north) = (window.west + window.width, window.south + window.height);
-    let line = px(LINE_PX + 2 * AIR_PX);
+    let line = px(LINE_PX + 2 * PADDING_PX);
     let south_west = (facts.place_of)(window.west, window.south);
     let north_east = (facts.place_of)(east, north);
     plate(
         area,
         &south_west,
-        (px(AWAY_PX), height - px(AWAY_PX) - line),
+        (px(MARK_MARGIN_PX), height - px(MARK_MARGIN_PX) - line),
         HPos::Left,
     )?;
     plate(
         area,
         &north_east,
-        (width - px(AWAY_PX), px(AWAY_PX)),
+        (width - px(MARK_MARGIN_PX), px(MARK_MARGIN_PX)),
         HPos::Right,
     )?;
     if let Some(metres_per_mm) = facts.metres_per_mm {
@@ -64,17 +64,17 @@ pub(super) fn draw(
 /// Draws text on a light plate, with an upper corner (`side`) at `at`.
 fn plate(area: &Area<'_>, text: &str, at: (i32, i32), side: HPos) -> Result<(), PictureError> {
     let font = style::text(18, &INK);
-    let wide = area.estimate_text_size(text, &font)?.0.cast_signed() + 2 * px(AIR_PX);
+    let wide = area.estimate_text_size(text, &font)?.0.cast_signed() + 2 * px(PADDING_PX);
     let left = match side {
         HPos::Right => at.0 - wide,
         _ => at.0,
     };
-    let high = px(LINE_PX + 2 * AIR_PX);
+    let high = px(LINE_PX + 2 * PADDING_PX);
     paper(area, [(left, at.1), (left + wide, at.1 + high)])?;
     axes::write(
         area,
         text,
-        (left + px(AIR_PX), at.1 + high / 2),
+        (left + px(PADDING_PX), at.1 + high / 2),
         font,
         HPos::Left,
     )
@@ -94,11 +94,11 @@ struct Bar {
 impl Bar {
     /// Returns the longest round length within its share of a map's width, mm.
     fn of(width_mm: f64, metres_per_mm: f64) -> Self {
-        let most = BAR_SHARE * width_mm * metres_per_mm;
-        let power = 10f64.powf(most.log10().floor());
+        let max_m = BAR_SHARE * width_mm * metres_per_mm;
+        let power = 10f64.powf(max_m.log10().floor());
         let digit = [5.0, 2.0, 1.0]
             .into_iter()
-            .find(|digit| digit * power <= most);
+            .find(|digit| digit * power <= max_m);
         let metres = digit.unwrap_or(1.0) * power;
         Self {
             metres,
@@ -134,16 +134,16 @@ impl Bar {
             .0
             .cast_signed()
             .max(long);
-        let (right, bottom) = (width - px(AWAY_PX), height - px(AWAY_PX));
-        let left = right - wide - 2 * px(AIR_PX);
-        let top = bottom - px(LINE_PX + BAR_PX + 3 * AIR_PX);
+        let (right, bottom) = (width - px(MARK_MARGIN_PX), height - px(MARK_MARGIN_PX));
+        let left = right - wide - 2 * px(PADDING_PX);
+        let top = bottom - px(LINE_PX + BAR_PX + 3 * PADDING_PX);
         paper(area, [(left, top), (right, bottom)])?;
         let middle = (left + right) / 2;
-        let text_at = (middle, top + px(AIR_PX + LINE_PX / 2));
+        let text_at = (middle, top + px(PADDING_PX + LINE_PX / 2));
         axes::write(area, &text, text_at, font, HPos::Center)?;
         let bar = [
-            (middle - long / 2, bottom - px(AIR_PX + BAR_PX)),
-            (middle - long / 2 + long, bottom - px(AIR_PX)),
+            (middle - long / 2, bottom - px(PADDING_PX + BAR_PX)),
+            (middle - long / 2 + long, bottom - px(PADDING_PX)),
         ];
         Ok(area.draw(&Rectangle::new(bar, INK.filled()))?)
     }
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bar_is_round_on_the_ground_and_never_too_long() {
+    fn scale_bar_is_a_round_length_within_its_limit() {
         for (width_mm, metres_per_mm, metres, text) in [
             (300.0, 10.0, 500.0, "500 m = 50 mm"),
             (300.0, 30.0, 2000.0, "2 km = 66.7 mm"),

@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn type_has_its_outline_inside_its_box() {
+    fn text_outline_lies_inside_its_box() {
         let line = TextLine::new("Height 0.5 µm", false, 40.0);
         assert!(line.width > 100.0 && line.height > 10.0);
         let bounds = line.outline.expect("letters").bounds();
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn both_faces_are_readable() {
+    fn both_fonts_can_be_parsed() {
         assert!(REGULAR.is_some() && BOLD.is_some());
         // The font has all characters of the pictures.
         for letter in "aZ09.,:−×·µ°()%±".chars() {

@@ -50,11 +50,11 @@ pub fn curve(
         }
         match y {
             Some(y) => bin.push((x, y)),
-            None => pieces.extend(take_line(&mut piece)),
+            None => pieces.extend(finish_line(&mut piece)),
         }
     }
     flush(&mut bin, &mut piece);
-    pieces.extend(take_line(&mut piece));
+    pieces.extend(finish_line(&mut piece));
     pieces
 }
 
@@ -65,12 +65,12 @@ pub fn path(points: impl Iterator<Item = Option<(f64, f64)>>, step: f64) -> Vec<
     let mut piece: Vec<(f64, f64)> = Vec::new();
     for point in points {
         match (point, piece.last()) {
-            (None, _) => pieces.extend(take_line(&mut piece)),
+            (None, _) => pieces.extend(finish_line(&mut piece)),
             (Some(p), Some(last)) if (p.0 - last.0).hypot(p.1 - last.1) < step => {}
             (Some(p), _) => piece.push(p),
         }
     }
-    pieces.extend(take_line(&mut piece));
+    pieces.extend(finish_line(&mut piece));
     pieces
 }
 
@@ -87,7 +87,7 @@ pub fn runs(points: impl Iterator<Item = (f64, bool)>, gap: f64) -> Vec<(f64, f6
 }
 
 /// Returns a piece as a line, and a single point as a dot.
-fn take_line(piece: &mut Vec<(f64, f64)>) -> Option<Vec<(f64, f64)>> {
+fn finish_line(piece: &mut Vec<(f64, f64)>) -> Option<Vec<(f64, f64)>> {
     let mut piece = std::mem::take(piece);
     if let [only] = piece[..] {
         piece.push(only);
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_single_spike_survives_thinning() {
+    fn single_spike_survives_thinning() {
         let points = (0..100_000).map(|i| {
             let y = if i == 77_123 { 9.0 } else { 0.0 };
             (f64::from(i), Some(y))

@@ -12,13 +12,13 @@ pub(super) struct MapView {
 /// Max finished pixels of a map.
 pub(super) const MAP_PX: (f64, f64) = (1096.0, 800.0);
 /// Share of the terrain's extent from which a path is shown on all of it.
-const WHOLE_SHARE: f64 = 0.55;
+const MIN_WHOLE_SHARE: f64 = 0.55;
 /// A terrain of at most this many cells in each direction is always shown whole.
 const SMALL_CELLS: f64 = 160.0;
 /// Margin around a path, as a share of its extent.
 const MARGIN: f64 = 0.25;
 /// Min number of cells on a map.
-const FEWEST_CELLS: f64 = 24.0;
+const MIN_CELLS: f64 = 24.0;
 
 impl MapView {
     const fn new(west: f64, south: f64, width: f64, height: f64) -> Self {
@@ -59,12 +59,12 @@ impl MapView {
             return whole;
         };
         let small = whole.width.max(whole.height) <= SMALL_CELLS * cell_mm;
-        let far =
-            path.width > WHOLE_SHARE * whole.width || path.height > WHOLE_SHARE * whole.height;
+        let far = path.width > MIN_WHOLE_SHARE * whole.width
+            || path.height > MIN_WHOLE_SHARE * whole.height;
         if small || far {
             return whole.union(path);
         }
-        let room = |extent: f64| (extent * (1.0 + MARGIN)).max(FEWEST_CELLS * cell_mm);
+        let room = |extent: f64| (extent * (1.0 + MARGIN)).max(MIN_CELLS * cell_mm);
         let (width, height) = (room(path.width), room(path.height));
         let aspect = MAP_PX.0 / MAP_PX.1;
         let (width, height) = (width.max(height * aspect), height.max(width / aspect));
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn small_terrains_and_long_paths_are_shown_whole() {
+    fn small_terrain_or_long_path_is_shown_completely() {
         let all = MapView::whole([100.0, 80.0]);
         assert_eq!(
             MapView::choose(path(40., 40., 3., 3.), [100., 80.], 1.0),
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_path_in_a_corner_gets_a_view_inside_the_terrain() {
+    fn view_of_short_corner_path_is_inside_the_terrain() {
         let view = MapView::choose(path(2., 3., 80., 40.), [10_000., 6000.], 1.0);
         assert_eq!((view.west, view.south), (0.0, 0.0));
         assert!(view.width >= 100.0 && view.width < 140.0, "{view:?}");
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_off_the_data_is_still_in_view() {
+    fn path_off_the_data_is_in_view() {
         let view = MapView::choose(path(-30., 10., 20., 20.), [1000., 800.], 1.0);
         assert!(view.west <= -30.0 && view.map_px().0 >= 40);
     }

@@ -14,9 +14,9 @@ use super::style::{self, HIP, INK, PROXY, SOFT_INK, SURFACE, TOUCHING, TOUCHING_
 /// Height of a line of text, finished pixels.
 const LINE_PX: i32 = 30;
 /// Max width of the inset and colour scale.
-const WIDE_PX: i32 = 330;
+const MAX_WIDTH_PX: i32 = 330;
 /// Min height of the inset.
-const LEAST_INSET_PX: i32 = 120;
+const MIN_INSET_PX: i32 = 120;
 
 /// A heading, and the names and values under it.
 pub(super) type Table<'a> = (&'a str, &'a [(String, String)]);
@@ -30,13 +30,13 @@ pub(super) fn draw(
     tables: &[Table<'_>],
 ) -> Result<(), PictureError> {
     let mut y = px(8);
-    y = key(area, y, relief.holes)? + px(16);
+    y = key(area, y, relief.has_no_data)? + px(16);
     y = scale(area, y, relief)? + px(20);
     for (title, facts) in tables.iter().filter(|table| !table.1.is_empty()) {
         y = figures(area, y, title, facts)? + px(20);
     }
     if !window.shows_all(surface.size_mm) {
-        where_the_map_lies(area, y, surface, window)?;
+        draw_locator(area, y, surface, window)?;
     }
     Ok(())
 }
@@ -50,14 +50,14 @@ pub(super) fn needed_px(surface: &Surface<'_>, window: &MapView, tables: &[Table
         .sum();
     let inset = match window.shows_all(surface.size_mm) {
         true => 0,
-        false => 20 + LEAST_INSET_PX,
+        false => 20 + MIN_INSET_PX,
     };
     // The key and the scale of heights with all optional lines.
     8 + 4 + 6 * LINE_PX + 16 + 18 + 16 + 16 + 24 + 14 + 20 + tables + inset
 }
 
 /// Draws the whole terrain with the map's window in it, in the remaining room.
-fn where_the_map_lies(
+fn draw_locator(
     area: &Area<'_>,
     y: i32,
     surface: &Surface<'_>,
@@ -67,7 +67,7 @@ fn where_the_map_lies(
     let (width, height) = area.dim_in_pixel();
     let top = y + px(20);
     let rest = height.cast_signed() - top;
-    let width = width.cast_signed().min(px(WIDE_PX));
+    let width = width.cast_signed().min(px(MAX_WIDTH_PX));
     let place = area.clone().shrink((0, top), (width, rest.min(px(300))));
     map::inset(&place, surface, window)
 }
@@ -81,7 +81,7 @@ fn label(area: &Area<'_>, x: i32, y: i32, text: &str, side: HPos) -> Result<(), 
 }
 
 /// Draws the key to lines and colours.
-fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
+fn key(area: &Area<'_>, top: i32, has_no_data: bool) -> Result<i32, PictureError> {
     let right = px(40);
     let mut y = top + px(4);
     let mut entry = |name: &str, sign: &dyn Fn(i32) -> Result<(), PictureError>| {
@@ -116,12 +116,15 @@ fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
         }
         Ok(())
     })?;
-    if holes {
+    if has_no_data {
         entry("no data", &|y| {
             for (row, column) in (0..16).flat_map(|row| (0..40).map(move |column| (row, column))) {
                 let (x, y) = (px(column), y + px(row - 8));
                 let pixel = [(x, y), (x + px(1) - 1, y + px(1) - 1)];
-                area.draw(&Rectangle::new(pixel, relief::hole(column, row).filled()))?;
+                area.draw(&Rectangle::new(
+                    pixel,
+                    relief::no_data_color(column, row).filled(),
+                ))?;
             }
             Ok(())
         })?;
@@ -132,7 +135,7 @@ fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
 /// Draws the colours of the heights.
 fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError> {
     heading(area, top, "Height of the surface (mm)")?;
-    let width = area.dim_in_pixel().0.cast_signed().min(px(WIDE_PX));
+    let width = area.dim_in_pixel().0.cast_signed().min(px(MAX_WIDTH_PX));
     let (bar_top, bar_bottom) = (top + px(18), top + px(34));
     for x in (0..width).step_by(px(1) as usize) {
         let color = relief::tint(f64::from(x) / f64::from(width));
@@ -173,7 +176,7 @@ fn figures(
         return Ok(top);
     }
     heading(area, top, title)?;
-    let width = area.dim_in_pixel().0.cast_signed().min(px(WIDE_PX));
+    let width = area.dim_in_pixel().0.cast_signed().min(px(MAX_WIDTH_PX));
     let mut y = top + px(LINE_PX);
     for (name, value) in facts {
         label(area, 0, y, name, HPos::Left)?;

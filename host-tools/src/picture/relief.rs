@@ -56,7 +56,7 @@ pub(super) struct Relief {
     pub(super) range_mm: (f64, f64),
     /// The lowest and the highest pixel, mm; heights beyond the tints are clipped.
     pub(super) ends_mm: (f64, f64),
-    pub(super) holes: bool,
+    pub(super) has_no_data: bool,
 }
 
 /// Share of the pixels lower than the first tint, and share higher than the last.
@@ -70,7 +70,7 @@ pub(super) fn tint(t: f64) -> RGBColor {
 }
 
 /// Returns the colour of a no-data pixel.
-pub(super) fn hole(x: i32, y: i32) -> RGBColor {
+pub(super) fn no_data_color(x: i32, y: i32) -> RGBColor {
     if (x + y).rem_euclid(8) < 2 {
         STRIPE
     } else {
@@ -84,7 +84,7 @@ pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows:
     let (range_mm, ends_mm) = grid.ranges();
     let exaggeration = grid.exaggeration();
     let mut rgb = Vec::with_capacity((columns * rows * 3) as usize);
-    let mut holes = false;
+    let mut has_no_data = false;
     for (x, y) in places(columns, rows, 1) {
         let RGBColor(r, g, b) = match grid.at(x, y) {
             Some(height) => {
@@ -93,8 +93,8 @@ pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows:
             }
             None if grid.outside(surface, window, x, y) => PAPER,
             None => {
-                holes = true;
-                hole(x, y)
+                has_no_data = true;
+                no_data_color(x, y)
             }
         };
         rgb.extend([r, g, b]);
@@ -105,7 +105,7 @@ pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows:
         rgb,
         range_mm,
         ends_mm,
-        holes,
+        has_no_data,
     }
 }
 
@@ -145,8 +145,8 @@ impl PixelHeights {
             window.width / f64::from(columns),
             window.height / f64::from(rows),
         ];
-        let wanted = (step[0] / surface.cell_mm).ceil().max(1.0);
-        let samples = (wanted as u32).min(MAX_SAMPLES);
+        let cells = (step[0] / surface.cell_mm).ceil().max(1.0);
+        let samples = (cells as u32).min(MAX_SAMPLES);
         let north = window.south + window.height;
         let heights = places(columns, rows, 1).map(|(x, y)| {
             let west = window.west + f64::from(x) * step[0];
@@ -269,8 +269,8 @@ mod tests {
         };
         let relief = shade(&field, &MapView::whole(field.size_mm), 100, 100);
         assert!(brightness(&relief, 30, 30) > brightness(&relief, 70, 70) + 100);
-        assert!(relief.holes);
-        let RGBColor(r, ..) = hole(50, 50);
+        assert!(relief.has_no_data);
+        let RGBColor(r, ..) = no_data_color(50, 50);
         assert_eq!(relief.rgb[(50 * 100 + 50) * 3], r);
     }
 
@@ -307,9 +307,9 @@ mod tests {
 
     #[test]
     fn work_is_bounded_by_the_picture_not_the_field() {
-        let asked = Cell::new(0u64);
+        let calls = Cell::new(0u64);
         let height = |x: f64, y: f64, _: f64| {
-            asked.set(asked.get() + 1);
+            calls.set(calls.get() + 1);
             Some(x.sin() + y.cos())
         };
         let field = Surface {
@@ -318,7 +318,7 @@ mod tests {
             cell_mm: 1.0,
         };
         shade(&field, &MapView::whole(field.size_mm), 200, 100);
-        assert!(asked.get() <= 200 * 100 * 9);
+        assert!(calls.get() <= 200 * 100 * 9);
     }
 
     #[test]

@@ -64,7 +64,7 @@ fn count_from(
 }
 
 #[test]
-fn a_session_shows_hip_and_proxy_on_map_and_profile() {
+fn picture_shows_hip_and_proxy_on_map_and_profile() {
     let samples = walk();
     let canvas = session(&samples, [100.0, 90.0]).draw().expect("drawn");
     let bottom = canvas.size().1.cast_signed();
@@ -73,8 +73,8 @@ fn a_session_shows_hip_and_proxy_on_map_and_profile() {
     let map = [HEADER_PX, heights];
     let profile = [heights, forces];
     for (color, part) in [(HIP, map), (PROXY, map), (HIP, profile), (PROXY, profile)] {
-        let seen = count(&canvas, color, part);
-        assert!(seen > 900, "{color:?} in rows {part:?}: {seen}");
+        let count = count(&canvas, color, part);
+        assert!(count > 900, "{color:?} in rows {part:?}: {count}");
     }
     assert!(count(&canvas, style::INK, [forces, bottom]) > 900);
     let empty = session(&[], [100.0, 90.0]).draw().expect("drawn");
@@ -83,19 +83,19 @@ fn a_session_shows_hip_and_proxy_on_map_and_profile() {
 
 /// A map of a part shows its position on the whole terrain, whatever the length of the panel.
 #[test]
-fn a_map_of_a_part_shows_where_it_lies() {
+fn partial_map_is_located_on_the_terrain() {
     let samples = walk();
-    let stated: Vec<_> = (0..9)
+    let rows: Vec<_> = (0..9)
         .map(|i| (format!("fact {i}"), "value".to_owned()))
         .collect();
     let facts = GroundFacts {
         metres_per_mm: Some(2.0),
         place_of: &|east, north| format!("{east}, {north}"),
-        lines: &stated,
+        lines: &rows,
     };
     for size_mm in [[5000.0, 3000.0], [1000.0, 3000.0], [5000.0, 400.0]] {
         let picture = SessionPicture {
-            facts: &stated,
+            facts: &rows,
             ground: Some(facts),
             ..session(&samples, size_mm)
         };
@@ -110,7 +110,7 @@ fn a_map_of_a_part_shows_where_it_lies() {
 }
 
 #[test]
-fn the_file_reads_back_with_the_size_it_was_drawn() {
+fn saved_picture_has_the_drawn_size() {
     let samples = walk();
     let drawn = session(&samples, [5000.0, 3000.0]).draw().expect("drawn");
     let path = std::env::temp_dir().join(format!("hapterra-{}.png", std::process::id()));
@@ -123,7 +123,7 @@ fn the_file_reads_back_with_the_size_it_was_drawn() {
 }
 
 #[test]
-fn odd_sessions_are_drawn_too() {
+fn degenerate_sessions_are_drawn() {
     let one = [walk()[0]];
     let still = vec![walk()[0]; 50];
     let mut wild = walk();

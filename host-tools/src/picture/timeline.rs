@@ -22,10 +22,10 @@ pub(super) fn heights(
     time: &Range<f64>,
 ) -> Result<(), PictureError> {
     let below = |r: &Record| (surface.height_mm)(r.hip_mm[0], r.hip_mm[1], 0.0);
-    let seen = records
+    let heights = records
         .iter()
         .flat_map(|r| [Some(r.hip_mm[2]), Some(r.proxy_mm[2]), below(r)]);
-    let range = axes::spread(seen.flatten(), 0.08);
+    let range = axes::spread(heights.flatten(), 0.08);
     let titles = Titles {
         x: "",
         y: "height (mm)",

@@ -10,12 +10,12 @@ use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 /// Maximum width of a file's sample in the hand, mm: a wider one feels like one flat patch.
 const MAX_CELL_MM: f64 = 50.0;
 /// Minimum longer side of a terrain in the hand, mm: a shorter one shows no detail.
-const SMALLEST_TERRAIN_MM: f64 = 5.0;
+const MIN_TERRAIN_MM: f64 = 5.0;
 /// Maximum stiffness, N/mm: above it an arm most likely buzzes or kicks
 /// (`docs/explanation/stability.md`).
-pub const STIFFEST_N_PER_MM: f32 = 1.0;
+pub const MAX_STIFFNESS_N_PER_MM: f32 = 1.0;
 /// Minimum stiffness, N/mm: a softer surface is not noticeable.
-const SOFTEST_N_PER_MM: f32 = 0.005;
+const MIN_STIFFNESS_N_PER_MM: f32 = 0.005;
 /// Smallest and largest radius of a ball at the tip, device millimetres; 0 is a point.
 pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
 
@@ -78,19 +78,19 @@ pub enum ChangeError {
     },
     /// A stiffness outside the valid range, N/mm.
     #[error(
-        "a stiffness of {0:.3} N/mm: from {SOFTEST_N_PER_MM} to {STIFFEST_N_PER_MM} N/mm can be had"
+        "a stiffness of {0:.3} N/mm: from {MIN_STIFFNESS_N_PER_MM} to {MAX_STIFFNESS_N_PER_MM} N/mm can be had"
     )]
     Stiffness(f32),
     /// A stiffness of a material above the maximum, N/mm.
     #[error(
-        "the stiffest of the materials would have {0:.3} N/mm: up to {STIFFEST_N_PER_MM} N/mm can be had"
+        "the stiffest of the materials would have {0:.3} N/mm: up to {MAX_STIFFNESS_N_PER_MM} N/mm can be had"
     )]
     Material(f32),
     /// An invalid surface parameter.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     /// A tip radius outside [`TIPS_MM`].
-    #[error("a tip of {0} mm: from {least} to {most} mm can be had", least = TIPS_MM[0], most = TIPS_MM[1])]
+    #[error("a tip of {0} mm: from {min} to {max} mm can be had", min = TIPS_MM[0], max = TIPS_MM[1])]
     Tip(f64),
     /// Numbers with which no terrain can be rendered.
     #[error(transparent)]
@@ -102,7 +102,7 @@ pub enum ChangeError {
 
 /// A placement and its surface parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Laid {
+pub struct PlacedSurface {
     /// Place, scale, level and heights.
     pub view: Placement,
     /// Stiffness, friction, damping, texture and shading.
@@ -113,7 +113,7 @@ pub struct Laid {
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// The initial placement.
-    pub first: Laid,
+    pub first: PlacedSurface,
     /// Resolution of the encoders at the tip, mm.
     pub resolution_mm: f64,
     /// Level of detail, if the user has stated one.
@@ -139,15 +139,15 @@ impl Hand {
     }
 
     /// Returns true if the terrain's cells at this place differ from the rendered ones
-    /// ([`HapticGrid::measured_anew`]).
+    /// ([`HapticGrid::remeasured_at`]).
     #[must_use]
-    pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
+    pub fn has_other_cell_size(&self, terrain: &Terrain<'_>) -> bool {
         let cell_mm = terrain.scale_of_level_0().cell_mm();
         let [east, north, _] = self.at_mm();
-        let anew = terrain
+        let remeasured = terrain
             .grid()
-            .measured_anew([east / cell_mm, north / cell_mm]);
-        anew.is_some()
+            .remeasured_at([east / cell_mm, north / cell_mm]);
+        remeasured.is_some()
     }
 }
 
@@ -155,7 +155,7 @@ impl Hand {
 #[derive(Clone)]
 pub struct Changed<'r> {
     /// The new placement and its surface parameters.
-    pub laid: Laid,
+    pub placed_surface: PlacedSurface,
     /// Its terrain.
     pub terrain: Terrain<'r>,
     /// The HIP, device millimetres of the new placement. Its height over the place under the hand
@@ -174,35 +174,36 @@ impl Bounds {
     pub fn apply<'r>(
         &self,
         terrain: &Terrain<'r>,
-        before: &Laid,
+        before: &PlacedSurface,
         changes: &[PlacementChange],
         hand: &Hand,
     ) -> Result<Changed<'r>, ChangeError> {
         let at_mm = hand.at_mm();
         let cell_mm = before.view.scale.cell_mm();
-        let mut laid = *before;
+        let mut placed_surface = *before;
         let mut at = [at_mm[0] / cell_mm, at_mm[1] / cell_mm];
         let mut grid = *terrain.grid();
         for change in changes {
-            (laid, at) = self.step(&mut grid, laid, at, change)?;
+            (placed_surface, at) = self.step(&mut grid, placed_surface, at, change)?;
         }
-        if let Some(anew) = grid.measured_anew(at) {
-            at = anew.of_ground(grid.to_ground(at));
-            laid.view = laid.view.measured_as(&anew)?;
-            grid = anew;
+        if let Some(remeasured) = grid.remeasured_at(at) {
+            at = remeasured.of_ground(grid.to_ground(at));
+            placed_surface.view = placed_surface.view.measured_as(&remeasured)?;
+            grid = remeasured;
         }
-        laid.view.level = match self.level {
+        placed_surface.view.level = match self.level {
             Some(level) => level,
-            None => finest_level(&grid, self.resolution_mm, &laid.view.scale),
+            None => finest_level(&grid, self.resolution_mm, &placed_surface.view.scale),
         };
-        let terrain_after = terrain.relaid(grid, laid.view.scale, laid.view.level)?;
+        let terrain_after =
+            terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
         let (hip_mm, ground_is_known) = hip_after((terrain, &terrain_after), hand, at_mm, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];
         let was = (before.view.scale, terrain.grid());
-        laid.view = laid.view.moved_to(&grid, home_mm, was);
+        placed_surface.view = placed_surface.view.moved_to(&grid, home_mm, was);
         Ok(Changed {
-            laid,
+            placed_surface,
             ground_is_known,
             terrain: terrain_after,
             hip_mm,
@@ -213,11 +214,11 @@ impl Bounds {
     fn step(
         &self,
         grid: &mut HapticGrid<'_>,
-        mut laid: Laid,
+        mut placed_surface: PlacedSurface,
         mut at: [f64; 2],
         change: &PlacementChange,
-    ) -> Result<(Laid, [f64; 2]), ChangeError> {
-        let Laid { view, params } = &mut laid;
+    ) -> Result<(PlacedSurface, [f64; 2]), ChangeError> {
+        let PlacedSurface { view, params } = &mut placed_surface;
         let scale = view.scale;
         let (cell_mm, height) = (scale.cell_mm(), scale.height_mm_per_unit());
         match *change {
@@ -241,8 +242,8 @@ impl Bounds {
             PlacementChange::Stiffness(factor) => {
                 let stiffness = params.stiffness_n_per_mm * factor_of(factor)? as f32;
                 // An initial stiffness above the maximum may be reduced and restored.
-                let most = STIFFEST_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
-                if !(SOFTEST_N_PER_MM..=most).contains(&stiffness) {
+                let max = MAX_STIFFNESS_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
+                if !(MIN_STIFFNESS_N_PER_MM..=max).contains(&stiffness) {
                     return Err(ChangeError::Stiffness(stiffness));
                 }
                 params.stiffness_n_per_mm = stiffness;
@@ -250,7 +251,7 @@ impl Bounds {
                 if let Some(materials) = grid.materials() {
                     let stiffest = |params| materials.table().hardest(params).stiffness_n_per_mm;
                     let (now, first) = (stiffest(params), stiffest(&self.first.params));
-                    if now > STIFFEST_N_PER_MM.max(first) {
+                    if now > MAX_STIFFNESS_N_PER_MM.max(first) {
                         return Err(ChangeError::Material(now));
                     }
                 }
@@ -274,7 +275,7 @@ impl Bounds {
                 *grid = grid.with_tip(self.tip_mm);
             }
         }
-        Ok((laid, at))
+        Ok((placed_surface, at))
     }
 }
 
@@ -288,7 +289,7 @@ fn hip_after(
 ) -> ([f64; 3], bool) {
     let cell_mm = after.scale_of_level_0().cell_mm();
     let [east, north] = at.map(|cells| cells * cell_mm);
-    let beside = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
+    let offset = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
     let cell_before_mm = before.scale_of_level_0().cell_mm();
     let place_before = [0, 1].map(|axis| at_mm[axis] / cell_before_mm);
     let (ground_before, before_is_known) = match hand.proxy_mm {
@@ -300,7 +301,7 @@ fn hip_after(
     let risen = ground_before
         .zip(ground_after)
         .map_or(0.0, |(before, after)| after - before);
-    let hip_mm = [east + beside(0), north + beside(1), hand.hip_mm[2] + risen];
+    let hip_mm = [east + offset(0), north + offset(1), hand.hip_mm[2] + risen];
     (hip_mm, before_is_known && after_is_known)
 }
 
@@ -338,7 +339,7 @@ fn check_size(grid: &HapticGrid<'_>, view: &Placement, factor: f64) -> Result<()
     if factor > 1.0 && cell_mm > MAX_CELL_MM {
         return Err(ChangeError::NoDetail { cell_mm });
     }
-    if factor < 1.0 && size_mm < SMALLEST_TERRAIN_MM {
+    if factor < 1.0 && size_mm < MIN_TERRAIN_MM {
         return Err(ChangeError::TooSmall { size_mm });
     }
     Ok(())

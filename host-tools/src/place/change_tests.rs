@@ -26,8 +26,8 @@ impl Bench {
         }
     }
 
-    /// Calls `look` with the terrain at 0.05 mm a cell, and its bounds.
-    fn with<T>(&self, look: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
+    /// Calls `check` with the terrain at 0.05 mm a cell, and its bounds.
+    fn with<T>(&self, check: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
         let options = PlacementOptions {
             target: Target::Whole,
             sizing: Sizing::CellMm(0.05),
@@ -40,7 +40,7 @@ impl Bench {
         let view = Placement::new(&grid, &reach, &options).expect("a view");
         let terrain = view.terrain(grid).expect("a terrain");
         let bounds = Bounds {
-            first: Laid {
+            first: PlacedSurface {
                 view,
                 params: SurfaceParams::PREMIUM,
             },
@@ -48,7 +48,7 @@ impl Bench {
             level: self.level,
             tip_mm: 0.0,
         };
-        look(&terrain, bounds)
+        check(&terrain, bounds)
     }
 }
 
@@ -62,7 +62,7 @@ fn pressing(terrain: &Terrain<'_>) -> Hand {
 }
 
 #[test]
-fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
+fn zoom_keeps_ground_under_proxy_and_hip_depth() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         let before = bounds.first;
@@ -70,7 +70,7 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
         let changed = bounds
             .apply(terrain, &before, &zoom, &hand)
             .expect("zoomed");
-        let view = changed.laid.view;
+        let view = changed.placed_surface.view;
         assert!((view.scale.cell_mm() - 0.4).abs() < 1e-12);
         assert_eq!(view.exaggeration, before.view.exaggeration);
         // The proxy's ground, now eight times as far from the first sample.
@@ -88,7 +88,7 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
             assert!((then - now).abs() < 1e-9);
         }
         // The part in front of the arm has grown by the same factor.
-        for (now, then) in view.laid_mm.iter().zip(before.view.laid_mm) {
+        for (now, then) in view.extent_mm.iter().zip(before.view.extent_mm) {
             assert!((now - 8.0 * then).abs() < 1e-9, "{now} {then}");
         }
         for (now, then) in view.heights_mm.iter().zip(before.view.heights_mm) {
@@ -101,10 +101,10 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
 }
 
 #[test]
-fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
-    for (stated, expected) in [(None, [0, 3, 0]), (Some(2), [2, 2, 2])] {
+fn level_follows_the_scale_unless_it_is_stated() {
+    for (fixed_level, expected) in [(None, [0, 3, 0]), (Some(2), [2, 2, 2])] {
         let bench = Bench {
-            level: stated,
+            level: fixed_level,
             ..Bench::new()
         };
         bench.with(|terrain, bounds| {
@@ -112,7 +112,7 @@ fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
             let level = |factor: f64| {
                 let zoom = [PlacementChange::Zoom(factor)];
                 let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
-                changed.expect("zoomed").laid.view.level
+                changed.expect("zoomed").placed_surface.view.level
             };
             // One count is 0.029 mm.
             assert_eq!([level(1.0), level(0.1), level(10.0)], expected);
@@ -160,7 +160,7 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
         ];
         let changed = bounds.apply(terrain, &bounds.first, &steeper, &hand);
         let changed = changed.expect("changed");
-        let Laid { view, params } = changed.laid;
+        let PlacedSurface { view, params } = changed.placed_surface;
         assert!((view.exaggeration.expect("known") - 3.0).abs() < 1e-9);
         assert_eq!(params.stiffness_n_per_mm, 0.25);
         assert!(!changed.terrain.has_tiles_of(terrain));
@@ -169,8 +169,8 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
             proxy_mm: None,
         };
         let back = [PlacementChange::Reset];
-        let back = bounds.apply(&changed.terrain, &changed.laid, &back, &there);
-        let back = back.expect("back").laid;
+        let back = bounds.apply(&changed.terrain, &changed.placed_surface, &back, &there);
+        let back = back.expect("back").placed_surface;
         assert_eq!(
             (back.view.scale, back.params),
             (bounds.first.view.scale, bounds.first.params)
@@ -183,7 +183,7 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
 fn refused_placement_change_names_the_bound() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
-        for (change, says) in [
+        for (change, expected) in [
             (PlacementChange::Zoom(2000.0), "no more detail"),
             (PlacementChange::Zoom(1e-3), "mm wide"),
             (PlacementChange::Zoom(-1.0), "not a valid factor"),
@@ -194,8 +194,8 @@ fn refused_placement_change_names_the_bound() {
             (PlacementChange::Stiffness(1e-4), "0.005"),
         ] {
             let refused = bounds.apply(terrain, &bounds.first, &[change], &hand);
-            let said = refused.err().expect("refused").to_string();
-            assert!(said.contains(says), "{change:?}: {said}");
+            let message = refused.err().expect("refused").to_string();
+            assert!(message.contains(expected), "{change:?}: {message}");
         }
     });
     // A terrain that is already too large may be made smaller.

@@ -10,7 +10,7 @@ const BELOW_MM: f64 = 10.0;
 /// Bisections of the search for the scale, far finer than a step of the reach's profile.
 const HALVINGS: usize = 24;
 /// Min size of a terrain as a share of the largest: its heights may require a small one.
-const SMALLEST: f64 = 1e-6;
+const MIN_SCALE_SHARE: f64 = 1e-6;
 
 /// Extent to fit to the workspace.
 pub(super) struct Extent<'a> {
@@ -45,7 +45,7 @@ impl Extent<'_> {
         widest.ok_or(PlaceError::NoReach)?;
         // No arm reaches more than twice its home pose's distances to each side.
         let mut too_large = 4.0 * reach.height_mm().max(1.0) / longest;
-        let mut fitting = too_large * SMALLEST;
+        let mut fitting = too_large * MIN_SCALE_SHARE;
         if !self.fits(reach, fitting) {
             let [low, high] = (self.heights_mm)(fitting);
             return Err(PlaceError::TooTall {

@@ -3,7 +3,7 @@
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
 use super::place_text::{
-    asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
+    bounds_in_words, box_in_words, own_box_in_words, place_as_given, system_in_words,
 };
 use crate::terrain::HapticGrid;
 use heightfield::{
@@ -18,7 +18,7 @@ const TORN: f64 = 0.5;
 /// Tolerance for a place beyond the outermost sample, in samples.
 const ON_SAMPLE: f64 = 1e-6;
 /// Samples along each side of a box that are read for its lowest and highest point.
-const LOOKS: u32 = 257;
+const MAX_SAMPLES_PER_SIDE: u32 = 257;
 
 /// Returns a place in the file's coordinates.
 pub(super) fn place(
@@ -85,7 +85,7 @@ fn is_latitude_first(file: &Georeference<'_>, [one, other]: [f64; 2]) -> bool {
 /// Returns points around a box, in the file's coordinates.
 pub(super) fn outline(
     file: &Georeference<'_>,
-    asked: Sides,
+    requested: Sides,
     coordinates: Coordinates,
 ) -> Result<Vec<[f64; 2]>, PlaceError> {
     let coordinates = coordinates.of(file);
@@ -94,19 +94,19 @@ pub(super) fn outline(
         (Coordinates::Own, System::Geographic { degrees }) => Some(360.0 / degrees),
         (Coordinates::Own | Coordinates::Epsg(_), _) => None,
     };
-    let [west, south, mut east, north] = asked;
+    let [west, south, mut east, north] = requested;
     if let Some(turn) = turn.filter(|_| west > east) {
         east += turn;
         if let System::Geographic { degrees } = file.system() {
             let [first, _, last, _] = file.bounds();
             // More than half of the globe, for a raster with less.
             if east - west > 0.5 * turn && (last - first) * degrees < 180.0 {
-                return Err(PlaceError::WestInTheEast(asked));
+                return Err(PlaceError::WestInTheEast(requested));
             }
         }
     }
     if !(west < east && south < north) {
-        return Err(PlaceError::NoBox(box_in_words(asked)));
+        return Err(PlaceError::NoBox(box_in_words(requested)));
     }
     let corners = [[west, south], [east, south], [east, north], [west, north]];
     let middle = [0.5 * (west + east), 0.5 * (south + north)];
@@ -114,7 +114,7 @@ pub(super) fn outline(
     if coordinates == Coordinates::Own {
         let moved = there[0] - middle[0];
         let corners = corners.map(|[x, y]| [x + moved, y]);
-        return in_one_piece(file, asked, corners.to_vec());
+        return unwrap_outline(file, requested, corners.to_vec());
     }
     let mut points = Vec::new();
     for side in 0..4 {
@@ -133,19 +133,19 @@ pub(super) fn outline(
     }
     match is_torn(&points) {
         true => Err(PlaceError::BoxAcrossSeam {
-            place: box_in_words(asked),
+            place: box_in_words(requested),
             system: system_in_words(file),
         }),
-        false => in_one_piece(file, asked, points),
+        false => unwrap_outline(file, requested, points),
     }
 }
 
 /// Returns the outline of a box in a raster in degrees. A raster around the whole globe has a
 /// border, and a box across that border has two parts, of which only one can be placed in front of
 /// an arm. A box around the globe is the whole raster.
-fn in_one_piece(
+fn unwrap_outline(
     file: &Georeference<'_>,
-    asked: Sides,
+    requested: Sides,
     points: Vec<[f64; 2]>,
 ) -> Result<Vec<[f64; 2]>, PlaceError> {
     let System::Geographic { degrees } = file.system() else {
@@ -166,7 +166,7 @@ fn in_one_piece(
     let parts: Vec<Sides> = [-1.0, 0.0, 1.0].into_iter().filter_map(part).collect();
     match parts.as_slice() {
         [one, other, ..] => Err(PlaceError::BoxInTwoParts {
-            place: box_in_words(asked),
+            place: box_in_words(requested),
             parts: [one, other].map(|part| own_box_in_words(file, *part)),
         }),
         _ => Ok(points),
@@ -204,14 +204,14 @@ fn is_torn(points: &[[f64; 2]]) -> bool {
 /// Returns a place with a height, in haptic cells, and the height in the file's vertical unit.
 pub(super) fn spot(
     grid: &HapticGrid<'_>,
-    asked: [f64; 2],
+    requested: [f64; 2],
     coordinates: Coordinates,
 ) -> Result<([f64; 2], f64), PlaceError> {
     let file = grid.raster().georeference();
-    let ground = place(&file, asked, coordinates)?;
+    let ground = place(&file, requested, coordinates)?;
     let reported = || {
         (
-            asked_in_words(&file, asked, coordinates),
+            place_as_given(&file, requested, coordinates),
             bounds_in_words(&file),
         )
     };
@@ -219,15 +219,15 @@ pub(super) fn spot(
     let sample = file.transform().to_samples(ground);
     let inside = |axis: usize| (-ON_SAMPLE..=last[axis] + ON_SAMPLE).contains(&sample[axis]);
     if !(inside(0) && inside(1)) {
-        if coordinates == Coordinates::LonLat && is_latitude_first(&file, asked) {
-            return Err(PlaceError::LatitudeFirst(asked));
+        if coordinates == Coordinates::LonLat && is_latitude_first(&file, requested) {
+            return Err(PlaceError::LatitudeFirst(requested));
         }
         let (place, bounds) = reported();
         return Err(PlaceError::Outside { place, bounds });
     }
     let haptic = grid.of_ground(ground);
-    let most = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
-    let haptic = [0, 1].map(|axis| haptic[axis].clamp(0.0, most[axis]));
+    let last = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
+    let haptic = [0, 1].map(|axis| haptic[axis].clamp(0.0, last[axis]));
     match grid.read_surface(haptic) {
         (Some(height), _) => Ok((haptic, height)),
         (None, ReadStatus::Pending) => Err(PlaceError::Unread {
@@ -244,12 +244,12 @@ pub(super) fn spot(
 /// file's vertical unit.
 pub(super) fn area(
     grid: &HapticGrid<'_>,
-    asked: Sides,
+    requested: Sides,
     coordinates: Coordinates,
 ) -> Result<(Sides, [f64; 2]), PlaceError> {
     let file = grid.raster().georeference();
-    let reported = || (box_in_words(asked), bounds_in_words(&file));
-    let points = outline(&file, asked, coordinates)?;
+    let reported = || (box_in_words(requested), bounds_in_words(&file));
+    let points = outline(&file, requested, coordinates)?;
     let haptic: Vec<_> = points.iter().map(|point| grid.of_ground(*point)).collect();
     let [west, south, east, north] = around(haptic);
     let last = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
@@ -284,13 +284,15 @@ fn heights(
     [west, south, east, north]: Sides,
 ) -> (Option<[f64; 2]>, ReadStatus) {
     let along = |from: f64, to: f64| {
-        let looks = LOOKS.min((to.ceil() - from.floor()) as u32 + 1).max(2);
-        (0..looks).map(move |look| {
-            let share = f64::from(look) / f64::from(looks - 1);
+        let samples = MAX_SAMPLES_PER_SIDE
+            .min((to.ceil() - from.floor()) as u32 + 1)
+            .max(2);
+        (0..samples).map(move |index| {
+            let share = f64::from(index) / f64::from(samples - 1);
             (from.floor() + share * (to.ceil() - from.floor())).round() as u32
         })
     };
-    let apart = (east - west).max(north - south) / f64::from(LOOKS);
+    let apart = (east - west).max(north - south) / f64::from(MAX_SAMPLES_PER_SIDE);
     let level = grid.raster().level_for(apart);
     let reads = ReadTracker::default();
     let known = along(south, north)

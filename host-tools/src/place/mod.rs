@@ -17,12 +17,13 @@ mod surface_change;
 mod target;
 
 pub use change::{
-    Bounds, ChangeError, Changed, Hand, Laid, PlacementChange, STIFFEST_N_PER_MM, TIPS_MM,
+    Bounds, ChangeError, Changed, Hand, MAX_STIFFNESS_N_PER_MM, PlacedSurface, PlacementChange,
+    TIPS_MM,
 };
 pub use coordinates::Coordinates;
 pub use error::PlaceError;
 pub use place_text::{bounds_in_words, coordinates_in_words, place_in_words};
-pub(crate) use placement::FELT_MM;
+pub(crate) use placement::CLEAR_RELIEF_MM;
 pub use placement::{Heights, Placement, PlacementOptions, Sizing, suited_height};
 pub use reach::{Reach, ReachBox};
 pub use surface_change::{SurfaceChange, SurfaceError};

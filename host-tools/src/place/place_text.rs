@@ -9,7 +9,7 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
     let [west, south, east, north] = file.bounds();
     let [x, y] = names(file);
     let digits = Digits::of(file);
-    let [w, s, e, n] = [west, south, east, north].map(|value| digits.say(value));
+    let [w, s, e, n] = [west, south, east, north].map(|value| digits.format(value));
     let own = format!("{x} {w} to {e}, {y} {s} to {n} ({})", system_in_words(file));
     if file.counts_lonlat() {
         return own + &kind_in_words(file.lonlat());
@@ -34,7 +34,7 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
 /// Returns a place in the file's coordinates and, if known, in longitude and latitude.
 #[must_use]
 pub fn place_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
-    let own = asked_in_words(file, ground, Coordinates::Own);
+    let own = place_as_given(file, ground, Coordinates::Own);
     let kind = kind_in_words(file.lonlat());
     match file.to_lonlat(ground) {
         Some(_) if file.counts_lonlat() => own + &kind,
@@ -69,11 +69,11 @@ fn kind_in_words(kind: LonLat<'_>) -> String {
 #[must_use]
 pub fn coordinates_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
     let digits = Digits::of(file);
-    ground.map(|value| digits.say(value)).join(", ")
+    ground.map(|value| digits.format(value)).join(", ")
 }
 
 /// Returns a place in the user's coordinates.
-pub(super) fn asked_in_words(
+pub(super) fn place_as_given(
     file: &Georeference<'_>,
     [a, b]: [f64; 2],
     coordinates: Coordinates,
@@ -83,7 +83,7 @@ pub(super) fn asked_in_words(
         Coordinates::Epsg(code) => format!("x {a}, y {b} (EPSG:{code})"),
         Coordinates::Own => {
             let ([x, y], digits) = (names(file), Digits::of(file));
-            let [a, b] = [a, b].map(|value| digits.say(value));
+            let [a, b] = [a, b].map(|value| digits.format(value));
             format!("{x} {a}, {y} {b} ({})", system_in_words(file))
         }
     }
@@ -92,7 +92,7 @@ pub(super) fn asked_in_words(
 /// Returns a box in the file's own coordinates, in the form of the option.
 pub(super) fn own_box_in_words(file: &Georeference<'_>, sides: Sides) -> String {
     let digits = Digits::of(file);
-    sides.map(|side| digits.say(side)).join(",")
+    sides.map(|side| digits.format(side)).join(",")
 }
 
 /// Returns a box in the form of the option.
@@ -145,7 +145,7 @@ impl Digits {
         Self(decimals.clamp(0.0, 9.0) as usize)
     }
 
-    fn say(&self, value: f64) -> String {
+    fn format(&self, value: f64) -> String {
         let text = format!("{value:.*}", self.0);
         match text.contains('.') {
             true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),

@@ -16,7 +16,7 @@ use crate::terrain::{
 /// size, mm.
 const RELIEF_MM: f64 = 25.0;
 /// Relief that a hand feels clearly, mm.
-pub(crate) const FELT_MM: f64 = 15.0;
+pub(crate) const CLEAR_RELIEF_MM: f64 = 15.0;
 /// Device millimetres for each haptic cell, at a place without a stated scale.
 const CELL_MM: f64 = 1.0;
 
@@ -57,7 +57,7 @@ impl Default for Heights {
 #[must_use]
 pub fn suited_height(plain: f64, relief: f64) -> f64 {
     match relief > 0.0 {
-        true => plain.max(FELT_MM / relief),
+        true => plain.max(CLEAR_RELIEF_MM / relief),
         false => plain,
     }
 }
@@ -93,7 +93,7 @@ pub struct Placement {
     pub exaggeration: Option<f64>,
     /// The part in front of the arm: west, south, east, north, device millimetres; the whole
     /// terrain if only place and scale are stated.
-    pub laid_mm: [f64; 4],
+    pub extent_mm: [f64; 4],
     /// Lowest and highest point of that part, device millimetres.
     pub heights_mm: [f64; 2],
     /// The arm's workspace ([`Reach::sides_mm`]).
@@ -114,33 +114,33 @@ impl Placement {
         reach: &Reach,
         options: &PlacementOptions,
     ) -> Result<Self, PlaceError> {
-        let wanted = Wanted::new(grid, options)?;
+        let request = CheckedRequest::new(grid, options)?;
         match (options.target, options.sizing) {
             (Target::At(place, coordinates), _) => {
                 let (haptic, height) = ground::spot(grid, place, coordinates)?;
-                let scale = wanted.stated_scale()?;
-                wanted.over(reach, scale, haptic, height)
+                let scale = request.stated_scale()?;
+                request.over(reach, scale, haptic, height)
             }
             (Target::Whole, Sizing::CellMm(_) | Sizing::GroundMPerMm(_)) => {
-                let scale = wanted.stated_scale()?;
-                let haptic = wanted.last().map(|last| 0.5 * last);
+                let scale = request.stated_scale()?;
+                let haptic = request.last().map(|last| 0.5 * last);
                 // The middle may be no-data; the ground around it is rendered all the same.
-                let [low, high] = wanted.whole_heights();
+                let [low, high] = request.whole_heights();
                 let (height, status) = grid.read_surface(haptic);
                 if !status.is_complete() {
                     let place = "the middle of the terrain".into();
                     return Err(PlaceError::Unread { place });
                 }
                 let height = height.unwrap_or(0.5 * (low + high));
-                wanted.over(reach, scale, haptic, height)
+                request.over(reach, scale, haptic, height)
             }
             (Target::Whole, Sizing::Fit) => {
-                let [east, north] = wanted.last();
-                wanted.fitted(reach, [0.0, 0.0, east, north], wanted.whole_heights())
+                let [east, north] = request.last();
+                request.fitted(reach, [0.0, 0.0, east, north], request.whole_heights())
             }
             (Target::Box(bounds, coordinates), _) => {
                 let (cells, heights) = ground::area(grid, bounds, coordinates)?;
-                wanted.fitted(reach, cells, heights)
+                request.fitted(reach, cells, heights)
             }
         }
     }
@@ -188,11 +188,11 @@ impl Placement {
     /// Returns the placement over cells measured at another place, equally large on the ground and
     /// in device millimetres, so that scale and exaggeration stay. The caller then has to call
     /// [`Self::moved_to`].
-    pub(super) fn measured_as(self, anew: &HapticGrid<'_>) -> Result<Self, ScaleError> {
-        let cell_mm = self.scale.cell_mm() * self.as_large_as_in(anew);
+    pub(super) fn measured_as(self, grid: &HapticGrid<'_>) -> Result<Self, ScaleError> {
+        let cell_mm = self.scale.cell_mm() * self.as_large_as_in(grid);
         Ok(Self {
             scale: Scale::new(cell_mm, self.scale.height_mm_per_unit())?,
-            side_m: anew.side_m(),
+            side_m: grid.side_m(),
             ..self
         })
     }
@@ -212,14 +212,14 @@ impl Placement {
         home_mm: [f64; 3],
         (before, grid_before): (Scale, &HapticGrid<'_>),
     ) -> Self {
-        let laid = self.laid_mm.map(|mm| mm / before.cell_mm());
-        let laid = grid.around_sides_of(grid_before, laid);
+        let cells = self.extent_mm.map(|mm| mm / before.cell_mm());
+        let cells = grid.around_sides_of(grid_before, cells);
         let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
         let haptic = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
         Self {
             home_mm,
             home_ground: grid.to_ground(haptic),
-            laid_mm: laid.map(|cells| cells * self.scale.cell_mm()),
+            extent_mm: cells.map(|cells| cells * self.scale.cell_mm()),
             heights_mm: match higher.is_finite() {
                 true => self.heights_mm.map(|mm| mm * higher),
                 false => self.heights_mm,
@@ -244,17 +244,17 @@ impl Placement {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
         let scene = terrain.scene(params, Source::Encoders, home);
-        Ok(terrain.underlaid(scene, self.reach_mm))
+        Ok(terrain.with_fallback(scene, self.reach_mm))
     }
 }
 
 /// Checked request for a grid.
-struct Wanted<'g> {
+struct CheckedRequest<'g> {
     grid: &'g HapticGrid<'g>,
     options: PlacementOptions,
 }
 
-impl<'g> Wanted<'g> {
+impl<'g> CheckedRequest<'g> {
     fn new(grid: &'g HapticGrid<'g>, options: &PlacementOptions) -> Result<Self, PlaceError> {
         match options.sizing {
             Sizing::GroundMPerMm(scale) if !(scale.is_finite() && scale > 0.0) => {
@@ -379,7 +379,7 @@ impl<'g> Wanted<'g> {
                 .unwrap_or_else(|| finest_level(self.grid, reach.resolution_mm(), &scale)),
             side_m: self.grid.side_m(),
             exaggeration: true_height.map(|cells| scale.height_cells(1.0) / cells),
-            laid_mm: cells.map(|cells| cells * scale.cell_mm()),
+            extent_mm: cells.map(|cells| cells * scale.cell_mm()),
             heights_mm: sorted(heights.map(|height| height * scale.height_mm_per_unit())),
             reach_mm: reach.sides_mm(),
         }
@@ -391,8 +391,8 @@ impl<'g> Wanted<'g> {
 pub(super) fn finest_level(grid: &HapticGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
     let fewest = grid.columns().min(grid.rows()) - 1;
     let last = fewest.max(1).ilog2() as u8;
-    let least_mm = resolution_mm.max(grid.tip_mm() / MAX_TIP_CELLS);
-    let fine = |level: &u8| scale.at_level(*level).cell_mm() < least_mm;
+    let min_mm = resolution_mm.max(grid.tip_mm() / MAX_TIP_CELLS);
+    let fine = |level: &u8| scale.at_level(*level).cell_mm() < min_mm;
     (0..last).find(|level| !fine(level)).unwrap_or(last)
 }
 

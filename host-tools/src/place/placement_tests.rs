@@ -100,7 +100,7 @@ fn reach() -> Reach {
 }
 
 /// Returns the placement and its grid.
-fn seen<'r>(
+fn placed<'r>(
     raster: &'r Raster,
     options: &PlacementOptions,
 ) -> Result<(HapticGrid<'r>, Placement), PlaceError> {
@@ -146,14 +146,14 @@ fn home_position_is_above_the_requested_location() {
                         level,
                         ..at(ground, OWN, sizing)
                     };
-                    let (grid, view) = seen(&raster, &options).expect(name);
+                    let (grid, view) = placed(&raster, &options).expect(name);
                     let found = grid.of_ground(ground_at_home(&grid, &view));
-                    let wanted = grid.of_ground(ground);
-                    let off = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
+                    let expected = grid.of_ground(ground);
+                    let off = (found[0] - expected[0]).hypot(found[1] - expected[1]);
                     assert!(off < 0.5, "{name}, {sample:?}: {off} cells");
                     // The real error is much smaller.
                     assert!(off < 1e-3, "{name}, {sample:?}: {off} cells");
-                    let height = grid.surface(wanted).expect("known");
+                    let height = grid.surface(expected).expect("known");
                     let up = height * view.scale.height_mm_per_unit();
                     assert!((view.home_mm[2] - up - ABOVE_MM).abs() < 1e-6, "{name}");
                 }
@@ -161,7 +161,7 @@ fn home_position_is_above_the_requested_location() {
             let lonlat = file.to_lonlat(ground);
             assert_eq!(lonlat.is_some(), on_globe, "{name}");
             if let Some(lonlat) = lonlat {
-                let (_, view) = seen(&raster, &at(lonlat, LONLAT, Sizing::Fit)).expect(name);
+                let (_, view) = placed(&raster, &at(lonlat, LONLAT, Sizing::Fit)).expect(name);
                 let off = [0, 1].map(|axis| view.home_ground[axis] - ground[axis]);
                 let step = file.transform().column_step();
                 let share = off[0].hypot(off[1]) / step[0].hypot(step[1]);
@@ -172,7 +172,7 @@ fn home_position_is_above_the_requested_location() {
 }
 
 #[test]
-fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
+fn fit_fills_the_workspace_of_every_premium() {
     for record in [
         Calibration::PREMIUM_1_0,
         Calibration::PREMIUM_1_5,
@@ -188,15 +188,19 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
                 };
                 let view = Placement::new(&grid, &reach, &options).expect(name);
                 let around_home = |spare: f64| {
-                    let (laid, heights) = (view.laid_mm, view.heights_mm);
-                    let low = [laid[0], laid[1], heights[0] - spare];
-                    let high = [laid[2], laid[3], heights[1] + spare];
+                    let (extent_mm, heights) = (view.extent_mm, view.heights_mm);
+                    let low = [extent_mm[0], extent_mm[1], heights[0] - spare];
+                    let high = [extent_mm[2], extent_mm[3], heights[1] + spare];
                     ReachBox {
                         low: [0, 1, 2].map(|axis| low[axis] - view.home_mm[axis]),
                         high: [0, 1, 2].map(|axis| high[axis] - view.home_mm[axis]),
                     }
                 };
-                assert!(reach.holds(&around_home(9.9)), "{name} {:?}", record.model);
+                assert!(
+                    reach.contains(&around_home(9.9)),
+                    "{name} {:?}",
+                    record.model
+                );
                 let tip = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
                 let held = around_home(9.9);
                 for corner in 0..8 {
@@ -208,8 +212,8 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
                     assert!(record.joints_at(at).is_ok(), "{name}: {at}");
                 }
                 let size = [
-                    view.laid_mm[2] - view.laid_mm[0],
-                    view.laid_mm[3] - view.laid_mm[1],
+                    view.extent_mm[2] - view.extent_mm[0],
+                    view.extent_mm[3] - view.extent_mm[1],
                     view.heights_mm[1] - view.heights_mm[0],
                 ];
                 let larger = size.map(|side| 1.05 * side + 26.0);
@@ -220,7 +224,7 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
 }
 
 #[test]
-fn suited_heights_are_true_to_scale_or_exaggerated() {
+fn suitable_heights_are_true_to_scale_or_exaggerated() {
     let metre = CellUnit::Length { metres: 1.0 };
     let options = |sizing| PlacementOptions {
         heights: Heights::Suited,
@@ -230,12 +234,15 @@ fn suited_heights_are_true_to_scale_or_exaggerated() {
     for side in [10.0, 1000.0, 1e5] {
         let raster = hills().with_cell(cell((side, side), metre, 0.0));
         for sizing in [Sizing::Fit, Sizing::GroundMPerMm(side / 4.0)] {
-            let (_, view) = seen(&raster, &options(sizing)).expect("fits");
+            let (_, view) = placed(&raster, &options(sizing)).expect("fits");
             let relief = view.heights_mm[1] - view.heights_mm[0];
             let times = view.exaggeration.expect("known");
             match side > 10.0 {
-                true => assert!((relief - FELT_MM).abs() < 1e-6 && times > 2.0, "{view:?}"),
-                false => assert!(relief > FELT_MM && times == 1.0, "{view:?}"),
+                true => assert!(
+                    (relief - CLEAR_RELIEF_MM).abs() < 1e-6 && times > 2.0,
+                    "{view:?}"
+                ),
+                false => assert!(relief > CLEAR_RELIEF_MM && times == 1.0, "{view:?}"),
             }
         }
     }
@@ -255,7 +262,7 @@ fn reported_scale_matches_location_and_level() {
             level: Some(2),
             ..at(ground, OWN, Sizing::GroundMPerMm(40.0))
         };
-        let (grid, view) = seen(raster, &options).expect(name);
+        let (grid, view) = placed(raster, &options).expect(name);
         let found = view.ground_m_per_mm().expect("known");
         assert!((found - 40.0).abs() < 1e-9, "{name}: {found}");
         let haptic = view.haptic_cell_m().expect("known");
@@ -286,7 +293,7 @@ fn cells_are_square_at_the_touched_place() {
         .with_ground(ground.expect("a plane"), Some(4326));
     for latitude in [57.5_f64, 62.5] {
         let options = at([10.2, latitude], OWN, Sizing::Fit);
-        let (grid, _) = seen(&raster, &options).expect("there");
+        let (grid, _) = placed(&raster, &options).expect("there");
         let side = grid.side_m().expect("known");
         let (a, e2) = (6_378_137.0_f64, 0.006_694_379_990_14);
         let (sin, cos) = latitude.to_radians().sin_cos();
@@ -303,7 +310,7 @@ fn box_is_centred_and_no_finer_than_the_encoders() {
     let raster = Raster::from_fn(30_000, 60, |column, _| (column % 100) as f32).expect("raster");
     let ground = GroundTransform::new([5e5, 4e6], [1.0, 0.0], [0.0, 1.0]).expect("a plane");
     let raster = raster.with_ground(ground, Some(32612));
-    let whole = seen(&raster, &PlacementOptions::default())
+    let whole = placed(&raster, &PlacementOptions::default())
         .expect("whole")
         .1;
     let resolution = reach().resolution_mm();
@@ -313,12 +320,12 @@ fn box_is_centred_and_no_finer_than_the_encoders() {
     assert_eq!(whole.level, 1, "{} mm", whole.haptic_cell_mm());
     assert!(0.5 * whole.haptic_cell_mm() < resolution, "{whole:?}");
     let sides = [501_000.0, 4_000_010.0, 501_060.0, 4_000_050.0];
-    let (grid, view) = seen(&raster, &boxed(sides, OWN)).expect("there");
+    let (grid, view) = placed(&raster, &boxed(sides, OWN)).expect("there");
     assert_eq!(view.level, 0);
-    let [west, south, east, north] = view.laid_mm.map(|mm| mm / view.scale.cell_mm());
+    let [west, south, east, north] = view.extent_mm.map(|mm| mm / view.scale.cell_mm());
     let corners = [grid.to_ground([west, south]), grid.to_ground([east, north])];
-    for (found, wanted) in corners.as_flattened().iter().zip(sides) {
-        assert!((found - wanted).abs() < 1e-3, "{corners:?}");
+    for (found, expected) in corners.as_flattened().iter().zip(sides) {
+        assert!((found - expected).abs() < 1e-3, "{corners:?}");
     }
     // The middle is directly in front of the home position.
     assert!((view.home_ground[0] - 501_030.0).abs() < 1e-3, "{view:?}");
@@ -330,7 +337,7 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
     let grids = made();
     let degrees = &grids[0].1;
     let by = |raster: &Raster, sides, coordinates| {
-        seen(raster, &boxed(sides, coordinates)).map(|(_, view)| view.laid_mm)
+        placed(raster, &boxed(sides, coordinates)).map(|(_, view)| view.extent_mm)
     };
     let sides = [10.005, 60.005, 10.025, 60.02];
     let own = by(degrees, sides, OWN).expect("there");
@@ -383,11 +390,11 @@ fn box_with_west_and_east_swapped_is_refused() {
         .with_ground(ground.expect("a plane"), Some(4326));
     for coordinates in [OWN, LONLAT] {
         for sides in [[-121.5, 46.1, -121.8, 46.4], [-121.5, 46.1, -122.0, 46.4]] {
-            let error = seen(&raster, &boxed(sides, coordinates)).expect_err("swapped");
+            let error = placed(&raster, &boxed(sides, coordinates)).expect_err("swapped");
             assert_eq!(error, PlaceError::WestInTheEast(sides));
         }
         let right = boxed([-121.8, 46.1, -121.5, 46.4], coordinates);
-        assert!(seen(&raster, &right).is_ok());
+        assert!(placed(&raster, &right).is_ok());
     }
 }
 
@@ -402,11 +409,11 @@ fn box_across_globe_seam_is_refused_with_its_two_parts() {
             .with_cell(cell((1.0, 1.0), CellUnit::Degree, 0.0));
         raster.with_ground(ground.expect("a plane"), Some(4326))
     };
-    let asked = [170.0, -20.0, -170.0, -10.0];
+    let requested = [170.0, -20.0, -170.0, -10.0];
     for (west, sides, parts) in [
         (
             -179.5,
-            asked,
+            requested,
             ["--bbox -179.5,-20,-170,-10", "--bbox 170,-20,179.5,-10"],
         ),
         (
@@ -417,10 +424,10 @@ fn box_across_globe_seam_is_refused_with_its_two_parts() {
     ] {
         let globe = globe(west);
         for coordinates in [OWN, LONLAT] {
-            let error = seen(&globe, &boxed(sides, coordinates)).expect_err("two parts");
-            let stated = error.to_string();
+            let error = placed(&globe, &boxed(sides, coordinates)).expect_err("two parts");
+            let message = error.to_string();
             for part in parts {
-                assert!(stated.contains(part), "{part} in: {stated}");
+                assert!(message.contains(part), "{part} in: {message}");
             }
         }
         // Each part is accepted, and so are a box elsewhere and the whole globe.
@@ -430,15 +437,15 @@ fn box_across_globe_seam_is_refused_with_its_two_parts() {
                 .map(|side| side.parse().expect("a number"))
                 .collect();
             let sides = numbers.try_into().expect("four");
-            assert!(seen(&globe, &boxed(sides, OWN)).is_ok(), "{part}");
+            assert!(placed(&globe, &boxed(sides, OWN)).is_ok(), "{part}");
         }
-        assert!(seen(&globe, &boxed([20.0, -20.0, 40.0, -10.0], LONLAT)).is_ok());
-        let (_, whole) = seen(&globe, &boxed([-180.0, -30.0, 180.0, 30.0], LONLAT)).expect("all");
-        let columns = (whole.laid_mm[2] - whole.laid_mm[0]) / whole.scale.cell_mm();
+        assert!(placed(&globe, &boxed([20.0, -20.0, 40.0, -10.0], LONLAT)).is_ok());
+        let (_, whole) = placed(&globe, &boxed([-180.0, -30.0, 180.0, 30.0], LONLAT)).expect("all");
+        let columns = (whole.extent_mm[2] - whole.extent_mm[0]) / whole.scale.cell_mm();
         assert!(columns > 358.0, "{columns} columns");
     }
     // A raster that extends farther beyond 180° than the box contains it in one part.
-    assert!(seen(&globe(0.5), &boxed(asked, LONLAT)).is_ok());
+    assert!(placed(&globe(0.5), &boxed(requested, LONLAT)).is_ok());
 }
 
 #[test]
@@ -452,12 +459,12 @@ fn invalid_placement_is_refused_with_the_bounds() {
     });
     let holes = holes.expect("raster");
     let refused = |raster: &Raster, options: PlacementOptions| {
-        let refused = seen(raster, &options).map(|_| ()).expect_err("refused");
+        let refused = placed(raster, &options).map(|_| ()).expect_err("refused");
         refused.to_string()
     };
     let utm_bounds =
         "x 386000 to 386400, y 3790000 to 3790300 (EPSG:26911), which is longitude -118.2";
-    for (stated, parts) in [
+    for (message, parts) in [
         (
             refused(utm, at([0.0, 0.0], OWN, Sizing::Fit)),
             ["x 0, y 0 (EPSG:26911) is outside", utm_bounds],
@@ -504,7 +511,7 @@ fn invalid_placement_is_refused_with_the_bounds() {
         ),
     ] {
         for part in parts {
-            assert!(stated.contains(part), "{part} in: {stated}");
+            assert!(message.contains(part), "{part} in: {message}");
         }
     }
     let sized = |sizing| {
@@ -512,7 +519,7 @@ fn invalid_placement_is_refused_with_the_bounds() {
             sizing,
             ..PlacementOptions::default()
         };
-        seen(utm, &options).map(|_| ())
+        placed(utm, &options).map(|_| ())
     };
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
@@ -528,13 +535,19 @@ fn invalid_placement_is_refused_with_the_bounds() {
         heights: Heights::MmPerUnit(50.0),
         ..PlacementOptions::default()
     };
-    assert!(matches!(seen(utm, &tall), Err(PlaceError::TooTall { .. })));
+    assert!(matches!(
+        placed(utm, &tall),
+        Err(PlaceError::TooTall { .. })
+    ));
     for times in [0.0, f64::NAN] {
         let flat = PlacementOptions {
             heights: Heights::Exaggerated(times),
             ..PlacementOptions::default()
         };
-        assert!(matches!(seen(utm, &flat), Err(PlaceError::Exaggeration(_))));
+        assert!(matches!(
+            placed(utm, &flat),
+            Err(PlaceError::Exaggeration(_))
+        ));
     }
 }
 
@@ -552,7 +565,7 @@ fn rounded_numbers_have_three_digits() {
 }
 
 #[test]
-fn a_home_that_is_too_far_to_be_addressed_is_named() {
+fn unaddressable_home_position_is_refused() {
     let raster = hills();
     let grid = Target::Whole
         .grid(&raster, HapticCells::default())
@@ -574,7 +587,7 @@ fn place_in_another_reference_system_is_the_same_place() {
     let grids = made();
     let (degrees, utm, bare) = (&grids[0].1, &grids[2].1, &grids[6].1);
     let ground = |raster: &Raster, place, coordinates| {
-        let view = seen(raster, &at(place, coordinates, Sizing::Fit));
+        let view = placed(raster, &at(place, coordinates, Sizing::Fit));
         view.map(|(_, view)| view.home_ground)
     };
     let near = |found: [f64; 2], place: [f64; 2], within: f64| {
@@ -596,11 +609,11 @@ fn place_in_another_reference_system_is_the_same_place() {
     let found = ground(degrees, web, Coordinates::Epsg(3857)).expect("there");
     assert!(near(found, lonlat, 1e-7), "{found:?}");
     let sides = [386_100.0, 3_790_050.0, 386_300.0, 3_790_200.0];
-    let laid = |coordinates| {
-        let (_, view) = seen(utm, &boxed(sides, coordinates)).expect("there");
-        view.laid_mm
+    let extent_mm = |coordinates| {
+        let (_, view) = placed(utm, &boxed(sides, coordinates)).expect("there");
+        view.extent_mm
     };
-    let (own, other) = (laid(OWN), laid(Coordinates::Epsg(32611)));
+    let (own, other) = (extent_mm(OWN), extent_mm(Coordinates::Epsg(32611)));
     for side in 0..4 {
         assert!((own[side] - other[side]).abs() < 1e-2, "{own:?} {other:?}");
     }

@@ -10,7 +10,7 @@ use hapterra_core::phantom::Calibration;
 const MARGIN_RAD: f32 = 5.0 * (std::f32::consts::PI / 180.0);
 /// Min distance of the tip from the base's axis, as a share of both links' length: nearer to the
 /// axis, the first joint turns far for a small step to the side.
-const NEAREST: f64 = 0.25;
+const MIN_AXIS_SHARE: f64 = 0.25;
 /// Places of the profile along the links' whole length.
 const PLACES: usize = 96;
 
@@ -76,7 +76,7 @@ impl Reach {
             missing: Vec::new(),
             resolution_mm: resolution_mm(record),
         };
-        reach.missing = reach.sums(record, NEAREST * whole);
+        reach.missing = reach.sums(record, MIN_AXIS_SHARE * whole);
         reach
     }
 
@@ -125,7 +125,7 @@ impl Reach {
 
     /// Returns true if the arm reaches every point of a box.
     #[must_use]
-    pub fn holds(&self, of: &ReachBox) -> bool {
+    pub fn contains(&self, of: &ReachBox) -> bool {
         let ([west, south, low], [east, north, high]) = (of.low, of.high);
         self.outwards([west, east], [south, north])
             .is_some_and(|out| self.reaches_all(out, [low, high]))
@@ -259,7 +259,7 @@ mod tests {
     ];
 
     #[test]
-    fn every_point_of_a_box_that_is_held_is_reached() {
+    fn every_point_of_a_contained_box_is_reachable() {
         for record in PRESETS {
             let (reach, whole) = (Reach::of(&record), f64::from(record.l1_mm + record.l2_mm));
             let home = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
@@ -287,7 +287,7 @@ mod tests {
         for record in PRESETS {
             let reach = Reach::of(&record);
             let home = Pose::from_angles(&record, Vec3::ZERO).tip_mm();
-            let nearest = NEAREST * f64::from(record.l1_mm + record.l2_mm);
+            let nearest = MIN_AXIS_SHARE * f64::from(record.l1_mm + record.l2_mm);
             let mut found = [0.0_f64; 4];
             for pose in 0..41 * 41 * 41 {
                 let steps = [pose % 41, pose / 41 % 41, pose / 1681].map(|step| step as f32 / 40.0);
@@ -307,16 +307,16 @@ mod tests {
                     found[3].max(north),
                 ];
             }
-            for (side, (found, stated)) in found.iter().zip(reach.sides_mm()).enumerate() {
+            for (side, (found, expected)) in found.iter().zip(reach.sides_mm()).enumerate() {
                 let outwards = if side < 2 {
-                    found - stated
+                    found - expected
                 } else {
-                    stated - found
+                    expected - found
                 };
                 let room = -reach.step_mm..3.0 * reach.step_mm;
                 assert!(
                     room.contains(&outwards),
-                    "side {side}: {found} and {stated}"
+                    "side {side}: {found} and {expected}"
                 );
             }
         }
@@ -333,12 +333,12 @@ mod tests {
             ([f64::NAN, 0.0, 0.0], [10.0, 10.0, 10.0]),
         ] {
             assert!(
-                !reach.holds(&ReachBox::around(middle, size)),
+                !reach.contains(&ReachBox::around(middle, size)),
                 "{middle:?} {size:?}"
             );
         }
         assert_eq!(reach.middle_of([900.0, 10.0, 10.0]), None);
-        assert!(reach.holds(&ReachBox::around([0.0; 3], [40.0, 20.0, 20.0])));
+        assert!(reach.contains(&ReachBox::around([0.0; 3], [40.0, 20.0, 20.0])));
         assert!(
             (300.0..750.0).contains(&reach.height_mm()),
             "{}",
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_is_none_reaches_nothing() {
+    fn invalid_record_has_an_empty_workspace() {
         for bad in [f32::NAN, f32::INFINITY, 0.0, -200.0] {
             let mut record = Calibration {
                 l1_mm: bad,
@@ -367,8 +367,11 @@ mod tests {
     #[test]
     fn encoder_resolution_matches_the_docs() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());
-        for (found, stated) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
-            assert!((found / stated - 1.0).abs() < 0.01, "{found} for {stated}");
+        for (found, expected) in counts.into_iter().zip([0.0192, 0.0287, 0.0202, 0.055]) {
+            assert!(
+                (found / expected - 1.0).abs() < 0.01,
+                "{found} for {expected}"
+            );
         }
     }
 }

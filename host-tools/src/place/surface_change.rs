@@ -32,8 +32,8 @@ pub enum SurfaceChange {
 pub enum SurfaceError {
     /// Coefficients outside their range.
     #[error(
-        "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {most}, and at rest not less than while the tip slides",
-        most = Friction::MAX
+        "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {max}, and at rest not less than while the tip slides",
+        max = Friction::MAX
     )]
     Friction {
         /// While the tip slides.
@@ -42,17 +42,17 @@ pub enum SurfaceError {
         static_mu: f32,
     },
     /// A time outside its range.
-    #[error("a viscous friction of {0} s: from 0 to {most} s can be had", most = Friction::MAX_VISCOUS_S)]
+    #[error("a viscous friction of {0} s: from 0 to {max} s can be had", max = Friction::MAX_VISCOUS_S)]
     ViscousFriction(f32),
     /// Damping outside its range.
-    #[error("a damping of {0} N·s/m: from 0 to {most} N·s/m can be had", most = Damping::MAX_NS_PER_M)]
+    #[error("a damping of {0} N·s/m: from 0 to {max} N·s/m can be had", max = Damping::MAX_NS_PER_M)]
     Damping(f32),
     /// A texture outside its range, or too fine for a tick.
     #[error(
-        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {most} mm can be had",
+        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {max} mm can be had",
         shortest = Texture::WAVELENGTHS_MM.0,
         longest = Texture::WAVELENGTHS_MM.1,
-        most = Texture::MAX_AMPLITUDE_MM
+        max = Texture::MAX_AMPLITUDE_MM
     )]
     Texture {
         /// Height above and below the surface.
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn refused_surface_change_states_the_accepted_range() {
-        for (change, says) in [
+        for (change, expected) in [
             (friction(0.5, 0.3), "at rest not less"),
             (friction(-0.1, 0.0), "from 0 to 10"),
             (friction(f32::NAN, 1.0), "from 0 to 10"),
@@ -198,13 +198,15 @@ mod tests {
             (texture(0.0, 1.0), "above 0"),
             (texture(0.01, 0.1), "from 0.25 to 100 mm"),
         ] {
-            let error = change.of(&SurfaceParams::PREMIUM, false).expect_err(says);
-            assert!(error.to_string().contains(says), "{error}");
+            let error = change
+                .of(&SurfaceParams::PREMIUM, false)
+                .expect_err(expected);
+            assert!(error.to_string().contains(expected), "{error}");
         }
     }
 
     #[test]
-    fn materials_have_all_but_shading_by_themselves() {
+    fn material_surfaces_only_accept_shading_changes() {
         let params = &SurfaceParams::PREMIUM;
         let damping = SurfaceChange::Damping(1.0);
         assert_eq!(damping.of(params, true), Err(SurfaceError::OfMaterials));

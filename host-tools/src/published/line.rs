@@ -20,10 +20,10 @@ impl<R: Real> Line<R> {
         let cell = from.map(R::whole);
         let last = to.map(R::whole);
         let axis = |i: usize| {
-            let way = to[i] - from[i];
-            let each = R::one() / way.abs();
+            let distance = to[i] - from[i];
+            let each = R::one() / distance.abs();
             let inside = from[i] - R::from_whole(cell[i]);
-            let first = if way > R::zero() {
+            let first = if distance > R::zero() {
                 R::one() - inside
             } else {
                 inside

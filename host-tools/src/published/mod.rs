@@ -58,7 +58,7 @@ struct Patch<R> {
 
 /// A point in a patch.
 #[derive(Clone, Copy, Debug)]
-struct Place<R> {
+struct PatchPoint<R> {
     cell: [i32; 2],
     u: R,
     v: R,
@@ -75,7 +75,7 @@ pub struct Paper<H, R> {
     start: Start,
     iterations: u32,
     last_hip: Option<[R; 3]>,
-    contact: Option<Place<R>>,
+    contact: Option<PatchPoint<R>>,
 }
 
 impl<H: Heights, R: Real> Paper<H, R> {
@@ -102,14 +102,14 @@ impl<H: Heights, R: Real> Paper<H, R> {
     #[inline]
     pub fn step(&mut self, hip: [R; 3]) -> Option<[R; 3]> {
         match self.last_hip.replace(hip) {
-            Some(last) if last != hip => self.follow(last, hip),
+            Some(last) if last != hip => self.follow_hip(last, hip),
             _ => {}
         }
         self.contact.as_ref().map(|place| place.displacement)
     }
 
     #[inline]
-    fn follow(&mut self, last: [R; 3], hip: [R; 3]) {
+    fn follow_hip(&mut self, last: [R; 3], hip: [R; 3]) {
         let middle = (R::HALF, R::HALF);
         let start = match (&self.contact, self.start) {
             (Some(place), Start::LastPoint) => Some((place.cell, (place.u, place.v))),
@@ -140,7 +140,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
 
     /// Finds the closest point in one patch: step 2.
     #[inline]
-    fn closest_in(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
+    fn closest_in(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> PatchPoint<R> {
         let [x, y] = cell.map(R::from_whole);
         let local = [hip[0] - x, hip[1] - y, hip[2]];
         self.patch(cell)
@@ -149,7 +149,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
 
     /// Finds the closest point across patches: step 2.
     #[inline]
-    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
+    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> PatchPoint<R> {
         let mut here = self.closest_in(cell, hip, start);
         let middle = (R::HALF, R::HALF);
         for _ in 0..PATCHES {
@@ -173,7 +173,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
 
     /// Returns true if (LCP − HIP)·n > 0, with n averaged at edges and vertices: step 3.
     #[inline]
-    fn is_inside(&self, place: &Place<R>) -> bool {
+    fn is_inside(&self, place: &PatchPoint<R>) -> bool {
         let normal = self.patch(place.cell).normal(place.u, place.v);
         if place.border == [0, 0] {
             return dot(&place.displacement, &normal) > R::zero();
@@ -197,7 +197,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
 
 /// Returns the one patch that shares the edge, or the three that share the vertex.
 #[inline]
-fn around<R: Real>(place: &Place<R>) -> impl Iterator<Item = [i32; 2]> + use<R> {
+fn around<R: Real>(place: &PatchPoint<R>) -> impl Iterator<Item = [i32; 2]> + use<R> {
     let ([x, y], [east, north]) = (place.cell, place.border);
     let corner = east != 0 && north != 0;
     let across = [
@@ -231,7 +231,13 @@ impl<R: Real> Patch<R> {
 
     /// Returns Newton's point, or the bounded one if that is outside the patch.
     #[inline]
-    fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R), iterations: u32) -> Place<R> {
+    fn closest(
+        &self,
+        cell: [i32; 2],
+        hip: &[R; 3],
+        start: (R, R),
+        iterations: u32,
+    ) -> PatchPoint<R> {
         let inside = |x: R| x >= R::zero() && x <= R::one();
         match self.newton(hip, start, iterations) {
             Some((u, v)) if inside(u) && inside(v) => self.place(cell, hip, u, v),
@@ -264,7 +270,7 @@ impl<R: Real> Patch<R> {
 
     /// Returns the nearest point on the four edges, vertices included.
     #[inline]
-    fn bounded(&self, cell: [i32; 2], hip: &[R; 3]) -> Place<R> {
+    fn bounded(&self, cell: [i32; 2], hip: &[R; 3]) -> PatchPoint<R> {
         let [p, q, r] = *hip;
         let along_u = |v: R| {
             let (slope, start) = (self.b + self.a * v, self.d + self.c * v);
@@ -286,10 +292,10 @@ impl<R: Real> Patch<R> {
     }
 
     #[inline]
-    fn place(&self, cell: [i32; 2], hip: &[R; 3], u: R, v: R) -> Place<R> {
+    fn place(&self, cell: [i32; 2], hip: &[R; 3], u: R, v: R) -> PatchPoint<R> {
         let displacement = [u - hip[0], v - hip[1], self.height(u, v) - hip[2]];
         let side = |x: R| i32::from(x == R::one()) - i32::from(x == R::zero());
-        Place {
+        PatchPoint {
             cell,
             u,
             v,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::steering::Made;
+use crate::steering::UserMark;
 
 /// A moment that the user has named during a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,7 +28,7 @@ struct Marks<'m> {
 impl Mark {
     /// Creates a mark with the time of its tick.
     #[must_use]
-    pub fn new(made: Made, t_s: f64) -> Self {
+    pub fn new(made: UserMark, t_s: f64) -> Self {
         Self {
             tick: made.tick,
             t_s,

@@ -85,7 +85,7 @@ pub type OnSample<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>))
 /// Renders a trajectory on a device and writes the samples to an output, which appears only when it
 /// is complete.
 ///
-/// `on_sample` receives each sample; `go_on` is called regularly with the number of rows, and
+/// `on_sample` receives each sample; `should_continue` is called regularly with the number of rows, and
 /// returns false to stop.
 ///
 /// # Errors
@@ -96,9 +96,9 @@ pub fn replay_trajectory<'t>(
     settings: &Settings,
     output: Output,
     on_sample: &mut OnSample<'_, 't>,
-    go_on: &mut dyn FnMut(u64) -> bool,
+    should_continue: &mut dyn FnMut(u64) -> bool,
 ) -> Result<Summary, ReplayError> {
-    const ASK_EVERY: u64 = 512;
+    const CHECK_INTERVAL_ROWS: u64 = 512;
     let columns = match settings.views.is_empty() {
         true => &MORE[..1],
         false => &MORE[..],
@@ -113,7 +113,7 @@ pub fn replay_trajectory<'t>(
         if tick.view != view && !settings.views.is_empty() {
             view = tick.view;
             let of_views = (&first, settings);
-            go_over(
+            change_placement(
                 replayer,
                 ticks.trajectory(),
                 of_views,
@@ -136,7 +136,7 @@ pub fn replay_trajectory<'t>(
         summary.rows += 1;
         summary.in_contact += u64::from(record.contact);
         summary.below_ground += u64::from(is_below_ground(&sample, &record, terrain));
-        if summary.rows % ASK_EVERY == 0 && !go_on(summary.rows) {
+        if summary.rows % CHECK_INTERVAL_ROWS == 0 && !should_continue(summary.rows) {
             return Err(ReplayError::Interrupted);
         }
     }
@@ -162,11 +162,11 @@ pub fn terrain_of<'t>(
     let number = view.number;
     let cannot = |why| ReplayError::Placement { number, why };
     let scale = view.scale().map_err(|why| cannot(why.into()))?;
-    first.relaid(grid, scale, view.level).map_err(cannot)
+    first.with_grid(grid, scale, view.level).map_err(cannot)
 }
 
 /// Changes to the placement of a row, as in the recorded session.
-fn go_over<'t>(
+fn change_placement<'t>(
     replayer: &mut OfflineDevice<'t>,
     trajectory: &mut Trajectory,
     (first, settings): (&Terrain<'t>, &Settings),

@@ -13,7 +13,7 @@ use crate::link::{Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
 /// Time-out of a point, as a multiple of that of an answer, after which the device counts as stuck.
-const ANSWERS_A_POINT: u32 = 8;
+const POINT_TIMEOUT_FACTOR: u32 = 8;
 
 /// A device that renders points in a scene of its own.
 pub struct OfflineDevice<'t> {
@@ -101,8 +101,8 @@ impl<'t> OfflineDevice<'t> {
         while Instant::now() < deadline {
             let (mut answer, wait) = (None, Duration::from_millis(100));
             self.session.poll(wait, &mut |event| {
-                if let Event::Viewed { taken, .. } = event {
-                    answer = Some(taken);
+                if let Event::SceneChangeResult { accepted, .. } = event {
+                    answer = Some(accepted);
                 }
             })?;
             match answer {
@@ -154,7 +154,7 @@ impl<'t> OfflineDevice<'t> {
             });
         }
         self.session.step(HipCommand { seq, hip })?;
-        let deadline = Instant::now() + ANSWERS_A_POINT * self.session.timeouts().give_up;
+        let deadline = Instant::now() + POINT_TIMEOUT_FACTOR * self.session.timeouts().give_up;
         while Instant::now() < deadline {
             if let Some(sample) = self.answer(seq)? {
                 return Ok(sample);
@@ -182,8 +182,8 @@ impl<'t> OfflineDevice<'t> {
     ///
     /// # Errors
     /// [`LinkError::NotConfirmed`].
-    pub fn say_goodbye(&mut self) -> Result<(), LinkError> {
-        self.session.say_goodbye(&mut |_| {})
+    pub fn close(&mut self) -> Result<(), LinkError> {
+        self.session.close(&mut |_| {})
     }
 }
 
@@ -203,7 +203,7 @@ mod tests {
     /// A device accepts a placement with the next number, and a tile with the placement's epoch: a
     /// repeated placement needs a new epoch, also after the numbers start again.
     #[test]
-    fn every_view_has_the_next_number_and_an_epoch_of_its_own() {
+    fn placements_have_consecutive_numbers_and_unique_epochs() {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
@@ -213,7 +213,7 @@ mod tests {
         for view in 0..300_u32 {
             if view > 0 {
                 let again = terrain.clone();
-                replayer.put_view(again, params, hip).expect("taken");
+                replayer.put_view(again, params, hip).expect("accepted");
             }
             let sample = replayer.step(hip).expect("rendered");
             assert_eq!(u32::from(sample.view), view % 256);

@@ -9,8 +9,8 @@ use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use super::marks::Mark;
-use crate::materials::{Looks, Materials};
-use crate::place::Laid;
+use crate::materials::{ClassMaterials, Materials};
+use crate::place::PlacedSurface;
 use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
 use heightfield::printable_text::printable;
@@ -22,7 +22,7 @@ pub const FORMAT: u32 = 1;
 /// Relative difference of cell sizes on the ground below which they count as equal. Machines may
 /// round the size of a degree differently, and earlier versions computed a map's scale over one
 /// metre, with an error up to 1e-7: their recordings can still be replayed.
-const SAME: f64 = 1e-6;
+const MAX_CELL_DIFFERENCE: f64 = 1e-6;
 
 /// The settings of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -112,7 +112,7 @@ struct Views<'v> {
 impl PlacementSettings {
     /// Creates the settings of a placement from its number and terrain.
     #[must_use]
-    pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
+    pub fn new(number: u32, terrain: &Terrain<'_>, placed_surface: &PlacedSurface) -> Self {
         let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
         Self {
             number,
@@ -123,13 +123,13 @@ impl PlacementSettings {
             height_mm_per_unit: scale.height_mm_per_unit(),
             tip_mm: Some(grid.tip_mm()),
             exaggeration: grid.exaggeration(&scale),
-            home_mm: laid.view.home_mm,
-            stiffness_n_per_mm: laid.params.stiffness_n_per_mm,
-            max_force_n: laid.params.max_force_n,
-            shading: laid.params.shading,
-            texture: laid.params.texture,
-            friction: laid.params.friction,
-            damping: laid.params.damping,
+            home_mm: placed_surface.view.home_mm,
+            stiffness_n_per_mm: placed_surface.params.stiffness_n_per_mm,
+            max_force_n: placed_surface.params.max_force_n,
+            shading: placed_surface.params.shading,
+            texture: placed_surface.params.texture,
+            friction: placed_surface.params.friction,
+            damping: placed_surface.params.damping,
         }
     }
 
@@ -256,7 +256,7 @@ pub struct MaterialSettings {
     pub fingerprint: String,
     /// Surfaces of the classes.
     #[serde(flatten)]
-    pub looks: Looks,
+    pub class_materials: ClassMaterials,
 }
 
 impl MaterialSettings {
@@ -266,7 +266,7 @@ impl MaterialSettings {
         Self {
             file: materials.file().to_owned(),
             fingerprint: format!("{:016x}", materials.fingerprint()),
-            looks: materials.looks().clone(),
+            class_materials: materials.class_materials().clone(),
         }
     }
 }
@@ -477,7 +477,9 @@ impl RenderedTerrain {
             return None;
         }
         let same_size = match (self.cell_m, grid.side_m()) {
-            (Some(recorded), Some(now)) => (recorded - now).abs() <= SAME * recorded.abs(),
+            (Some(recorded), Some(now)) => {
+                (recorded - now).abs() <= MAX_CELL_DIFFERENCE * recorded.abs()
+            }
             (recorded, now) => recorded == now,
         };
         let metres = |side: Option<f64>| side.map_or("unknown".into(), |m| format!("{m} m"));
@@ -587,11 +589,11 @@ mod tests {
             level: 1,
             side_m: grid.side_m(),
             exaggeration: None,
-            laid_mm: [0.0; 4],
+            extent_mm: [0.0; 4],
             heights_mm: [0.0; 2],
             reach_mm: [0.0; 4],
         };
-        let view = PlacementSettings::new(1, &terrain, &Laid { view, params });
+        let view = PlacementSettings::new(1, &terrain, &PlacedSurface { view, params });
         assert_eq!(view.params(), params);
         settings.views = vec![view];
         let text = settings.to_toml();
@@ -599,7 +601,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_or_later_settings_are_errors_and_remarks_are_not() {
+    fn broken_or_later_settings_are_errors_but_comments_not() {
         assert_eq!(Settings::from_toml(" a remark\n").expect("none"), None);
         let later = Settings::from_toml("hapterra-recording = 2\nall = \"else\"");
         assert!(matches!(later, Err(SettingsError::Later { found: 2 })));

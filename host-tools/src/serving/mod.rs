@@ -1,7 +1,7 @@
 //! A terrain served to a device, from the connection to a confirmed end.
 //!
 //! ```text
-//! Service (terrain, device) ─ open ─▶ Served ─ serve ─▶ End
+//! Service (terrain, device) ─ open ─▶ ServedSession ─ serve ─▶ End
 //!                                       │  ▲
 //!                       SessionHandler ◀┘  └─ connections, reopened when one is lost
 //! ```
@@ -18,5 +18,5 @@ mod session_handler;
 #[cfg(test)]
 mod tests;
 
-pub use service::{Connect, End, Served, Service, told_of_last_end};
+pub use service::{Connect, End, ServedSession, Service, last_end_remark};
 pub use session_handler::SessionHandler;

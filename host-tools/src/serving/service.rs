@@ -37,32 +37,32 @@ pub struct Service<'s, 't> {
     /// Time between two tries to find a lost device.
     pub retry: Duration,
     /// Returns true while the user wants to continue.
-    pub goes_on: &'t dyn Fn() -> bool,
+    pub should_continue: &'t dyn Fn() -> bool,
     /// Prints the messages that must reach the user in every case.
-    pub tell: &'s dyn Fn(&str),
+    pub notify: &'s dyn Fn(&str),
 }
 
 /// An open session, which is closed when it is dropped, also in a panic.
-pub struct Served<'s, 't> {
+pub struct ServedSession<'s, 't> {
     session: Session<'t>,
     connect: Connect<'s, 't>,
     device: String,
     retry: Duration,
-    goes_on: &'t dyn Fn() -> bool,
-    tell: &'s dyn Fn(&str),
+    should_continue: &'t dyn Fn() -> bool,
+    notify: &'s dyn Fn(&str),
     /// True if the open message was sent, or may have been.
     has_greeted: bool,
-    is_left: bool,
+    is_closed: bool,
 }
 
 /// End of a service.
 #[derive(Debug)]
 pub struct End {
     /// The error that ended the service, if there was one.
-    pub why: Result<(), LinkError>,
+    pub result: Result<(), LinkError>,
     /// The device's confirmation that it is disarmed: [`LinkError::NotConfirmed`] if it does not
     /// confirm, and [`LinkError::Taken`] if it answers that it has another host. This host must not
-    /// disarm another host's arm: if [`End::why`] is [`LinkError::Taken`], this is no error.
+    /// disarm another host's arm: if [`End::result`] is [`LinkError::Taken`], this is no error.
     pub disarmed: Result<(), LinkError>,
     /// Statistics of the link.
     pub stats: LinkStats,
@@ -78,64 +78,66 @@ impl<'s, 't> Service<'s, 't> {
     pub fn open<E: From<LinkError>>(
         mut self,
         check: impl FnOnce(&mut dyn Transport) -> Result<(), E>,
-    ) -> Result<(Served<'s, 't>, DeviceHello), E> {
+    ) -> Result<(ServedSession<'s, 't>, DeviceHello), E> {
         let mut line = (self.connect)()?;
         let checked = check(&mut *line);
         let (scene, arming) = (self.scene, Some(self.arming));
         let session = Session::new(self.terrain, scene, arming, line, self.timeouts);
-        let mut served = Served {
-            session: session.heeding(self.goes_on),
+        let mut served = ServedSession {
+            session: session.continuing_while(self.should_continue),
             connect: self.connect,
             device: self.device,
             retry: self.retry,
-            goes_on: self.goes_on,
-            tell: self.tell,
+            should_continue: self.should_continue,
+            notify: self.notify,
             has_greeted: false,
-            is_left: false,
+            is_closed: false,
         };
         if let Err(error) = checked {
-            served.leave_and_tell(None);
+            served.close_and_report(None);
             return Err(error);
         }
         served.has_greeted = true;
         match served.session.begin(&mut |_| {}) {
             Ok(device) => Ok((served, device)),
             Err(error) => {
-                served.leave_and_tell(Some(&error));
+                served.close_and_report(Some(&error));
                 Err(error.into())
             }
         }
     }
 }
 
-impl<'t> Served<'_, 't> {
+impl<'t> ServedSession<'_, 't> {
     /// Serves until the handler ends, the user ends, or an error occurs that waiting does not fix;
     /// then closes the session.
     pub fn serve(mut self, handler: &mut dyn SessionHandler<'t>) -> End {
-        let why = self.until_over(handler);
-        let disarmed = self.leave(why.as_ref().err(), &mut |event| handler.take(event));
+        let result = self.run_until_over(handler);
+        let disarmed = self.close(result.as_ref().err(), &mut |event| handler.on_event(event));
         let stats = self.session.stats().clone();
         End {
-            why,
+            result,
             disarmed,
             stats,
         }
     }
 
-    fn until_over(&mut self, handler: &mut dyn SessionHandler<'t>) -> Result<(), LinkError> {
-        while (self.goes_on)() && !handler.is_over() {
-            let polled = self.session.poll(POLL, &mut |event| handler.take(event));
-            for ask in handler.asks() {
-                self.session.ask(ask);
+    fn run_until_over(&mut self, handler: &mut dyn SessionHandler<'t>) -> Result<(), LinkError> {
+        while (self.should_continue)() && !handler.is_over() {
+            let polled = self
+                .session
+                .poll(POLL, &mut |event| handler.on_event(event));
+            for request in handler.requests() {
+                self.session.enqueue(request);
             }
             // The next poll reports any error of the line.
             let put = handler
-                .view()
+                .scene_change()
                 .map(|(view, terrain)| self.session.put_view(view, terrain));
             let polled = polled.and(put.unwrap_or(Ok(())));
             handler.show(self.session.stats());
             match polled {
-                Err(error) if error.is_passing() => self.wait_for_device(handler, &error)?,
+                Err(error) if error.is_transient() => self.wait_for_device(handler, &error)?,
                 other => other?,
             }
         }
@@ -148,27 +150,27 @@ impl<'t> Served<'_, 't> {
         handler: &mut dyn SessionHandler<'t>,
         why: &LinkError,
     ) -> Result<(), LinkError> {
-        let (why, device) = (described(why), &self.device);
-        handler.hear(&format!("{why}; waiting for {device} (Ctrl-C ends)"));
-        let began = Instant::now();
-        while (self.goes_on)() {
+        let (why, device) = (with_cause(why), &self.device);
+        handler.notify(&format!("{why}; waiting for {device} (Ctrl-C ends)"));
+        let start = Instant::now();
+        while (self.should_continue)() {
             // The old line may still have a claim on a silent device.
-            self.session.hang_up();
+            self.session.close_line();
             match self.resume(handler) {
                 Ok(device) => {
                     let again = match device.epoch == Some(self.session.scene().epoch) {
                         true => "goes on where it was",
                         false => "was restarted and begins anew",
                     };
-                    let after = began.elapsed();
-                    handler.hear(&format!("the device is back after {after:.1?}: it {again}"));
-                    if let Some(line) = told_of_last_end(&device) {
-                        handler.hear(line);
+                    let after = start.elapsed();
+                    handler.notify(&format!("the device is back after {after:.1?}: it {again}"));
+                    if let Some(line) = last_end_remark(&device) {
+                        handler.notify(line);
                     }
                     return Ok(());
                 }
                 Err(LinkError::Interrupted) => return Ok(()),
-                Err(error) if !error.is_passing() => return Err(error),
+                Err(error) if !error.is_transient() => return Err(error),
                 Err(_) => std::thread::sleep(self.retry),
             }
         }
@@ -177,17 +179,17 @@ impl<'t> Served<'_, 't> {
 
     fn resume(&mut self, handler: &mut dyn SessionHandler<'t>) -> Result<DeviceHello, LinkError> {
         let line = (self.connect)()?;
-        let on = &mut |event: Event<'_>| handler.take(event);
-        self.session.resume(line, self.goes_on, on)
+        let on = &mut |event: Event<'_>| handler.on_event(event);
+        self.session.resume(line, self.should_continue, on)
     }
 
     /// Ends the session, whatever has ended the service.
-    fn leave(
+    fn close(
         &mut self,
         why: Option<&LinkError>,
         on: &mut dyn FnMut(Event<'_>),
     ) -> Result<(), LinkError> {
-        self.is_left = true;
+        self.is_closed = true;
         match why {
             // Another host controls the arm and reports its end itself.
             Some(LinkError::Taken) => return Ok(()),
@@ -198,38 +200,38 @@ impl<'t> Served<'_, 't> {
         if !self.session.has_line()
             && let Ok(line) = (self.connect)()
         {
-            self.session.go_over(line);
+            self.session.switch_line(line);
         }
         match self.has_greeted {
-            true => self.session.say_goodbye(on),
-            false => self.session.say_hello_and_goodbye(on),
+            true => self.session.close(on),
+            false => self.session.open_and_close(on),
         }
     }
 
-    fn leave_and_tell(&mut self, why: Option<&LinkError>) {
-        if let Err(not_confirmed) = self.leave(why, &mut |_| {}) {
-            (self.tell)(&not_confirmed.to_string());
+    fn close_and_report(&mut self, why: Option<&LinkError>) {
+        if let Err(not_confirmed) = self.close(why, &mut |_| {}) {
+            (self.notify)(&not_confirmed.to_string());
         }
     }
 }
 
-impl Drop for Served<'_, '_> {
+impl Drop for ServedSession<'_, '_> {
     fn drop(&mut self) {
-        if !self.is_left {
-            self.leave_and_tell(None);
+        if !self.is_closed {
+            self.close_and_report(None);
         }
     }
 }
 
 /// Returns a remark if the device disarmed the last session's arm because its host was silent.
 #[must_use]
-pub fn told_of_last_end(device: &DeviceHello) -> Option<&'static str> {
+pub fn last_end_remark(device: &DeviceHello) -> Option<&'static str> {
     (device.last.end == SessionEnd::HostSilent).then_some(WAS_SILENT)
 }
 
-fn described(error: &LinkError) -> String {
+fn with_cause(error: &LinkError) -> String {
     match error {
-        LinkError::Gone(why) => format!("{error}: {why}"),
+        LinkError::Disconnected(why) => format!("{error}: {why}"),
         _ => error.to_string(),
     }
 }

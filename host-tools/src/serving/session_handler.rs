@@ -9,17 +9,17 @@ use crate::terrain::Terrain;
 /// service.
 pub trait SessionHandler<'t> {
     /// Receives an event of the device.
-    fn take(&mut self, event: Event<'_>);
+    fn on_event(&mut self, event: Event<'_>);
 
     /// Receives the state of the line, as text for the user.
-    fn hear(&mut self, line: &str);
+    fn notify(&mut self, line: &str);
 
     /// Returns the requests to the device; read after each poll of the line.
-    fn asks(&mut self) -> Vec<HostRequest>;
+    fn requests(&mut self) -> Vec<HostRequest>;
 
     /// Returns a scene change that is due, with its terrain; called after each poll of the line. An
-    /// [`Event::Viewed`] reports its result.
-    fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
+    /// [`Event::SceneChangeResult`] reports its result.
+    fn scene_change(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
         None
     }
 

@@ -11,7 +11,7 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SessionEnd};
 
-use super::{End, Served, Service, SessionHandler};
+use super::{End, ServedSession, Service, SessionHandler};
 use crate::link::{
     Arming, ControlSession, Event, HostRequest, LinkError, LinkStats, Native, Timeouts, Transport,
 };
@@ -24,9 +24,9 @@ const fn ms(ms: u64) -> Duration {
 
 /// Short, because the device answers at once.
 const TIMEOUTS: Timeouts = Timeouts {
-    again: ms(10),
-    alive: ms(20),
-    greet_again: ms(40),
+    retry: ms(10),
+    heartbeat: ms(20),
+    hello_retry: ms(40),
     give_up: ms(400),
     goodbye: ms(200),
     silence_s: DEFAULT_SILENCE_S,
@@ -93,7 +93,7 @@ impl Drop for Line {
 
 impl Bench {
     fn new() -> Self {
-        let device = Native::for_replay().restless().in_steps_of(20);
+        let device = Native::for_replay().free_running().with_ticks_per_call(20);
         Self {
             device: Rc::new(RefCell::new(device)),
             lines: Rc::default(),
@@ -140,19 +140,19 @@ impl Bench {
 
 fn absent() -> LinkError {
     LinkError::Absent {
-        looked_for: "a line".into(),
+        searched_for: "a line".into(),
         why: "it is in use".into(),
     }
 }
 
 /// A handler that ends after a number of polls, and calls `last` in the last one.
-struct Looks<'l> {
+struct LimitedHandler<'l> {
     left: u32,
     last: Box<dyn FnMut() + 'l>,
     received: Vec<String>,
 }
 
-impl<'l> Looks<'l> {
+impl<'l> LimitedHandler<'l> {
     fn times(left: u32, last: impl FnMut() + 'l) -> Self {
         Self {
             left,
@@ -162,14 +162,14 @@ impl<'l> Looks<'l> {
     }
 }
 
-impl SessionHandler<'_> for Looks<'_> {
-    fn take(&mut self, _: Event<'_>) {}
+impl SessionHandler<'_> for LimitedHandler<'_> {
+    fn on_event(&mut self, _: Event<'_>) {}
 
-    fn hear(&mut self, line: &str) {
+    fn notify(&mut self, line: &str) {
         self.received.push(line.to_owned());
     }
 
-    fn asks(&mut self) -> Vec<HostRequest> {
+    fn requests(&mut self) -> Vec<HostRequest> {
         vec![]
     }
 
@@ -186,17 +186,17 @@ impl SessionHandler<'_> for Looks<'_> {
 }
 
 /// Runs a service to the bench's device over lines from `connect`.
-fn played<T>(
+fn run_service<T>(
     bench: &Bench,
-    goes_on: &dyn Fn() -> bool,
+    should_continue: &dyn Fn() -> bool,
     connect: &mut dyn FnMut() -> Result<Box<dyn Transport>, LinkError>,
-    play: impl FnOnce(Service<'_, '_>) -> T,
+    run: impl FnOnce(Service<'_, '_>) -> T,
 ) -> T {
     let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
     let scale = Scale::new(1.0, 1.0).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let home = GridPoint::default();
-    play(Service {
+    run(Service {
         terrain: &terrain,
         scene: terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home),
         arming: Arming::default(),
@@ -204,19 +204,19 @@ fn played<T>(
         connect: Box::new(|| connect().map(|line| line as Box<dyn Transport>)),
         device: "the bench".into(),
         retry: ms(1),
-        goes_on,
-        tell: &|line| bench.reported.borrow_mut().push(line.to_owned()),
+        should_continue,
+        notify: &|line| bench.reported.borrow_mut().push(line.to_owned()),
     })
 }
 
-fn open<'s, 't>(service: Service<'s, 't>) -> Result<Served<'s, 't>, LinkError> {
+fn open<'s, 't>(service: Service<'s, 't>) -> Result<ServedSession<'s, 't>, LinkError> {
     service.open(|_| Ok(())).map(|(served, _)| served)
 }
 
 /// Serves for a number of polls; calls `last` in the last one.
-fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String>) {
-    let mut handler = Looks::times(looks, last);
-    let end = played(bench, &|| true, &mut || bench.only_line(), |service| {
+fn served(bench: &Bench, polls: u32, last: &mut dyn FnMut()) -> (End, Vec<String>) {
+    let mut handler = LimitedHandler::times(polls, last);
+    let end = run_service(bench, &|| true, &mut || bench.only_line(), |service| {
         let served = open(service).expect("it answers");
         served.serve(&mut handler)
     });
@@ -227,10 +227,10 @@ fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String
 fn finished_run_closes_the_session_or_reports_no_confirmation() {
     let bench = Bench::new();
     let (end, _) = served(&bench, 5, &mut || {});
-    assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
+    assert!(end.result.is_ok() && end.disarmed.is_ok(), "{end:?}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
     let (end, _) = served(&bench, 5, &mut || bench.deaf.set(true));
-    assert!(end.why.is_ok(), "{end:?}");
+    assert!(end.result.is_ok(), "{end:?}");
     assert!(matches!(end.disarmed, Err(LinkError::NotConfirmed)));
     assert_eq!(bench.last_end(), SessionEnd::Replaced);
 }
@@ -260,49 +260,49 @@ fn failed_start_closes_the_session_or_warns_the_user() {
         let killed = ControlSession::open(line, TIMEOUTS.give_up).expect("it answers");
         bench.deaf.set(deaf);
         drop(killed);
-        let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
+        let start = run_service(&bench, &|| true, &mut || bench.only_line(), |service| {
             service.open(|_| Err(absent())).map(|_| ())
         });
-        assert!(matches!(began, Err(LinkError::Absent { .. })), "{began:?}");
+        assert!(matches!(start, Err(LinkError::Absent { .. })), "{start:?}");
         assert_eq!(bench.was_reported(), deaf);
         let end = [SessionEnd::Goodbye, SessionEnd::Replaced][usize::from(deaf)];
         assert_eq!(bench.last_end(), end);
     }
     let bench = Bench::new();
     bench.deaf.set(true);
-    let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
+    let start = run_service(&bench, &|| true, &mut || bench.only_line(), |service| {
         open(service).map(|_| ())
     });
-    assert!(matches!(began, Err(LinkError::Silent(_))), "{began:?}");
+    assert!(matches!(start, Err(LinkError::Silent(_))), "{start:?}");
     assert!(bench.was_reported());
 }
 
 #[test]
 fn interrupt_during_opening_closes_the_session() {
     let bench = Bench::new();
-    let began = played(&bench, &|| false, &mut || bench.only_line(), |service| {
+    let start = run_service(&bench, &|| false, &mut || bench.only_line(), |service| {
         open(service).map(|_| ())
     });
-    assert!(matches!(began, Err(LinkError::Interrupted)), "{began:?}");
+    assert!(matches!(start, Err(LinkError::Interrupted)), "{start:?}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
 }
 
 #[test]
 fn silent_device_is_reopened_once_its_first_line_is_closed() {
     let bench = Bench::new();
-    let mut handler = Looks::times(2_000, || {});
+    let mut handler = LimitedHandler::times(2_000, || {});
     let mut connect = || {
         // Fail here, because the test would hang otherwise.
         let waits = bench.lines.get() > 0 && bench.made.get() > 0;
         assert!(!waits, "the line before is not closed");
         bench.only_line()
     };
-    let end = played(&bench, &|| true, &mut connect, |service| {
+    let end = run_service(&bench, &|| true, &mut connect, |service| {
         let served = open(service).expect("it answers");
         bench.dead_up_to.set(1);
         served.serve(&mut handler)
     });
-    assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
+    assert!(end.result.is_ok() && end.disarmed.is_ok(), "{end:?}");
     let received = handler.received.join("\n");
     assert!(received.contains("goes on where it was"), "{received}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
@@ -312,27 +312,27 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
 fn close_during_an_outage_is_sent_after_it() {
     for back in [true, false] {
         let bench = Bench::new();
-        let goes_on = Cell::new(true);
+        let should_continue = Cell::new(true);
         let mut made = 0;
         let mut connect = || {
             made += 1;
             match made {
                 1 => bench.only_line(),
                 2 => {
-                    goes_on.set(false);
+                    should_continue.set(false);
                     Err(absent())
                 }
                 _ if back => bench.only_line(),
                 _ => Err(absent()),
             }
         };
-        let mut handler = Looks::times(u32::MAX, || {});
-        let end = played(&bench, &|| goes_on.get(), &mut connect, |service| {
+        let mut handler = LimitedHandler::times(u32::MAX, || {});
+        let end = run_service(&bench, &|| should_continue.get(), &mut connect, |service| {
             let served = open(service).expect("it answers");
             bench.dead_up_to.set(1);
             served.serve(&mut handler)
         });
-        assert!(end.why.is_ok(), "{end:?}");
+        assert!(end.result.is_ok(), "{end:?}");
         assert_eq!(end.disarmed.is_ok(), back, "{end:?}");
         let last = [SessionEnd::Replaced, SessionEnd::Goodbye][usize::from(back)];
         assert_eq!(bench.last_end(), last);
@@ -343,14 +343,14 @@ fn close_during_an_outage_is_sent_after_it() {
 fn losing_the_device_warns_of_an_armed_arm() {
     let bench = Bench::new();
     let mut another = None;
-    let mut handler = Looks::times(u32::MAX, || {});
-    let end = played(&bench, &|| true, &mut || bench.only_line(), |service| {
+    let mut handler = LimitedHandler::times(u32::MAX, || {});
+    let end = run_service(&bench, &|| true, &mut || bench.only_line(), |service| {
         let served = open(service).expect("it answers");
         let line = Box::new(bench.line());
         another = Some(ControlSession::open(line, TIMEOUTS.give_up).expect("it answers"));
         served.serve(&mut handler)
     });
-    let Err(taken @ LinkError::Taken) = end.why else {
+    let Err(taken @ LinkError::Taken) = end.result else {
         panic!("{end:?}");
     };
     assert!(taken.to_string().contains("may be armed"), "{taken}");

@@ -3,13 +3,13 @@
 use hapterra_core::force::{Pattern, Shading, Texture};
 
 use super::marks::text_of;
-use super::{Steer, Wanted};
+use super::{Action, Steer};
 use crate::named_surfaces::NamedSurface;
 use crate::place::{PlacementChange, SurfaceChange};
 use heightfield::printable_text::printable;
 
 /// The known commands, for messages.
-pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
+pub const KNOWN_COMMANDS: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
      exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
      tip RADIUS (mm), shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
      clutch on, clutch off, mark TEXT, enter NUMBER; `at SECONDS` before any of them, and before that \
@@ -22,13 +22,13 @@ pub struct Command {
     /// ones are done.
     pub at_s: Option<f64>,
     /// Action of the command.
-    pub wanted: Wanted,
+    pub action: Action,
 }
 
 /// A line without a valid command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{line}` is no command ({why}); understood are: {UNDERSTOOD}")]
-pub struct NoCommand {
+#[error("`{line}` is no command ({why}); understood are: {KNOWN_COMMANDS}")]
+pub struct CommandError {
     line: String,
     why: &'static str,
 }
@@ -40,33 +40,33 @@ const SHOWN: usize = 60;
 /// the line's rest, `#` included.
 ///
 /// # Errors
-/// [`NoCommand`] lists the known commands.
-pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
-    let refused = |why| NoCommand {
+/// [`CommandError`] lists the known commands.
+pub fn parse(line: &str) -> Result<Option<Command>, CommandError> {
+    let refused = |why| CommandError {
         line: beginning(line),
         why,
     };
     let (at_s, rest) = timed(line).map_err(refused)?;
     if let Some(text) = mark_in(rest) {
         let text = text_of(text).map_err(refused)?;
-        let wanted = Wanted::Mark(text);
-        return Ok(Some(Command { at_s, wanted }));
+        let action = Action::Mark(text);
+        return Ok(Some(Command { at_s, action }));
     }
     let text = rest.split('#').next().unwrap_or_default();
     let words: Vec<_> = text.split_whitespace().collect();
     if words.is_empty() && at_s.is_none() {
         return Ok(None);
     }
-    let wanted = match words[..] {
+    let action = match words[..] {
         ["enter", number] => number
             .parse()
-            .map(Wanted::Enter)
+            .map(Action::Enter)
             .map_err(|_| "a number is wanted"),
         ["enter", ..] => Err("it takes the number of a question"),
-        _ => read(&words).map(Wanted::Steer),
+        _ => read(&words).map(Action::Steer),
     };
-    let wanted = wanted.map_err(refused)?;
-    Ok(Some(Command { at_s, wanted }))
+    let action = action.map_err(refused)?;
+    Ok(Some(Command { at_s, action }))
 }
 
 /// Returns the beginning of a line for a message.
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn each_command_is_read() {
+    fn each_steering_command_is_parsed() {
         let pan = PlacementChange::Pan {
             east_mm: 5.0,
             north_mm: -0.5,
@@ -291,18 +291,18 @@ mod tests {
             ("clutch\ton\r", None, Steer::Clutch(true)),
             ("clutch off", None, Steer::Clutch(false)),
         ] {
-            let wanted = Wanted::Steer(steer);
-            assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
+            let action = Action::Steer(steer);
+            assert_eq!(parse(line), Ok(Some(Command { at_s, action })), "{line}");
         }
-        let wanted = Wanted::Enter(7);
-        assert_eq!(parse("enter 7"), Ok(Some(Command { at_s: None, wanted })));
+        let action = Action::Enter(7);
+        assert_eq!(parse("enter 7"), Ok(Some(Command { at_s: None, action })));
         for nothing in ["", "  \r", "# a remark", "   # another"] {
             assert_eq!(parse(nothing), Ok(None));
         }
     }
 
     #[test]
-    fn a_mark_is_the_rest_of_its_line() {
+    fn mark_text_is_the_rest_of_its_line() {
         for (line, at_s, text) in [
             ("mark a", None, "a"),
             (
@@ -312,8 +312,8 @@ mod tests {
             ),
             ("mark mark at 2 zoom 3", None, "mark at 2 zoom 3"),
         ] {
-            let wanted = Wanted::Mark(text.to_owned());
-            assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
+            let action = Action::Mark(text.to_owned());
+            assert_eq!(parse(line), Ok(Some(Command { at_s, action })), "{line}");
         }
         let longest = "µ".repeat(MAX_MARK);
         assert!(parse(&format!("mark {longest}")).is_ok());
@@ -368,6 +368,6 @@ mod tests {
             assert!(reported.contains("exaggerate TIMES"), "{reported}");
         }
         let long = parse(&"x".repeat(10_000)).expect_err("no command");
-        assert!(long.to_string().len() < UNDERSTOOD.len() + 2 * SHOWN);
+        assert!(long.to_string().len() < KNOWN_COMMANDS.len() + 2 * SHOWN);
     }
 }

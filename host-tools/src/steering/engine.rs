@@ -10,26 +10,26 @@ use hapterra_core::wire::request::Request;
 
 use super::Steer;
 use crate::link::{Event, HostRequest};
-use crate::place::{Bounds, Changed, Hand, Laid, PlacementChange};
+use crate::place::{Bounds, Changed, Hand, PlacedSurface, PlacementChange};
 use crate::terrain::Terrain;
 
 /// Maximum number of changes that wait for the clutch to open; they are then applied together.
-const WAITING: usize = 64;
+const MAX_WAITING: usize = 64;
 /// Samples after which a clutch that has not opened counts as failed; it opens in 100 ticks of a
 /// millisecond.
-const SAMPLES_TO_OPEN: u32 = 5_000;
+const MAX_SAMPLES_TO_OPEN: u32 = 5_000;
 
 /// Maximum wait for the ground under the hand in the new placement, with the clutch open.
-const GROUND_WITHIN: Duration = Duration::from_secs(2);
+const MAX_GROUND_WAIT: Duration = Duration::from_secs(2);
 
 /// A placement to set on the device.
-pub struct Put<'r> {
+pub struct PlacementUpdate<'r> {
     /// Message to the device.
     pub view: SceneChange,
     /// The terrain that it is rendered on.
     pub terrain: Terrain<'r>,
     /// Place, scale and surface parameters.
-    pub laid: Laid,
+    pub placed_surface: PlacedSurface,
 }
 
 /// Stage of a change.
@@ -43,7 +43,7 @@ enum Stage<'r> {
     /// The clutch is open.
     Open,
     /// This placement was sent; with its terrain.
-    Putting(Box<(Laid, Terrain<'r>)>),
+    Applying(Box<(PlacedSurface, Terrain<'r>)>),
     /// The clutch was released, and is still reported open.
     Closing,
 }
@@ -51,7 +51,7 @@ enum Stage<'r> {
 /// Engine behind keys and commands: turns each [`Steer`] into requests to a device, by its samples.
 pub struct Steering<'r> {
     bounds: Bounds,
-    now: Laid,
+    now: PlacedSurface,
     terrain: Terrain<'r>,
     /// Number of the current placement on the device.
     number: u8,
@@ -61,14 +61,14 @@ pub struct Steering<'r> {
     /// The board's clutch input holds it open.
     by_input: bool,
     /// The user has held the clutch, and may be far from where the cells were measured.
-    measures: bool,
+    must_measure: bool,
     /// Requested hold of the clutch.
-    asked: ClutchMode,
+    requested_hold: ClutchMode,
     /// Start of the wait for the ground of the new placement.
-    awaits: Option<Instant>,
+    waiting_since: Option<Instant>,
     stage: Stage<'r>,
-    asks: Vec<HostRequest>,
-    put: Option<Put<'r>>,
+    requests: Vec<HostRequest>,
+    update: Option<PlacementUpdate<'r>>,
     lines: Vec<String>,
 }
 
@@ -84,19 +84,19 @@ impl<'r> Steering<'r> {
             waiting: vec![],
             held: false,
             by_input: false,
-            measures: false,
-            asked: ClutchMode::Released,
-            awaits: None,
+            must_measure: false,
+            requested_hold: ClutchMode::Released,
+            waiting_since: None,
             stage: Stage::Idle,
-            asks: vec![],
-            put: None,
+            requests: vec![],
+            update: None,
             lines: vec![],
         }
     }
 
     /// Returns the current placement, by the last report, and its surface parameters.
     #[must_use]
-    pub const fn now(&self) -> &Laid {
+    pub const fn now(&self) -> &PlacedSurface {
         &self.now
     }
 
@@ -109,22 +109,22 @@ impl<'r> Steering<'r> {
     /// Returns true if no request of the user is pending.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
-        let rests = match self.stage {
+        let is_at_rest = match self.stage {
             Stage::Idle => !self.held,
             Stage::Open => self.held,
             _ => false,
         };
-        rests && self.waiting.is_empty() && !self.measures
+        is_at_rest && self.waiting.is_empty() && !self.must_measure
     }
 
     /// Queues a request of the user.
     pub fn steer(&mut self, steer: Steer) {
         match steer {
             Steer::Clutch(held) => {
-                self.measures |= held && !self.held;
+                self.must_measure |= held && !self.held;
                 self.held = held;
             }
-            Steer::Change(change) if self.waiting.len() < WAITING => self.waiting.push(change),
+            Steer::Change(change) if self.waiting.len() < MAX_WAITING => self.waiting.push(change),
             // Only a stuck key fills the queue.
             Steer::Change(_) => {}
         }
@@ -136,25 +136,27 @@ impl<'r> Steering<'r> {
     }
 
     /// Returns the pending requests to the device.
-    pub fn asks(&mut self) -> Vec<HostRequest> {
-        std::mem::take(&mut self.asks)
+    pub fn requests(&mut self) -> Vec<HostRequest> {
+        std::mem::take(&mut self.requests)
     }
 
     /// Returns the placement to set now, if any.
-    pub fn take_put(&mut self) -> Option<Put<'r>> {
-        self.put.take()
+    pub fn take_update(&mut self) -> Option<PlacementUpdate<'r>> {
+        self.update.take()
     }
 
     /// Handles an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Sample(sample) => self.on_sample(sample),
-            Event::Viewed { view, taken } => self.on_viewed(view, *taken),
+            Event::SceneChangeResult { view, accepted } => {
+                self.on_scene_change_result(view, *accepted)
+            }
             Event::Opened { resumed, .. } => {
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
                 self.stage = Stage::Idle;
-                self.asked = ClutchMode::Released;
+                self.requested_hold = ClutchMode::Released;
                 if !resumed {
                     self.number = 0;
                 }
@@ -177,45 +179,45 @@ impl<'r> Steering<'r> {
     fn give_up(&mut self, why: &str) {
         self.lines.push(why.to_owned());
         self.waiting.clear();
-        (self.held, self.measures) = (false, false);
-        self.let_go();
+        (self.held, self.must_measure) = (false, false);
+        self.release_clutch();
     }
 
-    fn clutch(&mut self, hold: ClutchMode) {
-        self.asked = hold;
-        self.asks
+    fn request_clutch(&mut self, hold: ClutchMode) {
+        self.requested_hold = hold;
+        self.requests
             .push(HostRequest::Request(Request::Clutch { hold }));
     }
 
     /// Holds the clutch. For the user the terrain follows the hand; only for a change of placement
     /// it stays in its place.
-    fn hold(&mut self) {
-        self.clutch(match self.held {
+    fn hold_clutch(&mut self) {
+        self.request_clutch(match self.held {
             true => ClutchMode::WithHand,
             false => ClutchMode::InPlace,
         });
     }
 
-    fn let_go(&mut self) {
-        self.clutch(ClutchMode::Released);
+    fn release_clutch(&mut self) {
+        self.request_clutch(ClutchMode::Released);
         self.stage = Stage::Closing;
     }
 
     fn on_sample(&mut self, sample: &TickRecord) {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
         let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
-        let is_taken = by_input && is_open;
-        if is_taken && !self.by_input && matches!(self.stage, Stage::Idle) {
-            self.measures = self.hand(sample).is_far_from_measure(&self.terrain);
+        let is_held_by_input = by_input && is_open;
+        if is_held_by_input && !self.by_input && matches!(self.stage, Stage::Idle) {
+            self.must_measure = self.hand(sample).has_other_cell_size(&self.terrain);
         }
-        self.by_input = is_taken;
+        self.by_input = is_held_by_input;
         // The user has taken the clutch during a change of placement: the terrain follows the hand.
-        if self.held && self.asked == ClutchMode::InPlace {
-            self.hold();
+        if self.held && self.requested_hold == ClutchMode::InPlace {
+            self.hold_clutch();
         }
         match &mut self.stage {
-            Stage::Idle if self.held || self.measures || !self.waiting.is_empty() => {
-                self.hold();
+            Stage::Idle if self.held || self.must_measure || !self.waiting.is_empty() => {
+                self.hold_clutch();
                 self.stage = Stage::Opening {
                     samples: 0,
                     answered: false,
@@ -223,15 +225,15 @@ impl<'r> Steering<'r> {
             }
             Stage::Opening { answered: true, .. } if is_open && sample.view == self.number => {
                 self.stage = Stage::Open;
-                self.go_on(sample);
+                self.advance(sample);
             }
             Stage::Opening { samples, .. } => {
                 *samples += 1;
-                if *samples > SAMPLES_TO_OPEN {
+                if *samples > MAX_SAMPLES_TO_OPEN {
                     self.give_up("the device does not open its clutch: the view stays as it was");
                 }
             }
-            Stage::Open if sample.view == self.number => self.go_on(sample),
+            Stage::Open if sample.view == self.number => self.advance(sample),
             // The board's clutch input may still hold the clutch open.
             Stage::Closing if !is_open || by_input => self.stage = Stage::Idle,
             _ => {}
@@ -239,32 +241,36 @@ impl<'r> Steering<'r> {
     }
 
     /// Continues with an open clutch: sends the next placement, or releases the clutch.
-    fn go_on(&mut self, sample: &TickRecord) {
+    fn advance(&mut self, sample: &TickRecord) {
         // The ground height is unknown until the proxy has landed.
         if sample.missing_tile.is_some() {
             return;
         }
-        let measures = std::mem::take(&mut self.measures)
-            && self.hand(sample).is_far_from_measure(&self.terrain);
-        if self.waiting.is_empty() && !measures {
+        let must_measure = std::mem::take(&mut self.must_measure)
+            && self.hand(sample).has_other_cell_size(&self.terrain);
+        if self.waiting.is_empty() && !must_measure {
             if !self.held {
-                self.let_go();
+                self.release_clutch();
             }
             return;
         }
         let changes = std::mem::take(&mut self.waiting);
-        let waited = self.awaits.get_or_insert_with(Instant::now).elapsed();
-        let next = self.next_view(&changes, sample, waited < GROUND_WITHIN);
+        let waited = self
+            .waiting_since
+            .get_or_insert_with(Instant::now)
+            .elapsed();
+        let next = self.next_view(&changes, sample, waited < MAX_GROUND_WAIT);
         if let Ok(None) = next {
-            (self.waiting, self.measures) = (changes, measures);
+            (self.waiting, self.must_measure) = (changes, must_measure);
             return;
         }
-        self.awaits = None;
+        self.waiting_since = None;
         match next {
             Ok(None) => {}
-            Ok(Some(put)) => {
-                self.stage = Stage::Putting(Box::new((put.laid, put.terrain.clone())));
-                self.put = Some(put);
+            Ok(Some(update)) => {
+                self.stage =
+                    Stage::Applying(Box::new((update.placed_surface, update.terrain.clone())));
+                self.update = Some(update);
             }
             Err(why) => self.lines.push(format!("the view stays as it was: {why}")),
         }
@@ -287,11 +293,11 @@ impl<'r> Steering<'r> {
         changes: &[PlacementChange],
         sample: &TickRecord,
         waits: bool,
-    ) -> Result<Option<Put<'r>>, String> {
+    ) -> Result<Option<PlacementUpdate<'r>>, String> {
         let hand = self.hand(sample);
         let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
         let Changed {
-            laid,
+            placed_surface,
             terrain,
             hip_mm,
             ground_is_known,
@@ -303,28 +309,28 @@ impl<'r> Steering<'r> {
             let point = terrain.scale().to_grid(mm);
             point.ok_or("that is too far from the first sample")
         };
-        let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
-        let scene = terrain.scene(laid.params, Source::Encoders, home);
+        let (hip, home) = (on_grid(hip_mm)?, on_grid(placed_surface.view.home_mm)?);
+        let scene = terrain.scene(placed_surface.params, Source::Encoders, home);
         let view = SceneChange {
             number: self.number.wrapping_add(1),
-            scene: terrain.underlaid(scene, laid.view.reach_mm),
+            scene: terrain.with_fallback(scene, placed_surface.view.reach_mm),
             hip,
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
         };
-        Ok(Some(Put {
+        Ok(Some(PlacementUpdate {
             view,
             terrain,
-            laid,
+            placed_surface,
         }))
     }
 
-    fn on_viewed(&mut self, view: &SceneChange, taken: bool) {
-        let Stage::Putting(put) = &self.stage else {
+    fn on_scene_change_result(&mut self, view: &SceneChange, accepted: bool) {
+        let Stage::Applying(update) = &self.stage else {
             return;
         };
-        if taken {
+        if accepted {
             self.number = view.number;
-            (self.now, self.terrain) = (**put).clone();
+            (self.now, self.terrain) = (**update).clone();
         } else {
             let line = "the device refused the placement: it stays as it was";
             self.lines.push(line.to_owned());

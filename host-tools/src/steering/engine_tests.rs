@@ -10,15 +10,15 @@ use heightfield::Raster;
 
 const ZOOM: Steer = Steer::Change(PlacementChange::Zoom(2.0));
 
-/// Runs `look` on an engine over a plane, at 1 mm a cell.
-fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
+/// Runs `test` on an engine over a plane, at 1 mm a cell.
+fn with<T>(test: impl FnOnce(&mut Steering<'_>) -> T) -> T {
     with_raster(
         &Raster::from_fn(65, 65, |x, _| x as f32).expect("raster"),
-        look,
+        test,
     )
 }
 
-fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
+fn with_raster<T>(raster: &Raster, test: impl FnOnce(&mut Steering<'_>) -> T) -> T {
     let options = PlacementOptions {
         sizing: Sizing::CellMm(1.0),
         ..PlacementOptions::default()
@@ -30,12 +30,12 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
     let terrain = view.terrain(grid).expect("a terrain");
     let params = SurfaceParams::PREMIUM;
     let bounds = Bounds {
-        first: Laid { view, params },
+        first: PlacedSurface { view, params },
         resolution_mm: reach.resolution_mm(),
         level: None,
         tip_mm: 0.0,
     };
-    look(&mut Steering::new(bounds, terrain.clone()))
+    test(&mut Steering::new(bounds, terrain.clone()))
 }
 
 fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
@@ -48,8 +48,8 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 }
 
 /// Returns the last request to the clutch.
-fn asked(steering: &mut Steering<'_>) -> Option<ClutchMode> {
-    steering.asks().into_iter().rev().find_map(|ask| match ask {
+fn requested_hold(steering: &mut Steering<'_>) -> Option<ClutchMode> {
+    steering.requests().into_iter().rev().find_map(|request| match request {
         HostRequest::Request(Request::Clutch { hold }) => Some(hold),
         _ => None,
     })
@@ -65,35 +65,35 @@ fn answer(steering: &mut Steering<'_>, hold: ClutchMode) {
 fn open(steering: &mut Steering<'_>) {
     steering.steer(ZOOM);
     samples(steering, Limits::empty(), 1);
-    assert_eq!(asked(steering), Some(ClutchMode::InPlace));
+    assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
     // The board's input holds it open before the answer: the host's hold has not arrived.
     samples(steering, Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT, 3);
-    assert!(steering.take_put().is_none());
+    assert!(steering.take_update().is_none());
     answer(steering, ClutchMode::InPlace);
     samples(steering, Limits::CLUTCH_MOVES, 3);
-    assert!(steering.take_put().is_none(), "the clutch still opens");
+    assert!(steering.take_update().is_none(), "the clutch still opens");
 }
 
 /// Opens the clutch, and returns the change that is sent.
-fn put(steering: &mut Steering<'_>) -> SceneChange {
+fn update(steering: &mut Steering<'_>) -> SceneChange {
     open(steering);
     samples(steering, Limits::CLUTCH_OPEN, 1);
-    steering.take_put().expect("a view").view
+    steering.take_update().expect("a view").view
 }
 
-fn viewed(steering: &mut Steering<'_>, view: &SceneChange, taken: bool) {
-    steering.on_event(&Event::Viewed { view, taken });
+fn report_result(steering: &mut Steering<'_>, view: &SceneChange, accepted: bool) {
+    steering.on_event(&Event::SceneChangeResult { view, accepted });
 }
 
 #[test]
 fn accepted_placement_is_applied_and_releases_the_clutch() {
     with(|steering| {
-        let view = put(steering);
+        let view = update(steering);
         assert_eq!((view.number, steering.now().view.scale.cell_mm()), (1, 1.0));
-        viewed(steering, &view, true);
+        report_result(steering, &view, true);
         assert_eq!(steering.now().view.scale.cell_mm(), 2.0);
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert_eq!(asked(steering), Some(ClutchMode::Released));
+        assert_eq!(requested_hold(steering), Some(ClutchMode::Released));
         assert!(!steering.is_settled());
         samples(steering, Limits::CLUTCH_MOVES, 1);
         assert!(steering.is_settled());
@@ -103,47 +103,51 @@ fn accepted_placement_is_applied_and_releases_the_clutch() {
 #[test]
 fn refused_placement_changes_nothing_and_is_reported() {
     with(|steering| {
-        let view = put(steering);
-        viewed(steering, &view, false);
+        let view = update(steering);
+        report_result(steering, &view, false);
         assert_eq!(steering.now().view.scale.cell_mm(), 1.0);
         assert_eq!(steering.lines().len(), 1);
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert_eq!(asked(steering), Some(ClutchMode::Released));
+        assert_eq!(requested_hold(steering), Some(ClutchMode::Released));
         // The next one has the same number, because the first was refused.
         samples(steering, Limits::empty(), 1);
-        assert_eq!(put(steering).number, 1);
+        assert_eq!(update(steering).number, 1);
     });
 }
 
 #[test]
-fn unopened_clutch_or_silent_device_is_given_up() {
+fn unopened_clutch_or_silent_device_times_out() {
     for answers in [true, false] {
         with(|steering| {
             steering.steer(ZOOM);
             samples(steering, Limits::empty(), 1);
-            let hold = asked(steering).expect("asked");
+            let hold = requested_hold(steering).expect("asked");
             if answers {
                 answer(steering, hold);
-                samples(steering, Limits::CLUTCH_MOVES, SAMPLES_TO_OPEN as usize + 1);
+                samples(
+                    steering,
+                    Limits::CLUTCH_MOVES,
+                    MAX_SAMPLES_TO_OPEN as usize + 1,
+                );
             } else {
-                let ask = HostRequest::Request(Request::Clutch { hold });
-                steering.on_event(&Event::Unanswered(&ask));
+                let request = HostRequest::Request(Request::Clutch { hold });
+                steering.on_event(&Event::Unanswered(&request));
             }
             let reported = steering.lines();
             assert!(
                 reported.len() == 1 && reported[0].contains("stays as it was"),
                 "{reported:?}"
             );
-            assert_eq!(asked(steering), Some(ClutchMode::Released));
+            assert_eq!(requested_hold(steering), Some(ClutchMode::Released));
             samples(steering, Limits::empty(), 2);
-            assert!(steering.is_settled() && steering.take_put().is_none());
+            assert!(steering.is_settled() && steering.take_update().is_none());
         });
     }
 }
 
 /// The ground height is unknown until the proxy has landed.
 #[test]
-fn a_view_waits_for_the_tile_under_the_proxy() {
+fn placement_waits_for_the_tile_under_the_proxy() {
     with(|steering| {
         open(steering);
         let waits = TickRecord {
@@ -153,10 +157,10 @@ fn a_view_waits_for_the_tile_under_the_proxy() {
         };
         for _ in 0..3 {
             steering.on_event(&Event::Sample(&waits));
-            assert!(steering.take_put().is_none());
+            assert!(steering.take_update().is_none());
         }
         samples(steering, Limits::CLUTCH_OPEN, 1);
-        assert!(steering.take_put().is_some());
+        assert!(steering.take_update().is_some());
     });
 }
 
@@ -165,12 +169,12 @@ fn a_view_waits_for_the_tile_under_the_proxy() {
 fn restarted_device_counts_placements_from_zero() {
     for (resumed, number) in [(false, 1), (true, 2)] {
         with(|steering| {
-            let view = put(steering);
-            viewed(steering, &view, true);
+            let view = update(steering);
+            report_result(steering, &view, true);
             let device = hello();
             let device = &device;
             steering.on_event(&Event::Opened { device, resumed });
-            assert_eq!(put(steering).number, number, "resumed: {resumed}");
+            assert_eq!(update(steering).number, number, "resumed: {resumed}");
             assert_eq!(steering.now().view.scale.cell_mm(), 2.0);
         });
     }
@@ -180,11 +184,11 @@ fn restarted_device_counts_placements_from_zero() {
 #[test]
 fn host_releases_a_clutch_held_by_the_board_input() {
     with(|steering| {
-        let view = put(steering);
-        viewed(steering, &view, true);
+        let view = update(steering);
+        report_result(steering, &view, true);
         let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
         samples(steering, held, 1);
-        assert_eq!(asked(steering), Some(ClutchMode::Released));
+        assert_eq!(requested_hold(steering), Some(ClutchMode::Released));
         samples(steering, held, 1);
         assert!(steering.is_settled());
     });
@@ -218,7 +222,7 @@ fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> TickReco
 }
 
 #[test]
-fn far_clutch_measures_cells_again() {
+fn far_clutch_motion_measures_cells_again() {
     let raster = degrees();
     let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
     for (north_mm, by_input) in [(80.0, false), (80.0, true), (0.1, false), (0.1, true)] {
@@ -231,40 +235,40 @@ fn far_clutch_measures_cells_again() {
             }
             let sample = sample_at(steering, north_mm, limits);
             steering.on_event(&Event::Sample(&sample));
-            let asked = asked(steering);
-            let wanted = match by_input {
+            let requested_hold = requested_hold(steering);
+            let expected = match by_input {
                 true => (north_mm > 1.0).then_some(ClutchMode::InPlace),
                 false => Some(ClutchMode::WithHand),
             };
-            assert_eq!(asked, wanted);
-            if let Some(hold) = asked {
+            assert_eq!(requested_hold, expected);
+            if let Some(hold) = requested_hold {
                 answer(steering, hold);
             }
             let open = sample_at(steering, north_mm, limits | Limits::CLUTCH_OPEN);
             steering.on_event(&Event::Sample(&open));
-            let put = steering.take_put();
-            assert_eq!(put.is_some(), north_mm > 1.0);
-            let Some(put) = put else {
+            let update = steering.take_update();
+            assert_eq!(update.is_some(), north_mm > 1.0);
+            let Some(update) = update else {
                 return;
             };
-            let [_, latitude] = put.terrain.grid().measured_at().expect("a place");
+            let [_, latitude] = update.terrain.grid().measured_at().expect("a place");
             assert!((57.0..58.0).contains(&latitude), "{latitude}");
-            assert!(!put.view.keeps_tiles);
-            viewed(steering, &put.view, true);
+            assert!(!update.view.keeps_tiles);
+            report_result(steering, &update.view, true);
             assert!((metres(steering).expect("known") / before - 1.0).abs() < 1e-12);
             // The cells are measured once; the clutch is released when the user releases it.
             let open = TickRecord {
                 view: 1,
-                hip: put.view.hip,
+                hip: update.view.hip,
                 ..open
             };
             steering.on_event(&Event::Sample(&open));
-            assert!(steering.take_put().is_none());
-            let rests = match by_input {
-                true => self::asked(steering) == Some(ClutchMode::Released),
+            assert!(steering.take_update().is_none());
+            let is_at_rest = match by_input {
+                true => self::requested_hold(steering) == Some(ClutchMode::Released),
                 false => steering.is_settled(),
             };
-            assert!(rests);
+            assert!(is_at_rest);
         });
     }
 }

@@ -12,10 +12,10 @@ const PAN_MM: f64 = 5.0;
 /// Zoom factor of one key press.
 const ZOOM: f64 = 1.5;
 /// Factor of heights or stiffness of one key press.
-const MORE: f64 = 1.25;
+const STEP_FACTOR: f64 = 1.25;
 /// Time without a repetition after which a key counts as released: a terminal reports presses and
 /// repetitions, but no releases.
-const LET_GO: Duration = Duration::from_millis(800);
+const RELEASE_AFTER: Duration = Duration::from_millis(800);
 
 /// A key with a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,10 +45,10 @@ impl Keys {
             }),
             Key::Char('+' | '=') => change(PlacementChange::Zoom(ZOOM)),
             Key::Char('-' | '_') => change(PlacementChange::Zoom(1.0 / ZOOM)),
-            Key::Char(']') => change(PlacementChange::Exaggerate(MORE)),
-            Key::Char('[') => change(PlacementChange::Exaggerate(1.0 / MORE)),
-            Key::Char('.') => change(PlacementChange::Stiffness(MORE)),
-            Key::Char(',') => change(PlacementChange::Stiffness(1.0 / MORE)),
+            Key::Char(']') => change(PlacementChange::Exaggerate(STEP_FACTOR)),
+            Key::Char('[') => change(PlacementChange::Exaggerate(1.0 / STEP_FACTOR)),
+            Key::Char('.') => change(PlacementChange::Stiffness(STEP_FACTOR)),
+            Key::Char(',') => change(PlacementChange::Stiffness(1.0 / STEP_FACTOR)),
             Key::Char('0') => change(PlacementChange::Reset),
             Key::Char(' ') => {
                 let was_held = self.held.replace(now).is_some() || self.toggled;
@@ -65,7 +65,7 @@ impl Keys {
 
     /// Returns the release of the key that holds the clutch, once.
     pub fn released(&mut self, now: Duration) -> Option<Steer> {
-        let is_over = |received: &mut Duration| now.saturating_sub(*received) >= LET_GO;
+        let is_over = |received: &mut Duration| now.saturating_sub(*received) >= RELEASE_AFTER;
         let over = self.held.take_if(is_over).is_some();
         (over && !self.toggled).then_some(Steer::Clutch(false))
     }
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_clutch_is_held_while_its_key_repeats() {
+    fn clutch_is_held_while_its_key_repeats() {
         let mut keys = Keys::default();
         let space = Key::Char(' ');
         assert_eq!(keys.press(space, ms(0)), Some(Steer::Clutch(true)));

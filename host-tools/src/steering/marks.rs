@@ -11,11 +11,11 @@ use crate::link::{Event, HostRequest};
 /// Max characters of a mark's text.
 pub(super) const MAX_MARK: usize = 200;
 /// Max marks that wait for the device: it needs 20 ms for each.
-const WAITING: usize = 64;
+const MAX_WAITING: usize = 64;
 
 /// A mark as the user made it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Made {
+pub struct UserMark {
     /// The user's name for it.
     pub text: String,
     /// The host's clock at the request, seconds since 1970 in UTC.
@@ -47,20 +47,20 @@ pub(super) fn text_of(text: &str) -> Result<String, &'static str> {
 pub struct Marks {
     /// Text and host clock of the unanswered ones.
     waiting: VecDeque<(String, f64)>,
-    asks: Vec<HostRequest>,
-    made: Vec<Made>,
+    requests: Vec<HostRequest>,
+    done: Vec<UserMark>,
 }
 
 impl Marks {
     /// Requests a mark now. Returns a message for the user if too many are waiting.
     pub fn mark(&mut self, text: String) -> Option<String> {
-        if self.waiting.len() >= WAITING {
+        if self.waiting.len() >= MAX_WAITING {
             return Some(format!(
-                "the mark `{text}` is left out: {WAITING} marks wait for the device"
+                "the mark `{text}` is left out: {MAX_WAITING} marks wait for the device"
             ));
         }
         self.waiting.push_back((text, host_unix_s()));
-        self.asks.push(HostRequest::Request(Request::Mark));
+        self.requests.push(HostRequest::Request(Request::Mark));
         None
     }
 
@@ -76,12 +76,12 @@ impl Marks {
             _ => return,
         };
         // The device answers marks in their order.
-        self.made(tick);
+        self.complete(tick);
     }
 
-    fn made(&mut self, tick: Option<u32>) {
-        let made = self.waiting.pop_front();
-        self.made.extend(made.map(|(text, host_unix_s)| Made {
+    fn complete(&mut self, tick: Option<u32>) {
+        let done = self.waiting.pop_front();
+        self.done.extend(done.map(|(text, host_unix_s)| UserMark {
             text,
             host_unix_s,
             tick,
@@ -89,21 +89,21 @@ impl Marks {
     }
 
     /// Returns the requests to the device now.
-    pub fn asks(&mut self) -> Vec<HostRequest> {
-        std::mem::take(&mut self.asks)
+    pub fn requests(&mut self) -> Vec<HostRequest> {
+        std::mem::take(&mut self.requests)
     }
 
     /// Returns the marks made since the last call.
-    pub fn take_made(&mut self) -> Vec<Made> {
-        std::mem::take(&mut self.made)
+    pub fn take_marks(&mut self) -> Vec<UserMark> {
+        std::mem::take(&mut self.done)
     }
 
-    /// As [`Self::take_made`], at the end of a session: unanswered marks get no tick.
-    pub fn take_all(&mut self) -> Vec<Made> {
+    /// As [`Self::take_marks`], at the end of a session: unanswered marks get no tick.
+    pub fn take_all(&mut self) -> Vec<UserMark> {
         while !self.waiting.is_empty() {
-            self.made(None);
+            self.complete(None);
         }
-        self.take_made()
+        self.take_marks()
     }
 }
 
@@ -117,33 +117,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_mark_is_requested_once_and_gets_its_answers_tick() {
+    fn each_mark_is_requested_once_and_has_its_tick() {
         let mut marks = Marks::default();
         for text in ["a", "b", "c"] {
             assert_eq!(marks.mark(text.to_owned()), None);
         }
-        assert_eq!(marks.asks(), [HostRequest::Request(Request::Mark); 3]);
-        assert_eq!(marks.asks(), []);
+        assert_eq!(marks.requests(), [HostRequest::Request(Request::Mark); 3]);
+        assert_eq!(marks.requests(), []);
         marks.on_event(&Event::Marked { tick: 7 });
         marks.on_event(&Event::Unanswered(&HostRequest::Request(Request::Disarm)));
         marks.on_event(&Event::Unanswered(&HostRequest::Request(Request::Mark)));
-        let made: Vec<_> = (marks.take_made().into_iter())
-            .map(|made| (made.text, made.tick))
+        let done: Vec<_> = (marks.take_marks().into_iter())
+            .map(|done| (done.text, done.tick))
             .collect();
-        assert_eq!(made, [("a".to_owned(), Some(7)), ("b".to_owned(), None)]);
+        assert_eq!(done, [("a".to_owned(), Some(7)), ("b".to_owned(), None)]);
         let rest = marks.take_all();
         assert!(rest.len() == 1 && rest[0].text == "c" && rest[0].tick.is_none());
         assert_eq!(marks.take_all(), []);
     }
 
     #[test]
-    fn marks_beyond_those_that_may_wait_are_reported() {
+    fn marks_beyond_the_queue_limit_are_reported() {
         let mut marks = Marks::default();
-        for _ in 0..WAITING {
+        for _ in 0..MAX_WAITING {
             assert_eq!(marks.mark("x".to_owned()), None);
         }
         let reported = marks.mark("y".to_owned()).expect("a line");
         assert!(reported.contains("`y` is left out"), "{reported}");
-        assert_eq!(marks.asks().len(), WAITING);
+        assert_eq!(marks.requests().len(), MAX_WAITING);
     }
 }

@@ -20,13 +20,13 @@ mod queue;
 
 use crate::place::PlacementChange;
 
-pub use engine::{Put, Steering};
-pub use marks::{Made, Marks};
+pub use engine::{PlacementUpdate, Steering};
+pub use marks::{Marks, UserMark};
 pub use queue::{CommandQueue, Origin};
 
 /// Request of a command.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Wanted {
+pub enum Action {
     /// A change of placement or clutch.
     Steer(Steer),
     /// A mark with this text.

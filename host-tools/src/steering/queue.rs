@@ -9,14 +9,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
-use super::Wanted;
+use super::Action;
 use super::command::{Command, parse};
 
 /// Max commands of a device that wait to be read or executed; beyond them the reader waits.
-const WAITING: usize = 256;
+const MAX_WAITING: usize = 256;
 /// The same if several devices are served: a lost device must not block the others' commands, so
 /// its own are left out beyond this number.
-const WAITING_EACH: usize = 1 << 16;
+const MAX_WAITING_EACH: usize = 1 << 16;
 
 /// Max bytes of a line with its end; commands have a few dozen. A longer line is cut here and ends
 /// the input.
@@ -48,7 +48,7 @@ pub struct CommandQueue {
     lines: Option<Receiver<Read>>,
     waiting: VecDeque<Command>,
     /// Number of commands that were left out because the queue was full.
-    left_out: Arc<AtomicU64>,
+    omitted: Arc<AtomicU64>,
 }
 
 /// The result of reading a line: a command, or the fault.
@@ -60,7 +60,7 @@ impl CommandQueue {
     /// # Errors
     /// A file that cannot be opened.
     pub fn of(origin: &Origin) -> io::Result<Self> {
-        let (send, lines) = sync_channel(WAITING);
+        let (send, lines) = sync_channel(MAX_WAITING);
         let take = move |line: &str, number| {
             let read = for_each(line, number, 1).transpose();
             read.is_none_or(|read| send.send(read.map(|(_, command)| command)).is_ok())
@@ -86,79 +86,86 @@ impl CommandQueue {
     ) -> io::Result<Vec<Self>> {
         let (sends, queues): (Vec<_>, Vec<_>) = (0..devices)
             .map(|_| {
-                let (send, lines) = sync_channel(WAITING_EACH);
+                let (send, lines) = sync_channel(MAX_WAITING_EACH);
                 let queue = Self {
                     lines: Some(lines),
                     ..Self::default()
                 };
-                ((send, Arc::clone(&queue.left_out)), queue)
+                ((send, Arc::clone(&queue.omitted)), queue)
             })
             .unzip();
-        let take = move |line: &str, number| hand_out(line, number, &sends);
+        let take = move |line: &str, number| distribute(line, number, &sends);
         read_lines(origin, take, at_end)?;
         Ok(queues)
     }
 
     /// Returns the next command that is due at a time of the device, s; `is_free` is true if the
     /// earlier ones are done. Faults of lines are reported.
-    pub fn due(&mut self, t_s: f64, is_free: bool, tell: &mut dyn FnMut(String)) -> Option<Wanted> {
-        while self.waiting.len() < WAITING
+    pub fn due(
+        &mut self,
+        t_s: f64,
+        is_free: bool,
+        notify: &mut dyn FnMut(String),
+    ) -> Option<Action> {
+        while self.waiting.len() < MAX_WAITING
             && let Some(Ok(read)) = self.lines.as_ref().map(Receiver::try_recv)
         {
             match read {
                 Ok(command) => self.waiting.push_back(command),
-                Err(why) => tell(why),
+                Err(why) => notify(why),
             }
         }
-        let left_out = self.left_out.swap(0, Ordering::Relaxed);
-        if left_out > 0 {
-            tell(format!(
-                "{left_out} commands were left out: this device was too far behind"
+        let omitted = self.omitted.swap(0, Ordering::Relaxed);
+        if omitted > 0 {
+            notify(format!(
+                "{omitted} commands were left out: this device was too far behind"
             ));
         }
         // A user's answer is due now, before earlier commands.
-        let is_answer = |it: &Command| matches!(it.wanted, Wanted::Enter(_)) && it.at_s.is_none();
+        let is_answer = |it: &Command| matches!(it.action, Action::Enter(_)) && it.at_s.is_none();
         if let Some(answer) = self.waiting.iter().position(is_answer) {
-            return self.waiting.remove(answer).map(|command| command.wanted);
+            return self.waiting.remove(answer).map(|command| command.action);
         }
         let next = self.waiting.front()?;
         let is_due = is_free && next.at_s.is_none_or(|at_s| t_s >= at_s);
         match is_due {
-            true => self.waiting.pop_front().map(|command| command.wanted),
+            true => self.waiting.pop_front().map(|command| command.action),
             false => None,
         }
     }
 }
 
 /// Sender to the queue of a device, and the number of left-out commands.
-type Way = (SyncSender<Read>, Arc<AtomicU64>);
+type DeviceSender = (SyncSender<Read>, Arc<AtomicU64>);
 
 /// Sends a line to its devices, and a fault to the first one that is still served. Returns false if
 /// none is.
-fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
-    let is_served = |way: &Way, read: Read| match way.0.try_send(read) {
+fn distribute(line: &str, number: u64, senders: &[DeviceSender]) -> bool {
+    let is_served = |sender: &DeviceSender, read: Read| match sender.0.try_send(read) {
         Ok(()) => true,
         Err(TrySendError::Full(_)) => {
-            way.1.fetch_add(1, Ordering::Relaxed);
+            sender.1.fetch_add(1, Ordering::Relaxed);
             true
         }
         Err(TrySendError::Disconnected(_)) => false,
     };
-    match for_each(line, number, ways.len()) {
+    match for_each(line, number, senders.len()) {
         Ok(None) => true,
         Ok(Some((Some(device), command))) => {
             // Other devices may be served when this one no longer is.
-            let way = ways.get(device - 1);
-            way.map(|way| is_served(way, Ok(command)));
+            let sender = senders.get(device - 1);
+            sender.map(|sender| is_served(sender, Ok(command)));
             true
         }
         Ok(Some((None, command))) => {
-            let served = ways
+            let served = senders
                 .iter()
-                .filter(|way| is_served(way, Ok(command.clone())));
+                .filter(|sender| is_served(sender, Ok(command.clone())));
             served.count() > 0
         }
-        Err(why) => ways.iter().any(|way| is_served(way, Err(why.clone()))),
+        Err(why) => senders
+            .iter()
+            .any(|sender| is_served(sender, Err(why.clone()))),
     }
 }
 
@@ -176,7 +183,7 @@ fn for_each(
     let (device, command) = addressed(line, devices).map_err(wrong)?;
     let command = parse(command).map_err(|why| wrong(why.to_string()))?;
     // The questions of two devices may have the same number.
-    let is_enter = |command: &Command| matches!(command.wanted, Wanted::Enter(_));
+    let is_enter = |command: &Command| matches!(command.action, Action::Enter(_));
     if devices > 1 && device.is_none() && command.as_ref().is_some_and(is_enter) {
         return Err(wrong(
             "`enter` is for one device: `on DEVICE enter NUMBER`".into(),
@@ -218,8 +225,8 @@ fn read_lines(
             let read = input.by_ref().take(MAX).read_line(&mut line);
             let is_whole = line.ends_with('\n') || (line.len() as u64) < MAX;
             // After a cut line, the rest has no meaning.
-            let goes_on = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
-            if !goes_on || !is_whole {
+            let is_accepted = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
+            if !is_accepted || !is_whole {
                 break;
             }
         }
@@ -235,13 +242,13 @@ mod tests {
     use crate::steering::Steer;
     use crate::timeouts::{next, wait_for, wait_until};
 
-    fn change(change: PlacementChange) -> Wanted {
-        Wanted::Steer(Steer::Change(change))
+    fn change(change: PlacementChange) -> Action {
+        Action::Steer(Steer::Change(change))
     }
 
     #[cfg(unix)]
     #[test]
-    fn line_without_end_is_refused_and_the_last() {
+    fn endless_command_line_is_cut_and_ends_input() {
         let (send, lines) = sync_channel(4);
         let take = move |line: &str, number| send.send((line.len(), number)).is_ok();
         let endless = Origin::File("/dev/zero".into());
@@ -251,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_wait_for_their_time_and_for_the_ones_before() {
+    fn commands_wait_for_their_time_and_predecessors() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
         let text = "# a tour\nat 1 zoom 2\nnonsense\nzoom 4\nat 0.5 reset\nmark done\n";
@@ -274,7 +281,7 @@ mod tests {
         let fifth = wait_for("the fifth line", || due(1.2, true));
         assert_eq!(fifth, change(PlacementChange::Reset));
         let sixth = wait_for("the sixth line", || due(1.2, true));
-        assert_eq!(sixth, Wanted::Mark("done".to_owned()));
+        assert_eq!(sixth, Action::Mark("done".to_owned()));
         assert_eq!(due(9.0, true), None);
         assert!(
             reported[0].starts_with("line 3 of the commands: `nonsense`"),
@@ -285,7 +292,7 @@ mod tests {
     }
 
     /// Takes all due commands of some queues until each has its count.
-    fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Wanted>>, Vec<String>) {
+    fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Action>>, Vec<String>) {
         let (mut due, mut reported) = (vec![vec![]; queues.len()], vec![]);
         wait_until("all commands", || {
             for (queue, due) in queues.iter_mut().zip(&mut due) {
@@ -297,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_is_for_each_device_or_for_the_one_that_it_names() {
+    fn command_is_for_all_devices_or_the_named_one() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
         let text = "zoom 2\non 2 zoom 3\non 3 zoom 9\non x reset\non 1 at 0 zoom 4\non 2 nonsense\nenter 7\non 2 enter 7\nzoom 5";
@@ -307,10 +314,10 @@ mod tests {
         let zoom = |times| change(PlacementChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
         // An answer does not wait for earlier commands.
-        let is_answer = |it: &&Wanted| matches!(it, Wanted::Enter(_));
+        let is_answer = |it: &&Action| matches!(it, Action::Enter(_));
         let (answers, others): (Vec<_>, Vec<_>) = due[1].iter().partition(is_answer);
         assert_eq!(others, [2.0, 3.0, 5.0].map(zoom).each_ref());
-        assert_eq!(answers, [&Wanted::Enter(7)]);
+        assert_eq!(answers, [&Action::Enter(7)]);
         // An error is reported only once, not by each device.
         let [third, fourth, sixth, seventh] = &reported[..] else {
             panic!("{reported:?}");
@@ -335,17 +342,17 @@ mod tests {
             answer = queue.due(0.0, false, &mut |why| panic!("{why}"));
             std::thread::yield_now();
         }
-        assert_eq!(answer, Some(Wanted::Enter(7)));
+        assert_eq!(answer, Some(Action::Enter(7)));
         assert_eq!(queue.due(0.0, false, &mut |why| panic!("{why}")), None);
         let zoom = queue.due(0.0, true, &mut |why| panic!("{why}"));
         assert_eq!(zoom, Some(change(PlacementChange::Zoom(2.0))));
     }
 
     #[test]
-    fn a_device_that_takes_no_commands_holds_no_other_up() {
+    fn stalled_device_does_not_block_commands_of_others() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
-        let count = WAITING_EACH + 1000;
+        let count = MAX_WAITING_EACH + 1000;
         let text = "on 2 reset\n".repeat(count) + "on 1 reset\nnonsense\n";
         std::fs::write(&path, text).expect("written");
         let mut queues = CommandQueue::of_several(&Origin::File(path), 3, || {}).expect("opened");
@@ -355,27 +362,27 @@ mod tests {
         let (due, _) = all_due(&mut queues, &[1]);
         assert_eq!(due[0], [change(PlacementChange::Reset)]);
         let mut reported = vec![];
-        let (mut taken, t_s) = (0, 0.0);
+        let (mut executed, t_s) = (0, 0.0);
         // A bounded queue keeps the commands that are not due yet.
         for _ in 0..3 {
             assert_eq!(
                 second.due(t_s, false, &mut |line| reported.push(line)),
                 None
             );
-            assert_eq!(second.waiting.len(), WAITING);
+            assert_eq!(second.waiting.len(), MAX_WAITING);
         }
         while second
             .due(t_s, true, &mut |line| reported.push(line))
             .is_some()
         {
-            taken += 1;
+            executed += 1;
         }
-        assert_eq!(taken, WAITING_EACH);
+        assert_eq!(executed, MAX_WAITING_EACH);
         assert_eq!(
             reported,
             [format!(
                 "{} commands were left out: this device was too far behind",
-                count - WAITING_EACH
+                count - MAX_WAITING_EACH
             )]
         );
     }

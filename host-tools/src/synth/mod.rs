@@ -84,7 +84,7 @@ impl Synth {
 
 impl Kind {
     /// Returns an amplitude that suits the shape, in cells.
-    pub fn usual_amplitude_cells(self) -> f64 {
+    pub fn default_amplitude_cells(self) -> f64 {
         match self {
             Self::Fractal => 60.0,
             Self::Plane => 10.0,

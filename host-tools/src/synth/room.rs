@@ -8,9 +8,9 @@ use super::rows::{Grid, append_row, write_asc_row};
 use crate::output::folder_of;
 
 /// Number of samples whose text length is measured.
-const SAMPLED: u32 = 4096;
+const MEASURED_SAMPLES: u32 = 4096;
 /// Max compression ratio of Deflate.
-const DEFLATE_AT_BEST: u64 = 1032;
+const MAX_DEFLATE_RATIO: u64 = 1032;
 
 /// A disk with too little room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -55,7 +55,7 @@ fn bytes(format: WrittenFormat, synth: &Synth, grid: &Grid) -> u64 {
     match format {
         WrittenFormat::GeoTiff => samples.saturating_mul(size_of::<f32>() as u64),
         WrittenFormat::EsriAscii => {
-            let columns = grid.columns.min(SAMPLED);
+            let columns = grid.columns.min(MEASURED_SAMPLES);
             let mut row = Vec::new();
             append_row(synth, columns, grid.rows / 2, &mut row);
             let mut text = Vec::new();
@@ -66,7 +66,7 @@ fn bytes(format: WrittenFormat, synth: &Synth, grid: &Grid) -> u64 {
                 .try_into()
                 .unwrap_or(u64::MAX)
         }
-        WrittenFormat::Png => samples.saturating_mul(size_of::<u16>() as u64) / DEFLATE_AT_BEST,
+        WrittenFormat::Png => samples.saturating_mul(size_of::<u16>() as u64) / MAX_DEFLATE_RATIO,
     }
 }
 
@@ -76,7 +76,7 @@ mod tests {
     use crate::synth::{Kind, write};
 
     /// Returns the predicted and the real size of a file.
-    fn foretold_and_true(name: &str, kind: Kind) -> (u64, u64) {
+    fn predicted_and_real_bytes(name: &str, kind: Kind) -> (u64, u64) {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
         let synth = Synth::new(kind, 3, 500.0);
@@ -98,15 +98,15 @@ mod tests {
     #[test]
     fn size_estimate_matches_the_written_file() {
         for kind in [Kind::Fractal, Kind::Plane, Kind::Steps] {
-            let (foretold, length) = foretold_and_true("a.tif", kind);
+            let (foretold, length) = predicted_and_real_bytes("a.tif", kind);
             assert!(
                 length >= foretold && length < foretold + 4000,
                 "{foretold} {length}"
             );
-            let (foretold, length) = foretold_and_true("a.asc", kind);
+            let (foretold, length) = predicted_and_real_bytes("a.asc", kind);
             let ratio = foretold as f64 / length as f64;
             assert!((0.7..1.4).contains(&ratio), "{foretold} {length}");
-            let (foretold, length) = foretold_and_true("a.png", kind);
+            let (foretold, length) = predicted_and_real_bytes("a.png", kind);
             assert!(foretold <= length, "{foretold} {length}");
         }
     }
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_file_leaves_nothing_and_spares_what_was_there() {
+    fn interrupted_write_keeps_the_existing_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.tif");
         std::fs::write(&path, "before").expect("written");
@@ -143,12 +143,12 @@ mod tests {
             cell_m: 10.0,
         };
         let mut rows = 0;
-        let mut go_on = || {
+        let mut should_continue = || {
             rows += 1;
             rows < 50
         };
         let synth = Synth::new(Kind::Plane, 1, 10.0);
-        write(&path, &synth, &grid, &mut go_on).expect_err("interrupted");
+        write(&path, &synth, &grid, &mut should_continue).expect_err("interrupted");
         assert_eq!(std::fs::read(&path).expect("there"), b"before");
         assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
     }

@@ -24,7 +24,7 @@ pub struct Interrupted;
 pub(super) struct Rows<'a> {
     synth: &'a Synth,
     pub(super) grid: &'a Grid,
-    go_on: &'a mut dyn FnMut() -> bool,
+    should_continue: &'a mut dyn FnMut() -> bool,
     /// Number of remaining rows.
     pub(super) left: u32,
     heights: Vec<f32>,
@@ -34,12 +34,12 @@ impl<'a> Rows<'a> {
     pub(super) fn new(
         synth: &'a Synth,
         grid: &'a Grid,
-        go_on: &'a mut dyn FnMut() -> bool,
+        should_continue: &'a mut dyn FnMut() -> bool,
     ) -> Self {
         Self {
             synth,
             grid,
-            go_on,
+            should_continue,
             left: grid.rows,
             heights: Vec::new(),
         }
@@ -53,7 +53,7 @@ impl<'a> Rows<'a> {
         self.left = row;
         self.heights.clear();
         append_row(self.synth, self.grid.columns, row, &mut self.heights);
-        if (self.go_on)() {
+        if (self.should_continue)() {
             Ok(Some(&self.heights))
         } else {
             Err(Interrupted)

@@ -35,7 +35,7 @@ fn heights_stay_between_zero_and_the_amplitude() {
 }
 
 #[test]
-fn the_seed_makes_another_terrain() {
+fn seed_changes_the_terrain() {
     for kind in Kind::value_variants() {
         let same = checksum(&Synth::new(*kind, 1, 5.0)) == checksum(&Synth::new(*kind, 2, 5.0));
         assert_eq!(same, *kind == Kind::Plane, "{kind:?}");
@@ -44,7 +44,7 @@ fn the_seed_makes_another_terrain() {
 
 /// Fixed values: any machine, build or later version must compute these bits.
 #[test]
-fn heights_are_the_same_to_the_last_bit_everywhere() {
+fn heights_are_bit_identical_on_every_machine() {
     let sums: Vec<u32> = Kind::value_variants()
         .iter()
         .map(|kind| checksum(&Synth::new(*kind, 42, 100.0)))
@@ -61,7 +61,7 @@ fn heights_are_the_same_to_the_last_bit_everywhere() {
 }
 
 #[test]
-fn a_plane_rises_east_and_north() {
+fn plane_rises_east_and_north() {
     let plane = Synth::new(Kind::Plane, 0, 100.0);
     for (column, row) in SAMPLE_PLACES {
         let expected = 2.0 * column as f32 + row as f32;
@@ -70,7 +70,7 @@ fn a_plane_rises_east_and_north() {
 }
 
 #[test]
-fn a_plane_is_as_high_as_its_height_is_stated() {
+fn plane_has_its_stated_height() {
     let rise = Synth::new(Kind::Plane, 1, 1.0).rise(301, 201);
     let plane = Synth::new(Kind::Plane, 1, 100.0 / rise).raster(301, 201);
     let heights = plane.expect("raster").summary();

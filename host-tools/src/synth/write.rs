@@ -66,7 +66,7 @@ impl From<png::EncodingError> for WriteFault {
 
 /// Writes a terrain in the format of the path's extension: `.tif` (GeoTIFF, float32, metres,
 /// BigTIFF if it is large), `.asc` (Esri ASCII) or `.png` (16-bit grey, whole metres). The file
-/// appears when it is complete. `go_on` is called once for each row and returns false to stop.
+/// appears when it is complete. `should_continue` is called once for each row and returns false to stop.
 ///
 /// # Errors
 /// When the extension, the free space, the file or the heights do not allow it. No part of the file
@@ -75,9 +75,9 @@ pub fn write(
     path: &Path,
     synth: &Synth,
     grid: &Grid,
-    go_on: &mut dyn FnMut() -> bool,
+    should_continue: &mut dyn FnMut() -> bool,
 ) -> Result<(), WriteError> {
-    write_file(path, synth, grid, go_on).map_err(|fault| WriteError {
+    write_file(path, synth, grid, should_continue).map_err(|fault| WriteError {
         path: path.to_path_buf(),
         fault,
     })
@@ -87,12 +87,12 @@ fn write_file(
     path: &Path,
     synth: &Synth,
     grid: &Grid,
-    go_on: &mut dyn FnMut() -> bool,
+    should_continue: &mut dyn FnMut() -> bool,
 ) -> Result<(), WriteFault> {
     let format = WrittenFormat::of(path).ok_or(WriteFault::UnknownExtension)?;
     room::check(path, format, synth, grid)?;
     let mut out = Output::create(path).map_err(|error| error.source)?;
-    let rows = &mut Rows::new(synth, grid, go_on);
+    let rows = &mut Rows::new(synth, grid, should_continue);
     match format {
         WrittenFormat::GeoTiff => write_geotiff(&mut out, rows)?,
         WrittenFormat::EsriAscii => write_asc(&mut out, rows)?,

@@ -17,7 +17,7 @@ pub struct Mean {
 
 impl Mean {
     /// Adds a value, which must not be negative.
-    pub fn take(&mut self, value: f64) {
+    pub fn add(&mut self, value: f64) {
         self.sum += value;
         self.count += 1;
         self.max = self.max.max(value);
@@ -63,23 +63,23 @@ pub struct Figures {
 
 impl Figures {
     /// Adds a sample and its record.
-    pub fn take(&mut self, sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) {
+    pub fn add(&mut self, sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) {
         self.samples += 1;
         self.late = self.late.max(sample.late);
         self.fault = sample.fault;
         if sample.tick > 1 {
-            self.cost.take(f64::from(sample.cost)); // the cost of the tick before
+            self.cost.add(f64::from(sample.cost)); // the cost of the tick before
         }
         if sample.state != ContactState::Touching {
             return;
         }
         let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        self.force_n.take(length(record.force_n));
+        self.force_n.add(length(record.force_n));
         let [x, y, z] = record.proxy_mm;
         let depth = std::array::from_fn(|i| record.proxy_mm[i] - record.hip_mm[i]);
-        self.penetration_mm.take(length(depth));
+        self.penetration_mm.add(length(depth));
         if let Some(height) = terrain.height_mm(x, y) {
-            self.height_error_mm.take((z - height).abs());
+            self.height_error_mm.add((z - height).abs());
         }
     }
 }

@@ -3,7 +3,7 @@
 use hapterra_core::scene::TickRecord;
 
 use crate::link::Event;
-use crate::place::Laid;
+use crate::place::PlacedSurface;
 use crate::terrain::Terrain;
 
 /// A rendered placement.
@@ -11,7 +11,7 @@ pub struct SessionPlacement<'t> {
     /// Its terrain.
     pub terrain: Terrain<'t>,
     /// Place, scale and surface parameters; `None` for the first scene.
-    pub laid: Option<Laid>,
+    pub placed_surface: Option<PlacedSurface>,
 }
 
 /// All placements of a session, in order.
@@ -26,27 +26,35 @@ impl<'t> Placements<'t> {
     /// Begins with the first scene.
     #[must_use]
     pub fn new(terrain: Terrain<'t>) -> Self {
-        let laid = None;
+        let placed_surface = None;
         Self {
-            views: vec![SessionPlacement { terrain, laid }],
+            views: vec![SessionPlacement {
+                terrain,
+                placed_surface,
+            }],
             of_number: [0; 256],
         }
     }
 
     /// Adds a placement with a number: later samples may belong to it.
-    pub fn put(&mut self, number: u8, terrain: Terrain<'t>, laid: Laid) {
+    pub fn add(&mut self, number: u8, terrain: Terrain<'t>, placed_surface: PlacedSurface) {
         if let Some(index) = self.of_number.get_mut(usize::from(number)) {
             *index = self.views.len();
         }
-        let laid = Some(laid);
-        self.views.push(SessionPlacement { terrain, laid });
+        let placed_surface = Some(placed_surface);
+        self.views.push(SessionPlacement {
+            terrain,
+            placed_surface,
+        });
     }
 
     /// Processes an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
             // A placement that was not accepted has no samples.
-            Event::Viewed { taken: false, .. } if self.views.len() > 1 => {
+            Event::SceneChangeResult {
+                accepted: false, ..
+            } if self.views.len() > 1 => {
                 self.views.pop();
             }
             // A restarted device begins with the latest placement as its scene.
@@ -86,7 +94,7 @@ mod tests {
     use hapterra_core::scene::{SceneChange, Source};
     use heightfield::Raster;
 
-    fn with(look: impl for<'t> FnOnce(Placements<'t>, Terrain<'t>, Laid)) {
+    fn with(test: impl for<'t> FnOnce(Placements<'t>, Terrain<'t>, PlacedSurface)) {
         let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
         let options = PlacementOptions::default();
         let grid = options.target.grid(&raster, Default::default());
@@ -96,7 +104,7 @@ mod tests {
         let terrain = view.terrain(grid).expect("a terrain");
         let params = SurfaceParams::PREMIUM;
         let views = Placements::new(terrain.clone());
-        look(views, terrain, Laid { view, params });
+        test(views, terrain, PlacedSurface { view, params });
     }
 
     fn of(view: u8) -> TickRecord {
@@ -108,11 +116,11 @@ mod tests {
 
     #[test]
     fn number_finds_its_placement_after_it_wraps() {
-        with(|mut views, terrain, laid| {
+        with(|mut views, terrain, placed_surface| {
             assert_eq!(views.index_of(&of(0)), 0);
             for count in 1..=300_usize {
                 let number = count as u8;
-                views.put(number, terrain.clone(), laid);
+                views.add(number, terrain.clone(), placed_surface);
                 assert_eq!(views.index_of(&of(number)), count);
             }
             // 300 is 44 in a byte, and 45 is still the earlier one.
@@ -123,26 +131,26 @@ mod tests {
 
     #[test]
     fn refused_placement_has_no_sample() {
-        with(|mut views, terrain, laid| {
-            views.put(1, terrain.clone(), laid);
+        with(|mut views, terrain, placed_surface| {
+            views.add(1, terrain.clone(), placed_surface);
             let hip = GridPoint::default();
-            let scene = terrain.scene(laid.params, Source::Encoders, hip);
+            let scene = terrain.scene(placed_surface.params, Source::Encoders, hip);
             let view = SceneChange {
                 number: 1,
                 scene,
                 hip,
                 keeps_tiles: true,
             };
-            let (view, taken) = (&view, false);
-            views.on_event(&Event::Viewed { view, taken });
+            let (view, accepted) = (&view, false);
+            views.on_event(&Event::SceneChangeResult { view, accepted });
             assert_eq!(views.count(), 1);
         });
     }
 
     #[test]
     fn restarted_device_begins_with_the_latest_placement() {
-        with(|mut views, terrain, laid| {
-            views.put(1, terrain.clone(), laid);
+        with(|mut views, terrain, placed_surface| {
+            views.add(1, terrain.clone(), placed_surface);
             let device = hello();
             for (resumed, index) in [(true, 0), (false, 1)] {
                 let device = &device;

@@ -33,12 +33,12 @@ impl<'t> SampleLog<'t> {
     }
 
     /// Adds a sample; returns its row, mm and s since the beginning.
-    pub fn take(&mut self, sample: &TickRecord) -> Record {
+    pub fn add(&mut self, sample: &TickRecord) -> Record {
         self.view = self.views.index_of(sample);
         let terrain = &self.views.get(self.view).terrain;
         let mut record = Record::of_tick(sample, self.tick_hz, terrain.scale());
         record.t_s = self.timeline.at(sample);
-        self.figures.take(sample, &record, terrain);
+        self.figures.add(sample, &record, terrain);
         record
     }
 

@@ -21,12 +21,12 @@ pub struct Distortion {
 
 impl Distortion {
     /// Max distortion of a surface that counts as true, as a share.
-    pub const TRUE: f64 = 1e-3;
+    pub const MAX_TRUE_SHARE: f64 = 1e-3;
 
     /// Returns true if the distortion exceeds 0.1 % somewhere in the rectangle.
     #[must_use]
     pub fn is_noticeable(&self) -> bool {
-        self.share > Self::TRUE
+        self.share > Self::MAX_TRUE_SHARE
     }
 }
 
@@ -46,19 +46,19 @@ impl HapticGrid<'_> {
         }
         let share = |place: u32| f64::from(place) / f64::from(PLACES - 1);
         let places = (0..PLACES).flat_map(|row| (0..PLACES).map(move |column| [column, row]));
-        let off = places.filter_map(|place| {
+        let distortion = places.filter_map(|place| {
             let along = |axis: usize| low[axis] + share(place[axis]) * (high[axis] - low[axis]);
             let ground = self.to_ground([along(0), along(1)]);
             let cell = self.raster().georeference().cell_at(ground)?;
-            let share = self.off_by(&cell)?;
+            let share = self.distortion_of(&cell)?;
             Some(Distortion { share, ground })
         });
-        off.max_by(|one, other| one.share.total_cmp(&other.share))
+        distortion.max_by(|one, other| one.share.total_cmp(&other.share))
     }
 
     /// Returns the deviation of the longest and the shortest side of a haptic cell in any
     /// direction, as a share, for file cells of a size.
-    fn off_by(&self, cell: &CellSize) -> Option<f64> {
+    fn distortion_of(&self, cell: &CellSize) -> Option<f64> {
         let side = self.side_m()?;
         let ((long, high), cosine) = (cell.ground_metres(), cell.lean);
         let sine = (1.0 - cosine * cosine).sqrt();
@@ -91,7 +91,7 @@ mod tests {
     use crate::terrain::haptic_grid::tests::cell;
     use heightfield::Raster;
 
-    fn grid_off(lean: f64, (east, north): (f64, f64), cells: HapticCells) -> f64 {
+    fn grid_distortion(lean: f64, (east, north): (f64, f64), cells: HapticCells) -> f64 {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0)
             .expect("a raster")
             .with_cell(cell(east, north, lean));
@@ -104,19 +104,22 @@ mod tests {
     /// cos 60°, and its area, sin 60°.
     #[test]
     fn stored_cell_distortion_is_that_of_the_worst_direction() {
-        for (lean, sides, wanted) in [
+        for (lean, sides, expected) in [
             (0.0, (40.0, 10.0), 1.0),
             (0.5, (10.0, 10.0), (1.5 / 0.75_f64.sqrt()).sqrt() - 1.0),
             (0.0, (10.0, 10.0), 0.0),
         ] {
-            let off = grid_off(lean, sides, HapticCells::Stored);
-            assert!((off - wanted).abs() < 1e-9, "{off} for {wanted}");
-            assert!(grid_off(lean, sides, HapticCells::Square) < 1e-9);
+            let distortion = grid_distortion(lean, sides, HapticCells::Stored);
+            assert!(
+                (distortion - expected).abs() < 1e-9,
+                "{distortion} for {expected}"
+            );
+            assert!(grid_distortion(lean, sides, HapticCells::Square) < 1e-9);
         }
     }
 
     #[test]
-    fn beside_the_field_there_is_nothing_to_be_off() {
+    fn rectangle_beside_the_field_has_no_distortion() {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("a raster");
         let grid = HapticGrid::new(&raster, HapticCells::Square);
         assert_eq!(grid.worst_in([9.0, 0.0, 12.0, 5.0]), None);

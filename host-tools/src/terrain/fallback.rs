@@ -15,7 +15,7 @@ use super::{Terrain, TileBuffer, identity};
 
 /// Power of two by which the near tile's samples are closer than the wide one's: it reaches a
 /// quarter as far.
-const NEAR_IS_FINER: u8 = 2;
+const NEAR_SHIFT: u8 = 2;
 
 impl Terrain<'_> {
     /// Returns a scene of this terrain with a fallback under the arm's whole reach. `reach_mm` is
@@ -25,28 +25,28 @@ impl Terrain<'_> {
     /// The scene has no fallback if none of the terrain lies in the rectangle, or if all of it fits
     /// into four tiles, which the device stores anyway.
     #[must_use]
-    pub fn underlaid(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
+    pub fn with_fallback(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
         let mut scene = Scene {
-            fallback: self.under(&scene, reach_mm),
+            fallback: self.fallback_of(&scene, reach_mm),
             ..scene
         };
         scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
         scene
     }
 
-    fn under(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Fallback> {
+    fn fallback_of(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Fallback> {
         let size = self.size();
         if size.iter().all(|cells| *cells <= 2 * TILE_CELLS as i32) {
             return None;
         }
-        let wide = self.wide(scene, reach_mm)?;
+        let wide = self.wide_tile(scene, reach_mm)?;
         let near = near(&wide, scene.home.column());
         let fallback = Fallback { wide, near };
         fallback.is_valid(self.level()).then_some(fallback)
     }
 
     /// Returns the finest tile that spans the rectangle.
-    fn wide(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<CoarseTile> {
+    fn wide_tile(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<CoarseTile> {
         let home = self.scale().to_mm(&scene.home);
         let size = self.size();
         let along = |axis: usize| {
@@ -174,7 +174,7 @@ impl Terrain<'_> {
 /// Returns the finer tile within a wide one, centred on a cell as far as possible; `None` if it
 /// would not be finer. Its samples include the borders of the wide one's cells.
 fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
-    let shift = wide.shift.saturating_sub(NEAR_IS_FINER);
+    let shift = wide.shift.saturating_sub(NEAR_SHIFT);
     let near = CoarseTile {
         shift: shift.max(CoarseTile::MIN_SHIFT),
         ..*wide

@@ -24,7 +24,7 @@ fn hills() -> Raster {
 fn fallback(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene, Fallback) {
     let home = GridPoint::new([home[0], home[1], 100], hapterra_core::Vec3::ZERO);
     let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
-    let scene = terrain.underlaid(scene, reach_mm);
+    let scene = terrain.with_fallback(scene, reach_mm);
     let fallback = scene.fallback.expect("a fallback");
     (scene, fallback)
 }
@@ -63,7 +63,7 @@ fn near_tile_surrounds_home_and_lies_within_the_wide_tile() {
     for home in [[1000, 800], [1003, 777], [0, 0], [2000, 1500], [400, 1480]] {
         let (_, Fallback { wide, near }) = fallback(&terrain, home, reach_mm);
         let near = near.expect("a finer one");
-        assert_eq!(near.shift + NEAR_IS_FINER, wide.shift);
+        assert_eq!(near.shift + NEAR_SHIFT, wide.shift);
         let side = |tile: &CoarseTile| 32 * tile.spacing();
         for (home, near_first, wide_first) in [
             (home[0], near.first.x, wide.first.x),
@@ -115,7 +115,7 @@ fn surface_is_continuous_across_the_near_tile_border() {
 }
 
 #[test]
-fn near_tile_border_is_kept_where_wide_tile_has_no_data() {
+fn near_tile_border_is_exact_where_wide_tile_has_no_data() {
     // A sample of the wide tile is no-data, and the near tile's border passes it.
     let hole = [1024, 384];
     let height = |x: u32, y: u32| match [x, y] == hole {

@@ -133,7 +133,7 @@ impl<'r> HapticGrid<'r> {
     ///
     /// Returns `None` if the cells agree, or if there would be too many square cells to count.
     #[must_use]
-    pub fn measured_anew(&self, haptic: [f64; 2]) -> Option<Self> {
+    pub fn remeasured_at(&self, haptic: [f64; 2]) -> Option<Self> {
         let last = self.last();
         let inside = [0, 1].map(|axis| haptic[axis].clamp(0.0, last[axis]));
         let ground = self.to_ground(inside);
@@ -141,10 +141,12 @@ impl<'r> HapticGrid<'r> {
         if is_alike(&now, &there) {
             return None;
         }
-        let anew = Self::at(self.raster, self.cells, ground);
-        let anew = anew.with_materials(self.materials).with_tip(self.tip_mm);
-        let anew = anew.with_wait(self.wait);
-        (self.cells == HapticCells::Stored || !anew.is_distorted()).then_some(anew)
+        let remeasured = Self::at(self.raster, self.cells, ground);
+        let remeasured = remeasured
+            .with_materials(self.materials)
+            .with_tip(self.tip_mm);
+        let remeasured = remeasured.with_wait(self.wait);
+        (self.cells == HapticCells::Stored || !remeasured.is_distorted()).then_some(remeasured)
     }
 
     /// Returns true if the grid has the same samples as another over the same raster.
@@ -392,12 +394,12 @@ impl<'r> HapticGrid<'r> {
             return (f64::NAN, ReadStatus::Complete);
         };
         // Both are below 2^32, or outside the raster.
-        self.height_seen(level, [column as f64, row as f64])
+        self.height_at_level(level, [column as f64, row as f64])
     }
 
     /// Returns the file's height at a level of detail, at a position in haptic cells; NaN in
     /// no-data and outside the raster. Also returns whether it is known.
-    pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
+    pub(super) fn height_at_level(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
         let [last_column, last_row] = self.last();
         if u > last_column || v > last_row {
             return (f64::NAN, ReadStatus::Complete);
@@ -527,7 +529,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_plane_is_true_in_every_direction_whatever_the_cells() {
+    fn plane_is_true_to_scale_on_cells_of_any_shape() {
         for (across, along, lean) in [
             (10.0, 30.0, 0.0),
             (30.0, 10.0, 0.0),
@@ -560,7 +562,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn square_cells_keep_their_exact_samples_and_so_do_stored_ones() {
+    fn square_and_stored_cells_keep_exact_samples() {
         for (cells, east) in [(HapticCells::Square, 10.009), (HapticCells::Stored, 30.0)] {
             let raster = plane(cell(east, 10.0, 0.0), [0.3, 0.7]);
             let grid = HapticGrid::new(&raster, cells);

@@ -223,7 +223,7 @@ impl<'r> Terrain<'r> {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn relaid(
+    pub fn with_grid(
         &self,
         grid: HapticGrid<'r>,
         scale: Scale,
@@ -380,7 +380,7 @@ impl<'r> Terrain<'r> {
     /// Returns the height of the ground for a picture with points `apart_mm` apart, mm: for a
     /// raster that stays in its file, at a level that is quick to read.
     #[must_use]
-    pub fn seen_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
+    pub fn picture_height_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         let cells = apart_mm / self.scale_of_level_0().cell_mm();
         let level = self.raster().level_for(cells).max(self.level);
         self.ground_mm(level, [east_mm, north_mm], &ReadTracker::default())
@@ -388,14 +388,14 @@ impl<'r> Terrain<'r> {
 
     /// Returns the height of the surface for the plan of a hand's path, with points `apart_mm`
     /// apart, mm: [`Self::height_mm`] for a raster in memory; for one that stays in its file
-    /// [`Self::seen_mm`], with a ball's centre over flat ground. A plan covers the whole terrain,
+    /// [`Self::picture_height_mm`], with a ball's centre over flat ground. A plan covers the whole terrain,
     /// but must not read all of it.
     #[must_use]
-    pub fn planned_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
+    pub fn plan_height_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         if self.raster().is_summary_complete() {
             return self.height_mm(east_mm, north_mm);
         }
-        let ground = self.seen_mm(east_mm, north_mm, apart_mm)?;
+        let ground = self.picture_height_mm(east_mm, north_mm, apart_mm)?;
         Some(ground + self.tip_cells() * self.scale.cell_mm())
     }
 
@@ -420,8 +420,8 @@ impl<'r> Terrain<'r> {
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
         // A patch with no-data at one corner is no-data.
-        let holes = south.iter().chain(&north).any(|h| h.is_nan());
-        (!holes).then(|| mix([mix(south, u), mix(north, u)], v))
+        let has_no_data = south.iter().chain(&north).any(|h| h.is_nan());
+        (!has_no_data).then(|| mix([mix(south, u), mix(north, u)], v))
     }
 
     /// Returns true if the tile exists.
@@ -518,15 +518,15 @@ impl<'r> Terrain<'r> {
 
     /// Returns the file's height of the ground at a haptic sample, at a level of detail, in the
     /// file's vertical unit; NaN if there is none. Also returns whether it is known.
-    pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> (f64, ReadStatus) {
+    pub(crate) fn ground_at_level(&self, level: u8, [column, row]: [u32; 2]) -> (f64, ReadStatus) {
         let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
-        self.grid.height_seen(level, place)
+        self.grid.height_at_level(level, place)
     }
 
     /// Returns the same height in cells, or that of a ball's centre on flat ground there; NaN if
     /// there is none that can be rendered.
     pub(super) fn cells_at(&self, level: u8, haptic: [u32; 2], reads: &ReadTracker) -> f64 {
-        let height = reads.record(self.ground_seen(level, haptic));
+        let height = reads.record(self.ground_at_level(level, haptic));
         self.within(self.scale.height_cells(height)) + self.tip_cells()
     }
 

@@ -49,7 +49,7 @@ fn held(tile: &Tile) -> Vec<f32> {
 }
 
 #[test]
-fn tiles_hold_the_rasters_samples_at_every_level() {
+fn tiles_contain_the_raster_samples_at_every_level() {
     let raster = Raster::from_fn(100, 70, |x, y| (x * 1000 + y) as f32 / 8.0).expect("raster");
     let scale = Scale::new(0.5, 0.25).expect("valid");
     for level in 0..3 {
@@ -75,7 +75,7 @@ fn tiles_hold_the_rasters_samples_at_every_level() {
 }
 
 #[test]
-fn a_constant_tile_is_one_number_even_at_the_border() {
+fn constant_tile_is_one_number_even_at_the_border() {
     let raster = Raster::from_fn(40, 40, |_, _| 7.25).expect("raster");
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let mut buffer = TileBuffer::default();
@@ -120,7 +120,7 @@ fn no_data_samples_are_kept_and_empty_tile_is_no_data() {
 }
 
 #[test]
-fn the_top_is_above_every_sample_however_far_up() {
+fn top_exceeds_every_sample_at_any_height() {
     for (offset, step) in [(0.0f32, 0.37f32), (-1e6, 0.1), (1e6, 0.06), (0.0, 100.0)] {
         let raster = Raster::from_fn(33, 33, |x, y| offset + step * (x * y % 97) as f32);
         let raster = raster.expect("raster");

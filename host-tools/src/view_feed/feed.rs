@@ -21,16 +21,16 @@ use crate::terrain::Terrain;
 /// Samples in a message of a live session: the viewer's hand moves once with each message.
 const LIVE_BATCH: usize = 33;
 /// Samples in a message of a recording.
-const PATIENT_BATCH: usize = 1000;
+const RECORDING_BATCH: usize = 1000;
 /// Time between two messages on the link, s of the device's time.
-const LINK_EVERY_S: f64 = 0.5;
+const LINK_INTERVAL_S: f64 = 0.5;
 /// Max pending bytes of a live session: some ten seconds of samples and the largest layer.
 const LIVE_BYTES: usize = 8 << 20;
 /// Max pending bytes if nothing is armed: a replay may be faster than a viewer for moments, and a
 /// recording waits.
-const PATIENT_BYTES: usize = 64 << 20;
+const RECORDING_BYTES: usize = 64 << 20;
 /// Time-out of the viewer's pending messages at the end.
-const AT_THE_END: Duration = Duration::from_secs(5);
+const END_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Number of dropped messages, batches of samples included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,9 +47,9 @@ pub struct ViewFeed<'t> {
     /// The terrain of the first placement, whose tiles keep their detail.
     first: Terrain<'t>,
     /// True if the terrain of the first placement is drawn during the whole session.
-    stands: bool,
+    converts_to_first: bool,
     /// The placement in force, if its cells differ from those of the first one.
-    standing: Option<ToFirstPlacement<'t>>,
+    to_first: Option<ToFirstPlacement<'t>>,
     /// A placement that has to be sent to the viewer before anything else.
     scene_due: Option<Box<Scene>>,
     tiles: Tiles,
@@ -58,7 +58,7 @@ pub struct ViewFeed<'t> {
     /// The viewer.
     child: Option<Child>,
     batch: Vec<stream::Sample>,
-    at_a_time: usize,
+    batch_size: usize,
     link_due_s: f64,
     latest: Option<stream::Sample>,
     late: u32,
@@ -93,11 +93,11 @@ impl<'t> ViewFeed<'t> {
         mut prepared: Prepared<'t>,
         device: Option<&DeviceHello>,
     ) -> Self {
-        let (limit, at_a_time) = match prepared.scene.is_live {
+        let (limit, batch_size) = match prepared.scene.is_live {
             true => (LIVE_BYTES, LIVE_BATCH),
-            false => (PATIENT_BYTES, PATIENT_BATCH),
+            false => (RECORDING_BYTES, RECORDING_BATCH),
         };
-        let stands = !prepared.scene.is_live;
+        let converts_to_first = !prepared.scene.is_live;
         let (terrain, has_cost) = (prepared.terrain.clone(), device.is_some());
         let tick = device.map(tick_cost);
         prepared.scene.tick.clone_from(&tick);
@@ -108,15 +108,15 @@ impl<'t> ViewFeed<'t> {
             tiles: Tiles::new(window, terrain.parts()),
             first: terrain.clone(),
             terrain,
-            stands,
-            standing: None,
+            converts_to_first,
+            to_first: None,
             scene_due: None,
             surroundings,
             tick,
             queue: Queue::start(pipe, first, limit),
             child: None,
-            batch: Vec::with_capacity(at_a_time),
-            at_a_time,
+            batch: Vec::with_capacity(batch_size),
+            batch_size,
             link_due_s: 0.0,
             latest: None,
             late: 0,
@@ -126,9 +126,9 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Adds a sample and its row.
-    pub fn take(&mut self, sample: &TickRecord, record: &Record) {
+    pub fn on_sample(&mut self, sample: &TickRecord, record: &Record) {
         self.late = sample.late;
-        self.tiles.lacks(sample.missing_tile);
+        self.tiles.set_missing(sample.missing_tile);
         // A sample has the cost of the tick before; the first has none.
         let cost = (self.has_cost && sample.tick > 1).then_some(sample.cost);
         self.row(record, cost);
@@ -136,7 +136,7 @@ impl<'t> ViewFeed<'t> {
 
     /// Adds a row of a recording, or of a sample.
     pub fn row(&mut self, record: &Record, cost: Option<u32>) {
-        let record = &self.shown(record);
+        let record = &self.converted(record);
         let [x, y, _] = record.hip_mm;
         let row = stream::Sample {
             t_s: record.t_s,
@@ -149,7 +149,7 @@ impl<'t> ViewFeed<'t> {
         };
         self.latest = Some(row);
         self.batch.push(row);
-        if self.batch.len() >= self.at_a_time {
+        if self.batch.len() >= self.batch_size {
             self.flush();
         }
     }
@@ -160,86 +160,87 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Changes to another placement of the terrain, that of the next sample.
-    pub fn go_over(&mut self, picture: Picture<'_, 't>) {
+    pub fn change_placement(&mut self, picture: Picture<'_, 't>) {
         self.flush();
-        self.standing = match self.stands {
+        self.to_first = match self.converts_to_first {
             true => ToFirstPlacement::new(&self.first, picture.terrain),
             false => None,
         };
-        match self.standing.take() {
-            Some(standing) => {
-                self.tell_view(Picture {
-                    terrain: standing.terrain(),
-                    home_mm: picture.home_mm.map(|home_mm| standing.place(home_mm)),
+        match self.to_first.take() {
+            Some(to_first) => {
+                self.send_view(Picture {
+                    terrain: to_first.terrain(),
+                    home_mm: picture.home_mm.map(|home_mm| to_first.place(home_mm)),
                     ..picture
                 });
-                self.standing = Some(standing);
+                self.to_first = Some(to_first);
             }
-            None => self.tell_view(picture),
+            None => self.send_view(picture),
         }
     }
 
     /// Converts a row for the viewer.
-    fn shown(&self, record: &Record) -> Record {
-        let standing = self.standing.as_ref();
-        standing.map_or(*record, |standing| standing.record(record))
+    fn converted(&self, record: &Record) -> Record {
+        let to_first = self.to_first.as_ref();
+        to_first.map_or(*record, |to_first| to_first.record(record))
     }
 
-    fn tell_view(&mut self, picture: Picture<'_, 't>) {
+    fn send_view(&mut self, picture: Picture<'_, 't>) {
         let keeps_cells = picture.terrain.grid().has_samples_of(self.terrain.grid());
         let keeps_tiles = picture.terrain.has_tiles_of(&self.terrain);
         // Combines this placement with one that was not sent to the viewer.
         let before = self.scene_due.as_ref();
-        let all_keep = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
-        self.tiles.go_over(keeps_tiles, picture.terrain.parts());
+        let keeps_all = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
+        self.tiles
+            .change_placement(keeps_tiles, picture.terrain.parts());
         self.terrain = picture.terrain.clone();
         let scene = Scene {
-            keeps_tiles: all_keep,
+            keeps_tiles: keeps_all,
             tick: self.tick.clone(),
             ..picture.scene()
         };
         let home = home_cells(&scene);
         match keeps_cells {
             true => self.surroundings.follow(&self.terrain, home),
-            false => self.surroundings.begin_anew(&self.terrain, home),
+            false => self.surroundings.restart(&self.terrain, home),
         }
         self.scene_due = Some(Box::new(scene));
-        self.tell_scene();
+        self.send_scene();
     }
 
     /// Returns true if the viewer has the placement in force.
-    fn tell_scene(&mut self) -> bool {
+    fn send_scene(&mut self) -> bool {
         let Some(scene) = self.scene_due.take() else {
             return true;
         };
-        let is_reported = self.queue.offer(Message::Scene(scene.clone()));
-        if !is_reported {
+        let is_sent = self.queue.offer(Message::Scene(scene.clone()));
+        if !is_sent {
             self.scene_due = Some(scene);
         }
-        is_reported
+        is_sent
     }
 
     /// Keeps the tile under a row's HIP in full detail: for rows that are not rendered by a device
     /// with a window.
-    pub fn detail(&mut self, record: &Record) {
-        let [x, y, _] = self.shown(record).hip_mm;
+    pub fn keep_detailed(&mut self, record: &Record) {
+        let [x, y, _] = self.converted(record).hip_mm;
         let cell_mm = self.terrain.scale_of_level_0().cell_mm();
         self.tiles
-            .detail(&self.first, [x, y].map(|mm| mm / cell_mm));
-        self.tiles.tell(&self.first, &self.queue);
+            .keep_detailed(&self.first, [x, y].map(|mm| mm / cell_mm));
+        self.tiles.send_pending(&self.first, &self.queue);
     }
 
     /// Sends the due messages on tiles and link; call it after each poll of the line.
-    pub fn look(&mut self, stats: &LinkStats) {
-        if !self.tell_scene() {
+    pub fn send_due(&mut self, stats: &LinkStats) {
+        if !self.send_scene() {
             return;
         }
-        self.tiles.tell(&self.terrain, &self.queue);
-        self.tiles.tell_window(&self.queue);
-        self.surroundings.tell(&self.terrain, &self.queue);
+        self.tiles.send_pending(&self.terrain, &self.queue);
+        self.tiles.send_window(&self.queue);
+        self.surroundings.send_pending(&self.terrain, &self.queue);
         let due_s = self.link_due_s;
         if let Some(latest) = self.latest.filter(|latest| latest.t_s >= due_s) {
-            self.link_due_s = latest.t_s + LINK_EVERY_S;
+            self.link_due_s = latest.t_s + LINK_INTERVAL_S;
             let link = Link {
                 t_s: latest.t_s,
                 tiles: stats.tiles,
@@ -264,7 +265,7 @@ impl<'t> ViewFeed<'t> {
     #[must_use]
     pub fn finish(mut self) -> (Dropped, Option<Child>) {
         self.flush();
-        self.queue.end(AT_THE_END);
+        self.queue.end(END_TIMEOUT);
         (self.dropped, self.child)
     }
 
@@ -272,9 +273,9 @@ impl<'t> ViewFeed<'t> {
         if self.batch.is_empty() {
             return;
         }
-        let batch = std::mem::replace(&mut self.batch, Vec::with_capacity(self.at_a_time));
+        let batch = std::mem::replace(&mut self.batch, Vec::with_capacity(self.batch_size));
         let samples = batch.len() as u64;
-        let is_reported = match self.tell_scene() {
+        let is_sent = match self.send_scene() {
             true => self.offer(Message::Samples(batch)),
             // The viewer would draw them in the placement before.
             false => {
@@ -282,15 +283,15 @@ impl<'t> ViewFeed<'t> {
                 false
             }
         };
-        if !is_reported {
+        if !is_sent {
             self.dropped.samples += samples;
         }
     }
 
     fn offer(&mut self, message: Message) -> bool {
-        let is_taken = self.queue.offer(message);
-        self.dropped.messages += u64::from(!is_taken);
-        is_taken
+        let is_accepted = self.queue.offer(message);
+        self.dropped.messages += u64::from(!is_accepted);
+        is_accepted
     }
 }
 
@@ -357,7 +358,7 @@ mod tests {
         }
         // No room, not even for a placement.
         while feed.queue.offer(Message::Link(Link::default())) {}
-        feed.go_over(picture(&second));
+        feed.change_placement(picture(&second));
         for _ in 0..2 * LIVE_BATCH {
             row(&mut feed, 1.0);
         }

@@ -11,7 +11,7 @@ use crate::terrain::{Scale, Terrain};
 pub(super) struct ToFirstPlacement<'t> {
     view: Terrain<'t>,
     /// The placement's terrain in the cells of the first one, equally large in device millimetres.
-    stands: Terrain<'t>,
+    in_first_cells: Terrain<'t>,
 }
 
 impl<'t> ToFirstPlacement<'t> {
@@ -26,21 +26,24 @@ impl<'t> ToFirstPlacement<'t> {
         let scale = Scale::new(cell_mm, scale.height_mm_per_unit()).ok()?;
         Some(Self {
             view: view.clone(),
-            stands: first.relaid(*grid, scale, view.level()).ok()?,
+            in_first_cells: first.with_grid(*grid, scale, view.level()).ok()?,
         })
     }
 
     /// Returns the terrain of the placement in the cells of the first one.
     pub(super) const fn terrain(&self) -> &Terrain<'t> {
-        &self.stands
+        &self.in_first_cells
     }
 
     /// Converts a position, mm: the same ground and height.
     pub(super) fn place(&self, [east, north, up]: [f64; 3]) -> [f64; 3] {
-        let (from, to) = (self.view.scale_of_level_0(), self.stands.scale_of_level_0());
+        let (from, to) = (
+            self.view.scale_of_level_0(),
+            self.in_first_cells.scale_of_level_0(),
+        );
         let cells = [east, north].map(|mm| mm / from.cell_mm());
         let ground = self.view.grid().to_ground(cells);
-        let [east, north] = self.stands.grid().of_ground(ground);
+        let [east, north] = self.in_first_cells.grid().of_ground(ground);
         [east * to.cell_mm(), north * to.cell_mm(), up]
     }
 
@@ -61,7 +64,7 @@ mod tests {
     use heightfield::{CellSize, CellUnit, Raster};
 
     #[test]
-    fn the_same_ground_stands_where_the_beginning_has_it() {
+    fn ground_is_mapped_to_the_first_placement() {
         let raster = Raster::from_fn(41, 41, |column, row| (3 * column + row) as f32);
         let raster = raster.expect("raster");
         let cell = |east| CellSize {

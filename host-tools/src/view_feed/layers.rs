@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_and_a_layer_have_the_terrains_heights() {
+    fn tiles_and_layers_have_the_terrain_heights() {
         let raster = Raster::from_fn(70, 70, |x, y| (x + 100 * y) as f32);
         let raster = raster.expect("raster");
         let terrain = Terrain::new(&raster, Scale::new(0.5, 2.0).expect("scale"), 0);

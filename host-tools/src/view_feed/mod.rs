@@ -8,9 +8,9 @@
 //! and counted; a viewer that is slow, hangs or is killed changes nothing else.
 //! [`hapterra_view_stream`] defines the messages of the stream.
 
+mod device_window;
 mod feed;
 mod first_placement;
-mod held_tiles;
 mod layers;
 #[cfg(test)]
 mod pipe;

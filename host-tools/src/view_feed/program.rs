@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn missing_viewer_error_names_its_path() {
         let missing = Program::at("/no/such/program".into());
-        let stated = missing.start().expect_err("there is none").to_string();
-        assert!(stated.contains("/no/such/program"), "{stated}");
+        let message = missing.start().expect_err("there is none").to_string();
+        assert!(message.contains("/no/such/program"), "{message}");
     }
 }

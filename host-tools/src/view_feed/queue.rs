@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use hapterra_view_stream::{Message, write};
 
 /// Time between two checks that everything is written.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Pending messages to a viewer, in order.
 pub(super) struct Queue {
@@ -78,7 +78,7 @@ impl Queue {
         let until = Instant::now() + wait;
         let is_full = || self.waiting.load(Ordering::Acquire) > self.limit / 2;
         while is_full() && !self.is_gone.load(Ordering::Acquire) && Instant::now() < until {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
         !self.is_gone.load(Ordering::Acquire)
     }
@@ -91,7 +91,7 @@ impl Queue {
         let until = Instant::now() + wait;
         let is_writing = |writer: &JoinHandle<()>| !writer.is_finished();
         while self.writer.as_ref().is_some_and(is_writing) && Instant::now() < until {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
         // A thread that still writes ends with this program.
     }
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_reads_gets_everything_in_order() {
+    fn reader_receives_everything_in_order() {
         let (pipe, out) = sync_channel(1);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 1 << 20);
         let mut end = Vec::new();
@@ -185,8 +185,8 @@ mod tests {
     fn stalled_reader_never_blocks_the_sender() {
         let (pipe, out) = sync_channel(0);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);
-        let taken = (0..1000).filter(|_| queue.offer(tiles(100))).count();
-        assert!((1..=12).contains(&taken), "{taken}");
+        let accepted = (0..1000).filter(|_| queue.offer(tiles(100))).count();
+        assert!((1..=12).contains(&accepted), "{accepted}");
         queue.end(Duration::from_millis(50));
         drop(out);
     }

@@ -51,14 +51,14 @@ impl Surroundings {
 
     /// Begins again with the coarsest layer, around a home position (cells), because the cells have
     /// changed.
-    pub(super) fn begin_anew(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
+    pub(super) fn restart(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
         *self = Self::new(terrain, home);
         self.due = self.extents.iter().copied().enumerate().rev().collect();
     }
 
     /// Reads a few rows, and sends a layer that is complete: the caller waits for no more than
     /// these rows.
-    pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
+    pub(super) fn send_pending(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         if let Some(layer) = self.read.take() {
             let message = Message::Layer(layer);
             if let Err(Message::Layer(layer)) = queue.offer_or_return(message) {
@@ -109,7 +109,7 @@ mod tests {
         for (home, looks) in homes {
             surroundings.follow(&terrain, *home);
             for _ in 0..*looks {
-                surroundings.tell(&terrain, &queue);
+                surroundings.send_pending(&terrain, &queue);
             }
         }
         queue.end(HANG);
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_layers_follow_a_far_pan_but_not_a_near_one() {
+    fn finer_layers_follow_only_far_pans() {
         assert_eq!(reported(&[([2000.0, 30.0], 9), ([1000.0, 10.0], 9)]), []);
         let layers = reported(&[([15_000.0, 30.0], 9), ([15_100.0, 30.0], 9)]);
         let [layer] = layers.as_slice() else {
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pan_meanwhile_leaves_what_was_being_read() {
+    fn pan_cancels_the_layer_being_read() {
         let layers = reported(&[([9000.0, 30.0], 1), ([15_000.0, 30.0], 9)]);
         let wests: Vec<_> = layers.iter().map(|layer| layer.first[0]).collect();
         assert!(matches!(wests[..], [west] if west > 9000), "{wests:?}");

@@ -5,28 +5,28 @@ use std::collections::HashSet;
 use hapterra_core::terrain::{TileIndex, TileKey};
 use hapterra_view_stream::{Message, TILE_CELLS};
 
-use super::held_tiles::HeldTiles;
+use super::device_window::DeviceWindow;
 use super::layers;
 use super::queue::Queue;
 use crate::link::Event;
 use crate::terrain::Terrain;
 
 /// Max tiles that a device requests before the first sample of a placement.
-const MAX_COMING: usize = 1024;
+const MAX_REQUESTED: usize = 1024;
 /// Max tiles of a recording in full detail: further ones stay coarse.
 const MAX_DETAILED: usize = 400;
 /// Max tiles sent in one call, to keep it short: their heights are read again.
-const AT_A_TIME: usize = 8;
+const MAX_TILES_PER_CALL: usize = 8;
 
 /// Tiles, and those of them that are pending.
 pub(super) struct Tiles {
-    held: HeldTiles,
+    window: DeviceWindow,
     /// Tiles sent since the device accepted a placement that has no sample yet.
-    coming: Option<Vec<TileKey>>,
+    requested: Option<Vec<TileKey>>,
     /// Tiles that keep their detail.
     detailed: HashSet<TileKey>,
     /// Pending tiles for the viewer, by slot.
-    unreported: Vec<(u32, TileKey)>,
+    pending: Vec<(u32, TileKey)>,
 }
 
 impl Tiles {
@@ -34,24 +34,26 @@ impl Tiles {
     /// number of haptic cells along the side of a cell of the level.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
-            held: HeldTiles::new(side, parts),
-            coming: None,
+            window: DeviceWindow::new(side, parts),
+            requested: None,
             detailed: HashSet::new(),
-            unreported: vec![],
+            pending: vec![],
         }
     }
 
     /// Sets the tile that the loop lacks now.
-    pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
-        self.held.lacks(tile);
+    pub(super) fn set_missing(&mut self, tile: Option<TileIndex>) {
+        self.window.set_missing(tile);
     }
 
     /// Processes an event about the device's window.
     pub(super) fn on_event(&mut self, event: &Event<'_>) {
-        match (event, &mut self.coming) {
-            (Event::Viewed { taken: true, .. }, _) => self.coming = Some(vec![]),
+        match (event, &mut self.requested) {
+            (Event::SceneChangeResult { accepted: true, .. }, _) => self.requested = Some(vec![]),
             // More tiles than a window holds are not sent within a few samples.
-            (Event::TileSent(key), Some(coming)) if coming.len() < MAX_COMING => coming.push(*key),
+            (Event::TileSent(key), Some(requested)) if requested.len() < MAX_REQUESTED => {
+                requested.push(*key)
+            }
             (Event::TileSent(key), None) => self.sent(*key),
             (Event::Opened { resumed: false, .. }, _) => self.forget(),
             _ => {}
@@ -60,31 +62,31 @@ impl Tiles {
 
     /// Changes to another placement: with the tiles of the one before, or only with those sent
     /// since the device accepted it.
-    pub(super) fn go_over(&mut self, keeps_tiles: bool, parts: u32) {
+    pub(super) fn change_placement(&mut self, keeps_tiles: bool, parts: u32) {
         if !keeps_tiles {
             self.forget();
         }
-        self.held.go_over(parts);
-        for key in self.coming.take().unwrap_or_default() {
+        self.window.change_placement(parts);
+        for key in self.requested.take().unwrap_or_default() {
             self.sent(key);
         }
     }
 
     /// Empties the window.
     fn forget(&mut self) {
-        self.held.clear();
-        self.unreported.clear();
+        self.window.clear();
+        self.pending.clear();
     }
 
     fn sent(&mut self, key: TileKey) {
-        let (slot, key) = self.held.sent(key);
-        self.unreported.retain(|(other, _)| *other != slot);
-        self.unreported.push((slot, key));
+        let (slot, key) = self.window.sent(key);
+        self.pending.retain(|(other, _)| *other != slot);
+        self.pending.push((slot, key));
     }
 
     /// Keeps the tile at a position (cells) in full detail: for rows that are not rendered by a
     /// device with a window.
-    pub(super) fn detail(&mut self, terrain: &Terrain<'_>, cells: [f64; 2]) {
+    pub(super) fn keep_detailed(&mut self, terrain: &Terrain<'_>, cells: [f64; 2]) {
         let side = f64::from(TILE_CELLS) * f64::from(terrain.level()).exp2();
         let [col, row] = cells.map(|cells| (cells / side).floor() as i32);
         let key = TileKey::new(terrain.level(), col, row);
@@ -92,30 +94,30 @@ impl Tiles {
         let is_there = terrain.has(TileKey::new(key.level, haptic(col), haptic(row)));
         let has_room = self.detailed.len() < MAX_DETAILED;
         if has_room && is_there && self.detailed.insert(key) {
-            self.unreported.push((self.detailed.len() as u32, key));
+            self.pending.push((self.detailed.len() as u32, key));
         }
     }
 
     /// Sends some of the pending tiles.
-    pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
+    pub(super) fn send_pending(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         let mut reported = 0;
-        for (slot, key) in std::mem::take(&mut self.unreported) {
+        for (slot, key) in std::mem::take(&mut self.pending) {
             // A tile that does not fit in the queue is tried again in the next call.
-            let is_reported = reported < AT_A_TIME
+            let is_sent = reported < MAX_TILES_PER_CALL
                 && queue.offer(Message::Tile(layers::tile(terrain, key.index, slot)));
-            match is_reported {
+            match is_sent {
                 true => reported += 1,
-                false => self.unreported.push((slot, key)),
+                false => self.pending.push((slot, key)),
             }
         }
     }
 
     /// Sends the lists of stored and missing tiles if they have changed.
-    pub(super) fn tell_window(&mut self, queue: &Queue) {
-        if let Some(tiles) = self.held.take_change()
+    pub(super) fn send_window(&mut self, queue: &Queue) {
+        if let Some(tiles) = self.window.take_change()
             && !queue.offer(Message::Tiles(tiles))
         {
-            self.held.not_told();
+            self.window.mark_unsent();
         }
     }
 }

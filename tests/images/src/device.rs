@@ -193,7 +193,7 @@ impl<'t> Device<'t> {
     /// If there is no answer.
     pub fn query_status(&mut self) -> Status {
         self.status = None;
-        self.session.ask(HostRequest::Status);
+        self.session.enqueue(HostRequest::Status);
         self.run_ms(150);
         self.status.clone().expect("an answer")
     }

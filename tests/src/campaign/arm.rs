@@ -65,7 +65,7 @@ impl<'t> Arm<'t> {
         let wave = |random: &mut Random| (random.between(0.05, 0.45), random.between(0.0, TAU));
         Self {
             terrain,
-            plant: Plant::new(model, q.expect("within reach")).held_by(HandModel::default()),
+            plant: Plant::new(model, q.expect("within reach")).with_hand(HandModel::default()),
             placement,
             waves: std::array::from_fn(|_| wave(random)),
             t_s: 0.0,
@@ -108,7 +108,7 @@ impl<'t> Arm<'t> {
         self.target_mm = self.target(hand_motion);
         let speed = std::array::from_fn(|i| 1e-3 * (self.target_mm[i] - before[i]) / TICK_S);
         let at = self.placement.to_device_m(self.plant.model(), before);
-        self.plant.aim(at, ArmFrame::turn_to_device(speed));
+        self.plant.set_target(at, ArmFrame::turn_to_device(speed));
         self.plant.step(currents_a, TICK_S);
     }
 

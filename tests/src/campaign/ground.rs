@@ -1,6 +1,6 @@
 //! Surface of a segment's ground: frictionless, or effects and materials drawn at random.
 
-use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::materials::{ClassMaterial, ClassMaterials, Materials};
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{
     Controller, Damping, Material, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
@@ -105,12 +105,17 @@ impl Effects {
             name: None,
             material: *material,
         };
-        let looks = Looks {
+        let class_materials = ClassMaterials {
             default: Material::of(&self.params),
             class: (1..).zip(&self.classes).map(class).collect(),
         };
         let over = ("terrain", terrain);
-        Materials::over(over, ("classes", classes.expect("classes")), looks).ok()
+        Materials::over(
+            over,
+            ("classes", classes.expect("classes")),
+            class_materials,
+        )
+        .ok()
     }
 
     /// Returns the surface parameters of a scene with `times` the stiffness.

@@ -100,12 +100,12 @@ impl<'t> Host<'t> {
 
     /// Queries the status.
     pub fn query_status(&mut self) {
-        self.client.ask(HostRequest::Status);
+        self.client.enqueue(HostRequest::Status);
     }
 
     /// Sends a request.
     pub fn request(&mut self, request: Request) {
-        self.client.ask(HostRequest::Request(request));
+        self.client.enqueue(HostRequest::Request(request));
     }
 
     /// Sends a message that the real client would not send.
@@ -153,7 +153,7 @@ impl<'t> Host<'t> {
 
     /// Repeats unanswered messages, and opens a new session if the device is gone.
     fn run_timers(&mut self, now: u64, out: &mut Vec<u8>) {
-        match self.client.due(time(now), out, &mut |_| {}) {
+        match self.client.append_due(time(now), out, &mut |_| {}) {
             Ok(()) => {}
             Err(LinkError::Silent(_) | LinkError::NotConfirmed) => {
                 self.client.greet(time(now), out);

@@ -103,7 +103,7 @@ impl<'t> Host<'t> {
         let fault = self.view.and_then(|view| view.fault);
         let clear = Request::ClearFault { fault };
         for request in [clear, zero, Request::Arm] {
-            self.client.ask(HostRequest::Request(request));
+            self.client.enqueue(HostRequest::Request(request));
         }
     }
 
@@ -153,7 +153,7 @@ impl<'t> Host<'t> {
             _ => {}
         };
         client.receive(now, bytes, out, &mut on)?;
-        client.due(now, out, &mut on)
+        client.append_due(now, out, &mut on)
     }
 
     /// Returns true if its user sees that the arm waits for the dead-man switch.

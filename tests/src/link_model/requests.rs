@@ -106,8 +106,10 @@ impl RequestSequence {
                 RequestStep::HostRequest(HostRequest::Request(expected)),
             ) if **request == expected => usize::from(result.is_err()),
             (Event::Calibration(_), RequestStep::HostRequest(HostRequest::Calibration)) => 0,
-            (Event::Viewed { view, taken }, RequestStep::View(number)) if view.number == number => {
-                usize::from(!*taken)
+            (Event::SceneChangeResult { view, accepted }, RequestStep::View(number))
+                if view.number == number =>
+            {
+                usize::from(!*accepted)
             }
             (Event::Unanswered(unanswered), RequestStep::HostRequest(expected))
                 if **unanswered == expected =>

@@ -368,7 +368,7 @@ impl<'t> Simulation<'t> {
             }
             received = received.and_then(|()| self.client.receive(now, &frame, &mut out, &mut on));
         }
-        let received = received.and_then(|()| self.client.due(now, &mut out, &mut on));
+        let received = received.and_then(|()| self.client.append_due(now, &mut out, &mut on));
         self.send(&out);
         let session = self.client.session().get();
         self.oracle.reported(session, opened.as_ref(), &samples)?;
@@ -387,7 +387,7 @@ impl<'t> Simulation<'t> {
             && is_idle
             && let Some(ask) = self.status_queries.query(self.device_ticks)
         {
-            self.client.ask(ask);
+            self.client.enqueue(ask);
         }
     }
 
@@ -402,7 +402,7 @@ impl<'t> Simulation<'t> {
                 self.run_requests(0);
             }
             Step::Touching if self.ramp_samples >= RAMP_SAMPLES => {
-                self.client.ask(HostRequest::Request(Request::Disarm));
+                self.client.enqueue(HostRequest::Request(Request::Disarm));
                 self.step = Step::Disarming(None);
             }
             Step::Disarming(Some(answered)) => {
@@ -444,7 +444,7 @@ impl<'t> Simulation<'t> {
                     }
                     _ => {}
                 }
-                self.client.ask(ask);
+                self.client.enqueue(ask);
             }
             RequestStep::View(number) => self.put_view(number),
             // A remaining force has faded.
@@ -490,7 +490,7 @@ impl<'t> Simulation<'t> {
             (LinkError::Version { .. }, _) if self.other_device => {
                 self.step = Step::Ended(End::Reported);
             }
-            (LinkError::Silent(_) | LinkError::LetGo, _) if self.resumptions < MAX_RESUMPTIONS => {
+            (LinkError::Silent(_) | LinkError::HostSilent, _) if self.resumptions < MAX_RESUMPTIONS => {
                 self.resumptions += 1;
                 if let Step::Disarming(_) | Step::Requesting = self.step {
                     self.close();
@@ -498,7 +498,7 @@ impl<'t> Simulation<'t> {
                     self.greet();
                 }
             }
-            (LinkError::Silent(_) | LinkError::LetGo, _) => self.close(),
+            (LinkError::Silent(_) | LinkError::HostSilent, _) => self.close(),
             (error, _) => return Err(Violation::Error(error.to_string())),
         }
         Ok(())

@@ -5,8 +5,8 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use hapterra::bringup::{
-    Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, Step,
-    Stopped, Task, VirtualBench, VirtualUser, Walked, walk,
+    Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, SequenceEnd,
+    Step, Stopped, Task, VirtualBench, VirtualUser, run_sequence,
 };
 use hapterra::link::{ControlSession, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
@@ -23,49 +23,53 @@ const LATE_RAD_S: f64 = 0.3;
 
 thread_local! {
     /// Messages, one a line.
-    static STATED: RefCell<String> = const { RefCell::new(String::new()) };
+    static PRINTED: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-fn say(line: &str) {
+fn print_line(line: &str) {
     println!("{line}");
-    STATED.with_borrow_mut(|text| *text += &format!("{line}\n"));
+    PRINTED.with_borrow_mut(|text| *text += &format!("{line}\n"));
 }
 
 /// Runs the walk with a user, and checks the speeds of the joints.
-fn walked(user: &mut VirtualUser, record: Calibration, log: &mut Log) -> Result<(), BringupError> {
-    let ended = walked_unwatched(user, record, log);
-    let fastest = user.bench().borrow().fastest_rad_s();
-    println!("fastest {fastest:?} rad/s");
-    let most = f64::from(MAX_JOG_SPEED_RAD_S) + LATE_RAD_S;
-    assert!(fastest.iter().all(|speed| *speed < most), "{fastest:?}");
-    ended
-}
-
-/// Runs the walk with a user from the end of a log; the board is power-cycled where the steps
-/// require it.
-fn walked_unwatched(
+fn run_bringup(
     user: &mut VirtualUser,
     record: Calibration,
     log: &mut Log,
 ) -> Result<(), BringupError> {
-    STATED.take();
+    let result = run_unchecked(user, record, log);
+    let fastest = user.bench().borrow().max_rate_rad_s();
+    println!("fastest {fastest:?} rad/s");
+    let limit = f64::from(MAX_JOG_SPEED_RAD_S) + LATE_RAD_S;
+    assert!(fastest.iter().all(|speed| *speed < limit), "{fastest:?}");
+    result
+}
+
+/// Runs the walk with a user from the end of a log; the board is power-cycled where the steps
+/// require it.
+fn run_unchecked(
+    user: &mut VirtualUser,
+    record: Calibration,
+    log: &mut Log,
+) -> Result<(), BringupError> {
+    PRINTED.take();
     loop {
         let device = user.device(record);
-        match walked_once(user, device, log) {
-            Ok(Walked::BoardWasOff) => {}
-            Ok(Walked::ToTheEnd) => return Ok(()),
+        match run_once(user, device, log) {
+            Ok(SequenceEnd::BoardPoweredOff) => {}
+            Ok(SequenceEnd::Complete) => return Ok(()),
             Err(error) => return Err(error),
         }
     }
 }
 
-fn walked_once(
+fn run_once(
     user: &mut dyn Attendant,
     device: Native<StoppedClock>,
     log: &mut Log,
-) -> Result<Walked, BringupError> {
+) -> Result<SequenceEnd, BringupError> {
     let opened = ControlSession::open(Box::new(device), HANG);
-    walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
+    run_sequence(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
 /// Returns the transcript for a user without mistakes, as in the documentation.
@@ -82,24 +86,24 @@ fn found(bench: VirtualBench, record: Calibration) -> (Step, Finding) {
 /// Same as `found`, with all steps before this one passed earlier.
 fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Finding) {
     let mut user = VirtualUser::at(bench);
-    user.says = say;
+    user.print = print_line;
     let mut log = Log::default();
     let opened = ControlSession::open(Box::new(user.device(record)), HANG);
     let opened = opened.expect("it answers");
-    _ = log.meet(Identity::of(opened.device(), Some(&record)));
+    _ = log.update_identity(Identity::of(opened.device(), Some(&record)));
     for step in Step::ALL.into_iter().filter(|step| *step < from) {
-        log.take(step, true, String::new());
+        log.add(step, true, String::new());
     }
-    let ended = walked(&mut user, record, &mut log);
-    let Err(BringupError::Found { step, finding }) = ended else {
-        panic!("{ended:?}");
+    let result = run_bringup(&mut user, record, &mut log);
+    let Err(BringupError::Found { step, finding }) = result else {
+        panic!("{result:?}");
     };
     // The log records it, and the next start is at this step.
     assert_eq!(log.next(), Some(step));
     let last = log.entries.last().expect("an entry");
     assert_eq!((last.step, last.passed), (step, false));
     assert_eq!(last.result, finding.to_string());
-    assert!(!finding.what_to_do().is_empty());
+    assert!(!finding.remedy().is_empty());
     (step, finding)
 }
 
@@ -110,27 +114,27 @@ fn wired(wiring: Wiring) -> VirtualBench {
 #[test]
 fn correct_arm_completes_every_step() {
     let mut user = VirtualUser::new(Wiring::RIGHT);
-    user.says = say;
+    user.print = print_line;
     let mut log = Log::default();
-    walked(&mut user, RECORD, &mut log).expect("to the end");
+    run_bringup(&mut user, RECORD, &mut log).expect("to the end");
     assert_eq!(log.next(), None);
     assert_eq!(log.entries.len(), Step::ALL.len());
-    assert_eq!(STATED.take(), transcript());
+    assert_eq!(PRINTED.take(), transcript());
 }
 
 #[test]
 fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     let mut user = VirtualUser::new(Wiring::RIGHT.with_gain(1, -1.0));
-    user.says = say;
+    user.print = print_line;
     let mut log = Log::default();
-    walked(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
+    run_bringup(&mut user, RECORD, &mut log).expect_err("the sign is inverted");
     assert_eq!(log.next(), Some(Step::Motor2));
-    let error = STATED.take() + "error: " + &log.entries.last().expect("one").result + "\n";
+    let error = PRINTED.take() + "error: " + &log.entries.last().expect("one").result + "\n";
     assert!(error.contains("step 8 of 11: motor 2"));
     // The next start is at this step, and the arm must be zeroed again.
-    let ended = walked(&mut user, RECORD, &mut log);
-    assert!(ended.is_err());
-    let text = STATED.take();
+    let result = run_bringup(&mut user, RECORD, &mut log);
+    assert!(result.is_err());
+    let text = PRINTED.take();
     assert!(
         text.starts_with("step 8 of 11") && text.contains("zero pose"),
         "{text}"
@@ -138,14 +142,14 @@ fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     // With the reported sign the record changes, so it is measured again.
     let mut record = RECORD;
     record.motor_sign.y = -1.0;
-    walked(&mut user, record, &mut log).expect("to the end");
-    let text = STATED.take();
+    run_bringup(&mut user, record, &mut log).expect("to the end");
+    let text = PRINTED.take();
     assert!(text.starts_with("the calibration is another one"), "{text}");
     assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
 
 /// A user who does some tasks and answers some questions differently.
-struct Another {
+struct OtherUser {
     user: VirtualUser,
     /// Response to a task.
     does: fn(Task) -> Task,
@@ -153,8 +157,8 @@ struct Another {
     answers: fn(Question) -> Option<bool>,
 }
 
-impl Another {
-    fn than(user: VirtualUser) -> Self {
+impl OtherUser {
+    fn new(user: VirtualUser) -> Self {
         Self {
             user,
             does: |task| task,
@@ -163,13 +167,13 @@ impl Another {
     }
 
     /// Never holds the tip at a motor's first jog.
-    fn careless(user: VirtualUser) -> Self {
+    fn without_hold(user: VirtualUser) -> Self {
         Self {
             does: |task| match task {
-                Task::HoldLoosely => Task::LetGoOfTip,
+                Task::HoldLoosely => Task::ReleaseTip,
                 task => task,
             },
-            ..Self::than(user)
+            ..Self::new(user)
         }
     }
 
@@ -177,14 +181,14 @@ impl Another {
     fn without_ready(user: VirtualUser) -> Self {
         Self {
             answers: |question| (question == Question::ReadyIsWired).then_some(false),
-            ..Self::than(user)
+            ..Self::new(user)
         }
     }
 }
 
-impl Attendant for Another {
-    fn hear(&mut self, line: &str) {
-        self.user.hear(line);
+impl Attendant for OtherUser {
+    fn notify(&mut self, line: &str) {
+        self.user.notify(line);
     }
 
     fn begin(&mut self, task: Task) {
@@ -199,10 +203,10 @@ impl Attendant for Another {
         self.user.read(reading)
     }
 
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
+    fn confirm(&mut self, question: Question) -> Result<bool, Stopped> {
         match (self.answers)(question) {
             Some(answer) => Ok(answer),
-            None => self.user.confirms(question),
+            None => self.user.confirm(question),
         }
     }
 
@@ -233,7 +237,7 @@ fn wrong_tick_rate_of_the_board_is_named() {
     // The chips' own oscillators may be off by one per cent.
     let slow = BenchMistakes {
         clock_slow_by: 0.01,
-        output_off_v: [1.0; 3],
+        output_offset_v: [1.0; 3],
         ..BenchMistakes::default()
     };
     let (step, _) = found_of_the_board(slow);
@@ -241,7 +245,7 @@ fn wrong_tick_rate_of_the_board_is_named() {
 }
 
 #[test]
-fn a_usb_clock_that_does_not_follow_the_host_is_named() {
+fn unlocked_usb_clock_is_named() {
     let unlocked = BenchMistakes {
         usb_clock_unlocked: true,
         ..BenchMistakes::default()
@@ -257,21 +261,21 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     model.gravity_m_s2 = 0.0;
     for gain in [1.0, -1.0] {
         let wiring = Wiring::RIGHT.with_gain(0, gain);
-        let mut user = Another::careless(VirtualUser::at(VirtualBench::new(model, wiring)));
-        user.user.says = say;
-        STATED.take();
+        let mut user = OtherUser::without_hold(VirtualUser::at(VirtualBench::new(model, wiring)));
+        user.user.print = print_line;
+        PRINTED.take();
         let mut log = Log::default();
-        let mut ended = Ok(Walked::BoardWasOff);
-        while let Ok(Walked::BoardWasOff) = ended {
+        let mut result = Ok(SequenceEnd::BoardPoweredOff);
+        while let Ok(SequenceEnd::BoardPoweredOff) = result {
             let device = user.user.device(RECORD);
-            ended = walked_once(&mut user, device, &mut log);
+            result = run_once(&mut user, device, &mut log);
         }
-        let text = STATED.take();
+        let text = PRINTED.take();
         assert!(text.contains("the jog ended with fault 22"), "{text}");
-        let fastest = user.user.bench().borrow().fastest_rad_s();
+        let fastest = user.user.bench().borrow().max_rate_rad_s();
         println!("fastest {fastest:?} rad/s");
-        let most = f64::from(MAX_JOG_SPEED_RAD_S) + LATE_RAD_S;
-        assert!(fastest[0] < most, "{fastest:?}");
+        let limit = f64::from(MAX_JOG_SPEED_RAD_S) + LATE_RAD_S;
+        assert!(fastest[0] < limit, "{fastest:?}");
         // The direction of its motion is still reported.
         let inverted = log
             .entries
@@ -282,7 +286,7 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
 }
 
 #[test]
-fn an_amplifier_of_another_scale_is_named() {
+fn wrongly_scaled_amplifier_is_named() {
     for (gain, axis, step) in [(0.4, 0, Step::Motor1), (2.0, 1, Step::Motor2)] {
         let wiring = Wiring::RIGHT.with_gain(axis, gain);
         let (_, finding) = found_from(step, wired(wiring), RECORD);
@@ -301,8 +305,8 @@ fn an_amplifier_of_another_scale_is_named() {
 }
 
 #[test]
-fn a_weight_that_the_record_does_not_know_is_named() {
-    // It is detected before the arm is as fast as in a jog: `walked` checks that.
+fn wrong_gravity_record_is_named() {
+    // It is detected before the arm is as fast as in a jog: `run_bringup` checks that.
     for gravity_2_nm in [0.03, 0.1, -0.06, -0.1] {
         let record = Calibration {
             gravity_2_nm,
@@ -323,7 +327,7 @@ fn swapped_motors_are_named() {
 }
 
 #[test]
-fn an_inverted_sign_is_named() {
+fn inverted_motor_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
         .into_iter()
         .enumerate()
@@ -334,12 +338,12 @@ fn an_inverted_sign_is_named() {
         let motor = axis + 1;
         assert_eq!(finding, Finding::InvertedMotor { motor, right: -1 });
         let hint = format!("--set motor-sign-{motor}=-1");
-        assert!(finding.what_to_do().contains(&hint));
+        assert!(finding.remedy().contains(&hint));
     }
 }
 
 #[test]
-fn a_dead_encoder_is_named() {
+fn dead_encoder_is_named() {
     for axis in 0..3 {
         let (step, finding) = found(wired(Wiring::RIGHT.with_dead_encoder(axis)), RECORD);
         assert_eq!(step, Step::Encoders);
@@ -349,7 +353,7 @@ fn a_dead_encoder_is_named() {
 }
 
 #[test]
-fn a_wrong_ratio_is_named() {
+fn wrong_ratio_is_named() {
     let mut model = PhantomModel::premium_1_5();
     model.drive[1].ratio *= 0.8;
     let (step, finding) = found(VirtualBench::new(model, Wiring::RIGHT), RECORD);
@@ -378,7 +382,7 @@ fn miswired_emergency_stop_is_named() {
     };
     let (step, finding) = found_at(Step::Board, normally_open);
     assert_eq!(step, Step::Switches);
-    assert_eq!(finding, Finding::NotSeen(Task::ReleaseStop));
+    assert_eq!(finding, Finding::NotDetected(Task::ReleaseStop));
     let for_the_board_alone = BenchMistakes {
         stop_leaves_power: true,
         ..BenchMistakes::default()
@@ -391,7 +395,7 @@ fn miswired_emergency_stop_is_named() {
 }
 
 #[test]
-fn an_enable_line_without_its_pull_down_is_named() {
+fn enable_line_without_pull_down_is_named() {
     let floats = BenchMistakes {
         enable_floats: true,
         ..BenchMistakes::default()
@@ -404,23 +408,23 @@ fn an_enable_line_without_its_pull_down_is_named() {
 }
 
 #[test]
-fn a_ready_input_that_no_amplifier_drives_is_named() {
+fn grounded_ready_input_is_named() {
     for axis in 0..3 {
         let mut mistakes = BenchMistakes::default();
         mistakes.ready_grounded[axis] = true;
         let (step, finding) = found_at(Step::Board, mistakes);
         assert_eq!(step, Step::EnableLine);
-        assert_eq!(finding, Finding::NotSeen(Task::PullReadyWire(axis)));
-        assert!(finding.what_to_do().contains("tied to ground"), "{finding}");
+        assert_eq!(finding, Finding::NotDetected(Task::PullReadyWire(axis)));
+        assert!(finding.remedy().contains("tied to ground"), "{finding}");
     }
 }
 
 #[test]
-fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
+fn output_offset_is_named_at_the_amplifier_input() {
     for axis in 0..3 {
         let off = |volts| {
             let mut mistakes = BenchMistakes::default();
-            mistakes.output_off_v[axis] = volts;
+            mistakes.output_offset_v[axis] = volts;
             mistakes
         };
         let (step, finding) = found_at(Step::Board, off(0.5));
@@ -434,7 +438,7 @@ fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
         // A stage with resistors of one per cent passes.
         let mut log = Log::default();
         let bench = wired(Wiring::RIGHT).with_mistakes(off(0.3));
-        walked(&mut VirtualUser::at(bench), RECORD, &mut log).expect("to the end");
+        run_bringup(&mut VirtualUser::at(bench), RECORD, &mut log).expect("to the end");
     }
 }
 
@@ -462,11 +466,11 @@ fn amplifiers_without_ready_lines_are_noted() {
         ..BenchMistakes::default()
     };
     let bench = wired(Wiring::RIGHT).with_mistakes(mistakes);
-    let mut user = Another::without_ready(VirtualUser::at(bench));
+    let mut user = OtherUser::without_ready(VirtualUser::at(bench));
     let mut log = Log::default();
     let device = user.user.device(RECORD);
-    let ended = walked_once(&mut user, device, &mut log).expect("to the enable line");
-    assert_eq!(ended, Walked::BoardWasOff);
+    let result = run_once(&mut user, device, &mut log).expect("to the enable line");
+    assert_eq!(result, SequenceEnd::BoardPoweredOff);
     let last = log.entries.last().expect("an entry");
     assert_eq!(last.step, Step::EnableLine);
     assert!(
@@ -476,7 +480,7 @@ fn amplifiers_without_ready_lines_are_noted() {
 }
 
 #[test]
-fn a_motor_that_does_not_push_is_named() {
+fn motor_without_push_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
         .into_iter()
         .enumerate()
@@ -490,11 +494,11 @@ fn a_motor_that_does_not_push_is_named() {
 }
 
 #[test]
-fn a_jog_beyond_its_bounds_is_refused() {
+fn jog_beyond_its_bounds_is_refused() {
     let user = VirtualUser::new(Wiring::RIGHT);
     let opened = ControlSession::open(Box::new(user.device(RECORD)), HANG);
     let mut control = opened.expect("it answers");
-    let mut ask = |request| control.request(&request).expect("it answers");
+    let mut request = |request| control.request(&request).expect("it answers");
     let jog = |axis, current_a, hold_ms| {
         Request::Jog(Jog {
             axis,
@@ -508,9 +512,9 @@ fn a_jog_beyond_its_bounds_is_refused() {
         jog(0, 0.1, 5_001),
         jog(1, f32::NAN, 1),
     ] {
-        assert_eq!(ask(beyond), Err(Refusal::NoSuchJog), "{beyond:?}");
+        assert_eq!(request(beyond), Err(Refusal::NoSuchJog), "{beyond:?}");
     }
     // Conditions that block arming also block a jog: this arm is not zeroed.
-    let blocked = ask(jog(0, 0.3, 500));
+    let blocked = request(jog(0, 0.3, 500));
     assert_eq!(blocked, Err(Refusal::Blocked(Blockers::NOT_ZEROED)));
 }

@@ -1,7 +1,7 @@
 //! The calibration walk with a virtual Phantom whose true numbers differ from the preset, over the
 //! real link.
 
-use hapterra::calibrate::{Attendant, Plan, Review, VirtualUser, walk};
+use hapterra::calibrate::{Attendant, Plan, Review, VirtualUser, run_procedure};
 use hapterra::link::{ControlSession, HostClock, LinkError, Native};
 use hapterra::phantom::STANDARD_GRAVITY;
 use hapterra_core::phantom::Calibration;
@@ -12,8 +12,8 @@ const FRICTION_NM: f64 = 0.01;
 
 fn calibrated(user: &mut VirtualUser) -> Review {
     let device = Native::new(HostClock::default(), None)
-        .meddled_with(user.hands())
-        .restless();
+        .with_fault_injector(user.hands())
+        .free_running();
     let opened = ControlSession::open(Box::new(device), HANG);
     let mut control = opened.expect("it answers");
     let plan = Plan {
@@ -22,7 +22,8 @@ fn calibrated(user: &mut VirtualUser) -> Review {
     };
     let mut counts =
         || -> Result<[i32; 3], LinkError> { Ok(control.fresh_status()?.health.sense.counts) };
-    let review = walk(&Calibration::PREMIUM_1_5, plan, user, &mut counts).expect("a record");
+    let review =
+        run_procedure(&Calibration::PREMIUM_1_5, plan, user, &mut counts).expect("a record");
     let stored = control.store(review.after).expect("it answers");
     assert_eq!(stored, Ok(()));
     assert_eq!(
@@ -45,7 +46,7 @@ fn errors(user: &VirtualUser, review: &Review) -> ([f64; 3], [f64; 2]) {
 
 #[test]
 fn calibration_recovers_true_ratios_signs_and_weights() {
-    let mut user = VirtualUser::with_a_stylus();
+    let mut user = VirtualUser::with_stylus();
     let review = calibrated(&mut user);
     let (ratios, weights) = errors(&user, &review);
     assert!(ratios.iter().all(|error| *error < 0.003), "{ratios:?}");
@@ -62,9 +63,9 @@ fn calibration_recovers_true_ratios_signs_and_weights() {
 }
 
 #[test]
-fn a_ruler_read_half_a_millimetre_off_costs_a_per_cent() {
-    let mut user = VirtualUser::with_a_stylus();
-    user.ruler_off_mm = 0.5;
+fn ruler_error_of_half_a_millimetre_costs_one_per_cent() {
+    let mut user = VirtualUser::with_stylus();
+    user.ruler_error_mm = 0.5;
     let review = calibrated(&mut user);
     let (ratios, _) = errors(&user, &review);
     assert!(ratios.iter().all(|error| *error < 0.012), "{ratios:?}");
@@ -72,13 +73,13 @@ fn a_ruler_read_half_a_millimetre_off_costs_a_per_cent() {
 }
 
 #[test]
-fn an_attendant_who_does_not_agree_changes_nothing() {
+fn rejected_calibration_changes_nothing() {
     /// Refuses the result at the end.
     struct No(VirtualUser);
 
     impl Attendant for No {
-        fn hear(&mut self, line: &str) {
-            self.0.hear(line);
+        fn notify(&mut self, line: &str) {
+            self.0.notify(line);
         }
         fn zero_pose(&mut self) -> Result<(), hapterra::calibrate::Stopped> {
             self.0.zero_pose()
@@ -96,18 +97,18 @@ fn an_attendant_who_does_not_agree_changes_nothing() {
         ) -> Result<Option<[f64; 2]>, hapterra::calibrate::Stopped> {
             self.0.hold_still(number)
         }
-        fn agrees(&mut self, _: &Review) -> Result<bool, hapterra::calibrate::Stopped> {
+        fn confirm_record(&mut self, _: &Review) -> Result<bool, hapterra::calibrate::Stopped> {
             Ok(false)
         }
     }
 
-    let mut user = No(VirtualUser::with_a_stylus());
+    let mut user = No(VirtualUser::with_stylus());
     let counts = user.0.counts();
     let plan = Plan {
         ratios: true,
         gravity: false,
     };
     let mut read = || Ok::<_, std::convert::Infallible>(counts.get());
-    let refused = walk(&Calibration::PREMIUM_1_5, plan, &mut user, &mut read);
+    let refused = run_procedure(&Calibration::PREMIUM_1_5, plan, &mut user, &mut read);
     assert!(refused.is_err());
 }

@@ -33,12 +33,14 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
         .last()
         .is_none_or(|last: &TickRecord| last.tick < ticks)
     {
-        let mut take = |event: Event<'_>| {
+        let mut on_event = |event: Event<'_>| {
             if let Event::Sample(sample) = event {
                 samples.push(*sample);
             }
         };
-        session.poll(Duration::ZERO, &mut take).expect("goes on");
+        session
+            .poll(Duration::ZERO, &mut on_event)
+            .expect("goes on");
     }
     assert_eq!(session.stats().lost + session.stats().dropped, 0);
     assert!(samples.iter().all(|sample| sample.fault.is_none()));
@@ -84,7 +86,7 @@ fn tip_rests_at_the_depth_of_two_newtons() {
         let expected_mm = 2.0 / f64::from(stiffness);
         // Friction holds 0.01 N·m on an arm of 0.21 m against the springs of wall and hand
         // together; two encoders are half a count off.
-        let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
+        let hand_n_per_mm = 1e-3 / HandModel::default().compliance_m_per_n();
         let bound_mm = 0.01 / 0.2095 / (f64::from(stiffness) + hand_n_per_mm) + 0.03;
         for sample in &samples[lift - 300..lift - 5] {
             assert_eq!(sample.state, ContactState::Touching);
@@ -100,7 +102,7 @@ fn tip_rests_at_the_depth_of_two_newtons() {
 }
 
 #[test]
-fn lifted_there_is_no_force() {
+fn lifted_hand_has_no_force() {
     let (samples, _, _) = press(0.5);
     let end = &samples[samples.len() - 300..];
     assert!(end.iter().all(|s| s.state == ContactState::Free));
@@ -123,7 +125,7 @@ fn sliding_proxy_stays_on_surface_and_force_in_bounds() {
         let mut figures = Figures::default();
         for sample in &samples {
             let record = Record::of_tick(sample, 1000, &scale);
-            figures.take(sample, &record, &terrain);
+            figures.add(sample, &record, &terrain);
         }
         let mean = figures.height_error_mm.mean();
         eprintln!(

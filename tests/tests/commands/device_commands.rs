@@ -4,9 +4,9 @@ use std::process::{Command, Output, Stdio};
 
 use hapterra_tests::hapterra_binary;
 
-fn hapterra(words: &[&str]) -> Output {
+fn hapterra(arguments: &[&str]) -> Output {
     Command::new(hapterra_binary())
-        .args(words)
+        .args(arguments)
         .stdin(Stdio::null())
         .output()
         .expect("it runs")
@@ -18,12 +18,12 @@ fn output_text(output: &Output) -> String {
 }
 
 /// Runs a command that must fail with `code` and print each of these.
-fn fails(words: &[&str], code: i32, says: &[&str]) {
-    let output = hapterra(words);
+fn fails(arguments: &[&str], code: i32, expected: &[&str]) {
+    let output = hapterra(arguments);
     let text = output_text(&output);
-    assert_eq!(output.status.code(), Some(code), "{words:?}: {text}");
-    for part in says {
-        assert!(text.contains(part), "{words:?}: no {part:?} in\n{text}");
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {text}");
+    for part in expected {
+        assert!(text.contains(part), "{arguments:?}: no {part:?} in\n{text}");
     }
 }
 
@@ -119,8 +119,8 @@ fn guessed_ratios_need_measurement_or_explicit_consent() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];
     for model in ["premium-1.0", "premium-3.0", "omni"] {
         for skip in ["none", "zero,gravity"] {
-            let words = [&base[..], &["--model", model, "--measure", skip]].concat();
-            fails(&words, 1, &["a guess", "guessed-ratios"]);
+            let arguments = [&base[..], &["--model", model, "--measure", skip]].concat();
+            fails(&arguments, 1, &["a guess", "guessed-ratios"]);
         }
     }
     let agreed = ["--model", "premium-1.0", "--measure", "none,guessed-ratios"];
@@ -133,8 +133,8 @@ fn guessed_ratios_need_measurement_or_explicit_consent() {
         "--set",
         "ratio-1=7.2",
     ];
-    for words in [&agreed[..], &known[..], &measured[..]] {
-        let output = hapterra(&[&base[..], words].concat());
+    for arguments in [&agreed[..], &known[..], &measured[..]] {
+        let output = hapterra(&[&base[..], arguments].concat());
         assert!(output.status.success(), "{}", output_text(&output));
     }
 }
@@ -159,7 +159,7 @@ fn record_above_absolute_limit_is_refused_before_sending() {
 }
 
 #[test]
-fn wrong_words_are_answered_with_what_to_do() {
+fn wrong_arguments_have_an_error_with_a_remedy() {
     fails(
         &["status", "--device", "serial"],
         2,

@@ -16,9 +16,9 @@ use hapterra_tests::timeouts::next;
 use hapterra_tests::{hapterra_binary, repository, terrain_file};
 use serde_json::Value;
 
-fn hapterra(words: &[&str]) -> Command {
+fn hapterra(arguments: &[&str]) -> Command {
     let mut command = Command::new(hapterra_binary());
-    command.args(words).env_remove("HAPTERRA_MPS2_ELF");
+    command.args(arguments).env_remove("HAPTERRA_MPS2_ELF");
     command
 }
 
@@ -54,7 +54,7 @@ fn example(name: &str) -> Option<Example> {
 }
 
 /// Returns the lines that an example prints for these events.
-fn stated(mut example: Example, events: &[Value]) -> Vec<String> {
+fn printed_lines(mut example: Example, events: &[Value]) -> Vec<String> {
     for event in events {
         writeln!(example.line, "{event}").expect("taken");
     }
@@ -85,21 +85,21 @@ fn hills_in(folder: &Path, size: u32) -> PathBuf {
 }
 
 /// A command that sends events, and its events.
-struct Telling {
+struct EventRun {
     child: Child,
     stdin: Option<ChildStdin>,
     events: JoinHandle<Vec<Value>>,
     /// Each event as it arrives.
-    coming: Receiver<Value>,
+    arrived: Receiver<Value>,
     /// Connections that are never read.
     stuck: TcpStream,
     stderr: JoinHandle<Vec<String>>,
 }
 
-impl Telling {
+impl EventRun {
     /// Starts the command with this value of `--events`.
-    fn start(words: &[&str], events: &str) -> Self {
-        let mut child = hapterra(&[words, &["--events", events]].concat())
+    fn start(arguments: &[&str], events: &str) -> Self {
+        let mut child = hapterra(&[arguments, &["--events", events]].concat())
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -119,19 +119,19 @@ impl Telling {
         let address = address.expect("where it listens");
         let connect = || TcpStream::connect(&address).expect("connected");
         let (stream, stuck) = (connect(), connect());
-        let (came, coming) = channel();
+        let (sender, arrived) = channel();
         let events = spawn(move || {
             let lines = BufReader::new(stream).lines().map_while(Result::ok);
             let parsed = lines.map(|line| serde_json::from_str(&line).expect("JSON"));
             parsed
-                .inspect(|event: &Value| drop(came.send(event.clone())))
+                .inspect(|event: &Value| drop(sender.send(event.clone())))
                 .collect::<Vec<Value>>()
         });
         Self {
             stdin: child.stdin.take(),
             child,
             events,
-            coming,
+            arrived,
             stuck,
             stderr: spawn(move || reported.lines().map_while(Result::ok).collect()),
         }
@@ -139,7 +139,7 @@ impl Telling {
 
     /// Returns the next event of a kind.
     fn wait_for(&self, kind: &str) -> Value {
-        let found = from_fn(|| next(&self.coming)).find(|event| event["event"] == *kind);
+        let found = from_fn(|| next(&self.arrived)).find(|event| event["event"] == *kind);
         found.unwrap_or_else(|| panic!("no {kind}"))
     }
 
@@ -159,7 +159,7 @@ fn run_sends_events_that_the_examples_speak_and_sound() {
     let hills = hills_in(folder.path(), 256);
     let [record, commands] = ["felt.csv", "commands"].map(|name| folder.path().join(name));
     std::fs::write(&commands, "at 4 mark a \"b\"\nat 4.1 zoom 1.5\n").expect("written");
-    let words = [
+    let arguments = [
         "run",
         text(&hills),
         "--device",
@@ -168,10 +168,10 @@ fn run_sends_events_that_the_examples_speak_and_sound() {
         "6s",
     ];
     let more = ["--out", text(&record), "--commands", text(&commands)];
-    let events = Telling::start(&[&words[..], &more].concat(), "0,10").end();
-    judge(&events, &record);
+    let events = EventRun::start(&[&arguments[..], &more].concat(), "0,10").end();
+    check_events(&events, &record);
     if let Some(example) = example("speak_heights.py") {
-        let heights = stated(example, &events);
+        let heights = printed_lines(example, &events);
         let of = |kind: &'static str| events.iter().filter(move |event| event["event"] == *kind);
         let reported: Vec<_> = of("contact")
             .filter(|event| event["touching"] == true)
@@ -185,7 +185,7 @@ fn run_sends_events_that_the_examples_speak_and_sound() {
         );
     }
     if let Some(example) = example("sound_impacts.py") {
-        let knocks = stated(example, &events);
+        let knocks = printed_lines(example, &events);
         let contacts = events.iter().filter(|event| event["speed_mm_s"].is_f64());
         assert_eq!(knocks.len(), contacts.count(), "{knocks:?}");
         assert!(knocks.iter().all(|knock| knock.starts_with("knock at ")));
@@ -193,7 +193,7 @@ fn run_sends_events_that_the_examples_speak_and_sound() {
 }
 
 /// Compares events with the recording of the same run.
-fn judge(events: &[Value], record: &Path) {
+fn check_events(events: &[Value], record: &Path) {
     let recorded = std::fs::read_to_string(record).expect("there");
     let mut lines = recorded.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<_> = lines.next().expect("a header").split(',').collect();
@@ -341,7 +341,7 @@ fn demo_emits_samples_marks_and_refusals() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
     let out = folder.path().join("out");
-    let words = [
+    let arguments = [
         "demo",
         text(&hills),
         "--device",
@@ -350,7 +350,7 @@ fn demo_emits_samples_marks_and_refusals() {
         text(&out),
     ];
     let more = ["--duration", "2.5s", "--commands", "-"];
-    let mut demo = Telling::start(&[&words[..], &more].concat(), "0,100");
+    let mut demo = EventRun::start(&[&arguments[..], &more].concat(), "0,100");
     demo.wait_for("sample");
     let mut stdin = demo.stdin.take().expect("piped");
     stdin
@@ -382,7 +382,7 @@ fn run_ends_disarmed_when_its_input_ends() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
     let record = folder.path().join("felt.csv");
-    let words = [
+    let arguments = [
         "run",
         text(&hills),
         "--device",
@@ -390,8 +390,8 @@ fn run_ends_disarmed_when_its_input_ends() {
         "--out",
         text(&record),
     ];
-    let mut run = Telling::start(
-        &[&words[..], &["--commands", "-", "--end-with-input"]].concat(),
+    let mut run = EventRun::start(
+        &[&arguments[..], &["--commands", "-", "--end-with-input"]].concat(),
         "0",
     );
     run.wait_for("contact");
@@ -409,14 +409,14 @@ fn run_ends_disarmed_when_its_input_ends() {
         "it ended with its tour, {t_s} s, and not with its input"
     );
     assert!(record.is_file(), "the recording is complete");
-    let words = [
+    let arguments = [
         "run",
         text(&hills),
         "--commands",
         text(&record),
         "--end-with-input",
     ];
-    let refused = hapterra(&words).output().expect("started");
+    let refused = hapterra(&arguments).output().expect("started");
     let reported = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(reported.contains("hint: add --commands -"), "{reported}");
 }
@@ -428,9 +428,9 @@ fn enter_answers_the_question_of_its_number() {
     let hills = hills_in(folder.path(), 64);
     let served = SocketDevice::start();
     let device = format!("tcp:{}", served.address);
-    let words = ["run", text(&hills), "--device", &device, "--unchecked"];
-    let mut run = Telling::start(
-        &[&words[..], &["--commands", "-", "--end-with-input"]].concat(),
+    let arguments = ["run", text(&hills), "--device", &device, "--unchecked"];
+    let mut run = EventRun::start(
+        &[&arguments[..], &["--commands", "-", "--end-with-input"]].concat(),
         "0",
     );
     let asks = run.wait_for("arming")["asks"].as_u64().expect("a question");
@@ -448,13 +448,17 @@ fn enter_answers_the_question_of_its_number() {
 }
 
 #[test]
-fn a_port_that_is_taken_is_an_error_before_anything_is_armed() {
+fn occupied_port_is_an_error_before_arming() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
-    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let port = taken.local_addr().expect("an address").port().to_string();
-    let words = ["run", text(&hills), "--device", "native", "--events", &port];
-    let run = hapterra(&words).output().expect("started");
+    let occupied = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = occupied
+        .local_addr()
+        .expect("an address")
+        .port()
+        .to_string();
+    let arguments = ["run", text(&hills), "--device", "native", "--events", &port];
+    let run = hapterra(&arguments).output().expect("started");
     let reported = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(1), "{reported}");
     assert!(

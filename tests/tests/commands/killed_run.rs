@@ -31,7 +31,7 @@ fn replay(folder: &Path, terrain: &Path) -> Command {
     command
 }
 
-fn say_points(process: &mut Child) {
+fn write_points(process: &mut Child) {
     let mut points = String::from("t_s,x_mm,y_mm,z_mm\n");
     for point in 0..POINTS {
         points += &format!("{},10,10,5\n", point as f64 * 1e-3);
@@ -52,26 +52,26 @@ fn partial(folder: &Path) -> Vec<PathBuf> {
 fn killed(folder: &Path, terrain: &Path) -> PathBuf {
     let mut process = replay(folder, terrain).spawn().expect("started");
     // Its input stays open, so it cannot finish.
-    say_points(&mut process);
-    let left = wait_for("a partial recording", || {
+    write_points(&mut process);
+    let partial_file = wait_for("a partial recording", || {
         assert_eq!(process.try_wait().expect("waited for"), None, "it ended");
         let is_written = |path: &PathBuf| path.metadata().is_ok_and(|meta| meta.len() > 0);
         partial(folder).into_iter().find(is_written)
     });
     process.kill().expect("killed");
     process.wait().expect("waited for");
-    left
+    partial_file
 }
 
 /// Checks that a command named the partial file and its size, and left it unchanged.
-fn names_it(run: &Output, left: &Path, content: &[u8]) {
+fn assert_names_partial_file(run: &Output, partial_file: &Path, content: &[u8]) {
     let printed = output_text(run);
     assert!(run.status.success(), "{printed}");
     let size = format!("({} bytes)", content.len());
-    for part in [&*left.to_string_lossy(), &size, "to keep it"] {
+    for part in [&*partial_file.to_string_lossy(), &size, "to keep it"] {
         assert!(printed.contains(part), "{part} in {printed}");
     }
-    assert_eq!(fs::read(left).expect("still there"), content);
+    assert_eq!(fs::read(partial_file).expect("still there"), content);
 }
 
 #[test]
@@ -79,18 +79,22 @@ fn recording_of_a_killed_run_is_kept_and_named_at_next_start() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let terrain = terrain(folder);
-    let left = killed(folder, &terrain);
-    let content = fs::read(&left).expect("left behind");
+    let partial_file = killed(folder, &terrain);
+    let content = fs::read(&partial_file).expect("left behind");
     let text = String::from_utf8_lossy(&content);
     let is_recording = text.starts_with("# hapterra-recording") && text.contains("\nt_s,x_mm");
     assert!(is_recording, "it is the recording, with its settings");
 
     let mut again = replay(folder, &terrain).spawn().expect("started");
-    say_points(&mut again);
+    write_points(&mut again);
     drop(again.stdin.take());
-    names_it(&again.wait_with_output().expect("ended"), &left, &content);
+    assert_names_partial_file(
+        &again.wait_with_output().expect("ended"),
+        &partial_file,
+        &content,
+    );
     assert!(folder.join("out.csv").exists());
-    assert_eq!(partial(folder), [left.as_path()]);
+    assert_eq!(partial(folder), [partial_file.as_path()]);
 
     let run = Command::new(hapterra_binary())
         .arg("run")
@@ -99,5 +103,5 @@ fn recording_of_a_killed_run_is_kept_and_named_at_next_start() {
         .arg(folder.join("out.csv"))
         .output()
         .expect("started");
-    names_it(&run, &left, &content);
+    assert_names_partial_file(&run, &partial_file, &content);
 }

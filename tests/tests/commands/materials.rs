@@ -6,7 +6,7 @@ use std::process::Command;
 
 use hapterra::cli::options::surface::table::TableFile;
 use hapterra::link::{Emulator, Timeouts};
-use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::materials::{ClassMaterial, ClassMaterials, Materials};
 use hapterra::replay::{OfflineDevice, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
@@ -46,12 +46,12 @@ impl Folder {
             "table.toml",
             "[class.10]\nname = \"meadow\"\nstiffness = 0.4\n\n[class.80]\nname = \"rock\"\nstiffness = 1.0\n",
         );
-        let mut way = "t_s,x_mm,y_mm,z_mm\n0,45,40.3,2\n".to_owned();
+        let mut path = "t_s,x_mm,y_mm,z_mm\n0,45,40.3,2\n".to_owned();
         for row in 0..10 * ROWS_PER_MM {
             let x = 45.0 + f64::from(row) / f64::from(ROWS_PER_MM);
-            writeln!(way, "{},{x},40.3,-2", f64::from(row + 1) * 1e-3).expect("written");
+            writeln!(path, "{},{x},40.3,-2", f64::from(row + 1) * 1e-3).expect("written");
         }
-        folder.write("way.csv", &way);
+        folder.write("way.csv", &path);
         folder
     }
 
@@ -169,7 +169,7 @@ fn classes_in_another_system_and_resolution_are_in_place() {
 }
 
 #[test]
-fn recording_keeps_its_materials_for_its_replay() {
+fn replay_uses_the_materials_of_the_recording() {
     let folder = Folder::new();
     let replay = |more: &[&str], output: &str| {
         folder.hapterra(&[&["replay", "level.asc", "a.csv", "--out", output][..], more].concat())
@@ -280,11 +280,11 @@ fn stiffness_change_is_limited_by_the_stiffest_material() {
 #[test]
 fn invalid_materials_are_refused_with_a_hint() {
     let folder = Folder::new();
-    let fails = |materials: &str, table: &str, wanted: &[&str]| {
+    let fails = |materials: &str, table: &str, parts: &[&str]| {
         let options = ["x.csv", "--materials", materials, "--surface", table];
         let (succeeded, printed) = folder.hapterra(&[&REPLAY[..], &options].concat());
         assert!(!succeeded && printed.contains("hint: "), "{printed}");
-        for part in wanted {
+        for part in parts {
             assert!(printed.contains(part), "{part}: {printed}");
         }
     };
@@ -383,12 +383,12 @@ fn patchwork(raster: &Raster) -> Materials {
         name: None,
         material: *material,
     };
-    let looks = Looks {
+    let class_materials = ClassMaterials {
         default: plain,
         class: (1..).zip(&materials).map(class).collect(),
     };
     let classes = ("classes", classes.expect("raster"));
-    Materials::over(("terrain", raster), classes, looks).expect("they overlap")
+    Materials::over(("terrain", raster), classes, class_materials).expect("they overlap")
 }
 
 fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<(ContactState, [u32; 9])> {
@@ -442,6 +442,6 @@ fn replay_with_materials_is_bit_identical_on_emulated_board() {
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);
     }
-    board.say_goodbye().expect("sent");
+    board.close().expect("sent");
     emulator.finish().expect("the board ended well");
 }

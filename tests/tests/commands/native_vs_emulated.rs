@@ -59,7 +59,7 @@ fn holed() -> Raster {
 }
 
 #[test]
-fn a_replay_gives_the_same_bits_on_the_emulated_board() {
+fn replay_is_bit_identical_on_the_emulated_board() {
     let Some((qemu, image)) = emulated_board() else {
         return;
     };
@@ -101,7 +101,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
             .filter(|rendered| rendered.5 == ContactState::Touching)
             .count();
         assert!(touched > 50, "{name}: the walk hardly touches");
-        board.say_goodbye().expect("said");
+        board.close().expect("said");
         emulator.finish().expect("the board ended well");
     }
 }
@@ -123,19 +123,19 @@ fn emulated_demo_equals_native_and_is_never_late() {
             .args(more)
             .output()
             .expect("started");
-        let stated = String::from_utf8_lossy(&run.stdout).into_owned();
-        let complained = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{stated}{complained}");
+        let output = String::from_utf8_lossy(&run.stdout).into_owned();
+        let errors = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{output}{errors}");
         assert!(out.join("fractal.png").exists());
         (
             std::fs::read(out.join("fractal.csv")).expect("there"),
-            stated,
+            output,
         )
     };
     let (native, _) = demo("native", &["--device".as_ref(), "native".as_ref()]);
-    let (emulated, stated) = demo("emulated", &["--device".as_ref(), device.as_ref()]);
-    assert!(stated.contains(", 0 late"), "{stated}");
-    assert!(stated.contains("0 lost on the link, 0 dropped"), "{stated}");
+    let (emulated, output) = demo("emulated", &["--device".as_ref(), device.as_ref()]);
+    assert!(output.contains(", 0 late"), "{output}");
+    assert!(output.contains("0 lost on the link, 0 dropped"), "{output}");
     let lines = |csv: &[u8]| csv.iter().filter(|b| **b == b'\n').count();
     assert!(lines(&native) > 5400, "{} lines", lines(&native));
     // All but the device, which the recording names.

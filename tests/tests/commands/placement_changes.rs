@@ -8,8 +8,8 @@ use std::time::Duration;
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::place::{
-    Bounds, Coordinates, Laid, Placement, PlacementChange, PlacementOptions, Reach, Sizing,
-    SurfaceChange, Target,
+    Bounds, Coordinates, PlacedSurface, Placement, PlacementChange, PlacementOptions, Reach,
+    Sizing, SurfaceChange, Target,
 };
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::HapticCells;
@@ -53,7 +53,7 @@ struct Touching<'t> {
     session: Session<'t>,
     steering: Steering<'t>,
     samples: Vec<TickRecord>,
-    stated: Vec<String>,
+    messages: Vec<String>,
     /// True if the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
 }
@@ -94,11 +94,11 @@ fn pressed_at<T>(
     let pedal = Rc::new(Cell::new(false));
     let foot = Rc::clone(&pedal);
     let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
-        .meddled_with(Box::new(move |_, sense, _| sense.clutch = foot.get()));
+        .with_fault_injector(Box::new(move |_, sense, _| sense.clutch = foot.get()));
     let (arming, timeout) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), timeout);
     let bounds = Bounds {
-        first: Laid { view, params },
+        first: PlacedSurface { view, params },
         resolution_mm: RESOLUTION_MM,
         level: None,
         tip_mm: 0.0,
@@ -107,7 +107,7 @@ fn pressed_at<T>(
         session: opened.expect("opened").0,
         steering: Steering::new(bounds, terrain.clone()),
         samples: vec![],
-        stated: vec![],
+        messages: vec![],
         pedal,
     };
     // Armed, lowered, and at rest.
@@ -115,32 +115,31 @@ fn pressed_at<T>(
     let played = play(&mut touching);
     let stats = touching.session.stats();
     assert_eq!(stats.lost + stats.dropped, 0);
-    touching
-        .session
-        .say_goodbye(&mut |_| {})
-        .expect("confirmed");
+    touching.session.close(&mut |_| {}).expect("confirmed");
     played
 }
 
 impl Touching<'_> {
     fn poll(&mut self) {
         let (samples, steering) = (&mut self.samples, &mut self.steering);
-        let mut take = |event: Event<'_>| {
+        let mut on_event = |event: Event<'_>| {
             steering.on_event(&event);
             if let Event::Sample(sample) = event {
                 samples.push(*sample);
             }
         };
         self.session
-            .poll(Duration::ZERO, &mut take)
+            .poll(Duration::ZERO, &mut on_event)
             .expect("goes on");
-        for ask in self.steering.asks() {
-            self.session.ask(ask);
+        for request in self.steering.requests() {
+            self.session.enqueue(request);
         }
-        if let Some(put) = self.steering.take_put() {
-            self.session.put_view(put.view, put.terrain).expect("said");
+        if let Some(update) = self.steering.take_update() {
+            self.session
+                .put_view(update.view, update.terrain)
+                .expect("said");
         }
-        self.stated.extend(self.steering.lines());
+        self.messages.extend(self.steering.lines());
     }
 
     fn run_to(&mut self, tick: u32) {
@@ -164,7 +163,7 @@ impl Touching<'_> {
                 return self.run(700);
             }
         }
-        panic!("{steer:?} is never done: {:?}", self.stated);
+        panic!("{steer:?} is never done: {:?}", self.messages);
     }
 
     fn change(&mut self, change: PlacementChange) -> TickRecord {
@@ -182,13 +181,13 @@ impl Touching<'_> {
 
 /// Checks that the arm stays armed, that no tick changes the force by more than `max_n`, and that
 /// no force exceeds the one at the start.
-fn judge(samples: &[TickRecord], max_n: f32) {
+fn check_samples(samples: &[TickRecord], max_n: f32) {
     // The hand is pushed back, and its damping adds to the press during the motion.
-    judge_press(samples, max_n, 1.03);
+    check_press(samples, max_n, 1.03);
 }
 
-/// Same as `judge`, with a limit of `most_times` the first force while the hand is pushed back.
-fn judge_press(samples: &[TickRecord], max_n: f32, most_times: f32) {
+/// Same as `judge`, with a limit of `max_ratio` the first force while the hand is pushed back.
+fn check_press(samples: &[TickRecord], max_n: f32, max_ratio: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         assert_eq!(after.mode, Mode::Armed, "tick {}", after.tick);
@@ -198,11 +197,7 @@ fn judge_press(samples: &[TickRecord], max_n: f32, most_times: f32) {
         let share = MAX_SLEW_N_PER_S / 1_000.0;
         assert!(change <= share, "tick {}: {change} N", after.tick);
         let (force, first) = (after.force_n.length(), samples[0].force_n.length());
-        assert!(
-            force <= most_times * first,
-            "tick {}: {force} N",
-            after.tick
-        );
+        assert!(force <= max_ratio * first, "tick {}: {force} N", after.tick);
     }
     let worst = samples
         .windows(2)
@@ -231,14 +226,14 @@ fn assert_rendered(sample: &TickRecord, what: &str) {
 /// Returns the ratio of the forces of a press with two springs, N/mm. The hand is a spring as well,
 /// with a fixed end.
 fn in_series(with: f32, of: f32) -> f32 {
-    let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
-    (give + 1.0 / of) / (give + 1.0 / with)
+    let compliance_mm_per_n = 1_000.0 * HandModel::default().compliance_m_per_n() as f32;
+    (compliance_mm_per_n + 1.0 / of) / (compliance_mm_per_n + 1.0 / with)
 }
 
 /// Returns the share of a press that remains when the ground has moved to the hand's target.
-fn all_the_way() -> f32 {
-    let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
-    (1.0 / STIFFNESS) / (give + 1.0 / STIFFNESS)
+fn remaining_press_share() -> f32 {
+    let compliance_mm_per_n = 1_000.0 * HandModel::default().compliance_m_per_n() as f32;
+    (1.0 / STIFFNESS) / (compliance_mm_per_n + 1.0 / STIFFNESS)
 }
 
 #[test]
@@ -253,16 +248,16 @@ fn force_makes_no_step_while_zooming_through_eight_levels() {
         for level in (0..8).rev() {
             let sample = touching.change(PlacementChange::Zoom(2.0));
             assert_pressed(&sample, &before, &format!("zoomed to level {level}"));
-            assert_eq!(touching.level(), level, "{:?}", touching.stated);
+            assert_eq!(touching.level(), level, "{:?}", touching.messages);
         }
         for level in 1..=8 {
             let sample = touching.change(PlacementChange::Zoom(0.5));
             assert_pressed(&sample, &before, &format!("back to level {level}"));
-            assert_eq!(touching.level(), level, "{:?}", touching.stated);
+            assert_eq!(touching.level(), level, "{:?}", touching.messages);
         }
         assert_eq!(touching.samples.last().map(|last| last.view), Some(16));
-        assert_eq!(touching.stated, [""; 0]);
-        judge(&touching.samples[began..], GENTLE_N);
+        assert_eq!(touching.messages, [""; 0]);
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
@@ -300,21 +295,21 @@ fn force_makes_no_step_while_panning_and_scaling() {
         assert_pressed(&harder, &first, "as hard as before");
         let depth = |sample: &TickRecord| sample.hip.to(&sample.proxy).length();
         let deeper = depth(&softer) / depth(&harder);
-        let wanted = 2.0 * in_series(soft, hard);
+        let expected = 2.0 * in_series(soft, hard);
         assert!(
-            (deeper / wanted - 1.0).abs() < 0.02,
+            (deeper / expected - 1.0).abs() < 0.02,
             "a softer spring gives more"
         );
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.level(), 8);
-        assert_eq!(touching.stated, [""; 0]);
-        judge(&touching.samples[began..], GENTLE_N);
+        assert_eq!(touching.messages, [""; 0]);
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
 #[test]
-fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
+fn surface_command_during_contact_causes_no_force_step() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let texture = Texture {
@@ -340,9 +335,9 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             let sample = touching.change(PlacementChange::Surface(change));
             assert_eq!(sample.state, ContactState::Touching, "{change:?}");
         }
-        assert_eq!(touching.stated, [""; 0]);
+        assert_eq!(touching.messages, [""; 0]);
         let params = touching.steering.now().params;
-        let wanted = SurfaceParams {
+        let expected = SurfaceParams {
             friction: Friction {
                 static_mu: 0.5,
                 dynamic_mu: 0.3,
@@ -356,27 +351,31 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             texture,
             ..SurfaceParams::PREMIUM
         };
-        assert_eq!(params, wanted);
+        assert_eq!(params, expected);
         let friction = SurfaceChange::Friction {
             dynamic_mu: 11.0,
             static_mu: 11.0,
         };
         touching.change(PlacementChange::Surface(friction));
         assert!(
-            touching.stated[0].contains("a friction of 11"),
+            touching.messages[0].contains("a friction of 11"),
             "{:?}",
-            touching.stated
+            touching.messages
         );
-        assert_eq!(touching.steering.now().params, wanted, "it stays as it was");
+        assert_eq!(
+            touching.steering.now().params,
+            expected,
+            "it stays as it was"
+        );
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.steering.now().params, SurfaceParams::PREMIUM);
-        judge(&touching.samples[began..], GENTLE_N);
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
 #[test]
-fn a_tip_set_while_it_presses_makes_no_step() {
+fn tip_command_during_contact_causes_no_force_step() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let first = touching.change(PlacementChange::Zoom(64.0));
@@ -385,22 +384,27 @@ fn a_tip_set_while_it_presses_makes_no_step() {
             let terrain = touching.steering.terrain();
             (terrain.grid().tip_mm(), terrain.tip_cells() > 0.0)
         };
-        for (wanted_mm, is_ball) in [(2.0, true), (0.5, true), (0.0, false), (1.0, true)] {
-            let sample = touching.change(PlacementChange::Tip(wanted_mm));
-            assert_rendered(&sample, &format!("by a tip of {wanted_mm} mm"));
+        for (expected_mm, is_ball) in [(2.0, true), (0.5, true), (0.0, false), (1.0, true)] {
+            let sample = touching.change(PlacementChange::Tip(expected_mm));
+            assert_rendered(&sample, &format!("by a tip of {expected_mm} mm"));
             // A ball rests beside a point's position, where the slope differs.
             let share = sample.force_n.length() / first.force_n.length();
-            assert!((0.95..1.05).contains(&share), "{wanted_mm} mm: {share}");
-            assert_eq!(tip(touching), (wanted_mm, is_ball), "{:?}", touching.stated);
+            assert!((0.95..1.05).contains(&share), "{expected_mm} mm: {share}");
+            assert_eq!(
+                tip(touching),
+                (expected_mm, is_ball),
+                "{:?}",
+                touching.messages
+            );
         }
-        assert_eq!(touching.stated, [""; 0]);
+        assert_eq!(touching.messages, [""; 0]);
         touching.change(PlacementChange::Tip(-1.0));
-        assert!(touching.stated[0].contains("a tip of -1 mm: from 0 to 100 mm"));
+        assert!(touching.messages[0].contains("a tip of -1 mm: from 0 to 100 mm"));
         assert_eq!(tip(touching), (1.0, true), "it stays as it was");
         let reset = touching.change(PlacementChange::Reset);
         assert_rendered(&reset, "by a point again");
         assert_eq!(tip(touching), (0.0, false));
-        judge(&touching.samples[began..], GENTLE_N);
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
@@ -428,8 +432,8 @@ fn clutch_carries_the_terrain_with_the_hand() {
         // The ground moves with a yielding hand, at most to the hand's target. Then two springs
         // share the force of one.
         let share = closed.force_n.length() / before.force_n.length();
-        assert!((all_the_way()..1.0).contains(&share), "{share}");
-        judge(&touching.samples[began..], GENTLE_N);
+        assert!((remaining_press_share()..1.0).contains(&share), "{share}");
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
@@ -453,7 +457,7 @@ fn clutch_input_opens_clutch_and_allows_placement_changes() {
         let closed = touching.run(700);
         assert_rendered(&closed, "let go");
         let share = closed.force_n.length() / before.force_n.length();
-        assert!((all_the_way()..1.0).contains(&share), "{share}");
+        assert!((remaining_press_share()..1.0).contains(&share), "{share}");
         // Released during a change of the placement: the host then holds the clutch to the end.
         touching.pedal.set(true);
         touching.run(150);
@@ -465,8 +469,8 @@ fn clutch_input_opens_clutch_and_allows_placement_changes() {
         let closed = touching.run(900);
         assert_rendered(&closed, "let go meanwhile");
         assert_eq!(closed.view, 4);
-        assert_eq!(touching.stated, [""; 0]);
-        judge(&touching.samples[began..], GENTLE_N);
+        assert_eq!(touching.messages, [""; 0]);
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
@@ -482,18 +486,18 @@ fn impossible_change_is_reported_and_changes_nothing() {
         let before = touching.last();
         assert_pressed(&touching.change(far), &before, "after a place outside");
         assert!(
-            touching.stated[0].contains("outside"),
+            touching.messages[0].contains("outside"),
             "{:?}",
-            touching.stated
+            touching.messages
         );
         assert_pressed(
             &touching.change(PlacementChange::Stiffness(50.0)),
             &before,
             "after too much",
         );
-        assert_eq!(touching.stated.len(), 2);
+        assert_eq!(touching.messages.len(), 2);
         assert_eq!(touching.samples.last().map(|last| last.view), Some(0));
-        judge(&touching.samples[began..], GENTLE_N);
+        check_samples(&touching.samples[began..], GENTLE_N);
     });
 }
 
@@ -540,7 +544,7 @@ fn slope_of_force(sample: &TickRecord) -> [f64; 2] {
 
 /// At the southern end 1 mm is a haptic cell; commands bring the northern end under the hand, where
 /// a degree of longitude is 4.7 % shorter, and back.
-fn a_far_pan(axis: usize) {
+fn check_far_pan(axis: usize) {
     let raster = slope_of_degrees(axis);
     let options = PlacementOptions {
         target: Target::At([10.06, 43.1], Coordinates::Own),
@@ -553,16 +557,16 @@ fn a_far_pan(axis: usize) {
         let began = touching.samples.len();
         // The effect of an empty change on a hand on such a slope.
         touching.change(PlacementChange::Stiffness(1.0));
-        let most = most_times(&touching.samples[began..]);
+        let max = max_ratio(&touching.samples[began..]);
         let began = touching.samples.len();
-        let wanted = [[1.0, 0.0], [0.0, 1.0]][axis];
+        let expected = [[1.0, 0.0], [0.0, 1.0]][axis];
         let is_true = |sample: &TickRecord, where_: &str| {
             let rendered = slope_of_force(sample);
             eprintln!("{where_}: {rendered:?}");
-            for (rendered, wanted) in rendered.iter().zip(wanted) {
+            for (rendered, expected) in rendered.iter().zip(expected) {
                 assert!(
-                    (rendered - wanted).abs() < 1e-3,
-                    "{where_}: {rendered} for {wanted}"
+                    (rendered - expected).abs() < 1e-3,
+                    "{where_}: {rendered} for {expected}"
                 );
             }
         };
@@ -596,25 +600,25 @@ fn a_far_pan(axis: usize) {
         let cells = touching.steering.terrain().clone();
         touching.change(PlacementChange::Stiffness(0.9));
         assert!(touching.steering.terrain().has_tiles_of(&cells));
-        assert_eq!(touching.stated, [""; 0]);
-        judge_press(&touching.samples[began..], GENTLE_N, most + 0.01);
+        assert_eq!(touching.messages, [""; 0]);
+        check_press(&touching.samples[began..], GENTLE_N, max + 0.01);
     });
 }
 
 /// Returns the largest force of some samples, relative to the first.
-fn most_times(samples: &[TickRecord]) -> f32 {
+fn max_ratio(samples: &[TickRecord]) -> f32 {
     let forces = samples.iter().map(|sample| sample.force_n.length());
-    let most = forces.fold(0.0, f32::max) / samples[0].force_n.length();
-    eprintln!("at most {most} times the force of the beginning");
-    most
+    let max = forces.fold(0.0, f32::max) / samples[0].force_n.length();
+    eprintln!("at most {max} times the force of the beginning");
+    max
 }
 
 #[test]
 fn slope_to_the_east_is_true_at_both_ends_of_degrees() {
-    a_far_pan(0);
+    check_far_pan(0);
 }
 
 #[test]
 fn slope_to_the_north_is_true_at_both_ends_of_degrees() {
-    a_far_pan(1);
+    check_far_pan(1);
 }

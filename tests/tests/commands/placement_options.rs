@@ -248,15 +248,19 @@ fn cell_distortion_within_workspace_is_printed_at_start() {
             [percent, latitude].map(|number| number.parse::<f64>().expect("a number"))
         })
     };
-    let wanted = |from: f64, to: f64| 100.0 * (narrower(from, to) - 1.0).abs();
+    let expected = |from: f64, to: f64| 100.0 * (narrower(from, to) - 1.0).abs();
     for command in ["run", "demo"] {
         // Everything is in reach: cells of the middle are too wide in the north.
         let all = output_text(&hapterra(command, &file, &["--exaggeration", "9"]));
         let [percent, latitude] = shape(&all).expect("a line");
         // The last row of haptic cells.
         assert!((54.0..54.5).contains(&latitude), "{all}");
-        let off = percent - wanted(47.25, latitude);
-        assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));
+        let off = percent - expected(47.25, latitude);
+        assert!(
+            off.abs() < 0.2,
+            "{percent} for {}",
+            expected(47.25, latitude)
+        );
         // At a scale at which the arm reaches 20 km to each side, cells are correct.
         let near = ["--at", "15,47", "--scale", "5m/mm"];
         let near = output_text(&hapterra(command, &file, &near));
@@ -276,12 +280,12 @@ fn cell_distortion_within_workspace_is_printed_at_start() {
         }
     }
     let info = |more: &[&str]| {
-        let words = [&["info", file.to_str().expect("plain")], more].concat();
-        let output = Command::new(hapterra_binary()).args(words).output();
+        let arguments = [&["info", file.to_str().expect("plain")], more].concat();
+        let output = Command::new(hapterra_binary()).args(arguments).output();
         String::from_utf8(output.expect("started").stdout).expect("text")
     };
     let [percent, latitude] = shape(&info(&[])).expect("a line");
-    assert!((percent - wanted(47.25, latitude)).abs() < 0.2 && latitude > 54.0);
+    assert!((percent - expected(47.25, latitude)).abs() < 0.2 && latitude > 54.0);
     let report: serde_json::Value = serde_json::from_str(&info(&["--json"])).expect("JSON");
     let share = report["cell"]["worst_share"].as_f64().expect("a share");
     assert!((100.0 * share - percent).abs() < 0.01, "{report:#}");

@@ -54,7 +54,7 @@ fn to_border(place: [f64; 2]) -> f64 {
 }
 
 /// Wanders over a terrain and checks every result. Returns the number of rows in contact.
-fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
+fn check_contact(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let height = heights(&terrain);
     let oracle = Oracle::new(terrain.size().map(i64::from), &height);
@@ -125,7 +125,7 @@ fn proxy_is_local_closest_point_on_synthetic_terrains() {
         Kind::Spikes,
     ] {
         eprint!("{kind:?}: ");
-        let touched = judge(&synthetic(kind), scale, 11, 3000);
+        let touched = check_contact(&synthetic(kind), scale, 11, 3000);
         assert!(touched > 300, "{kind:?}: the walk hardly touches");
     }
 }
@@ -144,7 +144,7 @@ fn proxy_is_local_closest_point_on_real_terrains() {
         let grid = HapticGrid::new(&raster, HapticCells::default());
         let scale = grid.true_scale(cell_mm).expect("scale");
         eprint!("{file}: ");
-        let touched = judge(&raster, scale, 5, 2000);
+        let touched = check_contact(&raster, scale, 5, 2000);
         assert!(touched > 100, "{file}: the walk hardly touches");
     }
 }
@@ -264,7 +264,7 @@ fn no_data_edge_releases_smoothly_and_reentry_has_no_force() {
 
 /// The paper's Figure 8: from one side of a peak to the other in one tick.
 #[test]
-fn a_fast_sweep_does_not_pass_through_a_peak() {
+fn fast_sweep_does_not_pass_through_a_peak() {
     let raster = Raster::from_fn(64, 64, |x, _| if x == 30 || x == 33 { 10.0 } else { 0.0 });
     let raster = raster.expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
@@ -281,7 +281,7 @@ fn a_fast_sweep_does_not_pass_through_a_peak() {
 }
 
 #[test]
-fn the_same_trajectory_gives_the_same_bits_again() {
+fn replay_of_a_trajectory_is_deterministic() {
     let raster = synthetic(Kind::Fractal);
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let path = wander(&terrain, 3, 1500, 1.0);

@@ -143,13 +143,13 @@ fn replay_is_deterministic_and_accepts_its_own_output() {
 }
 
 #[test]
-fn an_empty_trajectory_gives_an_empty_recording() {
+fn empty_trajectory_gives_empty_recording() {
     let folder = Folder::new("t_s,x_mm,y_mm,z_mm\r\n");
     assert!(folder.replayed(&[]).is_empty());
 }
 
 #[test]
-fn a_wrong_trajectory_is_named_with_line_and_column() {
+fn invalid_trajectory_is_refused_with_line_and_column() {
     for (rows, expected) in [
         ("0,1,2,3\n1,2,3\n", "line 3 has 3 columns"),
         ("0,1,2,3\n1,2,NaN,4\n", "line 3, column y_mm"),
@@ -166,7 +166,7 @@ fn a_wrong_trajectory_is_named_with_line_and_column() {
 }
 
 #[test]
-fn an_old_result_outlives_a_replay_that_fails() {
+fn failed_replay_keeps_the_old_output() {
     let folder = Folder::new("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n0,1,2,x\n");
     folder.write("out.csv", "precious");
     let run = folder.replay(&[]);

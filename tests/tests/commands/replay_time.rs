@@ -148,7 +148,7 @@ fn pressed(replayed: &[Row]) -> usize {
 }
 
 #[test]
-fn damping_is_the_same_however_often_a_path_has_rows() {
+fn damping_is_independent_of_the_row_rate() {
     let folder = Folder::new();
     let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     for hz in [2, 10, 100, 250, 1_000, 1_600, 8_000, 100_000] {
@@ -176,7 +176,7 @@ const VISCOUS: [&str; 5] = [
     concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/viscous.toml"),
 ];
 
-fn trails(replayed: &[Row]) {
+fn assert_trails(replayed: &[Row]) {
     let last = replayed.last().expect("rows");
     let trail = last.hip_mm[0] - last.proxy_mm[0];
     assert!((trail - 1.3).abs() < 1e-3, "{trail} mm: {last:?}");
@@ -193,7 +193,7 @@ fn recording_is_replayed_at_its_own_tick_rate() {
         let (replayed, printed) = folder.replayed(&recording, &[]);
         assert_eq!(replayed.len(), rows.lines().count(), "{tick_hz} Hz");
         assert!(!printed.contains("straight lines"), "{printed}");
-        trails(&replayed);
+        assert_trails(&replayed);
         // The output has the input's rows, and replays byte for byte.
         let output = folder.read("out.csv");
         assert!(
@@ -220,12 +220,12 @@ fn ticks_between_a_recordings_rows_are_filled_in() {
     let (replayed, printed) = folder.replayed(&folder.recording(4_000, &rows, &VISCOUS), &[]);
     assert_eq!(replayed.len(), 2_401);
     assert!(printed.contains("4000 ticks a second by t_s"), "{printed}");
-    trails(&replayed);
+    assert_trails(&replayed);
     let kept = |(n, row): (usize, &'_ str)| (n % 7 == 0).then(|| format!("{row}\n"));
     let lossy: String = rows.lines().enumerate().filter_map(kept).collect();
     let (replayed, _) = folder.replayed(&folder.recording(1_000, &lossy, &VISCOUS), &[]);
     assert_eq!(replayed.len(), 596);
-    trails(&replayed);
+    assert_trails(&replayed);
 }
 
 #[test]
@@ -249,7 +249,7 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
     let (replayed, _) =
         folder.replayed(&recording, &[&["--ignore-settings"], &VISCOUS[..]].concat());
     assert_eq!(replayed.len(), 601);
-    trails(&replayed);
+    assert_trails(&replayed);
     for tick_hz in [0, 1_500, 44_100] {
         let recording = recording.replace("tick_hz = 1000", &format!("tick_hz = {tick_hz}"));
         let printed = folder.fails(&recording, &[]);
@@ -296,7 +296,7 @@ fn rows_without_times_are_ticks_and_this_is_reported() {
 }
 
 #[test]
-fn wrong_times_are_refused_and_odd_ones_remarked_on() {
+fn wrong_times_are_refused_and_odd_ones_reported() {
     let folder = Folder::new();
     for (rows, expected) in [
         (
@@ -334,7 +334,7 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
 }
 
 #[test]
-fn a_board_of_another_rate_than_a_recording_is_refused() {
+fn board_with_another_rate_than_the_recording_is_refused() {
     let Some((_, image)) = emulated_board() else {
         return;
     };
@@ -363,7 +363,7 @@ fn reviewed_paths_and_recordings_are_replayed_by_time() {
         assert!(run.status.success(), "{}", output_text(&run));
         rows(&folder.read("out.csv"))
     };
-    trails(&replayed(
+    assert_trails(&replayed(
         "case2_recording_4khz_t.tif",
         "case2_recording_4khz_rec4k.csv",
         &[],

@@ -74,7 +74,7 @@ impl Pair {
             .spawn()
             .expect("it runs");
         let named = [self.name(1), self.name(2)].map(|name| format!("{name} device "));
-        child.stdout = Some(hear(child.stdout.take().expect("piped"), &named));
+        child.stdout = Some(read_until(child.stdout.take().expect("piped"), &named));
         child
     }
 }
@@ -83,7 +83,7 @@ impl Pair {
 const MAX_LINES: usize = 60;
 
 /// Reads lines until there was one with each of these beginnings.
-fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
+fn read_until<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     let mut lines = BufReader::with_capacity(1, from);
     let mut missing: Vec<&String> = beginnings.iter().collect();
     for _ in 0..MAX_LINES {
@@ -105,11 +105,11 @@ fn rendered(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
     let (settings, rows): (Vec<&str>, Vec<&str>) =
         text.lines().partition(|line| line.starts_with('#'));
     let names: Vec<&str> = rows[0].split(',').collect();
-    let is_kept = |column: &usize| names.get(*column) != Some(&"cost");
+    let is_compared = |column: &usize| names.get(*column) != Some(&"cost");
     let cells = |row: &&str| {
         let cells = row.split(',').enumerate();
-        let kept = cells.filter(|(column, _)| is_kept(column));
-        kept.map(|(_, cell)| cell.to_owned()).collect()
+        let compared = cells.filter(|(column, _)| is_compared(column));
+        compared.map(|(_, cell)| cell.to_owned()).collect()
     };
     let settings = settings.into_iter().map(str::to_owned).collect();
     (rows.iter().map(cells).collect(), settings)
@@ -171,7 +171,7 @@ fn two_native_arms_render_the_same_bits_as_each_alone() {
 }
 
 #[test]
-fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
+fn signal_closes_each_session_with_confirmation() {
     for name in ["INT", "TERM"] {
         let pair = Pair::of(SocketDevice::start());
         let child = pair.start();
@@ -196,11 +196,11 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     let output = end_of(child);
     let printed = output_text(&output);
     assert_eq!(output.status.code(), Some(1), "{printed}");
-    let says = "did not confirm that it is disarmed: switch the amplifiers off";
+    let expected = "did not confirm that it is disarmed: switch the amplifiers off";
     let of = |number| {
         let name = pair.name(number);
         let lines = printed.lines().filter(move |line| line.starts_with(&name));
-        lines.filter(|line| line.contains(says)).count()
+        lines.filter(|line| line.contains(expected)).count()
     };
     // When it happened, and at the end.
     assert_eq!((of(1), of(2)), (0, 2), "{printed}");
@@ -217,14 +217,14 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
 }
 
 #[test]
-fn the_second_signal_names_the_boards_that_have_not_confirmed() {
+fn second_signal_names_the_unconfirmed_boards() {
     let pair = Pair::of(SocketDevice::start());
     let mut child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
     // The first has confirmed, and the second waits.
-    let kept = format!("{} recording ", pair.name(1));
-    child.stdout = Some(hear(child.stdout.take().expect("piped"), &[kept]));
+    let compared = format!("{} recording ", pair.name(1));
+    child.stdout = Some(read_until(child.stdout.take().expect("piped"), &[compared]));
     pair.served[1].wait_for_ignored_bye();
     signal(&child, "INT");
     let output = end_of(child);
@@ -248,7 +248,7 @@ fn lost_device_is_waited_for_and_the_other_continues() {
                 std::panic::resume_unwind(Box::new(()));
             }
         };
-        (Native::for_replay().restless(), die)
+        (Native::for_replay().free_running(), die)
     });
     let pair = Pair::of(mortal);
     let mut child = pair.start();
@@ -299,9 +299,9 @@ fn absent_device_fails_alone_and_is_reported_at_once() {
         .spawn()
         .expect("it runs");
     let failed = format!("[1 {absent}] error: ");
-    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[failed]));
+    child.stderr = Some(read_until(child.stderr.take().expect("piped"), &[failed]));
     let serves = format!("[2 {there}] device ");
-    child.stdout = Some(hear(child.stdout.take().expect("piped"), &[serves]));
+    child.stdout = Some(read_until(child.stdout.take().expect("piped"), &[serves]));
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);
@@ -322,13 +322,15 @@ fn fault_is_reported_only_for_the_affected_device() {
         let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
             sense.measured_ma = Some([2_000, 0, 0]);
         });
-        let device = Native::for_replay().restless().meddled_with(current);
+        let device = Native::for_replay()
+            .free_running()
+            .with_fault_injector(current);
         (device, || {})
     });
     let pair = Pair::of(conducts);
     let mut child = pair.start();
     let fault = format!("{} FAULT ", pair.name(2));
-    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[fault]));
+    child.stderr = Some(read_until(child.stderr.take().expect("piped"), &[fault]));
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);
@@ -346,7 +348,7 @@ fn fault_is_reported_only_for_the_affected_device() {
 }
 
 #[test]
-fn a_hostile_device_costs_the_other_nothing() {
+fn hostile_device_does_not_disturb_the_other() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let (there, greedy) = (
@@ -363,10 +365,10 @@ fn a_hostile_device_costs_the_other_nothing() {
         format!("[1 {greedy}] device "),
         format!("[2 {there}] device "),
     ];
-    child.stdout = Some(hear(child.stdout.take().expect("piped"), &begun));
+    child.stdout = Some(read_until(child.stdout.take().expect("piped"), &begun));
     // Progress lines are from the device with samples.
     let goes = format!("[2 {there}] ");
-    child.stderr = Some(hear(child.stderr.take().expect("piped"), &[goes]));
+    child.stderr = Some(read_until(child.stderr.take().expect("piped"), &[goes]));
     signal(&child, "INT");
     let output = end_of(child);
     let printed = output_text(&output);
@@ -433,7 +435,7 @@ fn second_device_causes_no_additional_terrain_reads() {
 fn options_for_one_device_are_refused_for_several() {
     let folder = tempfile::tempdir().expect("a folder");
     let record = recorded(folder.path(), "felt.csv");
-    for (devices, more, says) in [
+    for (devices, more, expected) in [
         (["tcp:localhost:4", "tcp:127.0.0.1:4"], None, "are the same"),
         (
             ["tcp:h.invalid:4", "tcp:h.invalid:4"],
@@ -450,7 +452,7 @@ fn options_for_one_device_are_refused_for_several() {
         let output = command.args(more).output().expect("it runs");
         let printed = output_text(&output);
         assert_eq!(output.status.code(), Some(1), "{printed}");
-        assert!(printed.contains(says), "{printed}");
+        assert!(printed.contains(expected), "{printed}");
         assert!(printed.contains("hint: "), "{printed}");
     }
     let there = std::fs::read_dir(folder.path()).expect("a folder");

@@ -1,7 +1,7 @@
 //! Forces of the library for arrays equal those of `replay` on a file of the same heights, to the
 //! bit.
 
-use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::materials::{ClassMaterial, ClassMaterials, Materials};
 use hapterra::replay::{on_native_at, state_name};
 use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::rate::TickRate;
@@ -199,7 +199,7 @@ fn materials_are_those_of_a_replay() {
         },
     ];
     let named = [7, 9].into_iter().zip(materials);
-    let looks = Looks {
+    let class_materials = ClassMaterials {
         default: Material::of(&rough()),
         class: named
             .map(|(class, material)| ClassMaterial {
@@ -209,7 +209,11 @@ fn materials_are_those_of_a_replay() {
             })
             .collect(),
     };
-    let over = Materials::over(("heights", &raster), ("classes", of_classes), looks);
+    let over = Materials::over(
+        ("heights", &raster),
+        ("classes", of_classes),
+        class_materials,
+    );
     let over = over.expect("they overlap");
     let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(Some(&over));
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");

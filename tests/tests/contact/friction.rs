@@ -71,8 +71,8 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
 /// Returns true if, from a point on a proxy's path, the straight line to a HIP leads through air or
 /// over no-data: there the proxy leaves the surface, lands elsewhere, and may be held where it
 /// lands.
-fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
-    let [from, to] = way;
+fn leaves_surface(terrain: &Terrain<'_>, path: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
+    let [from, to] = path;
     let between = |from: [f64; 3], to: [f64; 3]| {
         (1..=64).map(move |part| {
             let t = f64::from(part) / 64.0;
@@ -104,9 +104,9 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> V
     });
     let ratios = slides.filter_map(|pair| {
         let ratio = ratio(terrain, &pair[1])?;
-        let way = [&pair[0], &pair[1]].map(|sample| position(&sample.proxy));
-        let flew = || flies(terrain, way, position(&pair[1].hip));
-        let counts = (ratio / mu - 1.0).abs() <= off || !flew();
+        let path = [&pair[0], &pair[1]].map(|sample| position(&sample.proxy));
+        let left_surface = || leaves_surface(terrain, path, position(&pair[1].hip));
+        let counts = (ratio / mu - 1.0).abs() <= off || !left_surface();
         counts.then_some(ratio)
     });
     ratios.collect()
@@ -149,7 +149,7 @@ fn sliding_friction_on_real_terrain_is_within_three_percent() {
 }
 
 #[test]
-fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
+fn stuck_proxy_is_unmoved_by_an_hour_of_encoder_noise() {
     let raster =
         Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
     let terrain = terrain(&raster);
@@ -227,7 +227,7 @@ fn live(
 }
 
 #[test]
-fn a_live_tick_ends_where_friction_holds() {
+fn tick_in_real_time_ends_inside_the_friction_cone() {
     let files = real_ground::more_files();
     if files.is_empty() {
         println!("skipped: no elevation models beside the checkout");

@@ -123,7 +123,7 @@ fn tick_on_materials_survives_random_bytes() {
 
 /// Tries each check of the fuzz target: a tick with one change is refused.
 #[test]
-fn a_tick_that_may_not_be_is_refused() {
+fn invalid_tick_is_refused_by_the_fuzz_target() {
     let refuses = |change: fn(&mut Outcome)| {
         let mut outcome = Outcome::default();
         change(&mut outcome);
@@ -168,7 +168,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             key,
             heights,
         };
-        let stated = match random.below(7) {
+        let message = match random.below(7) {
             0 => ToDevice::Tile(tile),
             5 => ToDevice::MaterialScene(MaterialScene {
                 scene: hapterra_core::scene::Scene {
@@ -199,7 +199,7 @@ fn sensible_talk(random: &mut Random) -> Vec<u8> {
             },
             _ => ToDevice::Hip(HipCommand { seq, hip }),
         };
-        line.extend(wire::message(&stated));
+        line.extend(wire::message(&message));
     }
     let chunks = line.chunks(255);
     chunks

@@ -41,17 +41,17 @@ impl Found {
     }
 }
 
-fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
-    let mut judge = TickOracle::new(&scene.terrain);
+fn examine(scene: &Scene, buffers: &mut Buffers) -> Found {
+    let mut oracle = TickOracle::new(&scene.terrain);
     let mut found = Found::default();
     let seen = scene.render(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
     for (tick, now) in seen.iter().enumerate() {
-        let reported = judge.violations(now);
+        let reported = oracle.violations(now);
         let reported = reported
             .iter()
             .any(|v| v.invariant == Invariant::LocalMinimum);
-        if let Some(is_right) = rests_right(&scene.terrain, now) {
+        if let Some(is_right) = is_at_minimum(&scene.terrain, now) {
             found.judged += 1;
             if !is_right {
                 found.wrong.push(tick);
@@ -61,7 +61,7 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
             }
         }
         if let Some(before) = tick.checked_sub(1).map(|last| &seen[last]) {
-            ways(&scene.terrain, before, now, tick, &mut found);
+            check_path(&scene.terrain, before, now, tick, &mut found);
         }
     }
     found
@@ -69,7 +69,7 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
 
 /// Returns true if a proxy at rest is at a local closest point, within the oracle's bound; `None`
 /// if nothing can be checked.
-fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
+fn is_at_minimum(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
     let displacement = distance(seen.proxy, seen.hip);
     let rests = seen.output.state == ContactState::Touching && seen.output.converged;
     if !rests || !(2e-6..=1e4).contains(&displacement) {
@@ -98,7 +98,7 @@ fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
 }
 
 /// Checks the path of the HIP at every 1/256 of a cell.
-fn ways(
+fn check_path(
     terrain: &Terrain,
     before: &ObservedTick,
     now: &ObservedTick,
@@ -147,11 +147,11 @@ fn proxy_displaced_from_its_minimum_is_detected() {
         Ok(())
     });
     let honest = seen.expect("it settles")[1];
-    assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
+    assert_eq!(is_at_minimum(&scene.terrain, &honest), Some(true));
     for axis in 0..2 {
         let mut forged = honest;
         forged.proxy[axis] += 3e-5;
-        assert_eq!(rests_right(&scene.terrain, &forged), Some(false));
+        assert_eq!(is_at_minimum(&scene.terrain, &forged), Some(false));
     }
 }
 
@@ -165,7 +165,7 @@ fn both_oracles_agree_on_random_scenes() {
     let mut buffers = Buffers::default();
     let mut total = Found::default();
     for (number, scene) in scenes(0..200) {
-        let found = look(&scene, &mut buffers);
+        let found = examine(&scene, &mut buffers);
         let kind = scene.terrain.kind;
         assert_eq!(
             found.disputed, [0; 0],
@@ -205,7 +205,7 @@ fn every_proxy_on_real_terrain_rests_at_a_closest_point() {
                     Execution::LockStep,
                     Supply::Preloaded,
                 );
-                let found = look(&scene, &mut Buffers::default());
+                let found = examine(&scene, &mut Buffers::default());
                 let none = [&found.wrong, &found.disputed, &found.late]
                     .iter()
                     .all(|t| t.is_empty());

@@ -36,13 +36,13 @@ type Found = (Invariant, usize);
 
 /// A path over flat ground with the second material from column 20 on: 1.5 cells deep, eastward by
 /// a step in each tick, and back at the end.
-struct Way {
+struct Case {
     scene: Scene,
     materials: Materials,
     rendered: Vec<Replied>,
 }
 
-impl Way {
+impl Case {
     fn over(table: [Material; 2], [from, step]: [f64; 2], shading: Shading) -> Self {
         let terrain = Terrain::from_fn(Kind::Flat, SIZE, |_, _| 2.0);
         let materials = Materials::from_fn(&table, SIZE, |x, _| u8::from(x >= 20));
@@ -66,17 +66,17 @@ impl Way {
     /// Returns the oracle's result if one point is changed: the violation with its point, and the
     /// measurements.
     fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, MaterialCounts) {
-        let mut judge = MaterialOracle::new(&self.scene, &self.materials, [0; 3]);
+        let mut oracle = MaterialOracle::new(&self.scene, &self.materials, [0; 3]);
         for (point, rendered) in self.rendered.iter().enumerate() {
             let mut rendered = *rendered;
             if point == at {
                 change(&mut rendered);
             }
-            if let Err(violation) = judge.check(&rendered) {
-                return (Some((violation.invariant, point)), judge.counts);
+            if let Err(violation) = oracle.check(&rendered) {
+                return (Some((violation.invariant, point)), oracle.counts);
             }
         }
-        (None, judge.counts)
+        (None, oracle.counts)
     }
 
     fn honest(&self) -> MaterialCounts {
@@ -105,8 +105,9 @@ impl Way {
         let moved = |rendered: &mut Replied| {
             rendered.proxy[0] += east;
             rendered.sample.proxy = point(rendered.proxy);
-            let way = [0, 1, 2].map(|i| ((rendered.proxy[i] - rendered.hip[i]) * stiffness) as f32);
-            rendered.sample.force_n = Vec3::from_array(way);
+            let force_n =
+                [0, 1, 2].map(|i| ((rendered.proxy[i] - rendered.hip[i]) * stiffness) as f32);
+            rendered.sample.force_n = Vec3::from_array(force_n);
         };
         self.at_once(at, moved)
     }
@@ -119,41 +120,41 @@ const BORDER: usize = 51;
 
 #[test]
 fn wrong_force_during_a_stiffness_change_is_detected() {
-    let way = Way::over([SOFT, HARD], SLOW, Shading::None);
-    let counts = way.honest();
+    let case = Case::over([SOFT, HARD], SLOW, Shading::None);
+    let counts = case.honest();
     assert_eq!((counts.compared_as_vectors, counts.open), (300, 0));
     assert!((100..110).contains(&counts.changing), "{counts:?}");
     let wrong = Some(Invariant::Material);
     // In one step, not at all, one tick early and one tick late.
-    assert_eq!(way.force(BORDER, |_| Vec3::Z * 1.5), wrong);
-    assert_eq!(way.force(BORDER + 40, |_| Vec3::Z * 0.6), wrong);
-    assert_eq!(way.force(BORDER - 1, |f| f + Vec3::Z * 0.009), wrong);
+    assert_eq!(case.force(BORDER, |_| Vec3::Z * 1.5), wrong);
+    assert_eq!(case.force(BORDER + 40, |_| Vec3::Z * 0.6), wrong);
+    assert_eq!(case.force(BORDER - 1, |f| f + Vec3::Z * 0.009), wrong);
     for at in [BORDER + 1, BORDER + 50, BORDER + 98] {
-        assert_eq!(way.force(at, |f| f + Vec3::Z * 0.009), wrong, "{at}");
-        assert_eq!(way.force(at, |f| f - Vec3::Z * 0.009), wrong, "{at}");
+        assert_eq!(case.force(at, |f| f + Vec3::Z * 0.009), wrong, "{at}");
+        assert_eq!(case.force(at, |f| f - Vec3::Z * 0.009), wrong, "{at}");
     }
     for at in [3, BORDER, 299] {
-        assert_eq!(way.force(at, |f| f * 1.0001), wrong, "{at}");
-        assert_eq!(way.force(at, |f| f + Vec3::X * 1e-3), wrong, "{at}");
-        assert_eq!(way.force(at, |f| -f), wrong, "it pulls");
-        assert_eq!(way.force(at, |f| f * 1e3), wrong, "above the limit");
+        assert_eq!(case.force(at, |f| f * 1.0001), wrong, "{at}");
+        assert_eq!(case.force(at, |f| f + Vec3::X * 1e-3), wrong, "{at}");
+        assert_eq!(case.force(at, |f| -f), wrong, "it pulls");
+        assert_eq!(case.force(at, |f| f * 1e3), wrong, "above the limit");
     }
 }
 
 #[test]
 fn equidistant_materials_are_accepted_until_force_decides() {
     // Up to the line half way between two samples.
-    let way = Way::over([SOFT, HARD], [18.5, 1.0 / 64.0], Shading::None);
+    let case = Case::over([SOFT, HARD], [18.5, 1.0 / 64.0], Shading::None);
     let on_line = 66;
-    assert_eq!(way.rendered[on_line - 1].proxy[0], 19.5);
-    way.honest();
+    assert_eq!(case.rendered[on_line - 1].proxy[0], 19.5);
+    case.honest();
     // There the old class would be valid, but then the next point is the first of the change.
     let before = |rendered: &mut Replied| rendered.sample.force_n = Vec3::Z * 0.6;
-    let (found, _) = way.with(on_line - 1, before);
+    let (found, _) = case.with(on_line - 1, before);
     assert_eq!(found, Some((Invariant::Material, on_line)));
     let wrong = Some(Invariant::Material);
-    assert_eq!(way.force(on_line - 1, |_| Vec3::Z * 0.61), wrong);
-    assert_eq!(way.force(on_line - 2, |_| Vec3::Z * 0.609), wrong);
+    assert_eq!(case.force(on_line - 1, |_| Vec3::Z * 0.61), wrong);
+    assert_eq!(case.force(on_line - 2, |_| Vec3::Z * 0.609), wrong);
 }
 
 #[test]
@@ -162,24 +163,24 @@ fn friction_of_the_place_after_is_found() {
         friction: Friction::coulomb(0.5),
         ..SOFT
     };
-    let way = Way::over([SOFT, rough], SLOW, Shading::None);
-    let counts = way.honest();
+    let case = Case::over([SOFT, rough], SLOW, Shading::None);
+    let counts = case.honest();
     assert!(counts.sliding > 150 && counts.open == 0, "{counts:?}");
     // At 1.5 cells depth, each tick of the change holds 0.0075 cells more.
-    let proxy = |at, east| way.proxy(BORDER + at, east, 0.4);
+    let proxy = |at, east| case.proxy(BORDER + at, east, 0.4);
     let early = proxy(0, -0.0075);
     assert_eq!(early, Some(Invariant::LocalMinimum), "nothing is held yet");
     assert_eq!(proxy(10, 0.0), None);
     assert_eq!(proxy(10, -0.0075), Some(Invariant::Cone), "one tick early");
     assert_eq!(proxy(10, 0.0075), Some(Invariant::Cone), "one tick late");
     // On its return it is held, and does not move.
-    let [stuck, before] = [280, 279].map(|at| way.rendered[at].sample.proxy);
+    let [stuck, before] = [280, 279].map(|at| case.rendered[at].sample.proxy);
     assert_eq!(stuck, before);
-    assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
+    assert_eq!(case.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
 }
 
 #[test]
-fn two_textures_at_once_are_found() {
+fn two_simultaneous_textures_are_detected() {
     let textured = |wavelength_mm| Material {
         texture: Texture {
             wavelength_mm,
@@ -187,14 +188,14 @@ fn two_textures_at_once_are_found() {
         },
         ..SOFT
     };
-    let way = Way::over([textured(1.0), textured(1.7)], SLOW, Shading::None);
-    way.honest();
+    let case = Case::over([textured(1.0), textured(1.7)], SLOW, Shading::None);
+    case.honest();
     let wrong = Some(Invariant::Material);
     // In the middle of the change neither texture has any force.
-    assert_eq!(way.force(BORDER + 50, |f| f + Vec3::Z * 0.004), wrong);
+    assert_eq!(case.force(BORDER + 50, |f| f + Vec3::Z * 0.004), wrong);
     for at in [BORDER + 10, BORDER + 90, 280] {
-        assert_eq!(way.force(at, |f| f + Vec3::Z * 4e-3), wrong, "{at}");
-        assert_eq!(way.force(at, |f| f + Vec3::X * 8e-3), wrong, "{at}");
+        assert_eq!(case.force(at, |f| f + Vec3::Z * 4e-3), wrong, "{at}");
+        assert_eq!(case.force(at, |f| f + Vec3::X * 8e-3), wrong, "{at}");
     }
 }
 
@@ -209,32 +210,32 @@ fn another_damping_is_found() {
         ..damped
     };
     // 20 mm/s along the force make 0.2 N, and less with friction.
-    let way = Way::over([SOFT, rough], SLOW, Shading::None);
-    way.honest();
+    let case = Case::over([SOFT, rough], SLOW, Shading::None);
+    case.honest();
     let wrong = Some(Invariant::Material);
-    assert_eq!(way.force(280, |f| f * 1.01), wrong);
-    assert_eq!(way.force(280, |f| f / f.length() * 0.4 * 1.566), wrong);
+    assert_eq!(case.force(280, |f| f * 1.01), wrong);
+    assert_eq!(case.force(280, |f| f / f.length() * 0.4 * 1.566), wrong);
 }
 
 #[test]
 fn shaded_force_is_checked_by_magnitude() {
-    let way = Way::over([SOFT, HARD], SLOW, Shading::Smooth);
-    let counts = way.honest();
+    let case = Case::over([SOFT, HARD], SLOW, Shading::Smooth);
+    let counts = case.honest();
     assert_eq!(
         (counts.compared_as_vectors, counts.compared_by_size),
         (0, 300)
     );
     let wrong = Some(Invariant::Material);
-    assert_eq!(way.force(BORDER + 50, |f| f * 1.001), wrong);
-    assert_eq!(way.force(BORDER + 50, |f| f * 0.999), wrong);
+    assert_eq!(case.force(BORDER + 50, |f| f * 1.001), wrong);
+    assert_eq!(case.force(BORDER + 50, |f| f * 0.999), wrong);
     let turned = |f: Vec3| Vec3::X * f.length();
-    assert_eq!(way.force(BORDER + 50, turned), wrong, "by 90°");
+    assert_eq!(case.force(BORDER + 50, turned), wrong, "by 90°");
 }
 
 #[test]
-fn a_force_without_a_contact_is_found() {
-    let way = Way::over([SOFT, HARD], SLOW, Shading::None);
-    let found = way.at_once(0, |rendered| {
+fn force_without_contact_is_detected() {
+    let case = Case::over([SOFT, HARD], SLOW, Shading::None);
+    let found = case.at_once(0, |rendered| {
         assert_eq!(rendered.sample.state, ContactState::Free);
         rendered.sample.force_n = Vec3::Z * 1e-3;
     });

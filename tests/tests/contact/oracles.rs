@@ -52,7 +52,7 @@ fn rendered(state: ContactState, proxy: [f64; 3], displacement: [f64; 3]) -> Con
     }
 }
 
-fn waiting(hip: [f64; 3]) -> ObservedTick {
+fn unseeded(hip: [f64; 3]) -> ObservedTick {
     ObservedTick::new(hip, rendered(ContactState::Unseeded, hip, [0.0; 3]), [0; 3])
 }
 
@@ -74,7 +74,7 @@ fn touching(hip: [f64; 3], proxy: [f64; 3]) -> ObservedTick {
     faded(hip, proxy, 1.0)
 }
 
-fn letting_go(hip: [f64; 3], displacement: [f64; 3]) -> ObservedTick {
+fn releasing(hip: [f64; 3], displacement: [f64; 3]) -> ObservedTick {
     ObservedTick::new(
         hip,
         rendered(ContactState::Releasing, [10.5, 10.5, 2.0], displacement),
@@ -83,10 +83,10 @@ fn letting_go(hip: [f64; 3], displacement: [f64; 3]) -> ObservedTick {
 }
 
 /// Returns a tick with a changed output, and the forces that follow from it.
-fn with(seen: ObservedTick, change: impl FnOnce(&mut ContactOutput)) -> ObservedTick {
-    let mut rendered = seen.output;
+fn with(observed: ObservedTick, change: impl FnOnce(&mut ContactOutput)) -> ObservedTick {
+    let mut rendered = observed.output;
     change(&mut rendered);
-    ObservedTick::new(seen.hip, rendered, [0; 3])
+    ObservedTick::new(observed.hip, rendered, [0; 3])
 }
 
 /// Returns a position with a fraction that no constructor makes.
@@ -103,17 +103,17 @@ fn reports(terrain: &Terrain, ticks: &[ObservedTick]) -> Vec<Violation> {
     reports_of(TickOracle::new(terrain), ticks)
 }
 
-fn reports_of(mut judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Violation> {
+fn reports_of(mut oracle: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Violation> {
     let (last, before) = ticks.split_last().expect("there are ticks");
-    for seen in before {
-        assert_eq!(judge.violations(seen), [], "before the forged one");
+    for observed in before {
+        assert_eq!(oracle.violations(observed), [], "before the forged one");
     }
-    judge.violations(last)
+    oracle.violations(last)
 }
 
 /// Returns the invariants that the last of these ticks breaks.
-fn broken_of(judge: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Invariant> {
-    let reported = reports_of(judge, ticks);
+fn broken_of(oracle: TickOracle<'_>, ticks: &[ObservedTick]) -> Vec<Invariant> {
+    let reported = reports_of(oracle, ticks);
     reported
         .iter()
         .map(|violation| violation.invariant)
@@ -138,7 +138,7 @@ fn reports_only(
 /// With friction of 0.5, and 0.8 at rest: the proxy is outside the cone, or moves inside it, on
 /// flat ground and on a ridge.
 #[test]
-fn a_proxy_that_friction_would_hold_otherwise_is_found() {
+fn proxy_outside_its_friction_rule_is_detected() {
     use Invariant::{Cone, Stuck};
     let friction = Friction {
         static_mu: 0.8,
@@ -146,8 +146,8 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     };
     let flat = flat();
     let found = |ticks: &[ObservedTick]| -> Vec<Invariant> {
-        let judge = TickOracle::new(&flat).with_friction(friction);
-        broken_of(judge, ticks)
+        let oracle = TickOracle::new(&flat).with_friction(friction);
+        broken_of(oracle, ticks)
     };
     let at = |x: f64, hip_x: f64| touching([hip_x, 10.5, 1.0], [x, 10.5, 2.0]);
     let first = at(10.5, 10.6);
@@ -175,9 +175,9 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     assert_eq!(found(&[&rest[..], &[over, first, broken]].concat()), []);
     // At the ridge's edge only the HIP's side pulls.
     let ridge = ridge();
-    let judge = || TickOracle::new(&ridge).with_friction(friction);
+    let oracle = || TickOracle::new(&ridge).with_friction(friction);
     let edge = |x: f64| touching([x, 10.5, 1.0], [20.0, 10.5, 2.0]);
-    let reported = |ticks: &[ObservedTick]| -> Vec<Invariant> { broken_of(judge(), ticks) };
+    let reported = |ticks: &[ObservedTick]| -> Vec<Invariant> { broken_of(oracle(), ticks) };
     assert_eq!(
         reported(&[edge(20.1)]),
         [Cone],
@@ -187,15 +187,15 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
 
 /// The slide of a proxy in a tick determines the viscous part of its friction.
 #[test]
-fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
+fn proxy_trailing_beyond_its_viscous_slide_is_detected() {
     let friction = Friction {
         viscous_s: 0.003,
         ..Friction::coulomb(0.05)
     };
     let flat = flat();
     let found = |ticks: &[ObservedTick]| -> Vec<Invariant> {
-        let judge = TickOracle::new(&flat).with_friction(friction);
-        broken_of(judge, ticks)
+        let oracle = TickOracle::new(&flat).with_friction(friction);
+        broken_of(oracle, ticks)
     };
     // From (12, 10.5), where it landed or rested, by 2 cells: that holds 6.
     let slid = touching([20.03, 10.5, 1.0], [14.0, 10.5, 2.0]);
@@ -206,7 +206,7 @@ fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
 
 /// A height, and so the pull, is exact only to the last place of the corners it is made from.
 #[test]
-fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
+fn pull_within_corner_rounding_is_not_checked() {
     // Level in the middle of the patch (10, 10) for any corner heights.
     let found = |corner: f32| -> Vec<Invariant> {
         let saddle = Terrain::from_fn(Kind::Rough, SIZE, |x, y| match (x, y) {
@@ -214,9 +214,9 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
             (11, 10) | (10, 11) => 2.0 - corner,
             _ => 2.0,
         });
-        let judge = TickOracle::new(&saddle).with_friction(Friction::coulomb(0.5));
+        let oracle = TickOracle::new(&saddle).with_friction(Friction::coulomb(0.5));
         let pulled = touching([10.51, 10.5, 1.99], [10.5, 10.5, 2.0]);
-        broken_of(judge, &[pulled])
+        broken_of(oracle, &[pulled])
     };
     assert_eq!(found(1.0), [Invariant::Cone]);
     assert_eq!(found(3e5), []);
@@ -224,21 +224,22 @@ fn a_pull_in_the_last_place_of_a_patchs_corners_is_not_judged() {
 
 /// With shading the force has the length of the unshaded one, along the smoothed normal.
 #[test]
-fn a_force_that_is_shaded_otherwise_is_found() {
+fn wrongly_shaded_force_is_detected() {
     let ridge = ridge();
     // A quarter of a cell east of the edge, under a side that falls by 1 a cell; the slope there
     // goes from 0 at the edge to 1 at the next sample, with a linear change of direction.
     let shaded = |[x, z]: [f64; 2], is_whole| {
         let displacement = Vec3::new(x as f32, 0.0, z as f32);
-        let seen = touching([20.2, 10.5, 1.7], [20.25, 10.5, 1.75]);
+        let observed = touching([20.2, 10.5, 1.7], [20.25, 10.5, 1.75]);
         let shaded = Some(Shaded {
             displacement,
             is_whole,
         });
-        ObservedTick { shaded, ..seen }
+        ObservedTick { shaded, ..observed }
     };
-    let found =
-        |seen: ObservedTick| -> Vec<Invariant> { broken_of(TickOracle::new(&ridge), &[seen]) };
+    let found = |observed: ObservedTick| -> Vec<Invariant> {
+        broken_of(TickOracle::new(&ridge), &[observed])
+    };
     // Bends of 90° are turned along a fifth of an edge: this is beyond it.
     let along = [0.05, 0.05];
     assert_eq!(found(shaded(along, true)), []);
@@ -262,7 +263,7 @@ fn a_force_that_is_shaded_otherwise_is_found() {
 /// With texture the force is the untextured one plus the relief's, after the proxy was slow for
 /// some time.
 #[test]
-fn a_force_that_is_textured_otherwise_is_found() {
+fn wrongly_textured_force_is_detected() {
     let flat = flat();
     let grating = Texture {
         pattern: Pattern::Grating,
@@ -278,16 +279,16 @@ fn a_force_that_is_textured_otherwise_is_found() {
     };
     let (crest, slope) = ([0.0, 0.6], [-std::f64::consts::TAU / 48.0, 0.5]);
     let reported = |honest: Option<ObservedTick>, last: ObservedTick| -> Vec<Invariant> {
-        let mut judge = TickOracle::new(&flat).with_texture(grating);
-        for seen in honest
+        let mut oracle = TickOracle::new(&flat).with_texture(grating);
+        for observed in honest
             .iter()
             .cycle()
             .take(60 * usize::from(honest.is_some()))
         {
             // The fade-in is not checked here.
-            let _ = judge.violations(seen);
+            let _ = oracle.violations(observed);
         }
-        let reported = judge.violations(&last);
+        let reported = oracle.violations(&last);
         reported
             .iter()
             .map(|violation| violation.invariant)
@@ -327,7 +328,7 @@ const ON: [f64; 3] = [10.5, 10.5, 2.0];
 
 /// Checks of a single answer.
 #[test]
-fn an_answer_that_is_no_answer_is_found() {
+fn invalid_answer_is_detected() {
     use Invariant::{Clamp, Consistent, Finite, Work};
     let terrain = flat();
     let honest = touching(BELOW, ON);
@@ -342,7 +343,10 @@ fn an_answer_that_is_no_answer_is_found() {
         (Consistent, with(honest, |f| f.displacement.x = 0.01)),
         (Consistent, with(honest, |f| f.displacement.z = -0.5)),
         (Consistent, with(honest, |f| f.displacement.z = 0.501)),
-        (Consistent, with(waiting(BELOW), |f| f.displacement.z = 0.1)),
+        (
+            Consistent,
+            with(unseeded(BELOW), |f| f.displacement.z = 0.1),
+        ),
         // Forces: too long, of another spring, in the opposite direction, NaN.
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
@@ -364,15 +368,15 @@ fn an_answer_that_is_no_answer_is_found() {
     reports_only(Consistent, &terrain, &[], free(ABOVE), pressing);
 }
 
-fn forces(seen: ObservedTick, change: impl Fn([f64; 3]) -> [f64; 3]) -> ObservedTick {
+fn forces(observed: ObservedTick, change: impl Fn([f64; 3]) -> [f64; 3]) -> ObservedTick {
     ObservedTick {
-        force_n: seen.force_n.map(change),
-        ..seen
+        force_n: observed.force_n.map(change),
+        ..observed
     }
 }
 
 #[test]
-fn a_proxy_off_the_surface_is_found() {
+fn proxy_off_the_surface_is_detected() {
     let honest = touching(BELOW, ON);
     for off in [-1e-4, -3e-6, 3e-6, 1e-4] {
         let forged = touching(BELOW, [10.5, 10.5, 2.0 + off]);
@@ -381,7 +385,7 @@ fn a_proxy_off_the_surface_is_found() {
 }
 
 #[test]
-fn a_proxy_beside_the_closest_point_is_found() {
+fn proxy_beside_the_closest_point_is_detected() {
     // On level ground, on a slope of 1, and beside the edge where it should rest.
     let level = |off: f64| touching(BELOW, [10.5 + off, 10.5, 2.0]);
     let slope = |off: f64| touching([17.0, 10.5, -2.0], [16.5 + off, 10.5, -1.5 + off]);
@@ -407,15 +411,21 @@ fn a_proxy_beside_the_closest_point_is_found() {
 }
 
 #[test]
-fn a_contact_that_pulls_is_found() {
+fn pulling_contact_is_detected() {
     let above = |off: f64| touching([10.5, 10.5, 2.0 - off], ON);
     let slope = |off: f64| touching([16.5 + off, 10.5, -1.5 - off], [16.5, 10.5, -1.5]);
     for off in [1e-4, 0.1, 3.0] {
-        for (terrain, seen) in [
+        for (terrain, observed) in [
             (flat(), &above as &dyn Fn(f64) -> ObservedTick),
             (ridge(), &slope),
         ] {
-            reports_only(Invariant::HipBelow, &terrain, &[], seen(off), seen(-off));
+            reports_only(
+                Invariant::HipBelow,
+                &terrain,
+                &[],
+                observed(off),
+                observed(-off),
+            );
         }
     }
     // Correct contacts are not reported: a valley, the border of the data.
@@ -438,9 +448,9 @@ fn friction_at_no_data_edge_excuses_a_hip_above_ground() {
         _ => 0.0_f32.max((20 - x) as f32),
     });
     let found = |x: f64| -> Vec<Invariant> {
-        let judge = TickOracle::new(&hole).with_friction(Friction::coulomb(2.0));
-        let seen = touching([22.0, 20.1, 0.1], [x, 20.0, 0.0_f64.max(20.0 - x)]);
-        broken_of(judge, &[seen])
+        let oracle = TickOracle::new(&hole).with_friction(Friction::coulomb(2.0));
+        let observed = touching([22.0, 20.1, 0.1], [x, 20.0, 0.0_f64.max(20.0 - x)]);
+        broken_of(oracle, &[observed])
     };
     for before in [1e-2, 1e-5, 5e-7] {
         assert_eq!(found(20.0 - before), [], "{before}");
@@ -452,7 +462,7 @@ fn friction_at_no_data_edge_excuses_a_hip_above_ground() {
 
 /// Rounding of a patch's corners is allowed where they contribute, but not at the foot of one.
 #[test]
-fn a_spike_at_one_corner_excuses_nothing_at_the_others() {
+fn spike_at_one_corner_allows_no_error_at_the_others() {
     let spike = Terrain::from_fn(Kind::Spikes, SIZE, |x, y| {
         if (x, y) == (11, 11) { 1e6 } else { 2.0 }
     });
@@ -476,7 +486,7 @@ fn proxy_crossing_a_ridge_to_a_farther_point_is_reported() {
 }
 
 #[test]
-fn a_contact_beyond_the_first_crossing_is_found() {
+fn contact_beyond_the_first_crossing_is_detected() {
     let honest = touching(IN_RIDGE, NEAR_SIDE);
     let forged = touching(IN_RIDGE, FAR_SIDE);
     let before = free([18.875, 10.5, 1.5]);
@@ -490,7 +500,7 @@ fn a_contact_beyond_the_first_crossing_is_found() {
 }
 
 #[test]
-fn a_contact_with_nothing_crossed_is_found() {
+fn contact_without_a_crossing_is_detected() {
     let before = free(ABOVE);
     let near = [10.625, 10.5, 2.5];
     // Still moving, or the oracle would report it for pulling.
@@ -499,7 +509,7 @@ fn a_contact_with_nothing_crossed_is_found() {
 }
 
 #[test]
-fn a_free_hip_below_the_surface_is_found() {
+fn free_hip_below_the_surface_is_detected() {
     for depth in [1.0 / 65536.0, 0.5, 100.0] {
         let below = [10.5, 10.5, 2.0 - depth];
         let honest = touching(below, ON);
@@ -514,20 +524,20 @@ fn a_free_hip_below_the_surface_is_found() {
 }
 
 #[test]
-fn a_contact_out_of_nowhere_is_found() {
-    let (before, forged) = (waiting(BELOW), touching(BELOW, ON));
+fn contact_of_an_unseeded_proxy_is_detected() {
+    let (before, forged) = (unseeded(BELOW), touching(BELOW, ON));
     reports_only(
         Invariant::SeenAbove,
         &flat(),
         &[before],
-        waiting(BELOW),
+        unseeded(BELOW),
         forged,
     );
 }
 
 /// For any motion of the HIP, but not while a tile is missing.
 #[test]
-fn a_proxy_that_gets_no_farther_is_found() {
+fn proxy_without_progress_is_detected() {
     let flies = |tick: usize, height: f64| {
         let hip = [15.5 + 0.1 * tick as f64, 10.5, 1.5];
         with(free(hip), |f| {
@@ -553,7 +563,7 @@ fn a_proxy_that_gets_no_farther_is_found() {
 }
 
 #[test]
-fn a_wall_that_is_passed_is_found() {
+fn passage_through_a_wall_is_detected() {
     let before = free([20.5, 10.5, 3.0]);
     let honest = free([21.5, 10.5, 3.0]);
     let forged = free([25.5, 10.5, 3.0]);
@@ -576,30 +586,30 @@ fn abrupt_force_onset_or_release_is_reported() {
     reports_only(&[before], fades(0.97), fades(0.95));
     reports_only(&[fades(0.5)], fades(0.53), fades(0.55));
     // Released at once.
-    reports_only(&[before], fades(1.0), waiting(BELOW));
+    reports_only(&[before], fades(1.0), unseeded(BELOW));
     // A release that is too fast, returns, or turns.
-    let go = |part: f64| letting_go(BELOW, [0.0, 0.0, 0.5 * part]);
+    let go = |part: f64| releasing(BELOW, [0.0, 0.0, 0.5 * part]);
     reports_only(&[before], go(0.97), go(0.9));
     reports_only(&[before, go(0.97)], go(0.95), go(0.99));
-    let turned = letting_go(BELOW, [0.01, 0.0, 0.475]);
+    let turned = releasing(BELOW, [0.01, 0.0, 0.475]);
     reports_only(&[before, go(0.97)], go(0.95), turned);
-    reports_only(&[before, go(0.97), go(0.95)], go(0.92), waiting(BELOW));
+    reports_only(&[before, go(0.97), go(0.95)], go(0.92), unseeded(BELOW));
 }
 
 /// Plays a scene of a few HIPs. Returns the scene and its ticks.
-fn played(supply: Supply) -> (Scene, Vec<ObservedTick>, Buffers) {
+fn run_scene(supply: Supply) -> (Scene, Vec<ObservedTick>, Buffers) {
     // Down into a side of the ridge, along it, and up again.
     let path = [3.0, 0.0, 0.25, 3.0].map(|z| [18.5 + 0.5 * z, 10.5, z]);
     let scene = Scene::new(ridge(), path.to_vec(), Execution::LockStep, supply);
     let mut buffers = Buffers::default();
-    let seen = scene
+    let observed = scene
         .render(&mut buffers, [0; 3], supply, |_| Ok(()))
         .expect("it settles");
-    (scene, seen, buffers)
+    (scene, observed, buffers)
 }
 
 /// Returns copies of the ticks, each with one bit changed.
-fn other_bits(seen: &[ObservedTick]) -> Vec<Vec<ObservedTick>> {
+fn other_bits(observed: &[ObservedTick]) -> Vec<Vec<ObservedTick>> {
     let changes: [fn(&mut ContactOutput); 4] = [
         |f| f.displacement.z = f32::from_bits(f.displacement.z.to_bits() ^ 1),
         |f| f.proxy = f.proxy.midpoint(&point([0.0, 0.0, 0.0])),
@@ -608,13 +618,13 @@ fn other_bits(seen: &[ObservedTick]) -> Vec<Vec<ObservedTick>> {
     ];
     changes
         .map(|change| {
-            let mut forged = seen.to_vec();
+            let mut forged = observed.to_vec();
             forged[1] = with(forged[1], change);
             forged
         })
         .into_iter()
         .chain(std::iter::once({
-            let mut forged = seen.to_vec();
+            let mut forged = observed.to_vec();
             let textured = forged[1].textured.as_mut().expect("textured");
             textured.z = f32::from_bits(textured.z.to_bits() ^ 1);
             forged
@@ -622,48 +632,48 @@ fn other_bits(seen: &[ObservedTick]) -> Vec<Vec<ObservedTick>> {
         .collect()
 }
 
-fn only<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, Violation>) {
+fn assert_violates<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, Violation>) {
     assert_eq!(verdict.expect_err("forged").invariant, invariant);
 }
 
 #[test]
 fn other_bits_are_found() {
-    let (scene, seen, mut buffers) = played(Supply::Preloaded);
-    assert_eq!(metamorphic::repeated(&scene, &seen, &mut buffers), Ok(true));
-    for forged in other_bits(&seen) {
+    let (scene, observed, mut buffers) = run_scene(Supply::Preloaded);
+    assert_eq!(metamorphic::repeated(&scene, &observed, &mut buffers), Ok(true));
+    for forged in other_bits(&observed) {
         let verdict = metamorphic::repeated(&scene, &forged, &mut buffers);
-        only(Invariant::Repeatable, verdict);
+        assert_violates(Invariant::Repeatable, verdict);
     }
-    let (scene, seen, mut buffers) = played(Supply::OnDemand { latency: 2 });
+    let (scene, observed, mut buffers) = run_scene(Supply::OnDemand { latency: 2 });
     assert_eq!(
-        metamorphic::windowed(&scene, &seen, &mut buffers, &mut Random::new(1)),
+        metamorphic::windowed(&scene, &observed, &mut buffers, &mut Random::new(1)),
         Ok(true)
     );
-    for forged in other_bits(&seen) {
+    for forged in other_bits(&observed) {
         let verdict = metamorphic::windowed(&scene, &forged, &mut buffers, &mut Random::new(1));
-        only(Invariant::Window, verdict);
+        assert_violates(Invariant::Window, verdict);
     }
 }
 
 #[test]
-fn other_bits_far_away_are_found() {
+fn different_bits_far_away_are_detected() {
     let shift = [3200, 6400, -1_000_000];
-    let (scene, seen, mut buffers) = played(Supply::Preloaded);
+    let (scene, observed, mut buffers) = run_scene(Supply::Preloaded);
     let on_demand = Supply::OnDemand { latency: 0 };
     let away = scene.render(&mut buffers, shift, on_demand, |_| Ok(()));
     let away = away.expect("it settles");
-    let judge =
-        |away: &[ObservedTick], by| metamorphic::same_bits(Invariant::Shift, &seen, away, by);
-    assert_eq!(judge(&away, shift), Ok(()));
+    let compare =
+        |away: &[ObservedTick], by| metamorphic::same_bits(Invariant::Shift, &observed, away, by);
+    assert_eq!(compare(&away, shift), Ok(()));
     for forged in other_bits(&away) {
-        only(Invariant::Shift, judge(&forged, shift));
+        assert_violates(Invariant::Shift, compare(&forged, shift));
     }
-    only(Invariant::Shift, judge(&away, [3201, 6400, -1_000_000]));
+    assert_violates(Invariant::Shift, compare(&away, [3201, 6400, -1_000_000]));
 }
 
 #[test]
 fn result_differing_under_a_symmetry_is_reported() {
-    let (scene, seen, mut buffers) = played(Supply::Preloaded);
+    let (scene, observed, mut buffers) = run_scene(Supply::Preloaded);
     for symmetry in symmetry::all() {
         let turned = |p| symmetry.point(&scene.terrain, p);
         let path = scene.path.iter().map(|p| turned(*p)).collect();
@@ -671,33 +681,33 @@ fn result_differing_under_a_symmetry_is_reported() {
         let other = twin
             .render(&mut buffers, [0; 3], Supply::Preloaded, |_| Ok(()))
             .expect("it settles");
-        let mut judge = |other: &[ObservedTick]| {
-            metamorphic::same_forces(&scene, symmetry, &seen, other, &mut buffers)
+        let mut compare = |other: &[ObservedTick]| {
+            metamorphic::same_forces(&scene, symmetry, &observed, other, &mut buffers)
         };
-        assert_eq!(judge(&other), Ok(true), "{symmetry:?}");
+        assert_eq!(compare(&other), Ok(true), "{symmetry:?}");
         let mut elsewhere = other.clone();
         elsewhere[1] = touching(other[1].hip, {
             let [x, y, z] = other[1].proxy;
             [x, y, z + 1e-3]
         });
-        only(Invariant::Symmetry, judge(&elsewhere));
+        assert_violates(Invariant::Symmetry, compare(&elsewhere));
         // Held by rounding while the other is free.
         let mut held = other.clone();
         held[0] = touching(other[0].hip, {
             let [x, y, z] = other[0].hip;
             [x, y, z - 1e-5]
         });
-        only(Invariant::Symmetry, judge(&held));
+        assert_violates(Invariant::Symmetry, compare(&held));
         let mut let_go = other;
         let_go[2] = free(let_go[2].hip);
-        only(Invariant::Symmetry, judge(&let_go));
+        assert_violates(Invariant::Symmetry, compare(&let_go));
     }
 }
 
 #[test]
-fn a_hip_that_is_never_answered_is_found() {
+fn unanswered_hip_is_detected() {
     let path = vec![ABOVE, BELOW];
     let never = Supply::OnDemand { latency: 1 << 30 };
     let scene = Scene::new(flat(), path, Execution::LockStep, never);
-    only(Invariant::Settles, scene.run(&mut Buffers::default()));
+    assert_violates(Invariant::Settles, scene.run(&mut Buffers::default()));
 }

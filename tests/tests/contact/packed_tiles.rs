@@ -16,7 +16,7 @@ use heightfield::{OpenOptions, Raster, RasterError};
 const FLOATS: usize = 4 * TILE_SAMPLES * TILE_SAMPLES;
 
 #[test]
-fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
+fn tiles_of_real_terrain_are_lossless_and_smaller() {
     let Some(folder) = shared("dem/real") else {
         return;
     };
@@ -103,13 +103,13 @@ fn assert_held(
             if grid.is_resampled() {
                 cells = (cells * 131_072.0).round() / 131_072.0;
             }
-            let wanted = (cells - f64::from(tile.base())) as f32;
+            let expected = (cells - f64::from(tile.base())) as f32;
             // The last row and column are corners of the patches before them.
             let (u, v) = (col.min(31), row.min(31));
             let corner = (col - u) + 2 * (row - v);
             let held = tile.corners(Cell::new(u as i32, v as i32))[corner as usize];
-            let same = held.to_bits() == wanted.to_bits() || held.is_nan() && wanted.is_nan();
-            assert!(same, "{}: {col} {row}: {held:e} {wanted:e}", context());
+            let same = held.to_bits() == expected.to_bits() || held.is_nan() && expected.is_nan();
+            assert!(same, "{}: {col} {row}: {held:e} {expected:e}", context());
         }
     }
 }

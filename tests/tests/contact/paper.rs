@@ -30,8 +30,11 @@ fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Answer>; 2]
     [
         Box::new(move |hip| {
             let displacement = paper.step(hip);
-            let way = displacement.unwrap_or_default();
-            (displacement.is_some(), [0, 1, 2].map(|i| hip[i] + way[i]))
+            let offset = displacement.unwrap_or_default();
+            (
+                displacement.is_some(),
+                [0, 1, 2].map(|i| hip[i] + offset[i]),
+            )
         }),
         Box::new(move |hip| {
             let rendered = swept.step(hip);

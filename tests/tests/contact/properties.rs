@@ -81,7 +81,7 @@ fn execution() -> impl Strategy<Value = Execution> {
     prop_oneof![Just(Execution::RealTime), Just(Execution::LockStep)]
 }
 
-fn holds(scene: &Scene) -> Result<(), TestCaseError> {
+fn check_scene(scene: &Scene) -> Result<(), TestCaseError> {
     let ran = scene.run(&mut Buffers::default());
     ran.map(drop)
         .map_err(|violation| TestCaseError::fail(violation.to_string()))
@@ -100,24 +100,24 @@ proptest! {
     })]
 
     #[test]
-    fn everything_holds_on_gentle_ground(
+    fn invariants_hold_on_gentle_ground(
         heights in gentle(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::new(terrain(&heights), path, execution, Supply::Preloaded))?;
+        check_scene(&Scene::new(terrain(&heights), path, execution, Supply::Preloaded))?;
     }
 
     #[test]
-    fn everything_holds_on_wild_ground(
+    fn invariants_hold_on_wild_ground(
         heights in wild(), path in path(), execution in execution(),
     ) {
-        holds(&Scene::new(terrain(&heights), path, execution, Supply::Preloaded))?;
+        check_scene(&Scene::new(terrain(&heights), path, execution, Supply::Preloaded))?;
     }
 
     #[test]
-    fn everything_holds_while_tiles_arrive(
+    fn invariants_hold_while_tiles_arrive(
         heights in gentle(), path in path(), execution in execution(), latency in 0..4_u32,
     ) {
         let supply = Supply::OnDemand { latency };
-        holds(&Scene::new(terrain(&heights), path, execution, supply))?;
+        check_scene(&Scene::new(terrain(&heights), path, execution, supply))?;
     }
 }

@@ -17,21 +17,21 @@ fn thousand(surface: Surface) -> LinkStats {
         metamorphic
             .iter()
             .zip([150, 100, 50, 50])
-            .all(|(n, least)| *n >= least),
+            .all(|(n, minimum)| *n >= minimum),
         "{metamorphic:?}"
     );
     // In another window, shifted, mirrored or turned.
-    let (judged, metamorphic) = (total.on_materials, total.metamorphic_on_materials);
+    let (counts, metamorphic) = (total.on_materials, total.metamorphic_on_materials);
     assert!(
-        judged.compared_as_vectors > 20_000 && judged.changing > 10_000,
-        "{judged:?}"
+        counts.compared_as_vectors > 20_000 && counts.changing > 10_000,
+        "{counts:?}"
     );
-    assert!(100 * judged.open < judged.compared_as_vectors, "{judged:?}");
+    assert!(100 * counts.open < counts.compared_as_vectors, "{counts:?}");
     assert!(metamorphic.iter().all(|n| *n >= 20), "{metamorphic:?}");
     stats
 }
 
-fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b FailedScene>) {
+fn assert_no_violations<'b>(surface: Surface, broken: impl Iterator<Item = &'b FailedScene>) {
     let rough = surface.option();
     let reported: Vec<String> = broken
         .map(|b| {
@@ -48,17 +48,17 @@ fn none<'b>(surface: Surface, broken: impl Iterator<Item = &'b FailedScene>) {
 }
 
 #[test]
-fn everything_holds_in_a_thousand_random_scenes() {
-    none(Surface::Smooth, thousand(Surface::Smooth).failed.iter());
+fn invariants_hold_in_a_thousand_random_scenes() {
+    assert_no_violations(Surface::Smooth, thousand(Surface::Smooth).failed.iter());
 }
 
 #[test]
-fn everything_holds_with_friction_too() {
+fn invariants_hold_with_friction() {
     let stats = thousand(Surface::Rough);
-    let judged = stats.total().on_materials;
+    let counts = stats.total().on_materials;
     assert!(
-        judged.with_friction > 20_000 && judged.sliding > 1_000,
-        "{judged:?}"
+        counts.with_friction > 20_000 && counts.sliding > 1_000,
+        "{counts:?}"
     );
-    none(Surface::Rough, stats.failed.iter());
+    assert_no_violations(Surface::Rough, stats.failed.iter());
 }

@@ -27,7 +27,7 @@ fn run(
 /// A proxy exactly on the east or north border of the data that moved inward was treated like one
 /// that leaves no-data.
 #[test]
-fn a_proxy_on_the_east_border_leaves_as_on_the_west_one() {
+fn proxy_on_east_border_leaves_as_on_west_border() {
     let terrain = field([6, 6], |x, y| match (x, y) {
         (0, 3) => -0.5,
         (1, 4) => 0.5,
@@ -77,7 +77,7 @@ fn contact_over_no_data_into_solid_ends_without_force_step() {
 
 /// The closest point is 4·10⁻⁵ cell beyond the edge under the HIP.
 #[test]
-fn a_minimum_just_beyond_an_edge_is_found() {
+fn minimum_just_beyond_an_edge_is_found() {
     let rows = [
         [2.522_146_5, 0.941_511_03, -1.064_021_5, -2.589_368_8],
         [2.514_235, 0.938_557_8, -1.060_683_8, -2.581_246_6],
@@ -112,7 +112,7 @@ fn contact_lost_after_a_late_tile_fades_from_its_last_force() {
 /// The line from the surface to a HIP 1.1·10⁻⁵ cell below it was so short that it was skipped like
 /// the corner that a path touches when it leaves an edge.
 #[test]
-fn a_hip_just_below_a_vertex_is_not_let_through() {
+fn hip_just_below_a_vertex_does_not_pass() {
     let rows = [
         [-297.904_27, 265.127_4, 34.867_683, 109.010_83],
         [35.195_873, 9.611_267, 268.303_25, 93.524_216],
@@ -153,8 +153,8 @@ fn hip_leaving_high_ground_is_released() {
     }
     let terrain = field([6, 6], height);
     let states = run(terrain, &path, Execution::LockStep, Supply::Preloaded).expect("holds");
-    let wanted = [ContactState::Touching, ContactState::Free];
-    assert!(states[1..].chunks(2).all(|pair| pair == wanted));
+    let expected = [ContactState::Touching, ContactState::Free];
+    assert!(states[1..].chunks(2).all(|pair| pair == expected));
 }
 
 /// A part of the path ended exactly on the border of the data, far below it: its entry from outside
@@ -215,7 +215,7 @@ fn hip_vertically_above_its_proxy_is_released() {
 /// A path that met a saddle of the checkerboard again and again, each time nearer to the HIP,
 /// counted as motion to and fro, and the proxy stopped half-way up the last saddle.
 #[test]
-fn a_proxy_leaves_as_often_as_that_leads_nearer() {
+fn proxy_may_leave_while_it_approaches_the_hip() {
     let terrain = field([1500, 40], |x, y| ((x + y) & 1) as f32);
     let path = [[92.25, 8.0, 3.0], [92.5, 8.0, 0.5], [796.0, 36.0, 1.0]];
     let supply = Supply::OnDemand { latency: 0 };
@@ -226,7 +226,7 @@ fn a_proxy_leaves_as_often_as_that_leads_nearer() {
 /// A proxy left a point 10⁻⁶ cell before the foot of a wall and was held where it had begun, but
 /// counted as moved: measured in parts of so short a step it had moved.
 #[test]
-fn a_proxy_held_where_it_left_climbs_on() {
+fn proxy_stopped_at_its_departure_climbs_further() {
     let terrain = field([8, 8], |x, y| match (x, y) {
         (4, _) | (_, 5) => 300.0,
         (3, 3) => -0.669_687,
@@ -280,7 +280,7 @@ fn proxy_finds_the_path_over_an_edge_to_a_near_hip() {
 /// For a HIP 10⁸ cells down, a proxy's height above it was exact to 8 cells, and a path down a
 /// slope counted as leading no nearer: its end depended on the window.
 #[test]
-fn a_slope_far_above_the_hip_leads_on_to_its_end() {
+fn proxy_descends_a_slope_far_above_the_hip_to_its_end() {
     let slope = field([200, 40], |x, _| -0.56 * x as f32);
     let path = [[100.5, 2.5, 4.0], [100.5, 2.5, -57.0], [3.0, 3.0, -1e8]];
     let scene = Scene::new(slope, path.to_vec(), Execution::LockStep, Supply::Preloaded);
@@ -302,7 +302,7 @@ fn path_off_a_steep_slope_includes_its_first_short_step() {
 /// For a HIP a million cells away all points of a patch were beside its corner: a proxy was placed
 /// on a vertex 70,000 cells up, because of the valley beyond it.
 #[test]
-fn a_far_hip_lifts_no_proxy_to_a_vertex() {
+fn distant_hip_lifts_no_proxy_to_a_vertex() {
     let mut buffers = Buffers::default();
     let scene = Scene::random(20_261_126, 38_445);
     scene.run(&mut buffers).expect("holds");
@@ -320,7 +320,7 @@ fn upward_path_is_not_stopped_by_a_cell_that_it_grazes() {
 /// A proxy beside a spike of 10⁶ left an edge and was held beyond it, 32 times, and then rested on
 /// the edge's far side, below the HIP, which it pulled.
 #[test]
-fn a_proxy_that_may_leave_no_more_rests_where_it_was_held() {
+fn proxy_without_departures_rests_where_it_was_stopped() {
     let mut buffers = Buffers::default();
     Scene::random(31, 12_943).run(&mut buffers).expect("holds");
 }
@@ -328,7 +328,7 @@ fn a_proxy_that_may_leave_no_more_rests_where_it_was_held() {
 /// A path of 60 cells close over the ground takes several ticks. The HIP moved in each, and the
 /// path began again: while the HIP moved no force was rendered.
 #[test]
-fn a_proxy_in_the_air_arrives_while_the_hip_moves() {
+fn proxy_in_the_air_arrives_while_the_hip_moves() {
     let cliff = field([140, 20], |x, _| match x {
         ..=50 => 30.0,
         _ => 29.7 - 0.8 * (x - 50) as f32,

@@ -6,7 +6,7 @@ use hapterra_tests::instruction_counter::{Counted, CountingBoard};
 use hapterra_tests::scene::emulator_scene::EmulatorScene;
 
 #[test]
-fn scenes_give_the_same_bits_on_the_emulated_processor() {
+fn scenes_are_bit_identical_on_the_emulated_processor() {
     let Some(board) = CountingBoard::found() else {
         return;
     };

@@ -63,7 +63,7 @@ impl Circle<'_> {
     }
 
     /// Returns the energy of a shaded round, mJ; `None` if no-data interrupts it.
-    fn given(&self, terrain: &Terrain<'_>) -> Option<f64> {
+    fn energy_mj(&self, terrain: &Terrain<'_>) -> Option<f64> {
         let rendered = self.rendered(terrain, Shading::Smooth);
         let is_whole = rendered.len() + 2 >= self.steps() as usize;
         is_whole.then(|| gained_mj(&rendered))
@@ -75,10 +75,10 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
 }
 
 /// Returns the largest change of the force's direction from one HIP to the next, degrees, if the
-/// proxy moves by no more than `farthest` cells: over a ridge it moves by its depth at once.
-fn largest_turn(rendered: &[TickRecord], farthest: f32) -> f32 {
+/// proxy moves by no more than `max_motion` cells: over a ridge it moves by its depth at once.
+fn largest_turn(rendered: &[TickRecord], max_motion: f32) -> f32 {
     let pairs = rendered.windows(2);
-    let near = pairs.filter(|pair| pair[0].proxy.to(&pair[1].proxy).length() <= farthest);
+    let near = pairs.filter(|pair| pair[0].proxy.to(&pair[1].proxy).length() <= max_motion);
     let turns = near.map(|pair| degrees(pair[0].force_n, pair[1].force_n));
     turns.fold(0.0, f32::max)
 }
@@ -90,7 +90,7 @@ fn gained_mj(rendered: &[TickRecord]) -> f64 {
         let (from, to) = (position(&pair[0].hip), position(&pair[1].hip));
         force.dot([0, 1, 2].map(|i| to[i] - from[i]).into())
     });
-    gives.sum()
+    works.sum()
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn shading_reduces_force_rotation_tenfold_on_real_terrain() {
             let [plain, shaded] =
                 [Shading::None, Shading::Smooth].map(|shading| circle.rendered(&terrain, shading));
             let sharp = largest_turn(&plain, f32::MAX);
-            let [near, even] = [0.05, f32::MAX].map(|farthest| largest_turn(&shaded, farthest));
+            let [near, even] = [0.05, f32::MAX].map(|max_motion| largest_turn(&shaded, max_motion));
             println!(
                 "{name}, {depth} mm deep: {sharp:.1}° a step, shaded {even:.1}°, {near:.1}° where the proxy goes no farther than 0.05 cell"
             );
@@ -123,7 +123,7 @@ fn shading_reduces_force_rotation_tenfold_on_real_terrain() {
 }
 
 /// Runs rounds in both directions around five centres: a gain in one is a loss in the other.
-fn given_by_rounds(terrain: &Terrain<'_>, depth: &dyn Fn(f64) -> f64) -> Vec<f64> {
+fn energy_by_rounds(terrain: &Terrain<'_>, depth: &dyn Fn(f64) -> f64) -> Vec<f64> {
     let margins_mm = ROUND / std::f64::consts::TAU + 2.0;
     let has_room = |middle: &[f64; 2]| {
         let sides = terrain.size_mm().into_iter().zip(middle);
@@ -139,7 +139,7 @@ fn given_by_rounds(terrain: &Terrain<'_>, depth: &dyn Fn(f64) -> f64) -> Vec<f64
             step,
             depth,
         };
-        circle.given(terrain)
+        circle.energy_mj(terrain)
     });
     given.collect()
 }
@@ -151,7 +151,7 @@ fn energy_of_a_shaded_round_is_within_documented_bounds() {
     let (mut most, mut rounds) = ([0.0_f64; 2], 0);
     for (name, raster) in &real_ground::all_files() {
         let terrain = real_ground::terrain(raster);
-        let given = [&even as &dyn Fn(f64) -> f64, &deep].map(|it| given_by_rounds(&terrain, it));
+        let given = [&even as &dyn Fn(f64) -> f64, &deep].map(|it| energy_by_rounds(&terrain, it));
         let largest = given
             .each_ref()
             .map(|given| given.iter().copied().fold(0.0, f64::max));

@@ -78,7 +78,7 @@ fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
 
 /// Returns the textured tick for the oracle: the displacement is that of the same scene without
 /// texture.
-fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
+fn observed(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
     let rendered = ContactOutput {
         state: textured.state,
         proxy: textured.proxy,
@@ -93,7 +93,7 @@ fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
 }
 
 #[test]
-fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
+fn texture_changes_the_force_but_not_the_proxy() {
     for (name, raster) in &rasters() {
         let grid = HapticGrid::new(raster, HapticCells::Square);
         let scale = grid.true_scale(1.0).expect("scale");
@@ -110,7 +110,7 @@ fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
             let (mut touched, mut most) = (0, 0.0_f32);
             for (tick, (plain, textured)) in plain.iter().zip(&textured).enumerate() {
                 assert_eq!(plain.proxy, textured.proxy);
-                let judged = judge.check(&seen(plain, textured));
+                let judged = judge.check(&observed(plain, textured));
                 assert_eq!(judged, Ok(()), "{name}, {texture:?}, tick {tick}");
                 touched += u32::from(textured.state == ContactState::Touching);
                 most = most.max((textured.force_n - plain.force_n).length());
@@ -128,7 +128,7 @@ fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
 /// A demonstration with a texture is recorded with it, replayed with it, and replayed again to the
 /// same bytes.
 #[test]
-fn a_recording_keeps_its_texture() {
+fn replay_uses_the_texture_of_the_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let hapterra = |args: &[&str]| {
         let run = Command::new(hapterra_binary())

@@ -117,7 +117,7 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
 }
 
 /// Largest error of a proxy, as a fraction of the radius.
-const MAX_OFF: f64 = 0.02;
+const MAX_ERROR: f64 = 0.02;
 
 /// Walks over a raster, and checks that the centre is a radius away from the ground.
 fn check_distance(name: &str, raster: &Raster, radius: f64) {
@@ -132,14 +132,14 @@ fn check_distance(name: &str, raster: &Raster, radius: f64) {
     );
     eprintln!("{name}, {radius} cells, {} ticks: {found}", off.len());
     assert!(off.len() > 1500, "{name}: the walk hardly touches");
-    assert!(share(1.0) < MAX_OFF, "{name}, {radius} cells: {found}");
+    assert!(share(1.0) < MAX_ERROR, "{name}, {radius} cells: {found}");
 }
 
 /// Radii in cells of a millimetre.
 const RADII: [f64; 4] = [0.5, 2.0, 4.0, 8.0];
 
 #[test]
-fn a_ball_touches_real_ground_a_radius_away() {
+fn ball_touches_real_ground_a_radius_away() {
     for file in [
         "dem/real/bigtujunga.tif",
         "dem/real/mt_everest_90m.tif",
@@ -158,7 +158,7 @@ fn a_ball_touches_real_ground_a_radius_away() {
 type Shape<'s> = &'s dyn Fn(u32, u32) -> bool;
 
 #[test]
-fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
+fn ball_touches_poles_walls_and_pits_a_radius_away() {
     let every = |x: u32, n: u32| x % n == n / 2;
     let shapes: [(&str, Shape<'_>, f32); 5] = [
         ("poles", &|x, y| every(x, 5) && every(y, 5), 10.0),
@@ -224,7 +224,7 @@ fn pole_is_rendered_at_steps_of_one_and_a_half_radii() {
 /// A longer step also meets the pole. Without friction its proxy slides around the pole to a HIP
 /// beyond it; with friction it stays where the cone holds it.
 #[test]
-fn friction_holds_a_ball_at_a_pole_at_any_speed() {
+fn friction_stops_a_ball_at_a_pole_at_any_speed() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for speed in [5.0, 12.0, 30.0] {
             // A step longer than the window restarts the contact; 32 haptic cells are a radius.
@@ -249,7 +249,7 @@ fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
 
 /// Returns a hand's path along a row of a terrain at 30 mm/s, below the mean of the surface within
 /// 1 mm around.
-fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]> {
+fn path_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]> {
     const AROUND: usize = 33;
     let east = |tick: usize| 5.0 + 0.03 * tick as f64;
     let heights = (0..5_000).map(|tick| terrain.height_mm(east(tick), north_mm).expect("a city"));
@@ -259,12 +259,12 @@ fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]>
         let mean = around.iter().sum::<f64>() / around.len() as f64;
         [east(tick + AROUND), north_mm, mean - deep_mm]
     });
-    let mut way: Vec<_> = below.collect();
+    let mut path: Vec<_> = below.collect();
     // It starts in the air, where a contact begins, and descends within 200 ticks.
-    for (tick, hip) in way.iter_mut().take(200).enumerate() {
+    for (tick, hip) in path.iter_mut().take(200).enumerate() {
         hip[2] += 0.2 * (200 - tick) as f64;
     }
-    way
+    path
 }
 
 /// The same paths with the ball of a hand and with a point, each as deep in its own terrain.
@@ -281,8 +281,8 @@ fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
     let point = Terrain::over(grid, scale, 0).expect("terrain");
     for deep_mm in [0.1, 0.3, 0.5] {
         let count = |terrain: &Terrain<'_>| {
-            let ways = (1..=6).map(|row| way_over(terrain, f64::from(row) * 27.3, deep_mm));
-            ways.map(|way| steps_of_force(terrain, &way)).sum()
+            let ways = (1..=6).map(|row| path_over(terrain, f64::from(row) * 27.3, deep_mm));
+            ways.map(|path| steps_of_force(terrain, &path)).sum()
         };
         let [of_point, of_ball]: [usize; 2] = [&point, &ball].map(count);
         eprintln!("{deep_mm} mm deep: {of_point} steps of a point, {of_ball} of the ball");
@@ -312,15 +312,15 @@ fn samples_without_data_have_none_under_a_ball() {
 }
 
 /// Returns the standard error of a command that succeeds.
-fn runs(folder: &std::path::Path, words: &[&str]) -> String {
+fn runs(folder: &std::path::Path, arguments: &[&str]) -> String {
     let mut command = Command::new(hapterra_binary());
     let run = command
         .current_dir(folder)
-        .args(words)
+        .args(arguments)
         .env_remove("HAPTERRA_MPS2_ELF");
     let run = run.output().expect("started");
     let [out, printed] = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
-    assert!(run.status.success(), "{words:?}: {out}{printed}");
+    assert!(run.status.success(), "{arguments:?}: {out}{printed}");
     format!("{out}{printed}")
 }
 
@@ -395,7 +395,7 @@ fn recordings_of_a_ball_are_replayed_with_it() {
 }
 
 #[test]
-fn a_tip_of_too_many_cells_takes_a_coarser_level() {
+fn tip_of_too_many_cells_selects_a_coarser_level() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     terrain_file(&folder.join("hills.tif"), Kind::Fractal, 256, 1);
@@ -414,7 +414,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
     );
     let text = std::fs::read_to_string(folder.join("out.csv")).expect("there");
     assert!(text.contains("# level = 2\n"), "{text}");
-    for (words, expected) in [
+    for (arguments, expected) in [
         (
             ["--tip=20", "--level=0"],
             "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be rendered",
@@ -430,7 +430,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
             command
                 .current_dir(folder)
                 .args(["replay", "hills.tif", "in.csv", "-o", "o.csv"]);
-        let run = command.args(words).output().expect("started");
+        let run = command.args(arguments).output().expect("started");
         let printed = String::from_utf8_lossy(&run.stderr);
         assert!(
             !run.status.success() && printed.contains(expected),
@@ -457,7 +457,7 @@ fn run_and_demo_default_to_a_ball_but_replay_to_a_point() {
     ];
     let replay = ["replay", "hills.tif", "in.csv", "-o", "out.csv"];
     let line = "rendered with a ball of 7 mm over level";
-    for (words, more, is_ball) in [
+    for (arguments, more, is_ball) in [
         (&run[..], &[][..], true),
         (&run[..], &["--tip", "0"][..], false),
         // A stated level is as fine as for a point.
@@ -465,11 +465,11 @@ fn run_and_demo_default_to_a_ball_but_replay_to_a_point() {
         (&demo[..], &[][..], true),
         (&replay[..], &[][..], false),
     ] {
-        let printed = runs(folder, &[words, more].concat());
+        let printed = runs(folder, &[arguments, more].concat());
         assert_eq!(
             printed.contains(line),
             is_ball,
-            "{words:?} {more:?}: {printed}"
+            "{arguments:?} {more:?}: {printed}"
         );
     }
 }
@@ -485,8 +485,11 @@ struct Touched {
 impl Touched {
     fn in_demo(folder: &std::path::Path, file: &std::path::Path, friction: &str) -> Self {
         let file_text = file.to_string_lossy();
-        let words = ["demo", &file_text, "--device", "native", "--out", friction];
-        runs(folder, &[&words[..], &["--friction", friction]].concat());
+        let arguments = ["demo", &file_text, "--device", "native", "--out", friction];
+        runs(
+            folder,
+            &[&arguments[..], &["--friction", friction]].concat(),
+        );
         let name = file.file_stem().expect("a name").to_string_lossy();
         let recording = folder.join(friction).join(format!("{name}.csv"));
         let text = std::fs::read_to_string(recording).expect("there");
@@ -533,7 +536,7 @@ impl Touched {
 
 /// With the default ball of a hand.
 #[test]
-fn friction_holds_no_hand_on_ten_real_grounds() {
+fn friction_catches_no_hand_on_ten_real_terrains() {
     for name in [
         "dom1_32_356_5699_1_nw_2020.tif",
         "bijou_gully_5m.asc",

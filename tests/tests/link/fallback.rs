@@ -87,7 +87,7 @@ impl<'t> Slide<'t> {
         };
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         match has_fallback {
-            true => self.terrain.underlaid(scene, reach.sides_mm()),
+            true => self.terrain.with_fallback(scene, reach.sides_mm()),
             false => scene,
         }
     }
@@ -105,26 +105,26 @@ impl<'t> Slide<'t> {
         client.greet(ms(0), &mut out);
         // Without a scene the device's time stops, and the line carries everything.
         while !is_open {
-            let said = device.exchange(&std::mem::take(&mut out));
+            let output = device.exchange(&std::mem::take(&mut out));
             let mut open = |event: Event<'_>| is_open |= matches!(event, Event::Opened { .. });
             client
-                .receive(ms(0), &said, &mut out, &mut open)
+                .receive(ms(0), &output, &mut out, &mut open)
                 .expect("it answers");
         }
         let (mut line, mut samples) = (SlowLine::new(rate), vec![]);
         for tick in 1..=self.ticks {
-            let mut take = |event: Event<'_>| {
+            let mut on_event = |event: Event<'_>| {
                 if let Event::Sample(sample) = event {
                     samples.push(*sample);
                 }
             };
             client
-                .due(ms(tick), &mut out, &mut take)
+                .append_due(ms(tick), &mut out, &mut on_event)
                 .expect("it is there");
             line.send(&std::mem::take(&mut out));
-            let said = device.tick(client.session(), &line.carry());
+            let output = device.tick(client.session(), &line.carry());
             client
-                .receive(ms(tick), &said, &mut out, &mut take)
+                .receive(ms(tick), &output, &mut out, &mut on_event)
                 .expect("it is there");
         }
         (samples, client)
@@ -132,7 +132,7 @@ impl<'t> Slide<'t> {
 
     /// Returns the fallback's own error over the path of the hand, mm: at the samples, where the
     /// difference is largest, as both are bilinear between them.
-    fn stated_error_mm(&self, scene: &Scene) -> f64 {
+    fn fallback_error_mm(&self, scene: &Scene) -> f64 {
         let fallback = scene.fallback.expect("a fallback");
         let size = self.terrain.size();
         let at = |column: i32, row: i32| {
@@ -199,7 +199,7 @@ struct Ground {
     step_n: f32,
 }
 
-fn judged(terrain: &Terrain<'_>, samples: &[TickRecord]) -> Ground {
+fn measure_ground(terrain: &Terrain<'_>, samples: &[TickRecord]) -> Ground {
     let mut ground = Ground::default();
     for sample in samples {
         ground.lacked += u32::from(sample.limits.contains(Limits::TERRAIN_MISSING));
@@ -222,17 +222,17 @@ fn judged(terrain: &Terrain<'_>, samples: &[TickRecord]) -> Ground {
     ground
 }
 
-fn holds(
+fn check_slide(
     name: &str,
     slide: &Slide<'_>,
     scene: &Scene,
     (samples, stats): &(Vec<TickRecord>, LinkStats),
 ) {
     assert_eq!(stats.lost + stats.dropped, 0, "{name}");
-    let ground = judged(slide.terrain, samples);
-    let stated = slide.stated_error_mm(scene);
+    let ground = measure_ground(slide.terrain, samples);
+    let estimated = slide.fallback_error_mm(scene);
     eprintln!(
-        "{name}: {ground:?}, fallback off by up to {stated:.3} mm, {} tiles",
+        "{name}: {ground:?}, fallback off by up to {estimated:.3} mm, {} tiles",
         stats.tiles
     );
     // Until the fallback has arrived, only its absence is known.
@@ -240,7 +240,7 @@ fn holds(
         .iter()
         .position(|s| !s.limits.contains(Limits::TERRAIN_MISSING));
     assert!(comes.is_some_and(|tick| tick < 1000), "{name}: {comes:?}");
-    let ground_then = judged(slide.terrain, &samples[comes.unwrap_or(0)..]);
+    let ground_then = measure_ground(slide.terrain, &samples[comes.unwrap_or(0)..]);
     assert_eq!(ground_then.lacked, 0, "{name}");
     assert!(ground.touched > 1500, "{name}: hardly a touch");
     assert!(ground.coarse > 100, "{name}: the line was fast enough");
@@ -250,7 +250,7 @@ fn holds(
         ground.step_n
     );
     assert!(
-        ground.off_mm <= stated + 1e-4,
+        ground.off_mm <= estimated + 1e-4,
         "{name}: {} mm",
         ground.off_mm
     );
@@ -309,13 +309,13 @@ fn fallback_prevents_missing_terrain_at_2000_cells_per_second() {
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let slide = Slide::over(&terrain);
     let without = slide.scene(false);
-    let ground = judged(&terrain, &in_memory(&slide, without).0);
+    let ground = measure_ground(&terrain, &in_memory(&slide, without).0);
     assert!(
         ground.lacked > 100,
         "without a fallback there are holes: {ground:?}"
     );
     let scene = slide.scene(true);
-    holds(
+    check_slide(
         "made, in this program",
         &slide,
         &scene,
@@ -342,5 +342,5 @@ fn fallback_prevents_missing_terrain_on_the_emulated_board() {
     let slide = Slide::over(&terrain);
     let scene = slide.scene(true);
     let rendered = on_board(&slide, scene, &qemu, &image);
-    holds("real, on the emulated board", &slide, &scene, &rendered);
+    check_slide("real, on the emulated board", &slide, &scene, &rendered);
 }

@@ -62,12 +62,12 @@ fn elf(program: &[u8]) -> Vec<u8> {
     let mut file = vec![0x7F, b'E', b'L', b'F', 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0];
     let halves =
         |file: &mut Vec<u8>, all: &[u16]| file.extend(all.iter().flat_map(|h| h.to_le_bytes()));
-    let words =
+    let write_words =
         |file: &mut Vec<u8>, all: &[u32]| file.extend(all.iter().flat_map(|w| w.to_le_bytes()));
     halves(&mut file, &[2, 40]); // executable, ARM
-    words(&mut file, &[1, CODE as u32 | 1, 52, 0, 0x0500_0000]);
+    write_words(&mut file, &[1, CODE as u32 | 1, 52, 0, 0x0500_0000]);
     halves(&mut file, &[52, 32, 1, 0, 0, 0]);
-    words(&mut file, &[1, HEADERS, 0, 0, length, length, 5, 4]);
+    write_words(&mut file, &[1, HEADERS, 0, 0, length, length, 5, 4]);
     file.extend(program);
     file
 }
@@ -92,7 +92,7 @@ fn writes_a_file(path: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn an_image_cannot_reach_the_hosts_files() {
+fn emulated_image_cannot_access_host_files() {
     let Some(qemu) = qemu() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (target, path) = (folder.path().join("taken"), folder.path().join("image.elf"));
@@ -115,9 +115,9 @@ fn image_output_is_escaped_for_the_terminal() {
     stores.push((AIRCR, RESET));
     fs::write(&path, image(&[], &stores, &[], &[])).expect("written");
     // It may end before its lines are connected.
-    let stated = match Emulator::start(&qemu, &path) {
+    let message = match Emulator::start(&qemu, &path) {
         Ok((emulator, _)) => emulator.finish().expect_err("it failed").to_string(),
         Err(error) => error.to_string(),
     };
-    assert!(stated.contains("\\u{1b}[2Jall is well\\u{7}"), "{stated}");
+    assert!(message.contains("\\u{1b}[2Jall is well\\u{7}"), "{message}");
 }

@@ -47,7 +47,7 @@ fn device() -> Native<StoppedClock> {
         Stored::Found(Calibration::PREMIUM_1_5),
         boot,
     )
-    .restless()
+    .free_running()
 }
 
 fn rename(hello: &mut DeviceHello) {
@@ -56,12 +56,15 @@ fn rename(hello: &mut DeviceHello) {
 }
 
 /// Returns the replacement for a frame of the device.
-fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
+fn replaced_frame(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
     let printed = frames::modified(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
         ToHost::Status { status, .. } => rename(&mut status.device),
-        ToHost::SceneAck { epoch: taken, .. } => *epoch = *taken,
+        ToHost::SceneAck {
+            epoch: acknowledged,
+            ..
+        } => *epoch = *acknowledged,
         ToHost::Telemetry(_) => has_samples = true,
         _ => {}
     });
@@ -94,10 +97,10 @@ fn serve(mut stream: TcpStream) -> std::io::Result<()> {
         let n = device.receive(&mut chunk, Duration::ZERO)?;
         let mut rest = &chunk[..n];
         while !rest.is_empty() {
-            let (taken, frame) = reader.push(rest);
-            rest = &rest[taken..];
+            let (consumed, frame) = reader.push(rest);
+            rest = &rest[consumed..];
             if let Some(Ok(frame)) = frame {
-                stream.write_all(&instead(frame, &mut epoch))?;
+                stream.write_all(&replaced_frame(frame, &mut epoch))?;
             }
         }
     }
@@ -139,8 +142,8 @@ fn terrain(folder: &Path) -> std::path::PathBuf {
 #[test]
 fn device_text_cannot_control_the_terminal() {
     let device = started();
-    let hapterra = |words: &[&str]| {
-        let run = Command::new(hapterra_binary()).args(words).output();
+    let hapterra = |arguments: &[&str]| {
+        let run = Command::new(hapterra_binary()).args(arguments).output();
         output_text(&run.expect("started"))
     };
     let status = hapterra(&["status", "--device", &format!("tcp:{device}")]);

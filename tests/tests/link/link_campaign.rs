@@ -17,13 +17,13 @@ fn link_faults_change_no_force_never_hang_and_are_reported() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_campaign() {
+fn campaign_is_reproducible_from_its_seed() {
     let once = || run(SEED + 1, 1, &mut |_, _| {}).expect("no violation");
     assert_eq!(once(), once());
 }
 
 #[test]
-fn the_report_that_is_kept_has_every_kind() {
+fn committed_report_has_every_kind() {
     let path = repository().join("log/link-campaign.md");
     let page = std::fs::read_to_string(path).expect("the report is kept");
     assert_eq!(report::missing(&page), []);

@@ -29,9 +29,9 @@ use heightfield::Raster;
 
 /// A device in memory answers at once: an answer that has not arrived after a moment is lost.
 const AT_ONCE: Timeouts = Timeouts {
-    again: Duration::from_millis(2),
-    alive: Duration::from_millis(2),
-    greet_again: Duration::from_millis(10),
+    retry: Duration::from_millis(2),
+    heartbeat: Duration::from_millis(2),
+    hello_retry: Duration::from_millis(10),
     give_up: HANG,
     goodbye: HANG,
     ..Timeouts::REAL_TIME
@@ -106,8 +106,8 @@ impl Transport for Tap {
         let n = self.device.receive(into, wait)?;
         let mut rest = &into[..n];
         while !rest.is_empty() {
-            let (taken, frame) = self.reader.push(rest);
-            rest = &rest[taken..];
+            let (consumed, frame) = self.reader.push(rest);
+            rest = &rest[consumed..];
             let message = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>));
             let (samples, dropped) = self.made.get();
             match message.map(|framed| framed.expect("whole").message) {
@@ -153,7 +153,7 @@ fn telemetry_that_is_lost_is_counted() {
             })
             .expect("goes on");
     }
-    session.say_goodbye(&mut |_| {}).expect("confirmed");
+    session.close(&mut |_| {}).expect("confirmed");
     let stats = session.stats();
     // Losses before the first and after the last sample received are counted as well.
     eprintln!("{last} ticks, {stats:?}");
@@ -163,7 +163,7 @@ fn telemetry_that_is_lost_is_counted() {
 }
 
 #[test]
-fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
+fn returning_host_resumes_the_session_of_its_device() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("placed");
@@ -195,7 +195,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     drop(session);
     // It dies in the middle of a frame, and is away for half a second.
     device.borrow_mut().send(&[7; 30]).expect("sent");
-    device.borrow_mut().pass(500);
+    device.borrow_mut().run_ticks(500);
     let (mut session, hello) =
         Session::open(&terrain, placed.scene(), None, link(), AT_ONCE).expect("opened again");
     assert_eq!(
@@ -212,7 +212,7 @@ fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
 }
 
 #[test]
-fn a_device_that_restarts_ends_a_replay_with_a_word() {
+fn device_restart_ends_a_replay_with_an_error() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     /// Replaces the device by a new one during the session.
@@ -253,12 +253,12 @@ fn refusal(device: &mut Native, bytes: &[u8]) -> Option<VersionCheck> {
 }
 
 #[test]
-fn the_device_refuses_a_host_of_another_version() {
+fn host_of_another_version_is_refused() {
     let mut device = Native::for_replay();
     let mut frame = [0; 64];
     for protocol in [PROTOCOL + 1, PROTOCOL - 1, u16::MAX] {
-        let asked = VersionCheck::Query { protocol };
-        let bytes = encode(&asked, &mut frame).expect("fits");
+        let query = VersionCheck::Query { protocol };
+        let bytes = encode(&query, &mut frame).expect("fits");
         let refused = VersionCheck::Refused { protocol: PROTOCOL };
         assert_eq!(refusal(&mut device, bytes), Some(refused), "{protocol}");
     }

@@ -31,12 +31,12 @@ fn single_harms() -> Vec<(Direction, usize, FrameFault)> {
     let to_device = (0..to_device).map(|number| (Direction::ToDevice, number));
     let to_host = (0..to_host).map(|number| (Direction::ToHost, number));
     let all = to_device.chain(to_host);
-    all.flat_map(|(way, number)| HARMS.map(|frame_fault| (way, number, frame_fault)))
+    all.flat_map(|(direction, number)| HARMS.map(|frame_fault| (direction, number, frame_fault)))
         .collect()
 }
 
 #[test]
-fn undisturbed_it_ends_at_once_and_nothing_is_uncertain() {
+fn undisturbed_session_ends_at_once_without_uncertainty() {
     let report = agree(&Plan::default());
     eprintln!("{report:?}");
     assert!(report.ticks < 2_000 && report.uncertain == 0, "{report:?}");
@@ -87,8 +87,8 @@ fn session_survives_any_two_frame_faults_while_closing() {
     let [to_device, to_host] = frames();
     let last: Vec<_> = single_harms()
         .into_iter()
-        .filter(|(way, number, frame_fault)| {
-            let count = match way {
+        .filter(|(direction, number, frame_fault)| {
+            let count = match direction {
                 Direction::ToDevice => to_device,
                 Direction::ToHost => to_host,
             };
@@ -123,13 +123,13 @@ fn interrupted(what: Interruption) {
         assert_eq!(report.end, End::Agreed, "{plan:?}");
         // The first frames of the run.
         for number in 0..12 {
-            for (way, frame_fault) in [
+            for (direction, frame_fault) in [
                 (Direction::ToDevice, FrameFault::Lose),
                 (Direction::ToHost, FrameFault::Lose),
                 (Direction::ToHost, FrameFault::Repeat(900)),
             ] {
                 let plan = Plan {
-                    frame_faults: vec![(way, number, frame_fault)],
+                    frame_faults: vec![(direction, number, frame_fault)],
                     ..plan.clone()
                 };
                 let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
@@ -140,12 +140,12 @@ fn interrupted(what: Interruption) {
 }
 
 #[test]
-fn the_host_may_be_killed_at_any_moment() {
+fn host_may_be_killed_at_any_moment() {
     interrupted(Interruption::HostKilled);
 }
 
 #[test]
-fn the_device_may_be_reset_at_any_moment() {
+fn device_may_be_reset_at_any_moment() {
     interrupted(Interruption::DeviceReset);
 }
 
@@ -158,13 +158,13 @@ fn close_of_an_armed_session_is_confirmed_once_disarmed() {
     let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
     for frame_fault in HARMS {
         // The last frames in each direction: the close, its confirmation, and others around them.
-        for (way, count) in [Direction::ToDevice, Direction::ToHost]
+        for (direction, count) in [Direction::ToDevice, Direction::ToHost]
             .into_iter()
             .zip(frames)
         {
             for number in count.saturating_sub(12)..count {
                 agree(&Plan {
-                    frame_faults: vec![(way, number, frame_fault)],
+                    frame_faults: vec![(direction, number, frame_fault)],
                     ..abrupt()
                 });
             }
@@ -178,9 +178,9 @@ fn close_of_an_armed_session_is_confirmed_once_disarmed() {
     };
     let leaves = agree(&again).ticks - 150;
     for at in leaves..leaves + 150 {
-        for way in [Direction::ToDevice, Direction::ToHost] {
+        for direction in [Direction::ToDevice, Direction::ToHost] {
             agree(&Plan {
-                interruptions: vec![killed, (at, Interruption::Echo(way))],
+                interruptions: vec![killed, (at, Interruption::Echo(direction))],
                 ..abrupt()
             });
         }
@@ -217,8 +217,8 @@ fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interrupt
 
 #[test]
 fn replay_of_earlier_frames_does_not_change_the_outcome() {
-    for way in [Direction::ToDevice, Direction::ToHost] {
-        at_every_moment_after(&histories(), Interruption::Echo(way));
+    for direction in [Direction::ToDevice, Direction::ToHost] {
+        at_every_moment_after(&histories(), Interruption::Echo(direction));
     }
 }
 
@@ -230,7 +230,7 @@ fn frames_from_before_a_reset_do_not_change_the_outcome() {
 }
 
 #[test]
-fn a_host_of_another_version_may_speak_at_any_moment() {
+fn host_of_another_version_may_connect_at_any_moment() {
     at_every_moment_after(&histories(), Interruption::OtherHost);
 }
 
@@ -287,19 +287,19 @@ fn with_errands(frame_faults: Vec<(Direction, usize, FrameFault)>) -> Plan {
 }
 
 #[test]
-fn every_request_is_done_or_refused_once_under_lost_frames() {
+fn lost_frames_leave_every_request_executed_once_or_refused() {
     let whole = agree(&with_errands(vec![]));
     eprintln!("{whole:?}");
     assert_eq!(whole.outcomes, [10, 0, 0], "all are done");
-    let ways = [Direction::ToDevice, Direction::ToHost];
-    for (way, count) in ways.into_iter().zip(whole.frames) {
+    let directions = [Direction::ToDevice, Direction::ToHost];
+    for (direction, count) in directions.into_iter().zip(whole.frames) {
         for number in 0..count {
             for frame_fault in [
                 FrameFault::Lose,
                 FrameFault::Repeat(900),
                 FrameFault::Delay(900),
             ] {
-                let plan = with_errands(vec![(way, number, frame_fault)]);
+                let plan = with_errands(vec![(direction, number, frame_fault)]);
                 let report = agree(&plan);
                 assert_eq!(report.outcomes, whole.outcomes, "{plan:?}");
                 assert_eq!(report.uncertain, 0, "{plan:?}");
@@ -373,9 +373,9 @@ fn arm_is_disarmed_in_time_after_its_host_disappears() {
 fn cut_in_one_direction_ends_in_confirmed_disarm_or_report() {
     let ticks = agree(&Plan::default()).ticks;
     for long in [300, 1_500, 5_000] {
-        for way in [Direction::ToDevice, Direction::ToHost] {
+        for direction in [Direction::ToDevice, Direction::ToHost] {
             for at in (0..ticks).step_by(2 * MOMENTS) {
-                let interruptions = vec![(at, Interruption::Cut(way, long))];
+                let interruptions = vec![(at, Interruption::Cut(direction, long))];
                 let plan = Plan {
                     interruptions,
                     ..Plan::default()
@@ -404,10 +404,10 @@ fn random_faults_end_in_confirmed_disarm_or_a_report() {
 }
 
 #[test]
-fn a_dead_line_ends_in_a_word_and_not_in_a_hang() {
-    for way in [Direction::ToDevice, Direction::ToHost] {
+fn dead_line_is_reported_without_a_hang() {
+    for direction in [Direction::ToDevice, Direction::ToHost] {
         for at in [0, 200, 400] {
-            let interruptions = vec![(at, Interruption::Cut(way, u64::MAX / 2))];
+            let interruptions = vec![(at, Interruption::Cut(direction, u64::MAX / 2))];
             let plan = Plan {
                 interruptions,
                 ..Plan::default()

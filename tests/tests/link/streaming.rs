@@ -17,7 +17,7 @@ fn peak_mib() -> Option<f64> {
 }
 
 #[test]
-fn a_field_of_4096_by_4096_streams_through_a_window() {
+fn field_of_4096_by_4096_streams_through_a_window() {
     let raster = Raster::from_fn(SIDE, SIDE, |x, y| {
         8.0 * (x as f32 * 0.021).sin() + 6.0 * (y as f32 * 0.033).cos()
     })
@@ -45,11 +45,11 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
     let all = u64::from(SIDE / 32).pow(2);
     eprintln!(
         "{} tiles sent of {all}, {} again; window {window}",
-        stats.tiles, stats.again
+        stats.tiles, stats.repeated
     );
     // It passed over far more tiles than it can store, and requested far fewer than all.
     assert!(stats.tiles > 2 * window && stats.tiles < all / 4);
-    assert!(stats.again < stats.tiles / 4);
+    assert!(stats.repeated < stats.tiles / 4);
     if let (Some(before), Some(after)) = (before, peak_mib()) {
         let field = f64::from(SIDE) * f64::from(SIDE) * 4.0 / 1024.0 / 1024.0;
         eprintln!("{before:.0} MiB with the raster of {field} MiB, {after:.0} MiB at most");

@@ -38,7 +38,7 @@ fn enumerated() -> (Board, Found) {
 }
 
 #[test]
-fn a_board_is_enumerated_and_found_by_the_client() {
+fn board_is_enumerated_and_found_by_the_client() {
     let (mut board, found) = enumerated();
     let device = DeviceDescriptor::new(&found.device).expect("well formed");
     assert_eq!(
@@ -99,11 +99,11 @@ fn microsoft_os_descriptors_request_winusb() {
     assert_eq!(bos[at + 6], MSOS_VENDOR_CODE);
     let set = control_in(&mut board, (0xC0, MSOS_VENDOR_CODE, 0, 7), length).expect("the set");
     assert_eq!(set.len(), usize::from(length));
-    let holds = |bytes: &[u8]| set.windows(bytes.len()).any(|w| w == bytes);
-    assert!(holds(b"WINUSB\0\0"));
+    let contains = |bytes: &[u8]| set.windows(bytes.len()).any(|w| w == bytes);
+    assert!(contains(b"WINUSB\0\0"));
     let wide = |text: &str| -> Vec<u8> { text.encode_utf16().flat_map(u16::to_le_bytes).collect() };
-    assert!(holds(&wide("DeviceInterfaceGUIDs\0")));
-    assert!(holds(&wide(INTERFACE_GUIDS[0])));
+    assert!(contains(&wide("DeviceInterfaceGUIDs\0")));
+    assert!(contains(&wide(INTERFACE_GUIDS[0])));
 }
 
 #[test]
@@ -151,12 +151,12 @@ fn answers(board: &mut Board) -> bool {
         };
         let mut bytes = packet.as_slice();
         while !bytes.is_empty() {
-            let (taken, frame) = reader.push(bytes);
+            let (consumed, frame) = reader.push(bytes);
             let framed = frame.map(|f| f.and_then(decode::<InSession<ToHost>>));
             if framed.is_some_and(|f| f.is_ok_and(|f| matches!(f.message, ToHost::Hello(_)))) {
                 return true;
             }
-            bytes = &bytes[taken..];
+            bytes = &bytes[consumed..];
         }
     }
     false
@@ -173,7 +173,7 @@ fn packets_of_one_byte_and_of_none_make_the_same_message() {
 }
 
 #[test]
-fn a_packet_that_is_too_long_is_never_taken_and_harms_nothing() {
+fn oversized_packet_is_rejected_without_effect() {
     let (mut board, _) = enumerated();
     for _ in 0..3 {
         let babble = send_packet(&mut board, LINK, &[0xA5; PACKET + 1]);
@@ -276,7 +276,7 @@ fn tiles_and_samples_transfer_without_loss() {
         let gaps = ticks.windows(2).filter(|w| w[1] != w[0] + 1).count();
         assert!(ticks.len() > 100 && gaps == 0, "{} {gaps}", ticks.len());
         let stats = session.stats();
-        assert_eq!((stats.bad_frames, stats.lost, stats.again), (0, 0, 0));
+        assert_eq!((stats.bad_frames, stats.lost, stats.repeated), (0, 0, 0));
         // Each needs many packets, even when packed.
         assert!(
             stats.tiles >= 4 && stats.tile_bytes > 4 * 16 * PACKET as u64,
@@ -339,15 +339,15 @@ fn unplugged_board_keeps_ticking_and_resumes_its_session() {
 }
 
 #[test]
-fn the_udev_rule_names_the_board_as_it_names_itself() {
+fn udev_rule_matches_the_usb_identity() {
     let rules = include_str!("../../../host-tools/udev/70-hapterra.rules");
     let rule = rules
         .lines()
         .find(|line| line.starts_with("SUBSYSTEM"))
         .expect("a rule");
-    let says = |key: &str, value: &str| rule.contains(&format!("{key}==\"{value}\""));
-    assert!(says("ATTR{idVendor}", &format!("{VENDOR_ID:04x}")));
-    assert!(says("ATTR{idProduct}", &format!("{PRODUCT_ID:04x}")));
-    assert!(says("ATTR{product}", &format!("{PRODUCT}*")));
+    let has_value = |key: &str, value: &str| rule.contains(&format!("{key}==\"{value}\""));
+    assert!(has_value("ATTR{idVendor}", &format!("{VENDOR_ID:04x}")));
+    assert!(has_value("ATTR{idProduct}", &format!("{PRODUCT_ID:04x}")));
+    assert!(has_value("ATTR{product}", &format!("{PRODUCT}*")));
     assert!(rule.contains("TAG+=\"uaccess\""));
 }

@@ -51,7 +51,7 @@ fn source(files: &[&str]) -> String {
 }
 
 #[test]
-fn the_wiring_tables_have_the_pins_that_the_images_take() {
+fn wiring_tables_match_the_pins_of_the_images() {
     let page = |board: &str| {
         let path = repository().join(format!("docs/reference/boards/{board}.md"));
         std::fs::read_to_string(path).expect("the page")

@@ -17,13 +17,13 @@ mod textured_force;
 /// Tolerance of a line, pixels: on another machine a tangent may round to the next tenth.
 const OFF: f64 = 0.11;
 
-fn is_kept(drawn: Result<String, Box<dyn Error>>, example: &str, kept: &str) {
+fn assert_committed(drawn: Result<String, Box<dyn Error>>, example: &str, file: &str) {
     let drawn = drawn.expect("it is drawn");
-    let kept_text = std::fs::read_to_string(repository().join("docs").join(kept));
-    let kept_text = kept_text.expect("readable");
+    let committed = std::fs::read_to_string(repository().join("docs").join(file));
+    let committed = committed.expect("readable");
     assert!(
-        is_same(drawn.trim_end(), kept_text.trim_end()),
-        "type: cargo run -p hapterra-core --example {example} > docs/{kept}"
+        is_same(drawn.trim_end(), committed.trim_end()),
+        "type: cargo run -p hapterra-core --example {example} > docs/{file}"
     );
 }
 
@@ -43,18 +43,18 @@ fn is_same(one: &str, other: &str) -> bool {
 }
 
 #[test]
-fn the_picture_of_friction_is_the_examples() {
-    is_kept(stick_slip::picture(), "stick_slip", "stick-slip.svg");
+fn friction_picture_is_that_of_the_example() {
+    assert_committed(stick_slip::picture(), "stick_slip", "stick-slip.svg");
 }
 
 #[test]
-fn the_picture_of_shading_is_the_examples() {
-    is_kept(shaded_force::picture(), "shaded_force", "shading.svg");
+fn shading_picture_is_that_of_the_example() {
+    assert_committed(shaded_force::picture(), "shaded_force", "shading.svg");
 }
 
 #[test]
-fn the_picture_of_texture_is_the_examples() {
-    is_kept(textured_force::picture(), "textured_force", "texture.svg");
+fn texture_picture_is_that_of_the_example() {
+    assert_committed(textured_force::picture(), "textured_force", "texture.svg");
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceChecks {
 }
 
 /// Returns the verdict on one tick, 2 mm deep.
-fn stated(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
+fn verdict(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
     let sample = TickRecord {
         limits,
         ..at(0, -4.0, force_n)
@@ -67,11 +67,11 @@ fn pulling_force_is_reported_unless_slew_limited() {
     };
     for params in [PARAMS, shaded] {
         for force_n in [Vec3::Z, Vec3::ZERO, Vec3::new(1.0, 0.0, 0.01)] {
-            assert_eq!(stated(&params, force_n, Limits::empty()), Ok(()));
+            assert_eq!(verdict(&params, force_n, Limits::empty()), Ok(()));
         }
-        assert!(stated(&params, -Vec3::Z * 0.01, Limits::empty()).is_err());
+        assert!(verdict(&params, -Vec3::Z * 0.01, Limits::empty()).is_err());
         assert_eq!(
-            stated(&params, -Vec3::Z * 0.01, Limits::SLEW_LIMITED),
+            verdict(&params, -Vec3::Z * 0.01, Limits::SLEW_LIMITED),
             Ok(())
         );
     }
@@ -90,7 +90,7 @@ fn force_above_the_maximum_for_its_depth_is_reported() {
         ..plain
     };
     let most = |params: &SurfaceParams, max_n: f32| {
-        let force = |newtons: f32| stated(params, Vec3::Z * newtons, Limits::empty());
+        let force = |newtons: f32| verdict(params, Vec3::Z * newtons, Limits::empty());
         assert_eq!(force(max_n), Ok(()), "{params:?}");
         assert!(force(1.01 * max_n).is_err(), "{params:?}");
     };
@@ -140,10 +140,13 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
 fn energy_created_by_taps_is_reported_with_controller_on() {
     // A spring that is sampled in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
     // and twice 0.75 mm.
-    let (reported, given) = tap(&PARAMS, 0.0, true);
-    assert!(!reported && (given - 0.0229).abs() < 0.001, "{given}");
-    let (reported, given) = tap(&PARAMS, 0.5, true);
-    assert!(reported && given > 0.05, "{given}");
+    let (reported, energy_mj) = tap(&PARAMS, 0.0, true);
+    assert!(
+        !reported && (energy_mj - 0.0229).abs() < 0.001,
+        "{energy_mj}"
+    );
+    let (reported, energy_mj) = tap(&PARAMS, 0.5, true);
+    assert!(reported && energy_mj > 0.05, "{energy_mj}");
     // Not checked during a fault or without the controller.
     assert_eq!(tap(&PARAMS, 0.5, false), (false, 0.0));
     assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
@@ -152,17 +155,17 @@ fn energy_created_by_taps_is_reported_with_controller_on() {
         ..PARAMS
     };
     // Shading may give 0.2 mJ more, and 0.2 times 0.375 N times 0.5 mm and 0.75 mm.
-    let (reported, given) = tap(&shaded, 0.99, true);
-    assert!(!reported && given > 0.1, "{given}");
-    let (reported, given) = taps(&shaded, 0.99, true, 3);
-    assert!(reported && given > 0.344, "{given}");
+    let (reported, energy_mj) = tap(&shaded, 0.99, true);
+    assert!(!reported && energy_mj > 0.1, "{energy_mj}");
+    let (reported, energy_mj) = taps(&shaded, 0.99, true, 3);
+    assert!(reported && energy_mj > 0.344, "{energy_mj}");
 }
 
 /// Presses 2 mm deep at rest during the ramp, from the confirmation on, with `times` times the
 /// force that the ramp allows.
 fn ramped(times: f32) -> Result<(), String> {
     let mut watch = watch(&PARAMS, None);
-    let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
+    let mut check = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
         let sample = TickRecord {
             mode,
             limits,
@@ -170,16 +173,16 @@ fn ramped(times: f32) -> Result<(), String> {
         };
         watch.check(&sample, true)
     };
-    look(0, Mode::Confirming, 0.0, Limits::empty())?;
+    check(0, Mode::Confirming, 0.0, Limits::empty())?;
     for tick in 1..1000 {
         let spring_n = tick as f32 / 2000.0;
-        look(tick, Mode::Ramping, spring_n * times, Limits::RAMPING)?;
+        check(tick, Mode::Ramping, spring_n * times, Limits::RAMPING)?;
     }
     Ok(())
 }
 
 #[test]
-fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
+fn ramped_force_is_checked_against_the_ramp_share() {
     assert_eq!(ramped(1.0), Ok(()));
     // Damping may double it.
     assert_eq!(ramped(1.99), Ok(()));
@@ -213,8 +216,8 @@ fn energy_created_by_taps_in_the_ramp_is_reported() {
         }
         (reported, watch.max_gained_mj)
     };
-    let (reported, given) = tapped(0.0);
-    assert!(!reported, "{given}");
+    let (reported, energy_mj) = tapped(0.0);
+    assert!(!reported, "{energy_mj}");
     assert!(tapped(0.5).0);
 }
 

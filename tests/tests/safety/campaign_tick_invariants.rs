@@ -46,14 +46,14 @@ impl Tick {
         }
     }
 
-    fn judged(&self) -> (TickChecks, Result<(), String>) {
+    fn check(&self) -> (TickChecks, Result<(), String>) {
         let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
-        let stated = watch.check_outputs(&self.drive, &self.sense, ZERO, &self.truth);
-        (watch, stated)
+        let verdict = watch.check_outputs(&self.drive, &self.sense, ZERO, &self.truth);
+        (watch, verdict)
     }
 
     fn verdict(&self) -> String {
-        self.judged().1.expect_err("a violation")
+        self.check().1.expect_err("a violation")
     }
 }
 
@@ -79,9 +79,9 @@ const fn up(newtons: f64) -> [f64; 3] {
 }
 
 #[test]
-fn a_tick_as_it_should_be_passes_and_is_measured() {
-    let (watch, stated) = Tick::pushing(up(7.6)).judged();
-    assert_eq!(stated, Ok(()));
+fn correct_tick_passes_and_is_measured() {
+    let (watch, verdict) = Tick::pushing(up(7.6)).check();
+    assert_eq!(verdict, Ok(()));
     let seen = watch.extremes;
     // The reported pose is in whole counts.
     assert!((seen.read_force_n - 7.6).abs() < 0.01, "{seen:?}");
@@ -163,8 +163,8 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
     tick.truth.counts[1] += OFF_COUNTS as i32;
     assert!(tick.verdict().contains("at the tip"));
     tick.truth.counts[1] += 1;
-    let (watch, stated) = tick.judged();
-    assert_eq!(stated, Ok(()));
+    let (watch, verdict) = tick.check();
+    assert_eq!(verdict, Ok(()));
     let seen = watch.extremes;
     assert!(
         seen.misled.force_n > f64::from(record.max_force_n),
@@ -175,18 +175,18 @@ fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
 }
 
 #[test]
-fn a_singular_pose_is_counted_not_judged() {
+fn singular_pose_is_counted_but_not_checked() {
     let mut tick = Tick::pushing(up(7.6));
     tick.truth.q_rad = [0.0, 1.4, 0.2];
-    let (watch, stated) = tick.judged();
-    assert_eq!(stated, Ok(()));
+    let (watch, verdict) = tick.check();
+    assert_eq!(verdict, Ok(()));
     assert_eq!(watch.extremes.singular_ticks, 1);
 }
 
 /// While the core is halted no tick reads switches or encoders, but outputs and the true pose
 /// count.
 #[test]
-fn a_command_that_is_held_is_judged_by_what_is_true() {
+fn held_command_is_checked_against_the_true_pose() {
     let held = |tick: &Tick| {
         let mut watch = TickChecks::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
         watch.check_held(&tick.drive, &tick.truth)

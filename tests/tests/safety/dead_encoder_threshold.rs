@@ -12,71 +12,76 @@ const TICK_S: f64 = 1e-3;
 
 /// Most counts that the others travelled while a joint stayed within a count of its position.
 #[derive(Default)]
-struct Stands {
+struct TravelWhileStill {
     at: [i32; 3],
     others: [u32; 3],
     last: [i32; 3],
-    most: [u32; 3],
+    max: [u32; 3],
 }
 
-impl Stands {
-    fn look(&mut self, counts: [i32; 3]) {
-        let way: u32 = (0..3).map(|i| counts[i].abs_diff(self.last[i])).sum();
+impl TravelWhileStill {
+    fn add(&mut self, counts: [i32; 3]) {
+        let distance: u32 = (0..3).map(|i| counts[i].abs_diff(self.last[i])).sum();
         self.last = counts;
         for (axis, count) in counts.into_iter().enumerate() {
             if count.abs_diff(self.at[axis]) <= 1 {
-                self.others[axis] += way;
+                self.others[axis] += distance;
             } else {
                 self.at[axis] = count;
                 self.others[axis] = 0;
             }
-            self.most[axis] = self.most[axis].max(self.others[axis]);
+            self.max[axis] = self.max[axis].max(self.others[axis]);
         }
     }
 }
 
-/// Moves the tip along `way` (joint angles by time) with a tremor.
-fn along(way: impl Fn(f64) -> [f64; 3], tremor_mm: f64, current_a: f64, seconds: f64) -> [u32; 3] {
+/// Moves the tip along `path` (joint angles by time) with a tremor.
+fn travel_along(
+    path: impl Fn(f64) -> [f64; 3],
+    tremor_mm: f64,
+    current_a: f64,
+    seconds: f64,
+) -> [u32; 3] {
     let model = PhantomModel::premium_1_5();
-    let mut plant = Plant::new(model, way(0.0)).held_by(HandModel::default());
+    let mut plant = Plant::new(model, path(0.0)).with_hand(HandModel::default());
     let target = |t: f64| {
-        let tip = kinematics::tip(&model, way(t));
+        let tip = kinematics::tip(&model, path(t));
         std::array::from_fn(|i| tip[i] + 1e-3 * tremor_mm * (TAU * TREMOR_HZ[i] * t).sin())
     };
-    let mut stands = Stands::default();
+    let mut travel = TravelWhileStill::default();
     let ticks = (seconds / TICK_S) as u32;
     for tick in 0..ticks {
         let t = f64::from(tick) * TICK_S;
         let (now, next): ([f64; 3], [f64; 3]) = (target(t), target(t + TICK_S));
-        plant.aim(now, std::array::from_fn(|i| (next[i] - now[i]) / TICK_S));
+        plant.set_target(now, std::array::from_fn(|i| (next[i] - now[i]) / TICK_S));
         plant.step([current_a; 3], TICK_S);
         // The first second is for settling.
         if tick == 1_000 {
-            stands = Stands {
+            travel = TravelWhileStill {
                 at: plant.counts(),
                 last: plant.counts(),
-                ..Stands::default()
+                ..TravelWhileStill::default()
             };
         }
-        stands.look(plant.counts());
+        travel.add(plant.counts());
     }
-    stands.most
+    travel.max
 }
 
 /// Checks that the guard accepts three times the travel of a hand.
-fn assert_passes(what: &str, most: [u32; 3]) {
-    eprintln!("{what}: {most:?} counts");
+fn assert_passes(what: &str, max: [u32; 3]) {
+    eprintln!("{what}: {max:?} counts");
     let allowed = MAX_OTHERS_TRAVEL / 3;
-    assert!(most.iter().all(|most| *most <= allowed), "{what}: {most:?}");
+    assert!(max.iter().all(|max| *max <= allowed), "{what}: {max:?}");
 }
 
 /// The hardest case: only the tremor moves the other joints.
 #[test]
-fn a_hand_that_turns_one_joint_only_trembles_enough() {
+fn tremor_prevents_dead_encoder_fault_on_one_joint_motion() {
     let ways = [(0.1, 0.3), (0.3, 0.3), (0.8, 0.3), (0.5, 0.03)];
     for (tremor_mm, (hz, rad)) in [0.2, 0.4].into_iter().flat_map(|t| ways.map(|w| (t, w))) {
         for joint in 0..3 {
-            let way = |t: f64| {
+            let path = |t: f64| {
                 let mut q = [0.1, 0.2, 0.15];
                 q[joint] += rad * (TAU * hz * t).sin();
                 q
@@ -85,19 +90,19 @@ fn a_hand_that_turns_one_joint_only_trembles_enough() {
                 "tremor {tremor_mm} mm, joint {} by {rad} rad at {hz} Hz",
                 joint + 1
             );
-            assert_passes(&what, along(way, tremor_mm, 0.7, 30.0));
+            assert_passes(&what, travel_along(path, tremor_mm, 0.7, 30.0));
         }
     }
 }
 
 #[test]
-fn a_wandering_hand_needs_no_tremor() {
-    let way = |t: f64| {
+fn wandering_hand_causes_no_dead_encoder_fault() {
+    let path = |t: f64| {
         [
             0.25 * (1.9 * t).sin() + 0.1 * (4.1 * t).sin(),
             0.2 + 0.15 * (1.3 * t).sin(),
             0.15 + 0.2 * (2.3 * t + 1.0).sin(),
         ]
     };
-    assert_passes("wandering", along(way, 0.0, 0.7, 60.0));
+    assert_passes("wandering", travel_along(path, 0.0, 0.7, 60.0));
 }

@@ -46,7 +46,7 @@ fn encoder_error_of_two_jumps_keeps_force_within_the_maximum() {
     let mechanism = Kinematics::new(&record).expect("valid");
     let model = PhantomModel::premium_1_5();
     let mut worst = 0.0_f64;
-    let mut judged = 0;
+    let mut checked = 0;
     for q in poses(&record) {
         let right = mechanism.counts(q, [0; 3]);
         let angles = mechanism.angles(right, [0; 3]);
@@ -71,13 +71,13 @@ fn encoder_error_of_two_jumps_keeps_force_within_the_maximum() {
                 });
                 let [x, y, z] = force(&jacobian, torque);
                 worst = worst.max((x * x + y * y + z * z).sqrt());
-                judged += 1;
+                checked += 1;
             }
         }
     }
     let most = f64::from(record.max_force_n);
-    println!("{worst:.3} N of {most} N at most, in {judged} cases");
-    assert!(judged > 100_000, "{judged}");
+    println!("{worst:.3} N of {most} N at most, in {checked} cases");
+    assert!(checked > 100_000, "{checked}");
     assert!(worst <= most, "{worst} N");
     // The bound is not much wider than necessary.
     assert!(worst > 0.95 * most, "{worst} N");

@@ -261,7 +261,7 @@ fn pipes_and_devices_are_refused_unopened() {
     terrain_file(&hills, Kind::Fractal, 16, 1);
     let [hills, other] = [hills, pipe("pipe.toml")].map(|path| path.display().to_string());
     let run = ["run", &hills, "--device", "native", "--materials", &hills];
-    for (words, option) in [
+    for (arguments, option) in [
         (&["calibrate", "--show"][..], None),
         (&run, Some("--surface")),
         (
@@ -271,7 +271,7 @@ fn pipes_and_devices_are_refused_unopened() {
         (&["view"], None),
     ] {
         let child = Command::new(hapterra_binary())
-            .args(words)
+            .args(arguments)
             .args(option)
             .arg(&other)
             .stdin(Stdio::null())
@@ -280,7 +280,10 @@ fn pipes_and_devices_are_refused_unopened() {
             .spawn();
         let output = end_of(child.expect("the binary starts"));
         let reported = String::from_utf8_lossy(&output.stderr);
-        assert!(reported.contains("a pipe (FIFO)"), "{words:?}: {reported}");
+        assert!(
+            reported.contains("a pipe (FIFO)"),
+            "{arguments:?}: {reported}"
+        );
     }
 }
 
@@ -307,7 +310,7 @@ fn texts_of_files_reach_the_terminal_without_control_characters() {
     let paths = ["hills.asc", "table.toml", "path.csv"].map(|name| at(name).display().to_string());
     let [hills, table, csv] = paths;
     let named = named.display().to_string();
-    for words in [
+    for arguments in [
         &["info", &hills][..],
         &["info", "--json", &hills],
         &["info", &named],
@@ -330,12 +333,12 @@ fn texts_of_files_reach_the_terminal_without_control_characters() {
         &["calibrate", "--show", &csv],
         &["info", &hills, "--input", &format!("no-data={WICKED}")],
     ] {
-        let output = Command::new(hapterra_binary()).args(words).output();
+        let output = Command::new(hapterra_binary()).args(arguments).output();
         let output = output.expect("it runs");
         let reported = [output.stdout, output.stderr].concat();
         let reported = String::from_utf8(reported).expect("text");
         let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-        assert!(!reported.contains(controls), "{words:?}: {reported:?}");
-        assert!(!reported.is_empty(), "{words:?}");
+        assert!(!reported.contains(controls), "{arguments:?}: {reported:?}");
+        assert!(!reported.is_empty(), "{arguments:?}");
     }
 }

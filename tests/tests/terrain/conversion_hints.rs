@@ -59,15 +59,15 @@ fn hint(file: &Path) -> String {
 }
 
 /// Returns the hint of a command that refuses a file, run without a libgdal.
-fn hint_of(words: &[&str], file: &Path) -> String {
+fn hint_of(arguments: &[&str], file: &Path) -> String {
     let output = Command::new(hapterra_binary())
-        .args(words)
+        .args(arguments)
         .arg(file)
         .env("GDAL_LIBRARY", "none")
         .output();
     let output = output.expect("it runs");
     let opens = output.status.success();
-    assert!(!opens, "{words:?} opens {}", file.display());
+    assert!(!opens, "{arguments:?} opens {}", file.display());
     let reported = String::from_utf8_lossy(&output.stderr).into_owned();
     let hint = reported
         .split_once("hint: ")
@@ -92,7 +92,7 @@ fn follow(folder: &Path, hint: &str, program: &str) -> String {
 }
 
 /// Opens the output of a command, and deletes it.
-fn taken(path: &Path) -> Raster {
+fn open_and_delete(path: &Path) -> Raster {
     let raster = Raster::open(path, &OpenOptions::default());
     let raster = raster.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     std::fs::remove_file(path).expect("removed");
@@ -132,7 +132,7 @@ fn hint_converts_formats_that_only_gdal_reads() {
             .file_stem()
             .expect("a name")
             .to_string_lossy();
-        let raster = taken(&at.join(format!("{stem}-converted.tif")));
+        let raster = open_and_delete(&at.join(format!("{stem}-converted.tif")));
         assert_eq!((raster.columns(), raster.rows()), (40, 30), "{name}");
         let off = raster.height(20, 10) - (100.0 + 7.0 * 20.0 - 3.0 * 19.0);
         assert!(name == "jpeg.tif" || off.abs() < 1e-9, "{name}: {off} off");
@@ -142,17 +142,17 @@ fn hint_converts_formats_that_only_gdal_reads() {
 /// Runs `demo` at a longitude and latitude for a file without them, and the command in its hint.
 /// Opens the output.
 fn brought_to_degrees(folder: &Path, name: &str, program: &str, code: &str) -> Raster {
-    let words = [
+    let arguments = [
         "demo", "--device", "native", "--at", "173,-41", "--crs", "lonlat",
     ];
-    let hint = hint_of(&words, &folder.join(name));
+    let hint = hint_of(&arguments, &folder.join(name));
     let hint = hint.replace("IN OUT.tif", &format!("{name} brought.tif"));
     follow(folder, &hint.replace("EPSG:CODE", code), program);
-    taken(&folder.join("brought.tif"))
+    open_and_delete(&folder.join("brought.tif"))
 }
 
 #[test]
-fn a_map_without_longitudes_gets_them_by_the_hint() {
+fn hint_adds_longitudes_to_a_map_without_them() {
     if !has_gdal() {
         return;
     }
@@ -186,8 +186,8 @@ fn a_map_without_longitudes_gets_them_by_the_hint() {
             0.5 * (bounds.west + bounds.east),
             0.5 * (bounds.south + bounds.north),
         ];
-        for (found, wanted) in middle.iter().zip(lonlat) {
-            assert!((found - wanted).abs() < 0.02, "{name}: {bounds:?}");
+        for (found, expected) in middle.iter().zip(lonlat) {
+            assert!((found - expected).abs() < 0.02, "{name}: {bounds:?}");
         }
         // The area beside the turned map is no-data.
         let summary = raster.summary();
@@ -254,7 +254,7 @@ fn hint_turns_pictures_and_complex_data_into_heights() {
         assert!(output.status.success(), "{make}: {output:?}");
         follow(at, &hint(&at.join(name)), "gdal_translate");
         let stem = name.split('.').next().expect("a name");
-        let raster = taken(&at.join(format!("{stem}-converted.tif")));
+        let raster = open_and_delete(&at.join(format!("{stem}-converted.tif")));
         assert_eq!((raster.columns(), raster.rows()), (40, 30), "{name}");
         assert!(raster.bounds().is_some() || name.ends_with("png"), "{name}");
     }
@@ -262,7 +262,7 @@ fn hint_turns_pictures_and_complex_data_into_heights() {
 
 /// A name may contain any character with a meaning in a shell.
 #[test]
-fn a_name_that_a_shell_would_read_is_quoted() {
+fn shell_metacharacters_in_names_are_quoted() {
     if !has_gdal() {
         return;
     }
@@ -273,7 +273,7 @@ fn a_name_that_a_shell_would_read_is_quoted() {
         std::fs::rename(file, &named).expect("renamed");
         follow(folder.path(), &hint(&named), "gdal_translate");
         let stem = name.strip_suffix(".img").expect("the ending");
-        let raster = taken(&folder.path().join(format!("{stem}-converted.tif")));
+        let raster = open_and_delete(&folder.path().join(format!("{stem}-converted.tif")));
         assert_eq!(raster.columns(), 40, "{name}");
     }
 }
@@ -333,7 +333,7 @@ fn hints_crop_or_coarsen_a_raster_larger_than_memory() {
         ("gdal_translate -r average", (200, 110_000)),
     ] {
         follow(at, &hint, program);
-        let raster = taken(&at.join("large-converted.tif"));
+        let raster = open_and_delete(&at.join("large-converted.tif"));
         assert_eq!((raster.columns(), raster.rows()), size, "{program}");
     }
 }
@@ -363,7 +363,7 @@ fn arrays_are_converted_by_numpy() {
     ] {
         follow(at, &hint(&at.join(name)), "python3");
         assert_eq!(
-            taken(&at.join("heights.npy")).height(3, 0),
+            open_and_delete(&at.join("heights.npy")).height(3, 0),
             highest,
             "{name}"
         );
@@ -393,7 +393,7 @@ fn archives_are_unpacked_by_the_hint() {
     std::fs::remove_file(at.join("one.tif")).expect("removed");
     for name in ["two files.zip", "packed.zip"] {
         follow(at, &hint(&at.join(name)), "python3");
-        assert_eq!(taken(&at.join("one.tif")).columns(), 40, "{name}");
+        assert_eq!(open_and_delete(&at.join("one.tif")).columns(), 40, "{name}");
     }
     if !has_gdal() {
         return;
@@ -403,7 +403,10 @@ fn archives_are_unpacked_by_the_hint() {
     assert!(shell(at, "gzip picture.tif").status.success());
     follow(at, &hint(&at.join("picture.tif.gz")), "gzip");
     follow(at, &hint(&picture), "gdal_translate");
-    assert_eq!(taken(&at.join("picture-converted.tif")).rows(), 30);
+    assert_eq!(
+        open_and_delete(&at.join("picture-converted.tif")).rows(),
+        30
+    );
 }
 
 /// Point clouds: their ground points, on a grid in their own reference system.
@@ -442,7 +445,7 @@ fn points_become_a_grid_by_the_hint() {
     ] {
         follow(at, &hint(&at.join(name)), "python3");
         let stem = name.split('.').next().expect("a name");
-        let raster = taken(&at.join(format!("{stem}-converted.asc")));
+        let raster = open_and_delete(&at.join(format!("{stem}-converted.asc")));
         assert_eq!((raster.columns(), raster.rows()), (20, 12), "{name}");
         assert_eq!(raster.summary().no_data, 1, "{name}");
         assert!(raster.height(5, 3).is_nan(), "{name}");

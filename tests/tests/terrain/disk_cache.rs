@@ -55,7 +55,7 @@ fn heights(raster: &Raster, level: u8) -> Vec<u64> {
 }
 
 /// Returns the heights with this cache, and the blocks read besides opening the file.
-fn look(path: &Path, cache: &DiskCache) -> (Vec<u64>, u64) {
+fn read_heights(path: &Path, cache: &DiskCache) -> (Vec<u64>, u64) {
     let raster = open(path, cache);
     let before = raster.blocks_read();
     (heights(&raster, LEVEL), raster.blocks_read() - before)
@@ -104,23 +104,23 @@ fn files(folder_of_folders: &Path) -> Vec<PathBuf> {
 fn second_run_reads_no_coarse_block_and_has_identical_heights() {
     let bed = bed();
     let truth = truth(&bed.file);
-    let (first, read) = look(&bed.file, &bed.cache);
+    let (first, read) = read_heights(&bed.file, &bed.cache);
     assert!(first == truth && read > 0, "{read}");
     assert!(!bed.records().is_empty());
-    let (second, read) = look(&bed.file, &bed.cache);
+    let (second, read) = read_heights(&bed.file, &bed.cache);
     assert!(second == truth && read == 0, "{read}");
     // No file is created beside the user's file.
     assert_eq!(fs::read_dir(bed.folder.path()).expect("there").count(), 2);
     fs::remove_dir_all(bed.folder.path().join("cache")).expect("deleted");
-    let (third, read) = look(&bed.file, &bed.cache);
+    let (third, read) = read_heights(&bed.file, &bed.cache);
     assert!(third == truth && read > 0, "{read}");
-    assert_eq!(look(&bed.file, &bed.cache), (truth, 0));
+    assert_eq!(read_heights(&bed.file, &bed.cache), (truth, 0));
 }
 
 #[test]
-fn a_file_that_is_another_now_has_its_own_heights() {
+fn replaced_file_has_its_own_heights() {
     let bed = bed();
-    look(&bed.file, &bed.cache);
+    read_heights(&bed.file, &bed.cache);
     // With the same size, path and time.
     let modified = fs::metadata(&bed.file).and_then(|metadata| metadata.modified());
     let other = bed.folder.path().join("other.tif");
@@ -137,18 +137,18 @@ fn a_file_that_is_another_now_has_its_own_heights() {
         .expect("opens");
     file.set_modified(modified.expect("known")).expect("set");
     if cfg!(unix) {
-        let (found, read) = look(&bed.file, &bed.cache);
+        let (found, read) = read_heights(&bed.file, &bed.cache);
         assert!(found == truth(&other) && read > 0, "{read}");
     }
     // Renamed over it.
     let third = bed.folder.path().join("third.tif");
     hills(&third, 3);
     fs::rename(&third, &bed.file).expect("renamed");
-    let (found, _) = look(&bed.file, &bed.cache);
+    let (found, _) = read_heights(&bed.file, &bed.cache);
     assert_eq!(found, truth(&bed.file));
     // A new mask beside it, which declares everything no-data.
     let mask = bed.folder.path().join("hills.tif.msk");
-    let (_, read) = look(&bed.file, &bed.cache);
+    let (_, read) = read_heights(&bed.file, &bed.cache);
     assert_eq!(read, 0);
     fs::write(&mask, b"no mask at all").expect("written");
     age(&mask, 500);
@@ -171,26 +171,26 @@ fn file_overwritten_while_open_is_reread_by_next_run() {
     age(&bed.file, 300);
     heights(&raster, LEVEL);
     drop(raster);
-    let (found, read) = look(&bed.file, &bed.cache);
+    let (found, read) = read_heights(&bed.file, &bed.cache);
     assert!(found == truth(&other) && read > 0, "{read}");
 }
 
 #[test]
-fn a_file_that_was_written_a_moment_ago_is_not_kept() {
+fn just_written_file_is_not_cached() {
     let bed = bed();
     set_just_changed(&bed.file);
-    look(&bed.file, &bed.cache);
+    read_heights(&bed.file, &bed.cache);
     assert!(bed.records().is_empty());
     age(&bed.file, 1000);
-    look(&bed.file, &bed.cache);
+    read_heights(&bed.file, &bed.cache);
     assert!(!bed.records().is_empty());
 }
 
 #[test]
-fn whatever_becomes_of_the_folder_the_heights_are_right() {
+fn heights_are_right_with_a_damaged_cache() {
     let bed = bed();
     let truth = truth(&bed.file);
-    look(&bed.file, &bed.cache);
+    read_heights(&bed.file, &bed.cache);
     let whole: Vec<_> = (bed.records().into_iter())
         .map(|path| (path.clone(), fs::read(path).expect("there")))
         .collect();
@@ -213,16 +213,20 @@ fn whatever_becomes_of_the_folder_the_heights_are_right() {
         for (path, bytes) in &whole {
             fs::write(path, harm(bytes)).expect("written");
         }
-        let (found, read) = look(&bed.file, &bed.cache);
+        let (found, read) = read_heights(&bed.file, &bed.cache);
         assert!(found == truth && read > 0, "{number}: {read}");
         // It was written again, and is complete.
-        assert_eq!(look(&bed.file, &bed.cache), (truth.clone(), 0), "{number}");
+        assert_eq!(
+            read_heights(&bed.file, &bed.cache),
+            (truth.clone(), 0),
+            "{number}"
+        );
     }
     for (path, _) in &whole {
         fs::remove_file(path).expect("removed");
         fs::create_dir(path).expect("made");
     }
-    let (found, read) = look(&bed.file, &bed.cache);
+    let (found, read) = read_heights(&bed.file, &bed.cache);
     assert!(found == truth && read > 0, "{read}");
 }
 
@@ -244,7 +248,7 @@ fn unwritable_or_full_folder_behaves_like_no_cache() {
     }
     for cache in caches {
         for _ in 0..2 {
-            let (found, read) = look(&bed.file, &cache);
+            let (found, read) = read_heights(&bed.file, &cache);
             assert!(found == truth && read > 0, "{cache:?}: {read}");
         }
     }
@@ -252,7 +256,7 @@ fn unwritable_or_full_folder_behaves_like_no_cache() {
 }
 
 #[test]
-fn several_at_once_on_one_file_have_the_same_heights() {
+fn concurrent_runs_on_one_file_have_the_same_heights() {
     let bed = bed();
     let truth = truth(&bed.file);
     std::thread::scope(|scope| {
@@ -261,12 +265,12 @@ fn several_at_once_on_one_file_have_the_same_heights() {
                 // As separate processes.
                 let cache = DiskCache::at(&bed.folder.path().join("cache"), 1 << 20);
                 for _ in 0..3 {
-                    assert_eq!(look(&bed.file, &cache).0, truth);
+                    assert_eq!(read_heights(&bed.file, &cache).0, truth);
                 }
             });
         }
     });
-    assert_eq!(look(&bed.file, &bed.cache), (truth, 0));
+    assert_eq!(read_heights(&bed.file, &bed.cache), (truth, 0));
 }
 
 /// Writes SRTM's tiles: a folder of them is one terrain.
@@ -291,10 +295,10 @@ fn changed_file_of_a_mosaic_invalidates_its_cached_samples() {
     fs::create_dir(&srtm).expect("made");
     tiles(&srtm);
     let cache = DiskCache::at(&folder.path().join("cache"), 64 << 20);
-    let (truth, read) = look(&srtm, &DiskCache::off());
+    let (truth, read) = read_heights(&srtm, &DiskCache::off());
     assert!(read > 0 && truth.iter().any(|bits| *bits != 0));
-    assert_eq!(look(&srtm, &cache), (truth.clone(), read));
-    assert_eq!(look(&srtm, &cache), (truth.clone(), 0));
+    assert_eq!(read_heights(&srtm, &cache), (truth.clone(), read));
+    assert_eq!(read_heights(&srtm, &cache), (truth.clone(), 0));
     // One of the two has changed.
     let west = srtm.join("N00E000.hgt");
     let mut bytes = fs::read(&west).expect("there");
@@ -306,9 +310,9 @@ fn changed_file_of_a_mosaic_invalidates_its_cached_samples() {
     }
     fs::write(&west, bytes).expect("written");
     age(&west, 1000);
-    let now = look(&srtm, &DiskCache::off()).0;
+    let now = read_heights(&srtm, &DiskCache::off()).0;
     assert_ne!(now, truth);
-    let (found, again) = look(&srtm, &cache);
+    let (found, again) = read_heights(&srtm, &cache);
     assert!(found == now && again > 0 && again <= read, "{again}");
 }
 
@@ -357,7 +361,7 @@ fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
 }
 
 #[test]
-fn coarse_samples_are_kept_in_the_stated_folder_or_not_at_all() {
+fn coarse_samples_are_cached_only_in_the_given_folder() {
     let bed = bed();
     let opening = open(&bed.file, &DiskCache::off()).blocks_read();
     let there = bed.folder.path().join("there");

@@ -31,8 +31,8 @@ fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &
             if (column, row) == NO_DATA {
                 assert!(found.is_nan(), "{name}: {found} in the hole");
             } else {
-                let wanted = height(column, row) + 1000.0 * f64::from(band - 1);
-                assert_eq!(found, wanted, "{name}: column {column}, row {row}");
+                let expected = height(column, row) + 1000.0 * f64::from(band - 1);
+                assert_eq!(found, expected, "{name}: column {column}, row {row}");
             }
         }
     }
@@ -51,7 +51,7 @@ fn of_band(band: u32) -> OpenOptions {
 }
 
 #[test]
-fn every_encoding_holds_the_exact_field_in_its_place() {
+fn every_encoding_yields_the_exact_field_in_place() {
     for reader in Reader::all() {
         holds_the_exact_field(reader);
     }
@@ -102,7 +102,7 @@ fn holds_the_exact_field(reader: Reader) {
 }
 
 #[test]
-fn a_band_is_chosen_by_its_number() {
+fn band_is_selected_by_number() {
     for (name, bands) in [
         ("lerc_bands_i16.tif", 3),
         ("bands_planar_i16.tif", 3),
@@ -127,7 +127,7 @@ fn a_band_is_chosen_by_its_number() {
 }
 
 #[test]
-fn a_variable_of_a_file_of_one_field_is_refused() {
+fn variable_option_for_a_single_field_file_is_refused() {
     let named = |name: &str| OpenOptions {
         variable: Some(name.to_owned()),
         ..OpenOptions::default()
@@ -138,7 +138,7 @@ fn a_variable_of_a_file_of_one_field_is_refused() {
 
 /// A given cell size is used if the file has none, and refused if it has one.
 #[test]
-fn a_cell_size_is_for_files_that_state_none() {
+fn given_cell_size_is_used_only_if_the_file_has_none() {
     let sized = OpenOptions {
         ground_cell_m: Some(12.5),
         ..OpenOptions::default()
@@ -163,7 +163,7 @@ fn a_cell_size_is_for_files_that_state_none() {
 
 /// A file changed or truncated anywhere is refused or read; its memory stays bounded.
 #[test]
-fn a_damaged_copy_never_panics_and_is_bounded() {
+fn damaged_file_causes_no_panic_and_bounded_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in [
         "lerc_i16.tif",

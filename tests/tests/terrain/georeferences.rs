@@ -50,18 +50,18 @@ fn sides(bounds: Bounds) -> [f64; 4] {
     [bounds.west, bounds.south, bounds.east, bounds.north]
 }
 
-fn assert_same(found: Option<Bounds>, wanted: [f64; 4], file: &str) {
+fn assert_same(found: Option<Bounds>, expected: [f64; 4], file: &str) {
     let found = sides(found.unwrap_or_else(|| panic!("{file}: no bounds")));
-    for (found, wanted) in found.iter().zip(wanted) {
+    for (found, expected) in found.iter().zip(expected) {
         assert!(
-            (found - wanted).abs() < SAME_PLACE * wanted.abs().clamp(1.0, 1e3),
-            "{file}: {found} for {wanted}"
+            (found - expected).abs() < SAME_PLACE * expected.abs().clamp(1.0, 1e3),
+            "{file}: {found} for {expected}"
         );
     }
 }
 
 #[test]
-fn files_lie_where_gdal_sees_them() {
+fn files_are_placed_as_by_gdal() {
     let Some(folder) = shared("dem") else {
         return;
     };
@@ -123,8 +123,11 @@ fn compare(raster: &Raster, row: &Row, reader: Reader) {
     }
     // Without the code, the shift to WGS 84 is that of the datum's name: usually within 45 m.
     let found = sides(raster.bounds_lonlat().expect("a known projection"));
-    for (found, wanted) in found.iter().zip(degrees) {
-        assert!((found - wanted).abs() * 110_000.0 < 45.0, "{file}: {found}");
+    for (found, expected) in found.iter().zip(degrees) {
+        assert!(
+            (found - expected).abs() * 110_000.0 < 45.0,
+            "{file}: {found}"
+        );
     }
 }
 
@@ -153,7 +156,7 @@ fn info_names_the_source_of_each_georeference_value() {
             ["", "assumed", "", "assumed", "assumed", ""],
         ),
     ];
-    for (file, wanted) in cases {
+    for (file, expected) in cases {
         let report = info(&folder.join(file));
         let found = [
             &report["crs_from"],
@@ -164,7 +167,7 @@ fn info_names_the_source_of_each_georeference_value() {
             &report["vertical"]["datum_from"],
         ];
         let found = found.map(|from| from.as_str().unwrap_or_default());
-        assert_eq!(found, wanted, "{file}: {report:#}");
+        assert_eq!(found, expected, "{file}: {report:#}");
     }
     let report = info(&folder.join("bigtujunga.tif"));
     assert_eq!(report["crs"], "EPSG:32611");

@@ -110,7 +110,7 @@ fn in_file(disk: DiskCache) -> OpenOptions {
 }
 
 #[test]
-fn a_mask_in_one_large_strip_is_read_row_by_row() {
+fn mask_in_one_large_strip_is_read_row_by_row() {
     let mut mask = vec![7; (MASKED * MASKED) as usize];
     for hole in [0, MASKED + 1, 3500 * MASKED + 4000] {
         mask[hole as usize] = 0;

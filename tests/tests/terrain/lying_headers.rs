@@ -198,7 +198,7 @@ fn overview_at_another_place_is_not_used() {
 
 /// A damaged tile of an overview is no-data at coarse levels, and has no other effect.
 #[test]
-fn an_overview_whose_tiles_are_not_there_leaves_the_full_image() {
+fn missing_overview_tiles_leave_the_full_image_intact() {
     for (what, place, warns) in [
         ("behind the end", u32::MAX - 7, true),
         ("left out", 0, false),
@@ -291,7 +291,7 @@ fn tile_with_huge_stated_size_is_read_in_bounded_memory() {
 }
 
 #[test]
-fn directories_that_lie_are_errors_or_the_full_image() {
+fn false_directories_are_errors_or_yield_the_full_image() {
     let long = |values: &[u32]| Values::Longs(values.to_vec());
     let huge = 1 << 31;
     let both = |image: Directory, tags: [u16; 2], value: u32| {
@@ -358,7 +358,7 @@ fn npy(header: &str) -> Vec<u8> {
 }
 
 #[test]
-fn plain_samples_whose_headers_lie_are_errors() {
+fn plain_samples_with_false_headers_are_errors() {
     let shape = |shape: &str| {
         npy(&format!(
             "{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}"

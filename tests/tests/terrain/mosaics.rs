@@ -487,7 +487,7 @@ fn malformed_vrts_end_in_bounded_memory() {
 
 /// The command in the hint, run unchanged, makes one terrain of files that do not match.
 #[test]
-fn the_hint_for_files_that_do_not_fit_makes_one_of_them() {
+fn hint_merges_files_that_do_not_match() {
     let Some(range) = shared("real/bigtujunga.tif") else {
         return;
     };

@@ -88,7 +88,7 @@ fn bits(samples: &[Vec<f64>]) -> Vec<u64> {
 }
 
 #[test]
-fn every_storage_gives_the_same_samples_in_windows() {
+fn every_netcdf_storage_yields_the_same_samples_in_windows() {
     for name in files() {
         let whole = open(&path(name), &OpenOptions::default());
         let touched = open(&path(name), &windows());
@@ -130,7 +130,7 @@ fn every_storage_gives_the_same_samples_in_windows() {
 }
 
 #[test]
-fn every_storage_holds_the_exact_field() {
+fn every_netcdf_storage_yields_the_exact_field() {
     for name in files() {
         let raster = open(&path(name), &windows());
         let sign = if name == "depths.nc" { -1.0 } else { 1.0 };
@@ -138,22 +138,22 @@ fn every_storage_holds_the_exact_field() {
         for row in 0..SIZE.1 {
             for column in 0..SIZE.0 {
                 let found = rows[(SIZE.1 - 1 - row) as usize][column as usize];
-                let wanted = sign * height(column, row);
+                let expected = sign * height(column, row);
                 match name {
                     // Its valid range, in stored numbers.
-                    "packed.nc" if wanted > 300.0 => {
+                    "packed.nc" if expected > 300.0 => {
                         assert!(found.is_nan(), "{name}: {column} {row}");
                     }
                     _ if (column, row) == NO_DATA => {
                         assert!(found.is_nan(), "{name}: {column} {row}: {found}");
                     }
-                    _ => assert_eq!(found, wanted, "{name}: {column} {row}"),
+                    _ => assert_eq!(found, expected, "{name}: {column} {row}"),
                 }
             }
         }
         let bounds = raster.bounds().expect("its place");
-        for (found, wanted) in [(bounds.west, 7.995), (bounds.north, 50.005)] {
-            assert!((found - wanted).abs() < 1e-9, "{name}: {found}");
+        for (found, expected) in [(bounds.west, 7.995), (bounds.north, 50.005)] {
+            assert!((found - expected).abs() < 1e-9, "{name}: {found}");
         }
     }
 }
@@ -312,7 +312,7 @@ fn depth_sign_follows_positive_then_standard_name() {
 }
 
 #[test]
-fn a_variable_is_chosen_by_its_name() {
+fn variable_is_selected_by_name() {
     if !has_gdal() {
         return;
     }
@@ -371,7 +371,7 @@ fn open_options_reach_the_driver_and_unknown_ones_are_refused() {
 
 /// If a build of GDAL lacks a compression, its own error is reported: the file is not damaged.
 #[test]
-fn a_packing_that_is_not_read_is_no_damage() {
+fn unsupported_packing_is_not_reported_as_damage() {
     if !has_gdal() {
         return;
     }

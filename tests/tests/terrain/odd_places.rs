@@ -64,11 +64,11 @@ fn lonlat_of_bounds_and_middle_agrees_with_proj() {
         let bounds = &report["bounds_lonlat"];
         let found = ["west", "south", "east", "north"].map(|side| bounds[side].as_f64());
         let within_m = bounds["within_m"].as_f64().unwrap_or(0.0).max(0.01);
-        for (found, wanted) in found.iter().zip(row.sides()) {
+        for (found, expected) in found.iter().zip(row.sides()) {
             let found = found.unwrap_or_else(|| panic!("{}: {report:#}", row.file));
-            let off_m = (found - wanted).abs() * DEGREE_M;
+            let off_m = (found - expected).abs() * DEGREE_M;
             // A parallel is curved on most maps, so the edges are followed in steps.
-            assert!(off_m < within_m, "{}: {found} for {wanted}", row.file);
+            assert!(off_m < within_m, "{}: {found} for {expected}", row.file);
         }
         let raster = row.raster();
         let file = raster.georeference();
@@ -100,7 +100,7 @@ fn lonlat_target_resolves_to_its_sample() {
 }
 
 #[test]
-fn cells_are_as_large_as_on_their_own_body() {
+fn cell_sizes_are_those_on_the_own_body() {
     for row in rows() {
         for reader in Reader::all() {
             let raster = row.raster_by(reader);
@@ -116,14 +116,14 @@ fn cells_are_as_large_as_on_their_own_body() {
                 cell.lean,
                 row.lean
             );
-            for (found, wanted) in [
+            for (found, expected) in [
                 (along_row, row.along_row_m),
                 (along_column, row.along_column_m),
             ] {
-                let off = found / wanted - 1.0;
+                let off = found / expected - 1.0;
                 assert!(
                     off.abs() < 1e-4,
-                    "{} by {reader:?}: {found} for {wanted} m",
+                    "{} by {reader:?}: {found} for {expected} m",
                     row.file
                 );
             }
@@ -158,7 +158,7 @@ fn sheared_map_is_rendered_in_its_true_shape() {
     assert!(sheared >= 5, "{sheared}");
 }
 
-fn stated(file: &str) -> String {
+fn output_of(file: &str) -> String {
     let output = Command::new(hapterra_binary())
         .args(["info", &format!("{FOLDER}/{file}.tif")])
         .output()
@@ -185,9 +185,9 @@ fn info_states_unit_datum_and_accuracy_of_lonlat() {
         ("modis", ["west 1111950.500", "of its own datum, "]),
         ("feet", ["unit of 0.304", "WGS 84, usually within 4 m"]),
     ] {
-        let stated = stated(file);
+        let output = output_of(file);
         for part in parts {
-            assert!(stated.contains(part), "{part} in:\n{stated}");
+            assert!(output.contains(part), "{part} in:\n{output}");
         }
     }
 }
@@ -205,13 +205,13 @@ fn sheared_grid_is_resampled_to_true_shape_with_a_note() {
         (to[0] - from[0]).abs() < 1e-6 && to[1] > from[1],
         "{from:?} {to:?}"
     );
-    let stated = stated("sheared");
-    assert!(stated.contains("the grid is sheared"), "{stated}");
+    let output = output_of("sheared");
+    assert!(output.contains("the grid is sheared"), "{output}");
     assert!(
-        stated.contains("by -16.7°") || stated.contains("by 16.7°"),
-        "{stated}"
+        output.contains("by -16.7°") || output.contains("by 16.7°"),
+        "{output}"
     );
-    assert!(!stated.contains("rotated"), "{stated}");
+    assert!(!output.contains("rotated"), "{output}");
 }
 
 /// A map in feet whose heights have no unit is rendered 3.28 times too steep if they are in feet as
@@ -227,23 +227,23 @@ fn assumed_height_unit_is_reported_until_stated() {
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         let unit = report["vertical"]["metres_per_unit"].as_f64();
         let from = report["vertical"]["unit_from"].as_str().map(str::to_owned);
-        let stated = String::from_utf8(output.stderr).expect("text");
-        (stated, unit.expect("a unit"), from.expect("a source"))
+        let output = String::from_utf8(output.stderr).expect("text");
+        (output, unit.expect("a unit"), from.expect("a source"))
     };
-    let (stated, unit, from) = reported("feet.tif", &[]);
+    let (output, unit, from) = reported("feet.tif", &[]);
     assert!(
-        stated.contains("3.28 times too steep: --input height-unit=us-ft"),
-        "{stated}"
+        output.contains("3.28 times too steep: --input height-unit=us-ft"),
+        "{output}"
     );
     assert_eq!((unit, from.as_str()), (1.0, "assumed"));
-    let (stated, unit, from) = reported("feet.tif", &["--input", "height-unit=us-ft"]);
-    assert_eq!((stated.as_str(), from.as_str()), ("", "option"));
+    let (output, unit, from) = reported("feet.tif", &["--input", "height-unit=us-ft"]);
+    assert_eq!((output.as_str(), from.as_str()), ("", "option"));
     assert!((unit - 1200.0 / 3937.0).abs() < 1e-12, "{unit}");
-    let (stated, ..) = reported("nad27.tif", &[]);
-    assert!(stated.contains("--input height-unit="), "{stated}");
+    let (output, ..) = reported("nad27.tif", &[]);
+    assert!(output.contains("--input height-unit="), "{output}");
     // Metres on the ground, or a unit stated in the file, need no note.
-    let (stated, ..) = reported("rotated.tif", &[]);
-    assert_eq!(stated, "");
+    let (output, ..) = reported("rotated.tif", &[]);
+    assert_eq!(output, "");
 }
 
 /// Unknown projections are named, with a remedy.
@@ -263,10 +263,10 @@ fn unsupported_projection_is_named_with_a_remedy() {
             ])
             .output()
             .expect("it runs");
-        let stated = String::from_utf8(output.stderr).expect("text");
         assert!(!output.status.success());
+        let output = String::from_utf8(output.stderr).expect("text");
         for part in [name, "--at X,Y", "gdalwarp -t_srs EPSG:4326"] {
-            assert!(stated.contains(part), "{part} in:\n{stated}");
+            assert!(output.contains(part), "{part} in:\n{output}");
         }
     }
 }

@@ -40,10 +40,10 @@ fn files_that_only_gdal_reads_are_exact_and_in_place() {
                 // The file's first row is the northern one.
                 let found = raster.height(column, 3 - row);
                 let above = 1000.0 * f64::from(band - 1);
-                let wanted = 100.5 + 7.0 * f64::from(column) - 3.0 * f64::from(row) + above;
+                let expected = 100.5 + 7.0 * f64::from(column) - 3.0 * f64::from(row) + above;
                 match (column, row) {
                     (3, 1) => assert!(found.is_nan(), "{name}"),
-                    _ => assert_eq!(found, wanted, "{name} {column} {row}"),
+                    _ => assert_eq!(found, expected, "{name} {column} {row}"),
                 }
             }
             let bounds = raster.bounds().expect("placed");
@@ -72,13 +72,13 @@ fn large_files_stay_on_disk_and_overviews_survey_them() {
     // The coarsest overview has every fourth sample.
     assert_eq!(raster.summary().examined, 150 * 125);
     for (column, row) in [(0, 0), (599, 499), (17, 300), (512, 33)] {
-        let wanted = column / 16 + row / 16;
-        assert_eq!(raster.height(column, 499 - row), f64::from(wanted));
+        let expected = column / 16 + row / 16;
+        assert_eq!(raster.height(column, 499 - row), f64::from(expected));
     }
 }
 
 #[test]
-fn file_unknown_to_gdal_keeps_its_own_error() {
+fn file_unknown_to_gdal_has_the_original_error() {
     if !has_gdal() {
         return;
     }
@@ -109,11 +109,11 @@ fn vrt_gaps_without_no_data_are_reported_as_heights() {
     );
     let raster = Raster::open(&path, &OpenOptions::default()).expect("read by GDAL");
     assert_eq!((raster.height(0, 7), raster.height(0, 0)), (100.5, 0.0));
-    let stated = raster
+    let is_reported = raster
         .remarks()
         .iter()
         .any(|remark| remark.contains("-vrtnodata"));
-    assert!(stated, "{:?}", raster.remarks());
+    assert!(is_reported, "{:?}", raster.remarks());
 }
 
 /// Writes a VRT of 5 × 8 samples; a file has their northern half.
@@ -150,7 +150,7 @@ fn vrts_name_files_beside_them_and_other_vrts() {
 /// VRT.
 #[cfg(unix)]
 #[test]
-fn pipes_are_not_opened_however_they_are_named() {
+fn pipes_are_not_opened_under_any_name() {
     if !has_gdal() {
         return;
     }
@@ -268,13 +268,13 @@ fn labels_beside_planetary_images_are_opened() {
     std::fs::write(&image, samples).expect("written");
     let raster = Raster::open(&image, &OpenOptions::default()).expect("by its label");
     assert_eq!((raster.height(0, 2), raster.height(3, 0)), (0.0, 11.0));
-    let stated = raster.remarks().join(" ");
-    assert!(stated.contains("MOON.LBL"), "{stated}");
+    let remarks = raster.remarks().join(" ");
+    assert!(remarks.contains("MOON.LBL"), "{remarks}");
 }
 
 /// ENVI's samples have any extension, and a unit beside a zone is the unit of the coordinates.
 #[test]
-fn envi_is_placed_by_its_own_unit() {
+fn envi_file_is_placed_in_its_own_unit() {
     if !has_gdal() {
         return;
     }
@@ -374,7 +374,7 @@ fn grass_null_mark_is_refused_and_no_data_number_is_read() {
 /// A libgdal that needs 300 ms for each block delays no tick: until the blocks arrive the coarse
 /// fallback is under the hand, not no-data.
 #[test]
-fn slow_libgdal_holds_up_no_tick() {
+fn slow_libgdal_delays_no_tick() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let recording = at.join("felt.csv");

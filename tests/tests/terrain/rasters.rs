@@ -321,7 +321,7 @@ fn real_files_are_oriented_north_up() {
 
 /// 64.8 million samples use the bytes of their own type and no more.
 #[test]
-fn a_large_file_is_held_once_in_its_own_type() {
+fn large_file_is_in_memory_once_in_its_own_type() {
     let Some(path) = shared("dem/large/globe_g10g_10800x6000_i16_cog.tif") else {
         return;
     };
@@ -370,7 +370,7 @@ fn same_tiles(held: &Raster, blocks: &Raster) {
 
 /// All TIFFs read in blocks are the same as in memory.
 #[test]
-fn every_tiff_reads_the_same_in_blocks_as_at_once() {
+fn every_tiff_has_the_same_samples_in_blocks_and_at_once() {
     let folders = ["dem/real", "dem/variants", "dem/tiff_ok"];
     let Some(folders) = folders.map(shared).into_iter().collect::<Option<Vec<_>>>() else {
         return;
@@ -509,7 +509,7 @@ fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
 }
 
 #[test]
-fn a_colour_picture_needs_its_channel_named() {
+fn colour_picture_needs_a_named_channel() {
     let Some(path) = shared("dem/variants/png_rgba8_depth_in_alpha.png") else {
         return;
     };

@@ -149,7 +149,7 @@ fn items_with_absolute_paths_form_one_terrain() {
 }
 
 #[test]
-fn an_item_that_lies_elsewhere_than_its_file_is_named() {
+fn item_placed_elsewhere_than_its_file_is_named() {
     if !has_gdal() {
         return;
     }
@@ -202,17 +202,17 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
     }
     let document = write(place.path(), "all.json", &collection(&items));
     let output = info(&document, &[]);
-    let words = output_text(&output);
+    let arguments = output_text(&output);
     assert!(
-        words.contains("--input variable=dem_0_0.5|dem_0_2"),
-        "{words}"
+        arguments.contains("--input variable=dem_0_0.5|dem_0_2"),
+        "{arguments}"
     );
     assert_is_both(&built(
         place.path(),
         &info(&document, &["--input", "variable=dem_*_2"]),
     ));
-    let words = output_text(&info(&document, &["--input", "variable=dsm_*"]));
-    assert!(words.contains("no asset of that name"), "{words}");
+    let arguments = output_text(&info(&document, &["--input", "variable=dsm_*"]));
+    assert!(arguments.contains("no asset of that name"), "{arguments}");
 }
 
 /// A document of any size gives an error, within the program's own address space.

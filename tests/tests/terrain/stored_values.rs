@@ -93,8 +93,8 @@ fn remarks_are_noted_where_a_terrain_is_touched() {
         notes.contains("note: ") && notes.contains("--input no-data=-32768"),
         "{notes}"
     );
-    let stated = ["cut", "x.asc", "-o", "out", "--input", "no-data=-32768"];
-    let output = hapterra(folder.path(), &stated);
+    let arguments = ["cut", "x.asc", "-o", "out", "--input", "no-data=-32768"];
+    let output = hapterra(folder.path(), &arguments);
     let notes = String::from_utf8(output.stderr).expect("text");
     assert!(!notes.contains("--input no-data"), "{notes}");
 }

@@ -4,7 +4,7 @@ use super::error::UpdateError;
 
 /// A device that could be updated.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Plugged {
+pub struct ConnectedDevice {
     /// The USB port: the same before and after the device changes into its loader.
     pub place: String,
     /// Serial number. The loader's differs from the firmware's.
@@ -17,12 +17,12 @@ pub struct Plugged {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice<'p> {
     /// A board that runs its firmware and has to enter its loader first.
-    Board(&'p Plugged),
+    Board(&'p ConnectedDevice),
     /// The loader that the user named.
-    Loader(&'p Plugged),
+    Loader(&'p ConnectedDevice),
     /// A loader that the user did not name. It may be any STM32: a board after a failed update, or
     /// another machine. The user must confirm it.
-    UnnamedLoader(&'p Plugged),
+    UnnamedLoader(&'p ConnectedDevice),
 }
 
 /// Returns the device with a serial number, or the only device. If several match, none is chosen,
@@ -30,14 +30,17 @@ pub enum Choice<'p> {
 ///
 /// # Errors
 /// [`UpdateError::Nothing`] and [`UpdateError::Several`], which names them.
-pub fn choose<'p>(plugged: &'p [Plugged], serial: Option<&str>) -> Result<Choice<'p>, UpdateError> {
-    let fits = |device: &&Plugged| {
-        serial.is_none_or(|wanted| {
+pub fn choose<'p>(
+    connected_devices: &'p [ConnectedDevice],
+    serial: Option<&str>,
+) -> Result<Choice<'p>, UpdateError> {
+    let fits = |device: &&ConnectedDevice| {
+        serial.is_none_or(|requested| {
             let serial = device.serial.as_deref();
-            serial.is_some_and(|serial| serial.eq_ignore_ascii_case(wanted))
+            serial.is_some_and(|serial| serial.eq_ignore_ascii_case(requested))
         })
     };
-    let mut fitting = plugged.iter().filter(fits);
+    let mut fitting = connected_devices.iter().filter(fits);
     match (fitting.next(), fitting.next()) {
         (Some(device), None) if device.is_loader => Ok(match serial {
             Some(_) => Choice::Loader(device),
@@ -45,16 +48,18 @@ pub fn choose<'p>(plugged: &'p [Plugged], serial: Option<&str>) -> Result<Choice
         }),
         (Some(device), None) => Ok(Choice::Board(device)),
         (None, _) => Err(UpdateError::Nothing {
-            looked_for: match serial {
+            searched_for: match serial {
                 Some(serial) => format!("the serial number {serial:?}"),
                 None => "a hapterra board, or an STM32 in its loader".into(),
             },
         }),
-        (Some(_), Some(_)) => Err(UpdateError::Several(plugged.iter().map(name).collect())),
+        (Some(_), Some(_)) => Err(UpdateError::Several(
+            connected_devices.iter().map(name).collect(),
+        )),
     }
 }
 
-fn name(device: &Plugged) -> String {
+fn name(device: &ConnectedDevice) -> String {
     let kind = if device.is_loader {
         "a loader"
     } else {
@@ -69,8 +74,8 @@ fn name(device: &Plugged) -> String {
 mod tests {
     use super::*;
 
-    fn device(serial: &str, is_loader: bool) -> Plugged {
-        Plugged {
+    fn device(serial: &str, is_loader: bool) -> ConnectedDevice {
+        ConnectedDevice {
             place: format!("bus 1 port {}", serial.len()),
             serial: Some(serial.into()),
             is_loader,

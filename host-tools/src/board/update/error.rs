@@ -7,10 +7,10 @@ use std::{fmt, io};
 #[derive(Debug, thiserror::Error)]
 pub enum UpdateError {
     /// No board or loader is connected.
-    #[error("no board to update: looked for {looked_for} on USB")]
+    #[error("no board to update: looked for {searched_for} on USB")]
     Nothing {
         /// The device sought.
-        looked_for: String,
+        searched_for: String,
     },
     /// Several devices match.
     #[error("several boards could be updated: {}", .0.join(", "))]
@@ -30,12 +30,12 @@ pub enum UpdateError {
     #[error("the loader describes its flash in a way that is not understood: {0:?}")]
     Layout(String),
     /// The loader's flash differs from the board's chip.
-    #[error("the loader is not that of {board}: it reports the flash {stated:?}")]
+    #[error("the loader is not that of {board}: it reports the flash {description:?}")]
     OtherChip {
         /// The board that the image is for.
         board: &'static str,
         /// The loader's description.
-        stated: String,
+        description: String,
     },
     /// The loader cannot write or cannot read back.
     #[error("the loader cannot {0}")]
@@ -50,19 +50,19 @@ pub enum UpdateError {
     #[error("the image has no vectors at {0:#010x}")]
     NoVectors(u64),
     /// The loader was disconnected or does not respond.
-    #[error("the loader is gone, while it was to {doing}")]
-    Gone {
+    #[error("the loader is gone, while it was to {operation}")]
+    Disconnected {
         /// Step that failed.
-        doing: &'static str,
+        operation: &'static str,
         /// The reason.
         #[source]
         source: io::Error,
     },
     /// The loader refused a request.
-    #[error("the loader refused to {doing}: {why} (status {status}, state {state})")]
+    #[error("the loader refused to {operation}: {why} (status {status}, state {state})")]
     Refused {
         /// Step that failed.
-        doing: &'static str,
+        operation: &'static str,
         /// Meaning of the loader's status.
         why: &'static str,
         /// The loader's status.

@@ -10,7 +10,7 @@ const MAX_PAGES: u64 = 4096;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// The loader's text, to display: only its printable ASCII.
-    pub stated: String,
+    pub description: String,
     /// First address.
     pub start: u64,
     /// Bytes of a page.
@@ -25,14 +25,14 @@ impl Layout {
     /// # Errors
     /// [`UpdateError::Layout`] unless it is one block of pages of one size that can be read, erased
     /// and written.
-    pub fn read(words: &str) -> Result<Self, UpdateError> {
+    pub fn read(description: &str) -> Result<Self, UpdateError> {
         let printable = |c: &char| c.is_ascii_graphic() || *c == ' ';
-        let stated: String = words.chars().filter(printable).take(100).collect();
-        Self::parse(&stated).ok_or(UpdateError::Layout(stated))
+        let description: String = description.chars().filter(printable).take(100).collect();
+        Self::parse(&description).ok_or(UpdateError::Layout(description))
     }
 
-    fn parse(stated: &str) -> Option<Self> {
-        let mut fields = stated.strip_prefix('@')?.split('/');
+    fn parse(description: &str) -> Option<Self> {
+        let mut fields = description.strip_prefix('@')?.split('/');
         let (_name, address, runs) = (fields.next()?, fields.next()?, fields.next()?);
         if fields.next().is_some() {
             return None;
@@ -45,7 +45,7 @@ impl Layout {
         let even = runs.iter().all(|(_, bytes)| *bytes == page_bytes);
         let believed = even && page_bytes > 0 && (1..=MAX_PAGES).contains(&pages);
         believed.then(|| Self {
-            stated: stated.to_owned(),
+            description: description.to_owned(),
             start,
             page_bytes,
             pages,
@@ -75,9 +75,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_two_chips_loaders_are_understood() {
-        let read = |words| {
-            Layout::read(words)
+    fn layouts_of_both_chips_are_parsed() {
+        let read = |description| {
+            Layout::read(description)
                 .map(|l| (l.start, l.page_bytes, l.pages))
                 .ok()
         };
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn malformed_flash_layout_is_refused_without_panic() {
-        for words in [
+        for description in [
             "",
             "@",
             "@Option Bytes   /0x1FF22000/01*048 e",
@@ -105,15 +105,16 @@ mod tests {
             "@Internal Flash /0x08000000/256*0\u{e9}g",
             "@Internal Flash /0x08000000/256*02Ka",
         ] {
-            assert!(Layout::read(words).is_err(), "{words:?}");
+            assert!(Layout::read(description).is_err(), "{description:?}");
         }
     }
 
     #[test]
     fn control_characters_from_a_loader_are_removed() {
-        let Err(UpdateError::Layout(stated)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}") else {
+        let Err(UpdateError::Layout(description)) = Layout::read("@\u{1b}[2J\r\nFlash\u{202e}")
+        else {
             panic!("refused");
         };
-        assert_eq!(stated, "@[2JFlash");
+        assert_eq!(description, "@[2JFlash");
     }
 }

@@ -46,12 +46,12 @@ const CAN_UPLOAD: u8 = 1 << 1;
 /// The descriptor's type.
 const FUNCTIONAL: u8 = 0x21;
 /// Longest transfer used; STM32 loaders report 1,024 or 2,048.
-const MAX_TRANSFERRED: u16 = 4096;
+const MAX_TRANSFER_BYTES: u16 = 4096;
 
 /// Time limit of one operation; an H743's sector takes at most 4 s (its data sheet).
 const TIMEOUT: Duration = Duration::from_secs(30);
 /// Attempts to make a loader idle.
-const TRIES: usize = 8;
+const MAX_ATTEMPTS: usize = 8;
 
 /// Control transfers to the loader's interface.
 pub trait ControlPipe {
@@ -93,8 +93,8 @@ impl<P: ControlPipe> Loader<P> {
     ///
     /// # Errors
     /// [`UpdateError`]: the loader is unsuitable or does not respond.
-    pub fn open(pipe: P, words: &str, functional: &[u8]) -> Result<Self, UpdateError> {
-        let layout = Layout::read(words)?;
+    pub fn open(pipe: P, description: &str, functional: &[u8]) -> Result<Self, UpdateError> {
+        let layout = Layout::read(description)?;
         let (attributes, transfer) = match functional {
             [_, FUNCTIONAL, attributes, _, _, low, high, ..] => {
                 (*attributes, u16::from_le_bytes([*low, *high]))
@@ -108,7 +108,7 @@ impl<P: ControlPipe> Loader<P> {
             return Err(UpdateError::Cannot("read back what was written"));
         }
         // A transfer contains only whole words of flash.
-        let transfer = transfer.min(MAX_TRANSFERRED) / 32 * 32;
+        let transfer = transfer.min(MAX_TRANSFER_BYTES) / 32 * 32;
         if transfer == 0 {
             return Err(UpdateError::Cannot("take whole words of flash"));
         }
@@ -117,7 +117,7 @@ impl<P: ControlPipe> Loader<P> {
             layout,
             transfer,
         };
-        loader.rest("begin")?;
+        loader.make_idle("begin")?;
         Ok(loader)
     }
 
@@ -145,10 +145,10 @@ impl<P: ControlPipe> Loader<P> {
     /// # Errors
     /// [`UpdateError`].
     pub fn write(&mut self, address: u64, bytes: &[u8]) -> Result<(), UpdateError> {
-        const DOING: &str = "write";
-        self.command(SET_ADDRESS, address, DOING)?;
+        const OPERATION: &str = "write";
+        self.command(SET_ADDRESS, address, OPERATION)?;
         for (block, chunk) in (FIRST_BLOCK..).zip(bytes.chunks(self.transfer.into())) {
-            self.give(block, chunk, DOING)?;
+            self.send_block(block, chunk, OPERATION)?;
         }
         Ok(())
     }
@@ -158,23 +158,23 @@ impl<P: ControlPipe> Loader<P> {
     /// # Errors
     /// [`UpdateError`].
     pub fn read(&mut self, address: u64, bytes: usize) -> Result<Vec<u8>, UpdateError> {
-        const DOING: &str = "read back";
-        self.command(SET_ADDRESS, address, DOING)?;
+        const OPERATION: &str = "read back";
+        self.command(SET_ADDRESS, address, OPERATION)?;
         // A loader returns blocks only if it is idle or already reading.
-        self.rest(DOING)?;
+        self.make_idle(OPERATION)?;
         let mut all = Vec::with_capacity(bytes);
         let mut block = FIRST_BLOCK;
         while all.len() < bytes {
             let length = (bytes - all.len()).min(self.transfer.into()) as u16;
             let got = self.pipe.read(request::UPLOAD, block, length);
-            let got = got.map_err(|source| self.failed(DOING, source))?;
+            let got = got.map_err(|source| self.failure(OPERATION, source))?;
             if got.len() != usize::from(length) {
                 return Err(UpdateError::Cannot("read back what was written"));
             }
             all.extend(got);
             block = block.wrapping_add(1);
         }
-        self.rest(DOING)?;
+        self.make_idle(OPERATION)?;
         Ok(all)
     }
 
@@ -182,18 +182,18 @@ impl<P: ControlPipe> Loader<P> {
     ///
     /// # Errors
     /// [`UpdateError`].
-    pub fn leave(&mut self, address: u64) -> Result<(), UpdateError> {
-        const DOING: &str = "start the program";
-        self.command(SET_ADDRESS, address, DOING)?;
-        let given = self.pipe.write(request::DNLOAD, 0, &[]);
-        given.map_err(|source| UpdateError::Gone {
-            doing: DOING,
+    pub fn start_program(&mut self, address: u64) -> Result<(), UpdateError> {
+        const OPERATION: &str = "start the program";
+        self.command(SET_ADDRESS, address, OPERATION)?;
+        let sent = self.pipe.write(request::DNLOAD, 0, &[]);
+        sent.map_err(|source| UpdateError::Disconnected {
+            operation: OPERATION,
             source,
         })?;
         // The loader ends at the status request, possibly before it replies.
-        match self.status(DOING) {
+        match self.status(OPERATION) {
             Ok(status) if matches!(status.state, MANIFEST | MANIFEST_SYNC) => Ok(()),
-            Ok(status) => Err(refused(DOING, status)),
+            Ok(status) => Err(refusal(OPERATION, status)),
             Err(_) => Ok(()),
         }
     }
@@ -202,19 +202,24 @@ impl<P: ControlPipe> Loader<P> {
         &mut self,
         command: u8,
         address: u64,
-        doing: &'static str,
+        operation: &'static str,
     ) -> Result<(), UpdateError> {
         let [a, b, c, d, ..] = address.to_le_bytes();
-        self.give(0, &[command, a, b, c, d], doing)
+        self.send_block(0, &[command, a, b, c, d], operation)
     }
 
     /// Sends a block to the loader and waits until it is processed.
-    fn give(&mut self, block: u16, bytes: &[u8], doing: &'static str) -> Result<(), UpdateError> {
-        let given = self.pipe.write(request::DNLOAD, block, bytes);
-        given.map_err(|source| self.failed(doing, source))?;
+    fn send_block(
+        &mut self,
+        block: u16,
+        bytes: &[u8],
+        operation: &'static str,
+    ) -> Result<(), UpdateError> {
+        let sent = self.pipe.write(request::DNLOAD, block, bytes);
+        sent.map_err(|source| self.failure(operation, source))?;
         let mut waited = Duration::ZERO;
         while waited < TIMEOUT {
-            let status = self.status(doing)?;
+            let status = self.status(operation)?;
             match status.state {
                 DNLOAD_IDLE if status.status == 0 => return Ok(()),
                 DNBUSY | DNLOAD_SYNC if status.status == 0 => {
@@ -223,24 +228,24 @@ impl<P: ControlPipe> Loader<P> {
                     self.pipe.wait(wait);
                     waited += wait;
                 }
-                _ => return Err(refused(doing, status)),
+                _ => return Err(refusal(operation, status)),
             }
         }
-        Err(UpdateError::Endless(doing))
+        Err(UpdateError::Endless(operation))
     }
 
     /// Returns the error of a failed transfer: the loader's status, if it still responds.
-    fn failed(&mut self, doing: &'static str, source: io::Error) -> UpdateError {
-        match self.status(doing) {
-            Ok(status) if status.state == ERROR => refused(doing, status),
-            _ => UpdateError::Gone { doing, source },
+    fn failure(&mut self, operation: &'static str, source: io::Error) -> UpdateError {
+        match self.status(operation) {
+            Ok(status) if status.state == ERROR => refusal(operation, status),
+            _ => UpdateError::Disconnected { operation, source },
         }
     }
 
     /// Makes the loader `dfuIDLE` from any state.
-    fn rest(&mut self, doing: &'static str) -> Result<(), UpdateError> {
-        for _ in 0..TRIES {
-            let status = self.status(doing)?;
+    fn make_idle(&mut self, operation: &'static str) -> Result<(), UpdateError> {
+        for _ in 0..MAX_ATTEMPTS {
+            let status = self.status(operation)?;
             let number = match status.state {
                 IDLE => return Ok(()),
                 ERROR => request::CLRSTATUS,
@@ -251,14 +256,14 @@ impl<P: ControlPipe> Loader<P> {
                 _ => request::ABORT,
             };
             let done = self.pipe.write(number, 0, &[]);
-            done.map_err(|source| UpdateError::Gone { doing, source })?;
+            done.map_err(|source| UpdateError::Disconnected { operation, source })?;
         }
-        Err(UpdateError::Endless(doing))
+        Err(UpdateError::Endless(operation))
     }
 
-    fn status(&mut self, doing: &'static str) -> Result<Status, UpdateError> {
+    fn status(&mut self, operation: &'static str) -> Result<Status, UpdateError> {
         let answer = self.pipe.read(request::GETSTATUS, 0, 6);
-        let answer = answer.map_err(|source| UpdateError::Gone { doing, source })?;
+        let answer = answer.map_err(|source| UpdateError::Disconnected { operation, source })?;
         let [status, low, middle, high, state, _] = answer[..] else {
             return Err(UpdateError::Cannot("say how it is"));
         };
@@ -271,9 +276,9 @@ impl<P: ControlPipe> Loader<P> {
     }
 }
 
-fn refused(doing: &'static str, Status { status, state, .. }: Status) -> UpdateError {
+fn refusal(operation: &'static str, Status { status, state, .. }: Status) -> UpdateError {
     UpdateError::Refused {
-        doing,
+        operation,
         why: meaning(status),
         status,
         state,

@@ -24,10 +24,10 @@ mod system;
 #[cfg(test)]
 mod tests;
 
-pub use choice::{Choice, Plugged, choose};
+pub use choice::{Choice, ConnectedDevice, choose};
 pub use error::{UpdateError, UpdateFailure};
 pub use layout::Layout;
 pub use loader::{ControlPipe, Loader, request};
 pub use plan::{FlashRange, Plan};
 pub use procedure::{Step, update};
-pub use system::{LOADER_PRODUCT_ID, LOADER_VENDOR_ID, SystemPipe, open_loader, plugged};
+pub use system::{LOADER_PRODUCT_ID, LOADER_VENDOR_ID, SystemPipe, connected_devices, open_loader};

@@ -39,15 +39,15 @@ impl Plan {
     pub fn new(board: &Board, image: &Image, layout: &Layout) -> Result<Self, UpdateError> {
         let memories = image.memories;
         let expected = (memories.flash, memories.page_bytes, memories.flash_bytes);
-        let stated = (
+        let found = (
             layout.start,
             layout.page_bytes,
             layout.page_bytes * layout.pages,
         );
-        if stated != expected {
+        if found != expected {
             return Err(UpdateError::OtherChip {
                 board: board.name,
-                stated: layout.stated.clone(),
+                description: layout.description.clone(),
             });
         }
         let mut pages = pages(image, &memories)?;
@@ -120,9 +120,9 @@ mod tests {
         }
     }
 
-    fn plan(parts: &[(u64, usize)], words: &str) -> Result<Plan, UpdateError> {
+    fn plan(parts: &[(u64, usize)], description: &str) -> Result<Plan, UpdateError> {
         let board = Board::named("nucleo-g474re").expect("known");
-        let layout = Layout::read(words).expect("understood");
+        let layout = Layout::read(description).expect("understood");
         Plan::new(board, &image(parts), &layout)
     }
 
@@ -145,8 +145,8 @@ mod tests {
     fn h743_plan_writes_32_byte_words_and_erases_sectors() {
         const SECTOR: u64 = 128 * 1024;
         let board = Board::named("nucleo-h743zi2").expect("known");
-        let words = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";
-        let layout = Layout::read(words).expect("understood");
+        let description = "@Internal Flash   /0x08000000/8*128Kg,8*128Kg";
+        let layout = Layout::read(description).expect("understood");
         let of = |parts: &[(u64, usize)]| {
             let memories = Memories::H743;
             let image = Image {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_calibrations_are_out_of_reach() {
+    fn calibration_sectors_cannot_be_erased() {
         let calibrations = FLASH + 508 * 1024;
         assert!(plan(&[(FLASH, 8), (calibrations - 8, 8)], G474).is_ok());
         for part in [(calibrations - 8, 9), (calibrations, 1), (FLASH - 4, 8)] {
@@ -191,17 +191,17 @@ mod tests {
     }
 
     #[test]
-    fn another_chips_loader_is_refused() {
-        for words in [
+    fn loader_of_another_chip_is_refused() {
+        for description in [
             "@Internal Flash /0x08000000/16*128Kg",
             "@Internal Flash /0x08000000/128*02Kg",
             "@Internal Flash /0x08000000/128*04Kg",
             "@Internal Flash /0x90000000/256*02Kg",
         ] {
-            let refused = plan(&[(FLASH, 8)], words);
+            let refused = plan(&[(FLASH, 8)], description);
             assert!(
                 matches!(refused, Err(UpdateError::OtherChip { .. })),
-                "{words}"
+                "{description}"
             );
         }
         let refused = plan(&[(FLASH + 0x800, 8)], G474);

@@ -70,7 +70,7 @@ fn carry_out<P: ControlPipe>(
     progress(Step::Written(bytes, bytes));
     compare(loader, &plan.vectors)?;
     progress(Step::Compared(bytes, bytes));
-    loader.leave(plan.vectors.address)
+    loader.start_program(plan.vectors.address)
 }
 
 fn compare<P: ControlPipe>(loader: &mut Loader<P>, range: &FlashRange) -> Result<(), UpdateError> {

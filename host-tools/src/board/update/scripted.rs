@@ -62,7 +62,7 @@ pub(super) enum State {
 
 /// Operation on the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Deed {
+pub(super) enum FlashOperation {
     Erased(u64),
     Wrote(u64, usize),
     Started(u64),
@@ -72,7 +72,7 @@ pub(super) enum Deed {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Faults {
     /// Requests after which the loader is disconnected.
-    pub(super) gone_after: Option<usize>,
+    pub(super) disconnected_after: Option<usize>,
     /// A cell of the flash that reads back a wrong bit.
     pub(super) bad_cell: Option<u64>,
     /// A page that cannot be erased.
@@ -80,7 +80,7 @@ pub(super) struct Faults {
     /// True if the flash is protected against reading.
     pub(super) protected: bool,
     /// True if no command ever completes.
-    pub(super) never_done: bool,
+    pub(super) always_busy: bool,
 }
 
 /// The loader.
@@ -95,7 +95,7 @@ pub(super) struct Scripted {
     now: Duration,
     busy_until: Duration,
     requests: usize,
-    pub(super) deeds: Vec<Deed>,
+    pub(super) operations: Vec<FlashOperation>,
     pub(super) faults: Faults,
 }
 
@@ -112,13 +112,13 @@ impl Scripted {
             now: Duration::ZERO,
             busy_until: Duration::ZERO,
             requests: 0,
-            deeds: vec![],
+            operations: vec![],
             faults,
         }
     }
 
     /// Returns the same chip, reset into its loader again, without faults.
-    pub(super) fn again(self) -> Self {
+    pub(super) fn reset(self) -> Self {
         Self {
             flash: self.flash,
             ..Self::new(self.rom, Faults::default())
@@ -130,8 +130,13 @@ impl Scripted {
     }
 
     fn count(&mut self) -> io::Result<()> {
-        let has_gone = matches!(self.deeds.last(), Some(Deed::Started(_)));
-        if has_gone || self.faults.gone_after.is_some_and(|n| self.requests >= n) {
+        let has_started = matches!(self.operations.last(), Some(FlashOperation::Started(_)));
+        if has_started
+            || self
+                .faults
+                .disconnected_after
+                .is_some_and(|n| self.requests >= n)
+        {
             return Err(io::Error::new(io::ErrorKind::NotConnected, "unplugged"));
         }
         self.requests += 1;
@@ -177,7 +182,7 @@ impl Scripted {
                 let bytes = self.rom.page;
                 let page = at / bytes * bytes;
                 self.flash[page..page + bytes].fill(0xFF);
-                self.deeds.push(Deed::Erased(address));
+                self.operations.push(FlashOperation::Erased(address));
             }
             _ => return 0x0F,
         }
@@ -195,7 +200,8 @@ impl Scripted {
             return 0x03;
         }
         cells.copy_from_slice(bytes);
-        self.deeds.push(Deed::Wrote(address, bytes.len()));
+        self.operations
+            .push(FlashOperation::Wrote(address, bytes.len()));
         0
     }
 
@@ -211,7 +217,7 @@ impl Scripted {
                 self.busy_until = self.now + Duration::from_millis(wait);
                 self.state = State::Busy;
             }
-            State::Busy if self.faults.never_done => {}
+            State::Busy if self.faults.always_busy => {}
             State::Busy => {
                 self.status = self.carry_out();
                 self.state = match self.status {
@@ -221,7 +227,7 @@ impl Scripted {
             }
             State::ManifestSync => {
                 self.state = State::Manifest;
-                self.deeds.push(Deed::Started(self.pointer));
+                self.operations.push(FlashOperation::Started(self.pointer));
             }
             _ => {}
         }

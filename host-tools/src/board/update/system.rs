@@ -6,7 +6,7 @@ use std::time::Duration;
 use nusb::MaybeFuture;
 use nusb::transfer::{ControlIn, ControlOut, ControlType, Recipient};
 
-use super::choice::Plugged;
+use super::choice::ConnectedDevice;
 use super::error::UpdateError;
 use super::loader::{ControlPipe, Loader};
 use crate::link::{is_board, place_on_usb, printable, usb_devices};
@@ -64,12 +64,12 @@ fn is_loader(info: &nusb::DeviceInfo) -> bool {
 
 /// Returns the connected boards and loaders.
 #[must_use]
-pub fn plugged() -> Vec<Plugged> {
+pub fn connected_devices() -> Vec<ConnectedDevice> {
     let devices = usb_devices();
     let fitting = devices
         .iter()
         .filter(|info| is_loader(info) || is_board(info));
-    let described = fitting.map(|info| Plugged {
+    let described = fitting.map(|info| ConnectedDevice {
         place: place_on_usb(info),
         serial: info.serial_number().map(printable),
         is_loader: is_loader(info),
@@ -86,14 +86,14 @@ pub fn open_loader(place: &str) -> Result<Option<Loader<SystemPipe>>, UpdateErro
     let Some(info) = usb_devices().into_iter().find(here) else {
         return Ok(None);
     };
-    let device = info.open().wait().map_err(gone)?;
-    let configuration = device.active_configuration().map_err(gone)?;
+    let device = info.open().wait().map_err(disconnected)?;
+    let configuration = device.active_configuration().map_err(disconnected)?;
     for setting in configuration.interface_alt_settings() {
         let Some(text) = setting.string_index() else {
             continue;
         };
         let text = device.get_string_descriptor(text, ENGLISH, TIMEOUT).wait();
-        let text = text.map_err(gone)?;
+        let text = text.map_err(disconnected)?;
         if !text.starts_with(FLASH) {
             continue;
         }
@@ -105,11 +105,11 @@ pub fn open_loader(place: &str) -> Result<Option<Loader<SystemPipe>>, UpdateErro
         let functional = descriptors.find(|found| found.descriptor_type() == FUNCTIONAL);
         let functional = functional.map(|found| found.to_vec()).unwrap_or_default();
         let interface = device.detach_and_claim_interface(number).wait();
-        let interface = interface.map_err(gone)?;
+        let interface = interface.map_err(disconnected)?;
         let chosen = interface
             .set_alt_setting(setting.alternate_setting())
             .wait();
-        chosen.map_err(gone)?;
+        chosen.map_err(disconnected)?;
         return Loader::open(SystemPipe(interface), &text, &functional).map(Some);
     }
     Err(UpdateError::Layout("it names no internal flash".into()))
@@ -118,9 +118,9 @@ pub fn open_loader(place: &str) -> Result<Option<Loader<SystemPipe>>, UpdateErro
 /// The language of a loader's strings.
 const ENGLISH: u16 = 0x0409;
 
-fn gone(error: impl std::error::Error + Send + Sync + 'static) -> UpdateError {
-    UpdateError::Gone {
-        doing: "begin",
+fn disconnected(error: impl std::error::Error + Send + Sync + 'static) -> UpdateError {
+    UpdateError::Disconnected {
+        operation: "begin",
         source: io::Error::other(error),
     }
 }

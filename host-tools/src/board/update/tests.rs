@@ -1,6 +1,6 @@
 //! Whole updates with a scripted loader, without faults and with each fault.
 
-use super::scripted::{Deed, Faults, G474, H743, Rom, Scripted, State, TRANSFER};
+use super::scripted::{Faults, FlashOperation, G474, H743, Rom, Scripted, State, TRANSFER};
 use super::{ControlPipe, Loader, Plan, Step, UpdateError, UpdateFailure, request, update};
 use crate::board::image::Part;
 use crate::board::{Board, Image, Memories};
@@ -119,25 +119,36 @@ fn update_writes_and_starts_image_and_erases_no_other_page() {
         let mut cells = device.flash.iter().enumerate();
         let stray = cells.find(|(at, byte)| **byte != 0xA5 && !touched.contains(&of(*at)));
         assert_eq!(stray, None, "{}", rom.board);
-        let erased = |deed: &Deed| match deed {
-            Deed::Erased(page) => Some(*page),
+        let erased = |operation: &FlashOperation| match operation {
+            FlashOperation::Erased(page) => Some(*page),
             _ => None,
         };
-        let erased: Vec<u64> = device.deeds.iter().filter_map(erased).collect();
+        let erased: Vec<u64> = device.operations.iter().filter_map(erased).collect();
         assert_eq!(erased, touched, "{}", rom.board);
-        assert_eq!(device.deeds.last(), Some(&Deed::Started(FLASH)));
+        assert_eq!(
+            device.operations.last(),
+            Some(&FlashOperation::Started(FLASH))
+        );
     }
 }
 
 #[test]
-fn the_vectors_are_erased_first_and_written_last() {
+fn vectors_are_erased_first_and_written_last() {
     for rom in ROMS {
         let (device, _) = try_update(Scripted::new(rom, Faults::default()), &image(rom));
-        assert_eq!(device.deeds.first(), Some(&Deed::Erased(FLASH)));
-        let writes = device.deeds.iter().filter_map(|deed| match deed {
-            Deed::Wrote(address, bytes) => Some((*address < FLASH + rom.word as u64, *bytes)),
-            _ => None,
-        });
+        assert_eq!(
+            device.operations.first(),
+            Some(&FlashOperation::Erased(FLASH))
+        );
+        let writes = device
+            .operations
+            .iter()
+            .filter_map(|operation| match operation {
+                FlashOperation::Wrote(address, bytes) => {
+                    Some((*address < FLASH + rom.word as u64, *bytes))
+                }
+                _ => None,
+            });
         let writes: Vec<(bool, usize)> = writes.collect();
         let [others @ .., last] = &writes[..] else {
             panic!("nothing was written");
@@ -172,28 +183,28 @@ fn lost_loader_leaves_no_half_program_and_can_be_retried() {
         let image = image(rom);
         let (whole, _) = try_update(Scripted::new(rom, Faults::default()), &image);
         let all = whole.requests();
-        for gone_after in 0..all {
-            goes_away(rom, &image, gone_after, all);
+        for disconnected_after in 0..all {
+            check_disconnect(rom, &image, disconnected_after, all);
         }
     }
 }
 
-/// Runs an update whose loader disconnects after `gone_after` of `all` requests, and then another.
-fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
+/// Runs an update whose loader disconnects after `disconnected_after` of `all` requests, and then another.
+fn check_disconnect(rom: &'static Rom, image: &Image, disconnected_after: usize, all: usize) {
     let faults = Faults {
-        gone_after: Some(gone_after),
+        disconnected_after: Some(disconnected_after),
         ..Faults::default()
     };
-    let at = format!("{}: {gone_after} of {all}", rom.board);
+    let at = format!("{}: {disconnected_after} of {all}", rom.board);
     let (device, done) = try_update(Scripted::new(rom, faults), image);
     let Err(failure) = done else {
         // Only the loader's last reply is optional.
-        assert!(gone_after + 1 == all, "{at}");
+        assert!(disconnected_after + 1 == all, "{at}");
         return;
     };
-    let gone = matches!(failure.error, UpdateError::Gone { .. });
-    assert!(gone, "{at}: {failure:?}");
-    let erased = !device.deeds.is_empty();
+    let is_disconnected = matches!(failure.error, UpdateError::Disconnected { .. });
+    assert!(is_disconnected, "{at}: {failure:?}");
+    let erased = !device.operations.is_empty();
     assert!(failure.erased || !erased, "{at}: it was touched");
     let vectors = &device.flash[..rom.word];
     let all_are = |byte: u8| vectors.iter().all(|found| *found == byte);
@@ -203,7 +214,7 @@ fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
     );
     let hint = hint(&failure);
     assert_eq!(hint.contains("BOOT0"), failure.erased, "{hint}");
-    let (device, done) = try_update(device.again(), image);
+    let (device, done) = try_update(device.reset(), image);
     assert!(done.is_ok() && is_whole(&device, image), "{at}: again");
 }
 
@@ -224,8 +235,9 @@ fn image_that_fails_verification_is_not_started() {
             let failure = done.expect_err("found");
             assert!(matches!(failure.error, UpdateError::Differs(at) if at == bad));
             assert!(failure.erased);
-            let started = |deed: &Deed| matches!(deed, Deed::Started(_));
-            assert!(!device.deeds.iter().any(started));
+            let started =
+                |operation: &FlashOperation| matches!(operation, FlashOperation::Started(_));
+            assert!(!device.operations.iter().any(started));
             let is_vectors = bad < FLASH + rom.word as u64;
             let mut vectors = device.flash[..rom.word].iter();
             let none = vectors.all(|byte| *byte == 0xFF);
@@ -240,32 +252,32 @@ fn loader_failure_aborts_update_and_names_the_reason() {
         let (_, done) = try_update(Scripted::new(&G474, faults), &image(&G474));
         done.expect_err("refused").error.to_string()
     };
-    let stated = refused(Faults {
+    let message = refused(Faults {
         stuck_page: Some(FLASH + 4096),
         ..Faults::default()
     });
     assert!(
-        stated.contains("erase a page") && stated.contains("cannot be erased"),
-        "{stated}"
+        message.contains("erase a page") && message.contains("cannot be erased"),
+        "{message}"
     );
-    let stated = refused(Faults {
+    let message = refused(Faults {
         protected: true,
         ..Faults::default()
     });
     assert!(
-        stated.contains("read back") && stated.contains("protected"),
-        "{stated}"
+        message.contains("read back") && message.contains("protected"),
+        "{message}"
     );
-    let stated = refused(Faults {
-        never_done: true,
+    let message = refused(Faults {
+        always_busy: true,
         ..Faults::default()
     });
-    assert!(stated.contains("did not finish"), "{stated}");
+    assert!(message.contains("did not finish"), "{message}");
 }
 
 /// Asserts that nothing was erased or written.
 fn assert_untouched(device: &Scripted) {
-    assert_eq!(device.deeds, []);
+    assert_eq!(device.operations, []);
     assert!(device.flash.iter().all(|byte| *byte == 0xA5));
 }
 
@@ -350,7 +362,7 @@ fn update_progress_reaches_its_announced_totals() {
 }
 
 #[test]
-fn the_scripted_loader_forgives_nothing() {
+fn scripted_loader_rejects_protocol_violations() {
     let mut device = Scripted::new(&G474, Faults::default());
     // The second status request is too early.
     device

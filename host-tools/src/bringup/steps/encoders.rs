@@ -6,27 +6,27 @@ use crate::bringup::finding::Finding;
 use crate::calibrate::Direction;
 
 /// Distance of the move, mm.
-const ABOUT_MM: u16 = 80;
+const MOVE_MM: u16 = 80;
 /// Counts that a working encoder exceeds in this move.
-const ALIVE_COUNTS: u32 = 400;
+const MIN_LIVE_COUNTS: u32 = 400;
 /// Largest relative difference of forth and back: a hand returns to the zero pose no better.
-const LOST_SHARE: f64 = 0.1;
+const MAX_LOSS_SHARE: f64 = 0.1;
 
 /// Checks the encoders while the tip is moved right, up and towards the user, and back.
-pub(super) fn by_hand(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
     attendant.finish(Task::ZeroPose)?;
-    let mut from = board.still(attendant)?;
+    let mut from = board.wait_for_rest(attendant)?;
     let mut reported = Vec::new();
     for (joint, direction) in Direction::ALL.into_iter().enumerate() {
-        attendant.finish(Task::MoveAlong(direction, ABOUT_MM))?;
-        let to = board.still(attendant)?;
+        attendant.finish(Task::MoveAlong(direction, MOVE_MM))?;
+        let to = board.wait_for_rest(attendant)?;
         attendant.finish(Task::ZeroPose)?;
-        let again = board.still(attendant)?;
+        let again = board.wait_for_rest(attendant)?;
         let (there, back) = (moved(from, to), moved(to, again));
-        judge(joint, there, back)?;
+        check_joint(joint, there, back)?;
         reported.push(format!("joint {}: {:+} counts", joint + 1, there[joint]));
         from = again;
     }
@@ -38,26 +38,26 @@ fn moved(from: [i32; 3], to: [i32; 3]) -> [i32; 3] {
 }
 
 /// Checks the encoder of the moved joint (0 to 2).
-fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
-    let most = (0..3).max_by_key(|i| there[*i].unsigned_abs());
-    let most = most.unwrap_or(joint);
+fn check_joint(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
+    let max_joint = (0..3).max_by_key(|i| there[*i].unsigned_abs());
+    let max_joint = max_joint.unwrap_or(joint);
     let counts = there[joint];
-    let alive = counts.unsigned_abs() > ALIVE_COUNTS / 10;
-    if most != joint && alive && there[most].unsigned_abs() > ALIVE_COUNTS {
+    let is_live = counts.unsigned_abs() > MIN_LIVE_COUNTS / 10;
+    if max_joint != joint && is_live && there[max_joint].unsigned_abs() > MIN_LIVE_COUNTS {
         return Err(Finding::SwappedEncoders {
             joint: joint + 1,
-            encoder: most + 1,
+            encoder: max_joint + 1,
         });
     }
     // A joint's encoder that does not count is dead, even if others count.
-    if counts.unsigned_abs() <= ALIVE_COUNTS {
+    if counts.unsigned_abs() <= MIN_LIVE_COUNTS {
         return Err(Finding::DeadEncoder {
             joint: joint + 1,
             counts,
         });
     }
-    let off = (f64::from(counts) + f64::from(back[joint])).abs();
-    if off > LOST_SHARE * f64::from(counts).abs() {
+    let error = (f64::from(counts) + f64::from(back[joint])).abs();
+    if error > MAX_LOSS_SHARE * f64::from(counts).abs() {
         return Err(Finding::CountsLost {
             joint: joint + 1,
             there: counts,
@@ -72,23 +72,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_mistake_has_its_name() {
+    fn each_encoder_mistake_has_its_own_finding() {
         let back = |there: [i32; 3]| there.map(|counts| -counts);
-        let judge_one = |there| judge(1, there, back(there));
-        assert_eq!(judge_one([40, 2_800, 700]), Ok(()));
-        assert_eq!(judge_one([40, -2_800, 700]), Ok(()));
+        let check_joint_2 = |there| check_joint(1, there, back(there));
+        assert_eq!(check_joint_2([40, 2_800, 700]), Ok(()));
+        assert_eq!(check_joint_2([40, -2_800, 700]), Ok(()));
         let dead = |counts| Err(Finding::DeadEncoder { joint: 2, counts });
-        assert_eq!(judge_one([0, 0, 0]), dead(0));
-        assert_eq!(judge_one([40, 1, 700]), dead(1));
+        assert_eq!(check_joint_2([0, 0, 0]), dead(0));
+        assert_eq!(check_joint_2([40, 1, 700]), dead(1));
         let swapped = Finding::SwappedEncoders {
             joint: 2,
             encoder: 3,
         };
-        assert_eq!(judge_one([40, 700, 2_800]), Err(swapped));
+        assert_eq!(check_joint_2([40, 700, 2_800]), Err(swapped));
         // The counts are from the link and may have any value.
-        let most = judge(1, [0, i32::MAX, 0], [0, i32::MAX, 0]);
-        assert!(matches!(most, Err(Finding::CountsLost { joint: 2, .. })));
-        let lost = judge(1, [40, 2_800, 700], [-40, -2_000, -700]);
+        let max_joint = check_joint(1, [0, i32::MAX, 0], [0, i32::MAX, 0]);
+        assert!(matches!(
+            max_joint,
+            Err(Finding::CountsLost { joint: 2, .. })
+        ));
+        let lost = check_joint(1, [40, 2_800, 700], [-40, -2_000, -700]);
         assert!(matches!(lost, Err(Finding::CountsLost { joint: 2, .. })));
     }
 }

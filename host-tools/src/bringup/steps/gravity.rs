@@ -13,15 +13,15 @@ use crate::bringup::finding::Finding;
 
 /// Distance of the scene's plane below the tip, mm: out of reach.
 const OUT_OF_REACH_MM: f32 = 1_000.0;
-/// Looks, of 0.1 s each, for which the tip is released.
-const LOOKS: usize = 30;
+/// Status requests, 0.1 s apart, for which the tip is released.
+const MAX_POLLS: usize = 30;
 /// Largest drift of the tip in that time, mm.
-const DRIFT_MM: f64 = 20.0;
+const MAX_DRIFT_MM: f64 = 20.0;
 
 /// Speed limit of the released tip, mm/s: half of a jog's.
-const FAST_MM_S: f64 = 100.0;
+const MAX_SPEED_MM_S: f64 = 100.0;
 /// Interval of the speed estimate, ms.
-const OVER_MS: u32 = 10;
+const SPEED_INTERVAL_MS: u32 = 10;
 
 /// Motion of the tip, from samples.
 struct TipMotion {
@@ -29,7 +29,7 @@ struct TipMotion {
     /// The latest samples: tick, and position of the tip, mm.
     latest: VecDeque<(u32, DVec3)>,
     /// Maximum speed, mm/s.
-    fastest_mm_s: f64,
+    max_speed_mm_s: f64,
 }
 
 impl TipMotion {
@@ -37,63 +37,66 @@ impl TipMotion {
         Self {
             ticks_per_ms: (tick_hz / 1000).max(1),
             latest: VecDeque::new(),
-            fastest_mm_s: 0.0,
+            max_speed_mm_s: 0.0,
         }
     }
 
     /// Adds a sample. Returns true if the tip is too fast.
-    fn take(&mut self, sample: &TickRecord) -> bool {
+    fn add(&mut self, sample: &TickRecord) -> bool {
         let now = (sample.tick, plane::hip_mm(sample));
         let since = |then: &(u32, DVec3)| now.0.wrapping_sub(then.0) / self.ticks_per_ms;
         // Keep one sample that is old enough; older ones are not needed.
         while self
             .latest
             .get(1)
-            .is_some_and(|then| since(then) >= OVER_MS)
+            .is_some_and(|then| since(then) >= SPEED_INTERVAL_MS)
         {
             self.latest.pop_front();
         }
-        let then = self.latest.front().filter(|then| since(then) >= OVER_MS);
+        let then = self
+            .latest
+            .front()
+            .filter(|then| since(then) >= SPEED_INTERVAL_MS);
         if let Some(then) = then {
             let mm_s = 1e3 * now.1.distance(then.1) / f64::from(since(then));
-            self.fastest_mm_s = self.fastest_mm_s.max(mm_s);
+            self.max_speed_mm_s = self.max_speed_mm_s.max(mm_s);
         }
         self.latest.push_back(now);
-        self.fastest_mm_s > FAST_MM_S
+        self.max_speed_mm_s > MAX_SPEED_MM_S
     }
 }
 
 /// Checks that the released tip stays in place, and then that releasing the switch ends the force.
-pub(super) fn carried(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
     let record = super::armed_over_plane(board, attendant, OUT_OF_REACH_MM)?;
-    let from = plane::tip_mm(&record, &board.look()?);
-    attendant.begin(Task::LetGoOfTip);
+    let from = plane::tip_mm(&record, &board.poll_status()?);
+    attendant.begin(Task::ReleaseTip);
     let mut motion = TipMotion::new(board.device().tick_hz);
     let mut drift_mm = 0.0_f64;
-    for look in 1..=LOOKS {
-        let status = board.look_until(&mut |sample| motion.take(sample))?;
+    for poll in 1..=MAX_POLLS {
+        let status = board.poll_status_until(&mut |sample| motion.add(sample))?;
         if let Some(fault) = status.health.report.fault {
             return Err(Finding::Fault(fault).into());
         }
         drift_mm = drift_mm.max(from.distance(plane::tip_mm(&record, &status)));
-        let finding = match motion.fastest_mm_s {
-            mm_s if mm_s > FAST_MM_S => Finding::MovesByItself { mm_s },
-            _ if drift_mm > DRIFT_MM => Finding::Drifts {
+        let finding = match motion.max_speed_mm_s {
+            mm_s if mm_s > MAX_SPEED_MM_S => Finding::MovesByItself { mm_s },
+            _ if drift_mm > MAX_DRIFT_MM => Finding::Drifts {
                 mm: drift_mm,
-                seconds: 0.1 * look as f64,
+                seconds: 0.1 * poll as f64,
             },
             _ => continue,
         };
-        board.ask(&Request::Disarm)?;
+        board.request(&Request::Disarm)?;
         attendant.begin(Task::HoldTip);
         return Err(finding.into());
     }
     attendant.begin(Task::HoldTip);
-    board.trips(attendant, Task::ReleaseDeadMan, Fault::DeadManReleased)?;
-    board.leave()?;
+    board.expect_fault(attendant, Task::ReleaseDeadMan, Fault::DeadManReleased)?;
+    board.disarm_and_clear()?;
     Ok(format!(
         "the tip stayed within {drift_mm:.1} mm for 3 s; letting the switch go gave fault 6"
     ))

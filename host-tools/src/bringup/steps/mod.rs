@@ -27,7 +27,7 @@ use heightfield::printable_text::printable;
 ///
 /// # Errors
 /// [`Halt`].
-pub(super) fn go(
+pub(super) fn run_step(
     step: Step,
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -36,23 +36,23 @@ pub(super) fn go(
         attendant.finish(Task::Wire(how))?;
     }
     match step {
-        Step::Board => answers(board, attendant),
-        Step::Switches => switches::both_positions(board, attendant),
-        Step::EnableLine => lines::ready_and_enable(board, attendant),
-        Step::Outputs => outputs::held(board, attendant),
-        Step::Encoders => encoders::by_hand(board, attendant),
+        Step::Board => check_response(board, attendant),
+        Step::Switches => switches::check(board, attendant),
+        Step::EnableLine => lines::check(board, attendant),
+        Step::Outputs => outputs::check(board, attendant),
+        Step::Encoders => encoders::check(board, attendant),
         Step::Calibration => ruler::check(board, attendant),
-        Step::Motor1 => motors::jogged(board, attendant, 0),
-        Step::Motor2 => motors::jogged(board, attendant, 1),
-        Step::Motor3 => motors::jogged(board, attendant, 2),
-        Step::Gravity => gravity::carried(board, attendant),
-        Step::FirstTouch => touch::soft_plane(board, attendant),
+        Step::Motor1 => motors::check(board, attendant, 0),
+        Step::Motor2 => motors::check(board, attendant, 1),
+        Step::Motor3 => motors::check(board, attendant, 2),
+        Step::Gravity => gravity::check(board, attendant),
+        Step::FirstTouch => touch::check(board, attendant),
     }
 }
 
 /// Checks that the board responds, is disarmed and has no blocker, and that its clocks are right.
-fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<String, Halt> {
-    let status = board.look()?;
+fn check_response(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<String, Halt> {
+    let status = board.poll_status()?;
     let report = status.health.report;
     if let Some(fault) = report.fault {
         return Err(Finding::Fault(fault).into());
@@ -62,7 +62,7 @@ fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<Strin
     if !wrong.is_empty() || report.mode != Mode::Disarmed {
         return Err(Finding::NotReady(wrong).into());
     }
-    let hz = clocks::agree(board, attendant)?;
+    let hz = clocks::check_tick_rate(board, attendant)?;
     let device = &status.device;
     Ok(format!(
         "{} with firmware {}, {} ticks a second ({hz:.0} counted), disarmed",
@@ -74,7 +74,7 @@ fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<Strin
 
 /// Returns the record stored in the board's memory.
 fn stored_record(board: &mut Board<'_, '_>) -> Result<Calibration, Halt> {
-    let source = board.look()?.calibration;
+    let source = board.poll_status()?.calibration;
     match board.calibration()? {
         Some(record) if source == CalibrationSource::Stored => Ok(record),
         _ => Err(Finding::NoCalibration.into()),
@@ -82,9 +82,12 @@ fn stored_record(board: &mut Board<'_, '_>) -> Result<Calibration, Halt> {
 }
 
 /// Returns the record of the zeroed arm; zeroes it with the attendant if necessary.
-fn zeroed(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Calibration, Halt> {
+fn zeroed_record(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<Calibration, Halt> {
     let record = stored_record(board)?;
-    if board.look()?.health.zero.is_none() {
+    if board.poll_status()?.health.zero.is_none() {
         zero(board, attendant)?;
     }
     Ok(record)
@@ -93,8 +96,8 @@ fn zeroed(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Ca
 /// Zeroes the arm in the zero pose, with the attendant's help. Returns the counts there.
 fn zero(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<[i32; 3], Halt> {
     attendant.finish(Task::ZeroPose)?;
-    let counts = board.still(attendant)?;
-    board.ask(&Request::Zero { counts })?;
+    let counts = board.wait_for_rest(attendant)?;
+    board.request(&Request::Zero { counts })?;
     Ok(counts)
 }
 
@@ -105,11 +108,11 @@ fn armed_over_plane(
     attendant: &mut dyn Attendant,
     below_mm: f32,
 ) -> Result<Calibration, Halt> {
-    let record = zeroed(board, attendant)?;
+    let record = zeroed_record(board, attendant)?;
     attendant.finish(Task::HoldLoosely)?;
-    board.still(attendant)?;
-    let status = board.look()?;
-    board.put(plane::below_tip(&record, &status, below_mm))?;
+    board.wait_for_rest(attendant)?;
+    let status = board.poll_status()?;
+    board.put_scene(plane::below_tip(&record, &status, below_mm))?;
     board.arm(attendant)?;
     Ok(record)
 }

@@ -12,31 +12,31 @@ use crate::bringup::finding::Finding;
 use crate::calibrate::N_PER_GRAM;
 
 /// Duration of a jog to find the direction, ms.
-const GIVE_MS: u16 = 500;
+const SIGN_JOG_MS: u16 = 500;
 /// Duration of a jog to read the scale, ms.
-const SCALE_MS: u16 = 3_000;
+const SCALE_JOG_MS: u16 = 3_000;
 /// Angle from which a joint counts as moved by a jog, rad: 0.3 mm at the tip of a Premium 1.5, a
 /// third of the motion in a relaxed hand.
 const MOVED_RAD: f64 = 0.001_5;
 /// Attempts to distinguish the motor's motion from the hand's.
-const TRIES: usize = 3;
+const MAX_ATTEMPTS: usize = 3;
 /// Largest factor between measured torque and the record's, in both directions. The reading
 /// includes the joint's friction, about an eighth of a jog's torque on a Premium 1.5, and the scale
 /// is never quite straight: it shows only the order of magnitude.
 const TORQUE_FACTOR: f64 = 1.6;
 
 /// Finds the joint, sign and torque constant of a motor (0 to 2).
-pub(super) fn jogged(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
     axis: usize,
 ) -> Result<String, Halt> {
-    let record = super::zeroed(board, attendant)?;
+    let record = super::zeroed_record(board, attendant)?;
     let sign = find_sign(board, attendant, &record, axis)?;
     let found = find_torque(board, attendant, &record, axis)?;
-    let stated = f64::from(record.torque_constant[axis]);
+    let nominal = f64::from(record.torque_constant[axis]);
     Ok(format!(
-        "turns joint {} the right way ({sign:+} in the record); {found:.4} Nm/A by the scale, {stated:.4} in the record",
+        "turns joint {} the right way ({sign:+} in the record); {found:.4} Nm/A by the scale, {nominal:.4} in the record",
         axis + 1
     ))
 }
@@ -54,19 +54,19 @@ fn find_sign(
     axis: usize,
 ) -> Result<i8, Halt> {
     let current_a = current_a(record, axis);
-    let mut judged = Err(Finding::Unclear { motor: axis + 1 });
-    for _ in 0..TRIES {
+    let mut sign = Err(Finding::Unclear { motor: axis + 1 });
+    for _ in 0..MAX_ATTEMPTS {
         attendant.finish(Task::HoldLoosely)?;
-        board.still(attendant)?;
+        board.wait_for_rest(attendant)?;
         // The joints' positions also show the cause that a fault would report.
-        let mut gave = |current_a| jog(board, attendant, (axis, current_a, GIVE_MS), false);
-        let (plus, minus) = (gave(current_a)?.0, gave(-current_a)?.0);
-        judged = judge_sign(record, axis, plus, minus);
-        if !matches!(judged, Err(Finding::Unclear { .. })) {
+        let mut jog_once = |current_a| jog(board, attendant, (axis, current_a, SIGN_JOG_MS), false);
+        let (plus, minus) = (jog_once(current_a)?.0, jog_once(-current_a)?.0);
+        sign = sign_from_motion(record, axis, plus, minus);
+        if !matches!(sign, Err(Finding::Unclear { .. })) {
             break;
         }
     }
-    Ok(judged?)
+    Ok(sign?)
 }
 
 /// Runs a jog at the attendant's dead-man press. Returns the joints' motion, rad, and the jog fault
@@ -89,24 +89,24 @@ fn jog(
         let report = &status.health.report;
         report.mode.is_driving() || report.fault.is_some()
     };
-    let first = board.see(attendant, Task::PressDeadMan, began)?;
+    let first = board.wait_for_task(attendant, Task::PressDeadMan, began)?;
     let (from, mut driven, mut now, mut reported) = (angles(&first), first.clone(), first, false);
     while now.health.report.mode.is_driving() {
         let full = now.health.currents_a.abs().max_element() > 0.99 * current_a.abs();
         if on_scale && full && !reported {
-            attendant.begin(Task::LookAtScale);
+            attendant.begin(Task::ReadScale);
             reported = true;
         }
         driven = now;
-        now = board.look()?;
+        now = board.poll_status()?;
     }
-    board.see(attendant, Task::ReleaseDeadMan, |s| {
+    board.wait_for_task(attendant, Task::ReleaseDeadMan, |s| {
         !s.health.sense.dead_man
     })?;
     let fault = now.health.report.fault;
     if let Some(fault) = fault {
         let (number, meaning) = (fault.number(), fault.meaning());
-        attendant.hear(&format!("  the jog ended with fault {number}: {meaning}"));
+        attendant.notify(&format!("  the jog ended with fault {number}: {meaning}"));
     }
     // A held joint springs back when the current ends; one that ran away does not.
     let at = match fault {
@@ -115,13 +115,18 @@ fn jog(
         Some(fault) => return Err(Finding::Fault(fault).into()),
     };
     if fault.is_some() {
-        board.ask(&Request::ClearFault { fault })?;
+        board.request(&Request::ClearFault { fault })?;
     }
     Ok((angles(&at) - from, fault))
 }
 
 /// Returns the motor's sign, from the joints' motion under a positive and a negative current, rad.
-fn judge_sign(record: &Calibration, axis: usize, plus: DVec3, minus: DVec3) -> Result<i8, Finding> {
+fn sign_from_motion(
+    record: &Calibration,
+    axis: usize,
+    plus: DVec3,
+    minus: DVec3,
+) -> Result<i8, Finding> {
     let (by_motor, by_hand) = (0.5 * (plus - minus), 0.5 * (plus + minus));
     let joint = by_motor.abs().max_position();
     let motor = axis + 1;
@@ -163,21 +168,21 @@ fn find_torque(
 ) -> Result<f64, Halt> {
     let current_a = current_a(record, axis) * record.motor_sign[axis];
     attendant.finish(Task::HoldWithScale(axis))?;
-    board.still(attendant)?;
+    board.wait_for_rest(attendant)?;
     let rest = attendant.read(Reading::ScaleGrams { pushed: false })?;
-    if let (_, Some(fault)) = jog(board, attendant, (axis, current_a, SCALE_MS), true)? {
+    if let (_, Some(fault)) = jog(board, attendant, (axis, current_a, SCALE_JOG_MS), true)? {
         return Err(Finding::Fault(fault).into());
     }
     let pushed = attendant.read(Reading::ScaleGrams { pushed: true })?;
     let torque_nm = (pushed - rest) * N_PER_GRAM * 1e-3 * lever_mm(record, axis);
     let found = torque_nm / f64::from(current_a.abs() * record.ratio[axis]);
-    let stated = f64::from(record.torque_constant[axis]);
-    match (stated / TORQUE_FACTOR..stated * TORQUE_FACTOR).contains(&found) {
+    let nominal = f64::from(record.torque_constant[axis]);
+    match (nominal / TORQUE_FACTOR..nominal * TORQUE_FACTOR).contains(&found) {
         true => Ok(found),
         false => Err(Finding::WrongTorque {
             motor: axis + 1,
             found,
-            record: stated,
+            record: nominal,
         }
         .into()),
     }
@@ -197,31 +202,40 @@ mod tests {
 
     const RECORD: Calibration = Calibration::PREMIUM_1_5;
 
-    fn judge(plus: [f64; 3], minus: [f64; 3]) -> Result<i8, Finding> {
-        judge_sign(&RECORD, 1, DVec3::from(plus), DVec3::from(minus))
+    fn sign_of_motor_2(plus: [f64; 3], minus: [f64; 3]) -> Result<i8, Finding> {
+        sign_from_motion(&RECORD, 1, DVec3::from(plus), DVec3::from(minus))
     }
 
     #[test]
-    fn each_mistake_has_its_name() {
-        assert_eq!(judge([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]), Ok(1));
+    fn each_motor_mistake_has_its_own_finding() {
+        assert_eq!(
+            sign_of_motor_2([0.0, 0.006, 0.001], [0.0, -0.005, -0.001]),
+            Ok(1)
+        );
         let right = -1;
         let inverted = Err(Finding::InvertedMotor { motor: 2, right });
-        assert_eq!(judge([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]), inverted);
+        assert_eq!(
+            sign_of_motor_2([0.0, -0.006, 0.0], [0.0, 0.006, 0.0]),
+            inverted
+        );
         let swapped = Err(Finding::SwappedMotors { motor: 2, joint: 3 });
-        assert_eq!(judge([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]), swapped);
-        let none = judge([0.0, 0.000_1, 0.0], [0.000_1, 0.0, 0.0]);
+        assert_eq!(
+            sign_of_motor_2([0.0, 0.001, -0.007], [0.0, 0.0, 0.007]),
+            swapped
+        );
+        let none = sign_of_motor_2([0.0, 0.000_1, 0.0], [0.000_1, 0.0, 0.0]);
         assert!(matches!(none, Err(Finding::NoPush { motor: 2, .. })));
     }
 
     #[test]
-    fn a_hand_that_moves_more_than_the_motor_is_not_taken_for_it() {
+    fn hand_motion_beyond_motor_motion_is_unclear() {
         let unclear = Err(Finding::Unclear { motor: 2 });
-        assert_eq!(judge([0.0, 0.03, 0.0], [0.0, 0.02, 0.0]), unclear);
-        assert_eq!(judge([0.02, 0.0, 0.0], [0.02, 0.0, 0.0]), unclear);
+        assert_eq!(sign_of_motor_2([0.0, 0.03, 0.0], [0.0, 0.02, 0.0]), unclear);
+        assert_eq!(sign_of_motor_2([0.02, 0.0, 0.0], [0.02, 0.0, 0.0]), unclear);
     }
 
     #[test]
-    fn levers_of_the_zero_pose() {
+    fn levers_in_the_zero_pose_match_the_links() {
         let levers = [0, 1, 2].map(|axis| lever_mm(&RECORD, axis));
         for (lever, link) in levers.into_iter().zip([209.55, 209.55, 169.545]) {
             assert!((lever - link).abs() < 1e-3, "{lever} {link}");

@@ -9,7 +9,7 @@ use crate::bringup::finding::Finding;
 /// Fractions of full scale at which each output is measured.
 const FRACTIONS: [f32; 3] = [0.0, 0.5, -0.5];
 /// Largest error of a reading, as a share of full scale: resistors and meter have about 1 % each.
-const OFF_SHARE: f64 = 0.04;
+const MAX_ERROR_SHARE: f64 = 0.04;
 
 /// The meter's reading for a fraction of full scale, and its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ impl OutputScale {
 }
 
 /// Measures each output while the board holds it.
-pub(super) fn held(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
@@ -42,8 +42,8 @@ pub(super) fn held(
         for fraction in FRACTIONS {
             let mut shares = [0.0; 3];
             shares[axis] = fraction;
-            board.ask(&Request::HoldOutputs(Some(shares)))?;
-            board.look()?;
+            board.request(&Request::HoldOutputs(Some(shares)))?;
+            board.poll_status()?;
             let fraction = f64::from(fraction);
             let found = attendant.read(Reading::Output {
                 axis,
@@ -51,8 +51,8 @@ pub(super) fn held(
                 unit: scale.unit,
             })?;
             let expected = scale.middle + scale.full * fraction;
-            if found.is_nan() || (found - expected).abs() > OFF_SHARE * scale.full {
-                board.ask(&Request::HoldOutputs(None))?;
+            if found.is_nan() || (found - expected).abs() > MAX_ERROR_SHARE * scale.full {
+                board.request(&Request::HoldOutputs(None))?;
                 return Err(Finding::Output {
                     axis: axis + 1,
                     found,
@@ -63,7 +63,7 @@ pub(super) fn held(
             }
         }
     }
-    board.ask(&Request::HoldOutputs(None))?;
+    board.request(&Request::HoldOutputs(None))?;
     Ok("each output follows, at the middle and at half of full scale either way".into())
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use hapterra_firmware::amplifier::{duty_code, offset_code};
 
     /// Returns the offset stage's output for the converter's voltage (see the wiring page).
-    fn behind_the_stage(volts: f64) -> f64 {
+    fn stage_output_v(volts: f64) -> f64 {
         (volts - 1.65) * 10.0 / 1.444
     }
 
@@ -86,7 +86,7 @@ mod tests {
                 scale.middle + scale.full * f64::from(fraction)
             };
             let volts = 3.3 * f64::from(offset_code(fraction)) / 4096.0;
-            let behind = behind_the_stage(volts);
+            let behind = stage_output_v(volts);
             assert!(near(behind, expected("nucleo-g474re"), 10.0), "{behind}");
             let percent = 100.0 * f64::from(duty_code(fraction, 60_000)) / 60_000.0;
             assert!(near(percent, expected("nucleo-h743zi2"), 35.0), "{percent}");

@@ -5,10 +5,10 @@ use hapterra_core::phantom::Calibration;
 use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, Reading, Task};
 use crate::bringup::finding::Finding;
-use crate::calibrate::{Check, Direction, RatioFit, fit_ratios};
+use crate::calibrate::{Direction, RatioFit, RulerMove, fit_ratios};
 
 /// Distance of the move, mm.
-const ABOUT_MM: u16 = 80;
+const MOVE_MM: u16 = 80;
 /// Largest relative difference of a ratio from the ruler's: a reading to 1 mm has an error of 2 %.
 const RATIO_SHARE: f64 = 0.05;
 
@@ -20,13 +20,13 @@ pub(super) fn check(
     let record = super::stored_record(board)?;
     let zero = super::zero(board, attendant)?;
     let since_zero = |counts: [i32; 3]| std::array::from_fn(|i| counts[i].wrapping_sub(zero[i]));
-    let mut checks = Vec::new();
+    let mut moves = Vec::new();
     for direction in Direction::ALL {
-        let from = since_zero(board.still(attendant)?);
-        attendant.finish(Task::MoveAlong(direction, ABOUT_MM))?;
-        let to = since_zero(board.still(attendant)?);
-        let mm = attendant.read(Reading::MovedMm(direction, ABOUT_MM))?;
-        checks.push(Check {
+        let from = since_zero(board.wait_for_rest(attendant)?);
+        attendant.finish(Task::MoveAlong(direction, MOVE_MM))?;
+        let to = since_zero(board.wait_for_rest(attendant)?);
+        let mm = attendant.read(Reading::MovedMm(direction, MOVE_MM))?;
+        moves.push(RulerMove {
             from,
             to,
             direction,
@@ -34,9 +34,9 @@ pub(super) fn check(
         });
         attendant.finish(Task::ZeroPose)?;
     }
-    board.still(attendant)?;
-    let fit = fit_ratios(&record, &checks).map_err(Finding::Ruler)?;
-    judge(&record, &fit)?;
+    board.wait_for_rest(attendant)?;
+    let fit = fit_ratios(&record, &moves).map_err(Finding::Ruler)?;
+    compare_with_record(&record, &fit)?;
     let found = fit.ratio;
     Ok(format!(
         "ratios {:.2} {:.2} {:.2} by the ruler, {:.2} {:.2} {:.2} in the record",
@@ -45,7 +45,7 @@ pub(super) fn check(
 }
 
 /// Compares the record with the fit.
-fn judge(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
+fn compare_with_record(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
     for joint in 0..3 {
         let sign = record.encoder_sign[joint];
         if f64::from(sign) != fit.sign[joint] {

@@ -6,7 +6,7 @@ use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, Task};
 
 /// Checks each switch, and that a disconnected stop wire reads as pressed.
-pub(super) fn both_positions(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
@@ -19,14 +19,14 @@ pub(super) fn both_positions(
         (Task::PullStopWire, true),
         (Task::ConnectStopWire, false),
     ] {
-        board.see(attendant, task, |status| stop(status) == pressed)?;
+        board.wait_for_task(attendant, task, |status| stop(status) == pressed)?;
     }
     for (task, pressed) in [
         (Task::ReleaseDeadMan, false),
         (Task::PressDeadMan, true),
         (Task::ReleaseDeadMan, false),
     ] {
-        board.see(attendant, task, |status| dead_man(status) == pressed)?;
+        board.wait_for_task(attendant, task, |status| dead_man(status) == pressed)?;
     }
     Ok(
         "stop seen released, pressed and with a wire off; dead-man switch released and pressed"

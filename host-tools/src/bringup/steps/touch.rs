@@ -12,10 +12,10 @@ use crate::bringup::finding::Finding;
 const BELOW_MM: f32 = 20.0;
 /// Depth to which the tip must be pushed, mm.
 const DEEP_MM: f32 = 5.0;
-/// Largest increase of depth in a look while the tip is at rest, mm.
+/// Largest increase of depth between two status requests while the tip is at rest, mm.
 const STILL_MM: f32 = 0.1;
-/// Maximum looks, of 0.1 s each.
-const LOOKS: usize = 600;
+/// Maximum status requests, 0.1 s apart.
+const MAX_POLLS: usize = 600;
 
 /// Contact with the plane.
 #[derive(Default)]
@@ -26,12 +26,12 @@ struct PlaneContact {
     max_n: f32,
     /// Present force, N.
     now_n: f32,
-    /// Maximum depth until the last look, mm.
-    looked_mm: f32,
+    /// Maximum depth at the last status request, mm.
+    polled_depth_mm: f32,
 }
 
 impl PlaneContact {
-    fn take(&mut self, sample: &TickRecord) {
+    fn add(&mut self, sample: &TickRecord) {
         self.now_n = sample.force_n.length();
         self.max_n = self.max_n.max(self.now_n);
         let depth_mm = plane::depth_mm(sample);
@@ -42,37 +42,37 @@ impl PlaneContact {
 }
 
 /// Lets the user lower the tip into the plane, lift it and press the stop.
-pub(super) fn soft_plane(
+pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
     super::armed_over_plane(board, attendant, BELOW_MM)?;
-    let contact = touched(board, attendant)?;
-    let (deep_mm, up_n) = contact.deepest;
+    let contact = wait_for_touch(board, attendant)?;
+    let (depth_mm, up_n) = contact.deepest;
     let params = plane::SOFT;
-    let expected_n = (params.stiffness_n_per_mm * deep_mm).min(params.max_force_n);
+    let expected_n = (params.stiffness_n_per_mm * depth_mm).min(params.max_force_n);
     let pushed = (0.5 * expected_n..=1.1 * expected_n).contains(&up_n);
     if !pushed || contact.max_n > 1.01 * params.max_force_n {
         return Err(Finding::NoFloor.into());
     }
-    board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;
+    board.expect_fault(attendant, Task::PressStop, Fault::EmergencyStop)?;
     let released = |s: &hapterra_core::wire::status::Status| !s.health.sense.dead_man;
-    board.see(attendant, Task::ReleaseDeadMan, released)?;
-    board.leave()?;
+    board.wait_for_task(attendant, Task::ReleaseDeadMan, released)?;
+    board.disarm_and_clear()?;
     // The arm is disarmed during the question, because the host does not supervise the board while
     // it waits.
-    if !attendant.confirms(Question::StopTakesPower)? {
+    if !attendant.confirm(Question::StopCutsPower)? {
         return Err(Finding::StopLeavesPower.into());
     }
-    board.see(attendant, Task::ReleaseStop, |s| {
+    board.wait_for_task(attendant, Task::ReleaseStop, |s| {
         !s.health.sense.emergency_stop
     })?;
-    board.leave()?;
-    if !attendant.confirms(Question::PushedBack)? {
+    board.disarm_and_clear()?;
+    if !attendant.confirm(Question::PushedBack)? {
         return Err(Finding::NoFloor.into());
     }
     Ok(format!(
-        "{deep_mm:.1} mm deep the floor pushed up with {up_n:.2} N; the emergency stop gave fault 5"
+        "{depth_mm:.1} mm deep the floor pushed up with {up_n:.2} N; the emergency stop gave fault 5"
     ))
 }
 
@@ -80,28 +80,31 @@ pub(super) fn soft_plane(
 type IsDone = fn(&PlaneContact) -> bool;
 
 /// Waits until the tip is deep enough, and then until it has no force.
-fn touched(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<PlaneContact, Halt> {
+fn wait_for_touch(
+    board: &mut Board<'_, '_>,
+    attendant: &mut dyn Attendant,
+) -> Result<PlaneContact, Halt> {
     let mut contact = PlaneContact::default();
     // Deep enough and at rest.
     let deep = |contact: &PlaneContact| {
-        contact.deepest.0 >= DEEP_MM && contact.deepest.0 - contact.looked_mm < STILL_MM
+        contact.deepest.0 >= DEEP_MM && contact.deepest.0 - contact.polled_depth_mm < STILL_MM
     };
     let free = |contact: &PlaneContact| contact.now_n == 0.0;
     let moves = [Task::LowerTip, Task::LiftTip];
     for (task, done) in moves.into_iter().zip([deep as IsDone, free]) {
         attendant.begin(task);
-        for look in 0.. {
-            let status = board.look_with(&mut |sample| contact.take(sample))?;
+        for poll in 0.. {
+            let status = board.poll_status_with(&mut |sample| contact.add(sample))?;
             if let Some(fault) = status.health.report.fault {
                 return Err(Finding::Fault(fault).into());
             }
             if done(&contact) {
                 break;
             }
-            contact.looked_mm = contact.deepest.0;
-            if look > LOOKS {
-                board.ask(&Request::Disarm)?;
-                return Err(Finding::NotSeen(task).into());
+            contact.polled_depth_mm = contact.deepest.0;
+            if poll > MAX_POLLS {
+                board.request(&Request::Disarm)?;
+                return Err(Finding::NotDetected(task).into());
             }
         }
     }

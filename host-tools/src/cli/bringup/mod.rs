@@ -11,9 +11,9 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
-use super::terminal::writer::{say, tell};
+use super::terminal::writer::{notify, print_line};
 use crate::bringup::{
-    Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
+    Attendant, BringupError, Halt, Log, LogError, SequenceEnd, Step, VirtualUser, run_sequence,
 };
 use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native, Transport};
 use crate::phantom::Wiring;
@@ -22,7 +22,7 @@ use terminal::UserAtTerminal;
 /// Time limit for a device's reply.
 pub(super) const TIMEOUT: Duration = Duration::from_secs(4);
 /// Time limit for a reply of a device in this program.
-const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
+const VIRTUAL_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra bringup`.
 #[derive(Debug, clap::Args)]
@@ -49,10 +49,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     interrupt::listen();
     if args.device == DeviceAddress::Native {
-        say("a virtual user brings a virtual Phantom up");
+        print_line("a virtual user brings a virtual Phantom up");
         let mut user = VirtualUser::new(Wiring::RIGHT);
-        user.says = |line| say(line);
-        return bring_up(args, &mut user, VIRTUAL_PATIENCE, |user| {
+        user.print = |line| print_line(line);
+        return bring_up(args, &mut user, VIRTUAL_TIMEOUT, |user| {
             Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
         });
     }
@@ -76,39 +76,39 @@ fn bring_up<A: Attendant>(
 ) -> Result<(), Failure> {
     let mut again_from = args.again_from;
     // A virtual arm's log is written on request only.
-    let mut kept = None;
+    let mut unsaved_log = None;
     loop {
         let mut control = ControlSession::open(connect(user)?, timeout)?;
-        let path = place(args, &control)?;
-        let mut log = match (&path, kept.take()) {
+        let path = log_path(args, &control)?;
+        let mut log = match (&path, unsaved_log.take()) {
             (Some(path), _) => Log::read(path)?,
-            (None, kept) => kept.unwrap_or_default(),
+            (None, unsaved_log) => unsaved_log.unwrap_or_default(),
         };
         if let Some(step) = again_from.take() {
             log.entries.retain(|entry| entry.step < step);
         }
-        let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
-        let walked = walk(&mut control, user, &mut log, &mut keep);
+        let mut save = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
+        let ended = run_sequence(&mut control, user, &mut log, &mut save);
         if let Some(path) = &path {
-            say(format!("log            {}", path.display()));
+            print_line(format!("log            {}", path.display()));
         }
-        match (walked, control) {
+        match (ended, control) {
             // The session ended with the board's power, so there is none to close.
-            (Ok(Walked::BoardWasOff), _) => kept = Some(log),
-            (Ok(Walked::ToTheEnd), control) => {
+            (Ok(SequenceEnd::BoardPoweredOff), _) => unsaved_log = Some(log),
+            (Ok(SequenceEnd::Complete), control) => {
                 control.end()?;
                 break;
             }
             (Err(error), control) => {
                 let ended = control.end();
                 if let Err(reported @ (LinkError::NotConfirmed | LinkError::Taken)) = ended {
-                    tell(reported);
+                    notify(reported);
                 }
                 return Err(error.into());
             }
         }
     }
-    say(
+    print_line(
         "complete       every step is passed: do \"After the eleven steps\" of \
          docs/how-to/bring-up.md before any larger force",
     );
@@ -116,11 +116,11 @@ fn bring_up<A: Attendant>(
 }
 
 /// Returns the path of the log.
-fn place(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
+fn log_path(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
     Ok(match (&args.log, &args.device) {
         (Some(path), _) => Some(path.clone()),
         (None, DeviceAddress::Native) => None,
-        (None, _) => Some(Log::place(control.device())?),
+        (None, _) => Some(Log::path_of(control.device())?),
     })
 }
 
@@ -128,7 +128,7 @@ impl Hint for BringupError {
     fn hint(&self) -> String {
         match self {
             Self::Found { finding, .. } => {
-                format!("{}; then go on with hapterra bringup", finding.what_to_do())
+                format!("{}; then go on with hapterra bringup", finding.remedy())
             }
             Self::Halt(Halt::Link(error)) => error.hint(),
             Self::Halt(_) => "go on with hapterra bringup when you are ready".into(),

@@ -17,13 +17,13 @@ use heightfield::printable_text::printable;
 ///
 /// # Errors
 /// The board was not brought up; no reply.
-pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let mut control = ControlSession::look(Box::new(transport), TIMEOUT)?;
+pub(in crate::cli) fn check_brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
+    let mut control = ControlSession::open_read_only(Box::new(transport), TIMEOUT)?;
     if is_real(&control.device().board) {
         let record = control.calibration()?;
         let device = control.device();
-        let log = Log::read(&Log::place(device)?)?;
-        if let Some(step) = missing(device, record.as_ref(), log) {
+        let log = Log::read(&Log::path_of(device)?)?;
+        if let Some(step) = missing_step(device, record.as_ref(), log) {
             let (board, number, title) = (printable(&device.board), step.number(), step.title());
             let serial = device.serial;
             return Err(Failure::new(format!(
@@ -39,8 +39,8 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
 ///
 /// # Errors
 /// It may drive an arm; no reply.
-pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let control = ControlSession::look(Box::new(transport), EMULATED_TIMEOUT)?;
+pub(in crate::cli) fn check_drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
+    let control = ControlSession::open_read_only(Box::new(transport), EMULATED_TIMEOUT)?;
     let board = &control.device().board;
     if is_real(board) {
         let board = printable(board);
@@ -61,8 +61,8 @@ fn is_real(board: &str) -> bool {
 }
 
 /// Returns the first step missing in the log, for the device's current identity and record.
-fn missing(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
-    log.meet(Identity::of(device, record));
+fn missing_step(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
+    log.update_identity(Identity::of(device, record));
     log.next()
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use hapterra_core::wire::hello::SerialNumber;
 
     fn device() -> DeviceHello {
-        let native = Box::new(Native::for_replay().restless());
+        let native = Box::new(Native::for_replay().free_running());
         let control = ControlSession::open(native, TIMEOUT).expect("it answers");
         DeviceHello {
             board: "nucleo-g474re".try_into().expect("fits"),
@@ -87,23 +87,26 @@ mod tests {
         let (device, record) = (device(), Calibration::PREMIUM_1_5);
         let mut log = Log::default();
         assert_eq!(
-            missing(&device, Some(&record), log.clone()),
+            missing_step(&device, Some(&record), log.clone()),
             Some(Step::Board)
         );
-        log.meet(Identity::of(&device, Some(&record)));
+        log.update_identity(Identity::of(&device, Some(&record)));
         for step in Step::ALL {
-            assert_eq!(missing(&device, Some(&record), log.clone()), Some(step));
-            log.take(step, true, String::new());
+            assert_eq!(
+                missing_step(&device, Some(&record), log.clone()),
+                Some(step)
+            );
+            log.add(step, true, String::new());
         }
-        assert_eq!(missing(&device, Some(&record), log.clone()), None);
+        assert_eq!(missing_step(&device, Some(&record), log.clone()), None);
         let twin = DeviceHello {
             serial: SerialNumber::new([0x2B; 12]),
             ..device.clone()
         };
-        let never = missing(&twin, Some(&record), log.clone());
+        let never = missing_step(&twin, Some(&record), log.clone());
         assert_eq!(never, Some(Step::Board), "another board's log");
         let other = Calibration::PREMIUM_3_0;
-        let again = missing(&device, Some(&other), log);
+        let again = missing_step(&device, Some(&other), log);
         assert_eq!(again, Some(Step::Calibration));
     }
 
@@ -119,7 +122,7 @@ mod tests {
         ] {
             assert_eq!(is_real(board), real, "{board}");
         }
-        let mut native = Native::for_replay().restless();
-        assert!(brought_up(&mut native).is_ok());
+        let mut native = Native::for_replay().free_running();
+        assert!(check_brought_up(&mut native).is_ok());
     }
 }

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
-use crate::cli::terminal::questions::{ask, number};
-use crate::cli::terminal::writer::say;
+use crate::cli::terminal::questions::{number, prompt};
+use crate::cli::terminal::writer::print_line;
 use crate::link::DeviceAddress;
 
 /// A user at a terminal.
@@ -17,17 +17,17 @@ pub(super) struct UserAtTerminal {
 }
 
 impl Attendant for UserAtTerminal {
-    fn hear(&mut self, line: &str) {
-        say(line);
+    fn notify(&mut self, line: &str) {
+        print_line(line);
     }
 
     fn begin(&mut self, task: Task) {
-        say(format!("  > {task}"));
+        print_line(format!("  > {task}"));
     }
 
     fn finish(&mut self, task: Task) -> Result<(), Stopped> {
-        say(format!("  > {task}"));
-        ask("    press Enter when that is done (q stops)")
+        print_line(format!("  > {task}"));
+        prompt("    press Enter when that is done (q stops)")
             .map(drop)
             .ok_or(Stopped)
     }
@@ -40,12 +40,12 @@ impl Attendant for UserAtTerminal {
         }
     }
 
-    fn confirms(&mut self, question: Question) -> Result<bool, Stopped> {
-        let answer = ask(&format!("  ? {question} [y/N]")).ok_or(Stopped)?;
+    fn confirm(&mut self, question: Question) -> Result<bool, Stopped> {
+        let answer = prompt(&format!("  ? {question} [y/N]")).ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 
-    fn stops(&self) -> fn() -> bool {
+    fn stop_check(&self) -> fn() -> bool {
         interrupt::requested
     }
 

@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_of_what_is_measured() {
+    fn measurement_lists_are_parsed() {
         let read = |text: &str| {
             let measure = text.parse::<Measure>().expect(text);
             let guessed = measure.takes_guessed_ratios;

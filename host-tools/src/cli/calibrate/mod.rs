@@ -17,10 +17,10 @@ use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
 use super::report::put;
 use super::terminal::partial_files;
-use super::terminal::writer::say;
-use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
+use super::terminal::writer::print_line;
+use crate::calibrate::{Attendant, Plan, VirtualUser, file, run_procedure};
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
-use crate::output::keep_apart;
+use crate::output::check_distinct;
 use measure::Measure;
 use questions::UserAtTerminal;
 use set::Setting;
@@ -100,35 +100,39 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Vec::from_iter(args.out.as_deref()),
         Vec::from_iter(args.from.as_deref()),
     );
-    keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
+    check_distinct(&outputs, &inputs).or_hint(OTHER_FILE)?;
     match &args.show {
         Some(Some(path)) => return put(&file::to_toml(&file::read(path)?)),
         // A read-only query does not take the arm from its host.
-        Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
+        Some(None) => {
+            return put(&file::to_toml(
+                &args.device.with_read_only_session(device_record)?,
+            ));
+        }
         None => {}
     }
-    partial_files::tell(args.out.as_deref());
-    if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
+    partial_files::report(args.out.as_deref());
+    if args.device.device != DeviceChoice::Connected(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
         return args
             .device
-            .talk(|control| calibrate(args, control, &mut user));
+            .with_session(|control| calibrate(args, control, &mut user));
     }
     // A virtual user demonstrates the steps on an in-memory device.
-    let mut user = VirtualUser::with_a_stylus();
-    user.says = |line| say(line);
+    let mut user = VirtualUser::with_stylus();
+    user.print = |line| print_line(line);
     let device = Native::new(HostClock::default(), None)
-        .meddled_with(user.hands())
-        .restless();
+        .with_fault_injector(user.hands())
+        .free_running();
     if args.measure.zero {
-        say("a virtual user calibrates a virtual Phantom that differs from its preset");
+        print_line("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
     let mut control = ControlSession::open(Box::new(device), TIMEOUT)?;
     calibrate(args, &mut control, &mut user)
 }
 
 /// Returns the device's record.
-fn held(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
+fn device_record(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
     let held = control
         .calibration()?
         .ok_or("the device holds no calibration");
@@ -140,8 +144,8 @@ fn calibrate(
     control: &mut ControlSession<'_>,
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
-    let (begin, whence) = begin(args, control)?;
-    say(format!("begins with    {whence}"));
+    let (begin, source) = initial_record(args, control)?;
+    print_line(format!("begins with    {source}"));
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
@@ -158,26 +162,29 @@ fn calibrate(
             gravity: measure.gravity,
         };
         let mut counts = || Ok(control.fresh_status()?.health.sense.counts);
-        let review = walk(&begin, plan, attendant, &mut counts)?;
+        let review = run_procedure(&begin, plan, attendant, &mut counts)?;
         (record, zero) = (review.after, Some(review.zero));
     }
     if let Some(path) = &args.out {
         file::write(path, &record).or_hint(OTHER_FILE)?;
-        say(format!("written        {}", path.display()));
+        print_line(format!("written        {}", path.display()));
     }
-    hand_over(args, control, record)?;
+    activate(args, control, record)?;
     if let Some(counts) = zero {
         let zeroed = control.request(&Request::Zero { counts })?;
         zeroed.map_err(Failure::new)?;
-        say("zeroed         the arm, until the device is switched off");
+        print_line("zeroed         the arm, until the device is switched off");
     }
     Ok(())
 }
 
 /// Returns the initial record and its source.
-fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
+fn initial_record(
+    args: &Args,
+    control: &mut ControlSession<'_>,
+) -> Result<(Calibration, String), Failure> {
     let held = control.calibration()?;
-    let (mut record, whence) = match (&args.from, args.model, held) {
+    let (mut record, source) = match (&args.from, args.model, held) {
         (Some(path), _, _) => (file::read(path)?, path.display().to_string()),
         (None, Some(model), _) => (
             model.preset(),
@@ -202,11 +209,11 @@ fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, 
     valid
         .map_err(|bad| format!("the record cannot be used: {bad}"))
         .or_hint("change it with --set NAME=VALUE")?;
-    Ok((record, whence))
+    Ok((record, source))
 }
 
 /// Activates the record on the device, and stores it there unless `--no-store` is given.
-fn hand_over(
+fn activate(
     args: &Args,
     control: &mut ControlSession<'_>,
     calibration: Calibration,
@@ -217,7 +224,7 @@ fn hand_over(
             (control.request(&request)?, "until it is switched off")
         }
         false => {
-            say(format!(
+            print_line(format!(
                 "to store it    press the dead-man switch within {} s",
                 PRESS_TIMEOUT_MS / 1_000
             ));
@@ -225,6 +232,6 @@ fn hand_over(
         }
     };
     answer.or_hint("see hapterra status; the record can be kept in a file with -o FILE")?;
-    say(format!("in force       on the device, {until}"));
+    print_line(format!("in force       on the device, {until}"));
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! The questions of a calibration, at a terminal or from a pipe whose lines are the answers.
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
-use crate::cli::terminal::questions::{ask, number};
-use crate::cli::terminal::writer::{say, show};
+use crate::cli::terminal::questions::{number, prompt};
+use crate::cli::terminal::writer::{print_line, show};
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {
@@ -17,21 +17,21 @@ impl UserAtTerminal {
 }
 
 impl Attendant for UserAtTerminal {
-    fn hear(&mut self, line: &str) {
-        say(format!("  {line}"));
+    fn notify(&mut self, line: &str) {
+        print_line(format!("  {line}"));
     }
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
-        say(
+        print_line(
             "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down",
         );
-        ask("  press Enter when it is there (q stops)")
+        prompt("  press Enter when it is there (q stops)")
             .map(drop)
             .ok_or(Stopped)
     }
 
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped> {
-        say(format!(
+        print_line(format!(
             "lay a ruler at the tip, {}; move the tip along it by about {about_mm} mm and hold it",
             direction.words()
         ));
@@ -41,7 +41,7 @@ impl Attendant for UserAtTerminal {
 
     fn hold_still(&mut self, pose: usize) -> Result<Option<[f64; 2]>, Stopped> {
         if pose == 1 {
-            say(
+            print_line(
                 "gravity: hold the tip by a thread on a spring or kitchen scale, everything still, in poses that differ;\n  \
                  tell what the scale reads upwards and towards you (negative: down, away from you)",
             );
@@ -56,12 +56,12 @@ impl Attendant for UserAtTerminal {
         ))
     }
 
-    fn agrees(&mut self, review: &Review) -> Result<bool, Stopped> {
+    fn confirm_record(&mut self, review: &Review) -> Result<bool, Stopped> {
         show(review);
         if self.yes {
             return Ok(true);
         }
-        let answer = ask("take this record? [y/N]").ok_or(Stopped)?;
+        let answer = prompt("take this record? [y/N]").ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 }

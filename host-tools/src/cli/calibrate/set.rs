@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_by_name() {
+    fn calibration_numbers_are_found_by_name() {
         let mut record = Calibration::PREMIUM_1_5;
         for text in [
             "ratio-2=10.5",

@@ -7,37 +7,37 @@ use hapterra_core::wire::request::Request;
 use super::Args;
 use crate::board::Image;
 use crate::board::update::{
-    Choice, Loader, Plan, Plugged, Step, SystemPipe, UpdateError, choose, open_loader, plugged,
-    update,
+    Choice, ConnectedDevice, Loader, Plan, Step, SystemPipe, UpdateError, choose,
+    connected_devices, open_loader, update,
 };
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
 use crate::cli::terminal::progress;
-use crate::cli::terminal::questions::ask;
-use crate::cli::terminal::writer::{self, say};
+use crate::cli::terminal::questions::prompt;
+use crate::cli::terminal::writer::{self, print_line};
 use crate::link::{ControlSession, DeviceAddress, Usb};
 
 /// Time limit for the board's reply.
 const TIMEOUT: Duration = Duration::from_secs(4);
 /// Time limit for a device to reappear as another; on Windows, a driver's first start takes
 /// seconds.
-const REAPPEARS: Duration = Duration::from_secs(15);
+const REAPPEAR_TIMEOUT: Duration = Duration::from_secs(15);
 /// Interval of checks for connected devices.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     let serial = match &args.device {
         DeviceAddress::Usb(serial) => serial.as_deref(),
         _ => None,
     };
-    let plugged = plugged();
-    let place = match choose(&plugged, serial)? {
+    let connected_devices = connected_devices();
+    let place = match choose(&connected_devices, serial)? {
         Choice::Loader(device) => {
-            say(format!("loader         {}", device.place));
+            print_line(format!("loader         {}", device.place));
             &device.place
         }
         Choice::UnnamedLoader(device) => {
-            agree(args, device)?;
+            confirm_loader(args, device)?;
             &device.place
         }
         Choice::Board(device) => {
@@ -49,28 +49,28 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     // The update repeats this check before the first erase; a failure here can still restart the
     // program.
     if let Err(error) = Plan::new(args.board, image, loader.layout()) {
-        let _ = loader.leave(image.memories().flash);
+        let _ = loader.start_program(image.memories().flash);
         return Err(error.into());
     }
     let bytes = write(args, image, &mut loader)?;
-    say(format!(
+    print_line(format!(
         "written        {bytes} bytes to {}, read back and equal",
         args.board.name
     ));
     drop(loader);
-    greet(place)
+    wait_for_firmware(place)
 }
 
 /// Asks the user to confirm a loader that was not named, because a loader cannot report which board
 /// it is on.
-fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
+fn confirm_loader(args: &Args, device: &ConnectedDevice) -> Result<(), Failure> {
     let serial = device.serial.as_deref().unwrap_or("without a number");
     let (place, board) = (&device.place, args.board.name);
-    say(format!(
+    print_line(format!(
         "loader         {serial} at {place}, as it was found"
     ));
     let question = format!("is this the {board} to write? [y/N]");
-    match ask(&question).as_deref() {
+    match prompt(&question).as_deref() {
         Some("y" | "Y" | "yes") => Ok(()),
         _ => Err(Failure::new(format!(
             "the loader {serial} at {place} could not be confirmed as the board to write"
@@ -82,7 +82,7 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
 }
 
 /// Makes a board enter its loader if it is the right board.
-fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
+fn enter_loader(args: &Args, device: &ConnectedDevice) -> Result<(), Failure> {
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
     let mut control = ControlSession::open(transport, TIMEOUT)?;
     let running = control.device().board.as_str();
@@ -93,7 +93,7 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
         }
         .into());
     }
-    say(format!(
+    print_line(format!(
         "board          {}",
         session_summary::device(control.device())
     ));
@@ -102,15 +102,17 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
         .or_hint("disarm it (`hapterra status --disarm`) and try again; firmware without this request is flashed through the debug probe once")
 }
 
-/// Calls `look` until it finds something, at most for `REAPPEARS`.
+/// Calls `find` until it finds something, at most for `REAPPEAR_TIMEOUT`.
 fn wait_for<T>(
-    mut look: impl FnMut() -> Result<Option<T>, UpdateError>,
+    mut find: impl FnMut() -> Result<Option<T>, UpdateError>,
 ) -> Result<Option<T>, UpdateError> {
-    let began = Instant::now();
+    let start = Instant::now();
     loop {
-        match look() {
-            Ok(None) | Err(UpdateError::Gone { .. }) if began.elapsed() < REAPPEARS => {
-                std::thread::sleep(LOOK);
+        match find() {
+            Ok(None) | Err(UpdateError::Disconnected { .. })
+                if start.elapsed() < REAPPEAR_TIMEOUT =>
+            {
+                std::thread::sleep(POLL_INTERVAL);
             }
             other => return other,
         }
@@ -135,9 +137,9 @@ fn write(args: &Args, image: &Image, loader: &mut Loader<SystemPipe>) -> Result<
 }
 
 /// Waits for the new firmware's introduction.
-fn greet(place: &str) -> Result<(), Failure> {
+fn wait_for_firmware(place: &str) -> Result<(), Failure> {
     let back = wait_for(|| {
-        let mut devices = plugged().into_iter();
+        let mut devices = connected_devices().into_iter();
         Ok(devices.find(|device| !device.is_loader && device.place == place))
     })?;
     let Some(device) = back else {
@@ -148,7 +150,7 @@ fn greet(place: &str) -> Result<(), Failure> {
     };
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
     let control = ControlSession::open(transport, TIMEOUT)?;
-    say(format!(
+    print_line(format!(
         "started        {}",
         session_summary::device(control.device())
     ));

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native};
 
 /// Time limit for all attempts on a device.
-const TRIED_FOR: Duration = Duration::from_secs(10);
+const MAX_DURATION: Duration = Duration::from_secs(10);
 /// Time limit for a device's reply.
 const TIMEOUT: Duration = Duration::from_secs(2);
 /// Interval between attempts.
@@ -25,7 +25,7 @@ fn until_confirmed(address: &str) -> Result<(), LinkError> {
     let began = Instant::now();
     loop {
         match close(address) {
-            Err(_) if began.elapsed() < TRIED_FOR => thread::sleep(RETRY),
+            Err(_) if began.elapsed() < MAX_DURATION => thread::sleep(RETRY),
             closed => return closed,
         }
     }
@@ -33,7 +33,7 @@ fn until_confirmed(address: &str) -> Result<(), LinkError> {
 
 fn close(address: &str) -> Result<(), LinkError> {
     let absent = |why| LinkError::Absent {
-        looked_for: address.to_owned(),
+        searched_for: address.to_owned(),
         why,
     };
     let address: DeviceAddress = address.parse().map_err(absent)?;

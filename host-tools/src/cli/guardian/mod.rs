@@ -17,11 +17,11 @@
 //! Both are in the terminal's foreground, so Ctrl-C in a terminal reaches both. A signal to the
 //! worker only requests an end. The guardian counts the signals and sends each one through a pipe;
 //! the second ends the worker at once. A worker whose serving thread does not react to the first
-//! one within [`DEAF`] is killed.
+//! one within [`BLOCKED_AFTER`] is killed.
 //!
 //! On systems other than Unix there is no guardian.
 //!
-//! [`DEAF`]: process::DEAF
+//! [`BLOCKED_AFTER`]: process::BLOCKED_AFTER
 
 #[cfg(unix)]
 mod close;

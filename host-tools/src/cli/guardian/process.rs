@@ -20,15 +20,15 @@ use signal_hook::low_level::signal_name;
 
 use super::{WorkerMessage, close, worker};
 use crate::cli::failure::Failure;
-use crate::cli::terminal::interrupt::{self, ASK_FOR_AN_END, INTERRUPTED};
+use crate::cli::terminal::interrupt::{self, EXIT_SIGNALS, INTERRUPTED};
 
 /// Interval of checks.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time after which a serving thread that does not react to a press counts as blocked. Together
 /// with the board's time to confirm, it stays below 3 s.
-pub(super) const DEAF: Duration = Duration::from_secs(2);
+pub(super) const BLOCKED_AFTER: Duration = Duration::from_secs(2);
 /// Time limit for a worker to end at once.
-const AT_ONCE: Duration = Duration::from_secs(1);
+const EXIT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The worker and its reported state.
 struct Watch {
@@ -37,7 +37,7 @@ struct Watch {
     presses: PipeWriter,
     message: PipeReader,
     /// An incomplete line.
-    rest: Vec<u8>,
+    unparsed: Vec<u8>,
     terminal: Option<Termios>,
     is_listening: bool,
     may_be_armed: BTreeSet<String>,
@@ -63,7 +63,7 @@ pub(super) fn watch(program: &[OsString], arguments: &[OsString]) -> u8 {
 
 impl Watch {
     fn begin(program: &[OsString], arguments: &[OsString]) -> io::Result<Self> {
-        let signals = Signals::new(ASK_FOR_AN_END)?;
+        let signals = Signals::new(EXIT_SIGNALS)?;
         let (its_presses, presses) = pipe()?;
         let (message, its_messages) = pipe()?;
         ioctl_fionbio(&message, true)?;
@@ -85,7 +85,7 @@ impl Watch {
             signals,
             presses,
             message,
-            rest: vec![],
+            unparsed: vec![],
             terminal,
             is_listening: false,
             may_be_armed: BTreeSet::new(),
@@ -102,7 +102,7 @@ impl Watch {
             // Check for the end before the messages are read, so that none of an ended worker is
             // missed.
             let ended = self.child.try_wait();
-            self.read_news();
+            self.read_messages();
             match ended {
                 Ok(None) => {}
                 Ok(Some(status)) => break status,
@@ -113,7 +113,7 @@ impl Watch {
             if !was_killed && self.is_stuck() {
                 was_killed = self.child.kill().is_ok();
             }
-            sleep(LOOK);
+            sleep(POLL_INTERVAL);
         };
         if status.signal().is_some() || !self.may_be_armed.is_empty() {
             self.clean_up(status, was_killed);
@@ -143,31 +143,33 @@ impl Watch {
     }
 
     fn is_stuck(&self) -> bool {
-        let since = |asked: &Instant| asked.elapsed();
+        let since = |requests: &Instant| requests.elapsed();
         let is_deaf = !self.may_be_armed.is_subset(&self.leaving);
-        let mut asked = self.pressed.first().into_iter().chain(&self.input_ended);
-        is_deaf && asked.any(|asked| since(asked) > DEAF)
-            || self.pressed.get(1).map(since) > Some(AT_ONCE)
+        let mut requests = self.pressed.first().into_iter().chain(&self.input_ended);
+        is_deaf && requests.any(|requests| since(requests) > BLOCKED_AFTER)
+            || self.pressed.get(1).map(since) > Some(EXIT_TIMEOUT)
     }
 
-    fn read_news(&mut self) {
+    fn read_messages(&mut self) {
         let mut chunk = [0; 4096];
         loop {
             match self.message.read(&mut chunk) {
-                Ok(n @ 1..) => self.rest.extend_from_slice(chunk.get(..n).unwrap_or(&[])),
+                Ok(n @ 1..) => self
+                    .unparsed
+                    .extend_from_slice(chunk.get(..n).unwrap_or(&[])),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 _ => break,
             }
         }
-        while let Some(end) = self.rest.iter().position(|byte| *byte == b'\n') {
-            let line: Vec<u8> = self.rest.drain(..=end).collect();
+        while let Some(end) = self.unparsed.iter().position(|byte| *byte == b'\n') {
+            let line: Vec<u8> = self.unparsed.drain(..=end).collect();
             if let Some(message) = line.get(..end).and_then(WorkerMessage::read) {
-                self.take(message);
+                self.on_message(message);
             }
         }
     }
 
-    fn take(&mut self, message: WorkerMessage) {
+    fn on_message(&mut self, message: WorkerMessage) {
         match message {
             WorkerMessage::Listening => self.is_listening = true,
             WorkerMessage::Pressed => self.pressed.push(Instant::now()),
@@ -186,9 +188,9 @@ impl Watch {
             close::begin(address.clone(), done.clone());
         }
         drop(done);
-        self.put_terminal_back();
+        self.restore_terminal();
         if let Some(signal) = status.signal() {
-            interrupt::say(match was_killed {
+            interrupt::print_line(match was_killed {
                 true => "the program did not react to Ctrl-C and was killed\n".into(),
                 false => {
                     let name = signal_name(signal).unwrap_or("a signal");
@@ -198,7 +200,7 @@ impl Watch {
         }
         let _ = self.signals.pending().count();
         while !self.may_be_armed.is_empty() && self.signals.pending().next().is_none() {
-            let line = match closed.recv_timeout(LOOK) {
+            let line = match closed.recv_timeout(POLL_INTERVAL) {
                 Ok((address, Ok(()))) => {
                     self.may_be_armed.remove(&address);
                     format!("{address}: the board has confirmed that it is disarmed\n")
@@ -206,10 +208,10 @@ impl Watch {
                 Ok((_, Err(_))) | Err(RecvTimeoutError::Timeout) => continue,
                 Err(RecvTimeoutError::Disconnected) => break,
             };
-            interrupt::say(line);
+            interrupt::print_line(line);
         }
         if let Some(line) = interrupt::not_confirmed(&self.may_be_armed) {
-            interrupt::say(line);
+            interrupt::print_line(line);
         }
     }
 
@@ -218,7 +220,7 @@ impl Watch {
         for path in &self.recordings {
             if let Ok(file) = fs::metadata(path) {
                 let (path, bytes) = (path.display(), file.len());
-                interrupt::say(format!(
+                interrupt::print_line(format!(
                     "recording      {path} ({bytes} bytes) is what was written of it (its last line may be cut); it stays until you delete it\n"
                 ));
             }
@@ -226,10 +228,10 @@ impl Watch {
     }
 
     /// Restores the terminal's modes. The cursor may be anywhere in a line.
-    fn put_terminal_back(&self) {
+    fn restore_terminal(&self) {
         if let Some(before) = &self.terminal {
             let _ = tcsetattr(io::stdin(), OptionalActions::Now, before);
-            interrupt::say("\n".into());
+            interrupt::print_line("\n".into());
         }
     }
 }

@@ -62,7 +62,7 @@ mod lines {
     }
 
     #[test]
-    fn each_news_is_read_as_it_was_written() {
+    fn worker_messages_round_trip() {
         for message in [
             WorkerMessage::Listening,
             WorkerMessage::Pressed,

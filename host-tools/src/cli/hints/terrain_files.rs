@@ -23,15 +23,15 @@ fn hint(path: &Path, fault: &RasterError) -> String {
             return format!(
                 "{}{}; or say how raw samples lie with --input raw=WxH:i16:le",
                 with_gdal(path),
-                converted(path, "")
+                conversion_command(path, "")
             );
         }
         RasterError::NeedsGdal { .. } => {
             return format!(
                 "{}; then this works: hapterra info {}; or {}",
                 GdalError::how_to_install(),
-                names(path).0,
-                converted(path, "")
+                shell_names(path).0,
+                conversion_command(path, "")
             );
         }
         RasterError::ByGdal(GdalError::OpenOption { .. }) => {
@@ -40,14 +40,16 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::ByGdal(_) => {
             return format!(
                 "see whether GDAL's own program reads it: gdalinfo {}; or try a newer GDAL",
-                names(path).0
+                shell_names(path).0
             );
         }
-        RasterError::NeedsVrt { files, .. } => return built(path, files),
-        RasterError::Unsupported { .. } => return with_gdal(path) + &converted(path, PLAIN),
+        RasterError::NeedsVrt { files, .. } => return vrt_command(path, files),
+        RasterError::Unsupported { .. } => {
+            return with_gdal(path) + &conversion_command(path, PLAIN);
+        }
         RasterError::InTile { file, fault } => return hint(file, fault),
         RasterError::TilesDiffer { file, other, .. } => {
-            return brought_together(path, file, other);
+            return resampling_command(path, file, other);
         }
         RasterError::SamePlace { .. } => {
             "name the file with the heights, or a pattern of names in quotes that leaves the other out, as '*_dem.tif'"
@@ -55,8 +57,8 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::NoPlace(_) => {
             return format!(
                 "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or bring it onto rows and columns of its map: gdalwarp -r bilinear {} {}",
-                names(path).0,
-                names(path).1
+                shell_names(path).0,
+                shell_names(path).1
             );
         }
         RasterError::NoTiles(_) => {
@@ -76,7 +78,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
             let one_band = format!("-b 1 {PLAIN}");
             return format!(
                 "take a file with heights; or {}",
-                converted(path, &one_band)
+                conversion_command(path, &one_band)
             );
         }
         RasterError::NoNumbers(_) => "take a file with heights",
@@ -108,23 +110,23 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         }
         RasterError::TooLarge { columns, rows, .. } => {
             let (width, height) = (columns.min(&20_000), rows.min(&20_000));
-            return cut(path, (*width, *height));
+            return crop_command(path, (*width, *height));
         }
         RasterError::DecoderFailed(_) => {
-            return format!("get the file again; or {}", converted(path, ""));
+            return format!("get the file again; or {}", conversion_command(path, ""));
         }
         RasterError::Unfamiliar(_) if is_known_to_gdal(path) => {
             return format!(
                 "see whether GDAL reads it whole: gdalinfo -checksum {}; or {}",
-                names(path).0,
-                converted(path, "")
+                shell_names(path).0,
+                conversion_command(path, "")
             );
         }
         RasterError::Unfamiliar(_) => {
-            return format!("get the file again; or {}", converted(path, ""));
+            return format!("get the file again; or {}", conversion_command(path, ""));
         }
         RasterError::Unreadable(_) => "check the path and that you may read the file",
-        RasterError::Remote(error) => elsewhere(path, error),
+        RasterError::Remote(error) => remote_hint(path, error),
         RasterError::RawSizeMissing => "state the sample layout: --input raw=WxH:i16:le",
         RasterError::AmbiguousChannels(_) => {
             "state which channel holds the height: --input channel=red|green|blue|alpha|grey"
@@ -142,7 +144,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         _ => {
             return format!(
                 "get the file again; at its source, this shows whether it is complete: gdalinfo -checksum {}",
-                names(path).0
+                shell_names(path).0
             );
         }
     };
@@ -150,7 +152,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
 }
 
 /// Returns the hint for a file at a URL.
-fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
+fn remote_hint(path: &Path, error: &std::io::Error) -> &'static str {
     const NO_URLS: &str = "build it with them: cargo build --release --features remote (cargo xtask demo URL does); or fetch the file and name that";
     let url = path.to_str().unwrap_or_default().to_ascii_lowercase();
     let scheme = url.split_once("://").map(|(scheme, _)| scheme);
@@ -221,8 +223,8 @@ const FROM_POINTS: &str = r"import sys, laspy, numpy as n; f, t, d = sys.argv[1:
 
 /// Returns the command that converts a file to a readable one, with GDAL's `options` if GDAL reads
 /// such files.
-fn converted(path: &Path, options: &str) -> String {
-    let (from, to) = names(path);
+fn conversion_command(path: &Path, options: &str) -> String {
+    let (from, to) = shell_names(path);
     let space = if options.is_empty() { "" } else { " " };
     match extension(path).as_str() {
         "npy" => format!("store two dimensions of numbers: python3 -c \"{FROM_NPY}\" {from}"),
@@ -241,12 +243,16 @@ fn converted(path: &Path, options: &str) -> String {
 }
 
 /// Returns the command that makes a VRT of files.
-fn built(path: &Path, files: &[String]) -> String {
+fn vrt_command(path: &Path, files: &[String]) -> String {
     /// More names would make the command unreadable.
-    const SHOWN: usize = 20;
-    let each: Vec<_> = files.iter().take(SHOWN).map(|file| quoted(file)).collect();
+    const MAX_NAMES: usize = 20;
+    let each: Vec<_> = files
+        .iter()
+        .take(MAX_NAMES)
+        .map(|file| quoted(file))
+        .collect();
     let more = match files.len() {
-        0..=SHOWN => String::new(),
+        0..=MAX_NAMES => String::new(),
         count => format!(" … (all {count} files)"),
     };
     let to = quoted(&format!("{}.vrt", stem(path)));
@@ -257,8 +263,8 @@ fn built(path: &Path, files: &[String]) -> String {
 }
 
 /// Returns the command that cuts a part of this size, in samples, out of a file.
-fn cut(path: &Path, (width, height): (u64, u64)) -> String {
-    let (from, to) = names(path);
+fn crop_command(path: &Path, (width, height): (u64, u64)) -> String {
+    let (from, to) = shell_names(path);
     format!(
         "cut a part out (offsets, then width and height in samples): gdal_translate -srcwin 0 0 \
          {width} {height} {from} {to}; or make it coarser: gdal_translate -r average \
@@ -267,7 +273,7 @@ fn cut(path: &Path, (width, height): (u64, u64)) -> String {
 }
 
 /// Returns the command that resamples files of different grids to one grid.
-fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
+fn resampling_command(path: &Path, file: &Path, other: &Path) -> String {
     const ONTO_ONE: &str = "gdalwarp -r bilinear -ot Float32 -dstnodata -9999 -co TILED=YES \
                             -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER";
     let name = path.display().to_string();
@@ -278,7 +284,7 @@ fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
         );
     }
     if !name.contains(['*', '?', '[']) || is_url(&name) {
-        let files = [other, file].map(|file| names(file).0).join(" ");
+        let files = [other, file].map(|file| shell_names(file).0).join(" ");
         return format!("lay them onto one grid: {ONTO_ONE} {files} one.tif");
     }
     let files = name.replace(' ', "\\ ");
@@ -289,7 +295,7 @@ fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
 }
 
 /// Returns the file and its converted copy in this folder, as shell words.
-fn names(path: &Path) -> (String, String) {
+fn shell_names(path: &Path) -> (String, String) {
     let to = format!("{}.tif", stem(path));
     let from = path.display().to_string();
     // GDAL's name for a file at a URL.

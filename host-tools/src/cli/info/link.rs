@@ -158,7 +158,7 @@ mod tests {
     use heightfield::{Raster, Wait};
 
     #[test]
-    fn a_hip_along_an_axis_needs_two_tiles_every_32_cells() {
+    fn hip_along_an_axis_requests_two_tiles_every_32_cells() {
         assert_eq!(tiles_across(), 2);
         let metres = Raster::from_fn(100, 70, |x, y| (x * y % 50) as f32).expect("raster");
         let grid = HapticGrid::new(&metres, HapticCells::Square);

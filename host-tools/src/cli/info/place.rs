@@ -15,7 +15,7 @@ pub(super) const fn from(certainty: Certainty) -> &'static str {
 }
 
 /// Returns the source as text for the user.
-pub(super) fn reported(from: &str) -> &'static str {
+pub(super) fn source_text(from: &str) -> &'static str {
     match from {
         "file" => "stated",
         "code" => "by the code of its reference system",
@@ -112,7 +112,7 @@ impl Rectangle {
 
     /// Returns the edges in longitude and latitude.
     pub(super) fn lonlat(raster: &Raster) -> Option<Self> {
-        let way = match (raster.cell()?.unit, raster.reference_system()) {
+        let source = match (raster.cell()?.unit, raster.reference_system()) {
             _ if raster.reference_system_from() == Certainty::Assumed => Certainty::Assumed,
             (CellUnit::Degree, system) if system.is_none_or(ReferenceSystem::counts_lonlat) => {
                 raster.cell()?.certainty
@@ -124,7 +124,7 @@ impl Rectangle {
         Some(Self::new(
             raster.bounds_lonlat()?,
             "degree".into(),
-            way,
+            source,
             Some(globe),
         ))
     }
@@ -151,7 +151,7 @@ impl Rectangle {
             "west {west:.digits$}, south {south:.digits$}, east {east:.digits$}, \
              north {north:.digits$} ({}, {}{globe})",
             self.unit,
-            reported(self.from)
+            source_text(self.from)
         )
     }
 }
@@ -193,6 +193,6 @@ impl Vertical {
             (Some(name), None) => format!("datum {name} (stated)"),
             (None, _) => "datum not stated".into(),
         };
-        format!("{unit} ({}), {datum}", reported(self.unit_from))
+        format!("{unit} ({}), {datum}", source_text(self.unit_from))
     }
 }

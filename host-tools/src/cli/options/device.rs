@@ -21,7 +21,7 @@ pub(in crate::cli) const EMULATED_TIMEOUT: Duration = Duration::from_secs(60);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceChoice {
     /// A device that already runs.
-    There(DeviceAddress),
+    Connected(DeviceAddress),
     /// A board emulated by QEMU, with a virtual Phantom at rest.
     Emulated(EmulatedBoard),
 }
@@ -30,9 +30,9 @@ impl FromStr for DeviceChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (EmulatedBoard::named(text), text.parse()) {
+        match (EmulatedBoard::parse_name(text), text.parse()) {
             (Some(board), _) => Ok(Self::Emulated(board)),
-            (None, Ok(address)) => Ok(Self::There(address)),
+            (None, Ok(address)) => Ok(Self::Connected(address)),
             (None, Err(_)) => Err(
                 "a device is usb, usb:SERIAL, tcp:HOST:PORT, native, emulated or emulated:ELF"
                     .into(),
@@ -54,7 +54,7 @@ impl FromStr for VirtualDevice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (text, EmulatedBoard::named(text)) {
+        match (text, EmulatedBoard::parse_name(text)) {
             ("native", _) => Ok(Self::Native),
             (_, Some(board)) => Ok(Self::Emulated(board)),
             _ => Err("native, emulated or emulated:ELF".into()),
@@ -71,7 +71,7 @@ pub struct EmulatedBoard {
 
 impl EmulatedBoard {
     /// Parses the name of an emulated board, if it is one.
-    fn named(text: &str) -> Option<Self> {
+    fn parse_name(text: &str) -> Option<Self> {
         match text.strip_prefix("emulated")? {
             "" => Some(Self::default()),
             rest => {
@@ -117,78 +117,79 @@ pub struct Device {
 }
 
 impl Device {
-    /// Opens a session without a scene and calls `talk`.
+    /// Opens a session without a scene and calls `run`.
     ///
     /// # Errors
-    /// No device, or the error of `talk`.
-    pub fn talk<T>(
+    /// No device, or the error of `run`.
+    pub fn with_session<T>(
         &self,
-        talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
+        run: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        self.speak(opened, talk)
+        self.with_opened(open_session, run)
     }
 
     /// Queries the device without taking it from its host.
     ///
     /// # Errors
-    /// As [`Device::talk`].
-    pub fn look<T>(
+    /// As [`Device::with_session`].
+    pub fn with_read_only_session<T>(
         &self,
-        talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
+        run: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        self.speak(looked_at, talk)
+        self.with_opened(open_read_only, run)
     }
 
-    fn speak<T>(
+    fn with_opened<T>(
         &self,
         open: for<'t> fn(
             Box<dyn Transport + 't>,
             Duration,
         ) -> Result<ControlSession<'t>, LinkError>,
-        talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
+        run: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        let mut arm = resting()?;
+        let mut arm = resting_phantom()?;
         match &self.device {
-            DeviceChoice::There(address) => {
-                let native = || Native::new(HostClock::default(), Some(Box::new(arm))).restless();
-                converse(open(address.connect(native)?, TIMEOUT)?, talk)
+            DeviceChoice::Connected(address) => {
+                let native =
+                    || Native::new(HostClock::default(), Some(Box::new(arm))).free_running();
+                run_and_close(open(address.connect(native)?, TIMEOUT)?, run)
             }
             DeviceChoice::Emulated(board) => {
                 let (_emulator, mut lines) = board.start()?;
                 move_arm_while(&mut lines.plant, &mut arm, || {
-                    converse(open(Box::new(lines.link), EMULATED_TIMEOUT)?, talk)
+                    run_and_close(open(Box::new(lines.link), EMULATED_TIMEOUT)?, run)
                 })
             }
         }
     }
 }
 
-/// Calls `talk` and ends the session.
-fn converse<T>(
+/// Calls `run` and ends the session.
+fn run_and_close<T>(
     mut control: ControlSession<'_>,
-    talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
+    run: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let stated = talk(&mut control)?;
+    let result = run(&mut control)?;
     control.end()?;
-    Ok(stated)
+    Ok(result)
 }
 
-fn opened<'t>(
+fn open_session<'t>(
     line: Box<dyn Transport + 't>,
     timeout: Duration,
 ) -> Result<ControlSession<'t>, LinkError> {
     ControlSession::open(line, timeout)
 }
 
-fn looked_at<'t>(
+fn open_read_only<'t>(
     line: Box<dyn Transport + 't>,
     timeout: Duration,
 ) -> Result<ControlSession<'t>, LinkError> {
-    ControlSession::look(line, timeout)
+    ControlSession::open_read_only(line, timeout)
 }
 
 /// Returns a virtual Phantom at rest in its zero pose.
-fn resting() -> Result<HeldPhantom, Failure> {
+fn resting_phantom() -> Result<HeldPhantom, Failure> {
     let home_mm = [0.0; 3];
     let script = Script::start(home_mm);
     let model = PhantomModel::premium_1_5();
@@ -201,13 +202,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn devices_by_name() {
+    fn device_choices_are_parsed() {
         let emulated = |image: Option<&str>| {
             let image = image.map(Into::into);
             EmulatedBoard { image }
         };
-        let usual = DeviceChoice::Emulated(emulated(None));
-        assert_eq!("emulated".parse(), Ok(usual));
+        let default = DeviceChoice::Emulated(emulated(None));
+        assert_eq!("emulated".parse(), Ok(default));
         let named = VirtualDevice::Emulated(emulated(Some("a:b/c.elf")));
         assert_eq!("emulated:a:b/c.elf".parse(), Ok(named));
         assert_eq!("native".parse(), Ok(VirtualDevice::Native));
@@ -216,17 +217,17 @@ mod tests {
         }
         assert_eq!(
             "usb".parse(),
-            Ok(DeviceChoice::There(DeviceAddress::Usb(None)))
+            Ok(DeviceChoice::Connected(DeviceAddress::Usb(None)))
         );
         assert!("serial".parse::<DeviceChoice>().is_err());
     }
 
     #[test]
-    fn the_device_in_memory_talks() {
+    fn native_device_reports_its_board() {
         let device = Device {
-            device: DeviceChoice::There(DeviceAddress::Native),
+            device: DeviceChoice::Connected(DeviceAddress::Native),
         };
-        let board = device.talk(|control| Ok(control.device().board.to_string()));
+        let board = device.with_session(|control| Ok(control.device().board.to_string()));
         assert_eq!(board.ok().as_deref(), Some("native"));
     }
 }

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::terminal::writer::tell;
+use crate::cli::terminal::writer::notify;
 use crate::events::{Server, Watcher};
 
 /// Events to other programs.
@@ -49,7 +49,7 @@ impl EventOptions {
         let server = Server::listen(port)
             .map_err(|why| format!("events cannot be sent on port {port} of 127.0.0.1: {why}"))
             .or_hint("name another port with --events, or 0 for any that is free")?;
-        tell(format!("events         {}", server.address()));
+        notify(format!("events         {}", server.address()));
         Ok(Some(server))
     }
 
@@ -63,7 +63,7 @@ impl EventOptions {
 pub(in crate::cli) fn end(server: Server) {
     let dropped = server.end();
     if dropped > 0 {
-        tell(format!(
+        notify(format!(
             "events         {dropped} lines were dropped: a reader was too slow"
         ));
     }
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn port_and_every_nth_sample() {
+    fn port_and_sample_interval_are_parsed() {
         let samples = None;
         assert_eq!(
             events("4100"),

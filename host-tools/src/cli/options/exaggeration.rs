@@ -73,16 +73,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_heights_and_auto() {
-        for (text, wanted) in [
+    fn exaggerations_are_parsed() {
+        for (text, expected) in [
             ("auto", Exaggeration::Auto),
             ("2.5", Exaggeration::Times(2.5)),
             ("-1", Exaggeration::Times(-1.0)),
             ("0.0485mm/unit", Exaggeration::MmPerUnit(0.0485)),
             ("-0.5 mm/unit", Exaggeration::MmPerUnit(-0.5)),
         ] {
-            assert_eq!(text.parse(), Ok(wanted));
-            assert_eq!(wanted.to_string().parse(), Ok(wanted));
+            assert_eq!(text.parse(), Ok(expected));
+            assert_eq!(expected.to_string().parse(), Ok(expected));
         }
         for bad in ["much", "inf", "nan", "", "2mm", "nanmm/unit", "mm/unit"] {
             assert!(bad.parse::<Exaggeration>().is_err(), "{bad}");

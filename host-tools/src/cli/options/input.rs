@@ -199,8 +199,8 @@ fn number(text: &str) -> Result<f64, String> {
 /// Parses the distance within which no-data is filled.
 fn fill(text: &str) -> Result<Fill, String> {
     let samples = text.trim().parse().ok();
-    let wanted = || format!("a whole number of samples from 1 to {}", Fill::MAX);
-    samples.and_then(Fill::within).ok_or_else(wanted)
+    let expected = || format!("a whole number of samples from 1 to {}", Fill::MAX);
+    samples.and_then(Fill::within).ok_or_else(expected)
 }
 
 /// Parses a unit of height, in metres.
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn each_key_with_its_example_is_read() {
+    fn each_input_key_parses_its_example() {
         for (key, value) in KEYS {
             let text = format!("{key}={value}");
             assert!(text.parse::<InputSetting>().is_ok(), "{text}");
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn invalid_input_setting_error_names_the_valid_form() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("bands=2", "band=2"),
             ("stored", "cells=stored"),
             ("gdal:=1", "gdal:NAME"),
@@ -285,12 +285,12 @@ mod tests {
             ("encoding=morse", "terrarium"),
         ] {
             let why = text.parse::<InputSetting>().expect_err(text);
-            assert!(why.contains(wanted), "{text}: {why}");
+            assert!(why.contains(expected), "{text}: {why}");
         }
     }
 
     #[test]
-    fn sources_that_disagree_are_refused() {
+    fn contradicting_input_options_are_refused() {
         let why = options(&["band=1", "band=2"]).expect_err("twice");
         assert!(why.contains("band=… is given twice"), "{why}");
         assert!(options(&["variable=a", "asset=b"]).is_err());
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn units_of_height() {
+    fn height_units_are_parsed() {
         let feet = 1200.0 / 3937.0;
         for (unit, metres) in [("m", 1.0), ("ft", 0.3048), ("us-ft", feet), ("0.01", 0.01)] {
             assert_eq!(height_unit(unit), Ok(metres));

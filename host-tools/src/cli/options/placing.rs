@@ -6,7 +6,7 @@ use super::rendering::Rendering;
 use super::scale::MapScale;
 use crate::cli::failure::Failure;
 use crate::place::{
-    Coordinates, FELT_MM, PlaceError, Placement, PlacementOptions, Reach, Target,
+    CLEAR_RELIEF_MM, Coordinates, PlaceError, Placement, PlacementOptions, Reach, Target,
     coordinates_in_words, place_in_words,
 };
 use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};
@@ -41,7 +41,7 @@ pub struct Placing {
 }
 
 /// A grid and its requested placement.
-pub(in crate::cli) struct Asked<'r> {
+pub(in crate::cli) struct TerrainRequest<'r> {
     pub(in crate::cli) grid: HapticGrid<'r>,
     options: PlacementOptions,
 }
@@ -55,12 +55,12 @@ impl Placing {
         &self,
         (rendering, cells): (&Rendering, HapticCells),
         raster: &'r Raster,
-    ) -> Result<Asked<'r>, Failure> {
+    ) -> Result<TerrainRequest<'r>, Failure> {
         let options = self.options(rendering);
         let grid = options.target.grid(raster, cells)?;
         // Any arm will do here: only the workspace depends on it.
         placement(&grid, &Calibration::PREMIUM_3_0, &options)?;
-        Ok(Asked { grid, options })
+        Ok(TerrainRequest { grid, options })
     }
 
     fn options(&self, rendering: &Rendering) -> PlacementOptions {
@@ -79,7 +79,7 @@ impl Placing {
     }
 }
 
-impl Asked<'_> {
+impl TerrainRequest<'_> {
     /// Returns the placement in front of an arm with a calibration.
     ///
     /// # Errors
@@ -104,7 +104,7 @@ fn placement(
 }
 
 /// Returns the place and scale of a terrain, in lines that `run` and `demo` print.
-pub(in crate::cli) fn reported(view: &Placement, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn describe(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(
         "place          {} under the home position\nscale          {}\n",
@@ -124,7 +124,7 @@ pub(in crate::cli) fn reported(view: &Placement, terrain: &Terrain<'_>) -> Strin
     }
     let relief = view.heights_mm[1] - view.heights_mm[0];
     if relief > 0.0 && relief < FLAT_MM && view.exaggeration.is_some_and(|times| times == 1.0) {
-        let times = (FELT_MM / relief).round();
+        let times = (CLEAR_RELIEF_MM / relief).round();
         text += &format!(
             "relief         {relief:.2} mm in the hand; --exaggeration {times} makes it {:.0} mm\n",
             times * relief
@@ -173,17 +173,17 @@ pub(in crate::cli) fn picture_lines(
         ),
     });
     if let Some(times) = view.exaggeration {
-        let stated = match (times - 1.0).abs() < 1e-9 {
+        let text = match (times - 1.0).abs() < 1e-9 {
             true => "true to scale".to_owned(),
             false => format!("× {}", short(times)),
         };
-        lines.push(("heights".to_owned(), stated));
+        lines.push(("heights".to_owned(), text));
     }
     let home = coordinates_in_words(file, view.home_ground);
     lines.push(("home position".to_owned(), home));
     if let Some([longitude, latitude]) = file.to_lonlat(view.home_ground) {
-        let stated = format!("{longitude:.5}, {latitude:.5}");
-        lines.push(("longitude, latitude".to_owned(), stated));
+        let text = format!("{longitude:.5}, {latitude:.5}");
+        lines.push(("longitude, latitude".to_owned(), text));
     }
     lines
 }
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coordinates_by_name() {
+    fn coordinate_systems_are_parsed() {
         assert_eq!(coordinates("file"), Ok(Coordinates::Own));
         assert_eq!(coordinates("lonlat"), Ok(Coordinates::LonLat));
         assert_eq!(coordinates("epsg:2056"), Ok(Coordinates::Epsg(2056)));
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_between_commas() {
+    fn comma_separated_numbers_are_parsed() {
         assert_eq!(numbers("-72.5, 44"), Ok([-72.5, 44.0]));
         for bad in ["1", "1,2,3", "1;2", "1,", "inf,0", "nan,1", ""] {
             assert!(numbers::<2>(bad).is_err(), "{bad}");
@@ -254,14 +254,14 @@ mod tests {
 
     #[test]
     fn lengths_are_printed_with_five_significant_digits() {
-        for (value, stated) in [
+        for (value, text) in [
             (10.9, "10.9"),
             (0.123_456_7, "0.12346"),
             (1234.567, "1234.6"),
             (400_000.0, "400000"),
             (5.0, "5"),
         ] {
-            assert_eq!(short(value), stated);
+            assert_eq!(short(value), text);
         }
     }
 }

@@ -113,21 +113,21 @@ impl Units {
     /// As [`Units::read`]; the quantity is out of range.
     pub fn read_within(&self, text: &str, range: [f64; 2]) -> Result<f64, String> {
         let value = self.read(text)?;
-        let [least, most] = range;
-        let unit = self.usual();
-        (least..=most)
+        let [min, max] = range;
+        let unit = self.default_unit();
+        (min..=max)
             .contains(&value)
             .then_some(value)
-            .ok_or_else(|| format!("{} from {least} to {most} {unit}", self.name))
+            .ok_or_else(|| format!("{} from {min} to {max} {unit}", self.name))
     }
 
     /// Formats a quantity as on the command line.
     #[must_use]
-    pub fn say(&self, value: impl Display) -> String {
-        format!("{value}{}", self.usual())
+    pub fn format(&self, value: impl Display) -> String {
+        format!("{value}{}", self.default_unit())
     }
 
-    fn usual(&self) -> &'static str {
+    fn default_unit(&self) -> &'static str {
         self.units.first().map_or("", |(unit, _)| unit)
     }
 
@@ -142,10 +142,10 @@ impl Units {
     fn expected(&self, text: &str) -> String {
         let units: Vec<_> = self.units.iter().map(|(unit, _)| *unit).collect();
         let (name, units) = (self.name, units.join(", "));
-        let usual = self.usual();
+        let default_unit = self.default_unit();
         match split(text) {
-            ("", _) => format!("{name} is a number in {usual}, or with its unit: {units}"),
-            (_, "") => format!("{name} is a finite number in {usual}"),
+            ("", _) => format!("{name} is a number in {default_unit}, or with its unit: {units}"),
+            (_, "") => format!("{name} is a finite number in {default_unit}"),
             (_, unit) => format!("{name} is not in `{unit}`: its units are {units}"),
         }
     }
@@ -180,8 +180,8 @@ mod tests {
     }
 
     #[test]
-    fn wrong_unit_names_the_right_ones() {
-        for (units, text, wanted) in [
+    fn invalid_unit_error_names_the_valid_ones() {
+        for (units, text, part) in [
             (&STIFFNESS, "0.5N", "N/mm, N/m"),
             (&LENGTH, "2m", "mm, cm"),
             (&TIME, "soon", "s, ms, min, h"),
@@ -192,7 +192,7 @@ mod tests {
             (&ANGLE, "1 2deg", "deg"),
         ] {
             let why = units.read(text).expect_err(text);
-            assert!(why.contains(wanted), "{text}: {why}");
+            assert!(why.contains(part), "{text}: {why}");
         }
         let why = TIME.read_within("0.5s", [1.0, 60.0]).expect_err("short");
         assert_eq!(why, "a time from 1 to 60 s");
@@ -201,9 +201,9 @@ mod tests {
     #[test]
     fn written_quantity_is_read_back_bit_for_bit() {
         for value in [0.1_f32, 0.3, 1.0 / 3.0, 8.5, f32::MIN_POSITIVE] {
-            assert_eq!(STIFFNESS.read_single(&STIFFNESS.say(value)), Ok(value));
+            assert_eq!(STIFFNESS.read_single(&STIFFNESS.format(value)), Ok(value));
             let value = f64::from(value);
-            assert_eq!(LENGTH.read(&LENGTH.say(value)), Ok(value));
+            assert_eq!(LENGTH.read(&LENGTH.format(value)), Ok(value));
         }
     }
 }

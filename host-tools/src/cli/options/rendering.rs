@@ -98,8 +98,8 @@ impl Rendering {
     /// point.
     #[must_use]
     pub fn tip_of_hand_mm(&self) -> f64 {
-        let usual = if self.level.is_none() { HAND_MM } else { 0.0 };
-        self.tip.unwrap_or(usual)
+        let default_mm = if self.level.is_none() { HAND_MM } else { 0.0 };
+        self.tip.unwrap_or(default_mm)
     }
 
     /// Returns the terrain at a scale. The default level is the finest in which the tip is at most

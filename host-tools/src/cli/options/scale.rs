@@ -69,7 +69,7 @@ impl FromStr for MapScale {
 impl fmt::Display for MapScale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::GroundMPerMm(metres) => f.write_str(&GROUND_SCALE.say(metres)),
+            Self::GroundMPerMm(metres) => f.write_str(&GROUND_SCALE.format(metres)),
             Self::CellMm(cell_mm) => write!(f, "{cell_mm}{MM_PER_CELL}"),
         }
     }
@@ -80,16 +80,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn metres_and_cells() {
-        for (text, wanted) in [
+    fn map_scales_are_parsed() {
+        for (text, expected) in [
             ("5", MapScale::GroundMPerMm(5.0)),
             ("5m/mm", MapScale::GroundMPerMm(5.0)),
             ("0.25 km/mm", MapScale::GroundMPerMm(250.0)),
             ("1.5mm/cell", MapScale::CellMm(1.5)),
             ("0.1 mm/cell", MapScale::CellMm(0.1)),
         ] {
-            assert_eq!(text.parse(), Ok(wanted));
-            assert_eq!(wanted.to_string().parse(), Ok(wanted));
+            assert_eq!(text.parse(), Ok(expected));
+            assert_eq!(expected.to_string().parse(), Ok(expected));
         }
         for bad in [
             "",

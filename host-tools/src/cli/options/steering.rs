@@ -14,10 +14,12 @@ use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_mode::RawMode;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::link::{Event, HostRequest};
-use crate::place::{Bounds, Laid, Reach};
+use crate::place::{Bounds, PlacedSurface, Reach};
 use crate::replay::Mark;
 use crate::steering::keys::{KEYS, Key, Keys};
-use crate::steering::{CommandQueue, Made, Marks, Origin, Put, Steer, Steering, Wanted};
+use crate::steering::{
+    Action, CommandQueue, Marks, Origin, PlacementUpdate, Steer, Steering, UserMark,
+};
 use crate::telemetry::{Placements, SampleLog};
 use crate::terrain::Terrain;
 
@@ -58,7 +60,7 @@ impl Commands {
                 .map(|queues| queues.into_iter().next().unwrap_or_default());
         }
         let queue = self.commands.as_ref().map(CommandQueue::of);
-        self.opened(queue.transpose())
+        self.with_hint(queue.transpose())
             .map(Option::unwrap_or_default)
     }
 
@@ -83,11 +85,11 @@ impl Commands {
         let several = |origin| CommandQueue::of_several(origin, devices, at_end);
         let queues = self.commands.as_ref().map(several);
         let none = || (0..devices).map(|_| CommandQueue::default()).collect();
-        self.opened(queues.transpose())
+        self.with_hint(queues.transpose())
             .map(|queues| queues.unwrap_or_else(none))
     }
 
-    fn opened<T>(&self, opened: std::io::Result<T>) -> Result<T, Failure> {
+    fn with_hint<T>(&self, opened: std::io::Result<T>) -> Result<T, Failure> {
         let from = match self.file() {
             Some(path) => format!(" from {}", path.display()),
             None => String::new(),
@@ -118,7 +120,7 @@ pub(in crate::cli) struct PlacementControl<'t> {
 /// Source of keys.
 enum Typing {
     /// No keyboard, or standard input is read by lines.
-    Nobody,
+    None,
     /// The terminal, in raw mode until the value is dropped.
     Terminal(RawMode),
     /// The shared terminal of several devices.
@@ -129,7 +131,7 @@ impl Typing {
     /// Returns the keys pressed since the last call; `None` without a keyboard.
     fn keys(&self) -> Option<Vec<Key>> {
         match self {
-            Self::Nobody => None,
+            Self::None => None,
             Self::Terminal(_) => Some(keyboard().keys()),
             Self::DeviceKeys(device_keys) => device_keys.has_keys().then(|| device_keys.keys()),
         }
@@ -139,12 +141,12 @@ impl Typing {
 impl<'t> PlacementControl<'t> {
     /// Starts with the first placement served.
     pub(in crate::cli) fn new(
-        (terrain, laid): (&Terrain<'t>, Laid),
+        (terrain, placed_surface): (&Terrain<'t>, PlacedSurface),
         (arm, level): (&Calibration, Option<u8>),
         commands: CommandQueue,
     ) -> Self {
         let bounds = Bounds {
-            first: laid,
+            first: placed_surface,
             resolution_mm: Reach::of(arm).resolution_mm(),
             level,
             tip_mm: terrain.grid().tip_mm(),
@@ -154,7 +156,7 @@ impl<'t> PlacementControl<'t> {
             marks: Marks::default(),
             commands,
             keys: Keys::default(),
-            typing: Typing::Nobody,
+            typing: Typing::None,
             began: Instant::now(),
             entered: None,
         }
@@ -186,38 +188,38 @@ impl<'t> PlacementControl<'t> {
         self.marks.on_event(event);
     }
 
-    /// Processes keys and commands at a time of the device, s. Reports their errors with `tell`.
-    pub(in crate::cli) fn look(&mut self, t_s: f64, tell: &mut dyn FnMut(String)) {
+    /// Processes keys and commands at a time of the device, s. Reports their errors with `notify`.
+    pub(in crate::cli) fn update(&mut self, t_s: f64, notify: &mut dyn FnMut(String)) {
         let now = self.began.elapsed();
         if let Some(keys) = self.typing.keys() {
             for key in keys {
                 let steer = self.keys.press(key, now);
-                self.take(steer);
+                self.apply(steer);
             }
             let released = self.keys.released(now);
-            self.take(released);
+            self.apply(released);
         }
         let is_free = self.steering.is_settled();
-        match self.commands.due(t_s, is_free, tell) {
-            Some(Wanted::Steer(steer)) => self.take(Some(steer)),
-            Some(Wanted::Mark(text)) => self.marks.mark(text).into_iter().for_each(&mut *tell),
-            Some(Wanted::Enter(number)) => self.entered = Some(number),
+        match self.commands.due(t_s, is_free, notify) {
+            Some(Action::Steer(steer)) => self.apply(Some(steer)),
+            Some(Action::Mark(text)) => self.marks.mark(text).into_iter().for_each(&mut *notify),
+            Some(Action::Enter(number)) => self.entered = Some(number),
             None => {}
         }
-        self.steering.lines().into_iter().for_each(tell);
+        self.steering.lines().into_iter().for_each(notify);
     }
 
-    fn take(&mut self, steer: Option<Steer>) {
+    fn apply(&mut self, steer: Option<Steer>) {
         if let Some(steer) = steer {
             self.steering.steer(steer);
         }
     }
 
     /// Returns the present requests to the device.
-    pub(in crate::cli) fn asks(&mut self) -> Vec<HostRequest> {
-        let mut asks = self.steering.asks();
-        asks.extend(self.marks.asks());
-        asks
+    pub(in crate::cli) fn requests(&mut self) -> Vec<HostRequest> {
+        let mut requests = self.steering.requests();
+        requests.extend(self.marks.requests());
+        requests
     }
 
     /// Returns the marks made since the last call, for a recording. `is_over` is true at the end,
@@ -225,9 +227,9 @@ impl<'t> PlacementControl<'t> {
     pub(in crate::cli) fn marks(&mut self, log: &SampleLog<'_>, is_over: bool) -> Vec<Mark> {
         let made = match is_over {
             true => self.marks.take_all(),
-            false => self.marks.take_made(),
+            false => self.marks.take_marks(),
         };
-        let mark = |made: Made| {
+        let mark = |made: UserMark| {
             let t_s = made.tick.map_or(log.t_s(), |tick| log.t_s_of(tick));
             Mark::new(made, t_s)
         };
@@ -235,15 +237,22 @@ impl<'t> PlacementControl<'t> {
     }
 
     /// Returns the placement to activate now; samples may use it from now on.
-    pub(in crate::cli) fn put(&mut self, views: &mut Placements<'t>) -> Option<Put<'t>> {
-        let put = self.steering.take_put()?;
-        views.put(put.view.number, put.terrain.clone(), put.laid);
-        Some(put)
+    pub(in crate::cli) fn take_update(
+        &mut self,
+        views: &mut Placements<'t>,
+    ) -> Option<PlacementUpdate<'t>> {
+        let update = self.steering.take_update()?;
+        views.add(
+            update.view.number,
+            update.terrain.clone(),
+            update.placed_surface,
+        );
+        Some(update)
     }
 
     /// Describes the active placement briefly, with the keys.
     pub(in crate::cli) fn in_words(&self) -> String {
-        let Laid { view, params } = self.steering.now();
+        let PlacedSurface { view, params } = self.steering.now();
         let scale = match view.ground_m_per_mm() {
             Some(metres) => format!("{} m/mm", short(metres)),
             None => format!("{} mm a cell", short(view.haptic_cell_mm())),
@@ -284,7 +293,7 @@ fn surface_in_words(params: &SurfaceParams) -> String {
 }
 
 /// Describes a mark in one line.
-pub(in crate::cli) fn marked(mark: &Mark) -> String {
+pub(in crate::cli) fn mark_text(mark: &Mark) -> String {
     let Mark { text, t_s, .. } = mark;
     match mark.tick {
         Some(tick) => format!("mark           `{text}` at tick {tick}, {t_s:.3} s"),
@@ -295,16 +304,20 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
 }
 
 /// Describes a new placement in one line.
-pub(in crate::cli) fn reported(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn placement_text(
+    number: usize,
+    placed_surface: &PlacedSurface,
+    terrain: &Terrain<'_>,
+) -> String {
     let file = terrain.raster().georeference();
     format!(
         "view {number}: {}; {}; {}; {} under the home position",
-        scale_in_words(&laid.view),
-        surface_in_words(&laid.params),
+        scale_in_words(&placed_surface.view),
+        surface_in_words(&placed_surface.params),
         match terrain.grid().tip_mm() {
             0.0 => "a point".to_owned(),
             mm => format!("a ball of {} mm", short(mm)),
         },
-        crate::place::place_in_words(&file, laid.view.home_ground)
+        crate::place::place_in_words(&file, placed_surface.view.home_ground)
     )
 }

@@ -111,8 +111,8 @@ impl ReadingOptions {
     /// Returns the kind of cells to render.
     #[must_use]
     pub fn cells(&self) -> HapticCells {
-        let mut stated = self.input.iter().filter_map(InputSetting::cells);
-        stated.next().unwrap_or_default()
+        let mut cells = self.input.iter().filter_map(InputSetting::cells);
+        cells.next().unwrap_or_default()
     }
 
     /// The cache is off if there is no home folder or the user disabled it.

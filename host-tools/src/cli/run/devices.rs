@@ -68,13 +68,13 @@ impl OneDevice {
     /// Returns the calibration that the device reports. If it reports none, returns that of a
     /// Premium 1.5 and the error. The session is closed later, because the arm may already be
     /// armed.
-    pub(super) fn meet(&self) -> (Calibration, Result<(), Failure>) {
+    pub(super) fn read_calibration(&self) -> (Calibration, Result<(), Failure>) {
         // The virtual Phantom is a Premium 1.5.
         let preset = Calibration::PREMIUM_1_5;
         if self.is_scripted() {
             return (preset, Ok(()));
         }
-        match calibration_of(&self.address, &|line| self.device_console.tell(line)) {
+        match calibration_of(&self.address, &|line| self.device_console.notify(line)) {
             Ok(calibration) => (calibration, Ok(())),
             Err(failure) => (preset, Err(failure)),
         }
@@ -119,8 +119,8 @@ fn check(args: &Args) -> Result<(), Failure> {
         );
         return Err(Failure::new(error).hint("serve the others by another `hapterra run`"));
     }
-    apart(&addresses_of(args))?;
-    plants_apart(args)?;
+    check_distinct(&addresses_of(args))?;
+    check_plants_distinct(args)?;
     if args.viewing.view {
         return Err(
             Failure::new(format!("--view shows one device, and not {count}")).hint(
@@ -137,7 +137,7 @@ fn check(args: &Args) -> Result<(), Failure> {
 }
 
 /// Checks that no device is named twice.
-fn apart(addresses: &[DeviceAddress]) -> Result<(), Failure> {
+fn check_distinct(addresses: &[DeviceAddress]) -> Result<(), Failure> {
     for (index, second) in addresses.iter().enumerate() {
         let firsts = addresses.iter().take(index).zip(1..);
         for (first, number) in firsts {
@@ -198,7 +198,7 @@ fn is_same_socket(first: &str, second: &str) -> bool {
 
 /// Checks that all devices except native ones have plant lines, each a different one, or that none
 /// has.
-fn plants_apart(args: &Args) -> Result<(), Failure> {
+fn check_plants_distinct(args: &Args) -> Result<(), Failure> {
     let plants: Vec<_> = { args.device.iter() }
         .filter_map(|device| device.plant.as_ref())
         .collect();

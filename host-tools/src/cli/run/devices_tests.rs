@@ -60,8 +60,8 @@ fn several_devices_have_numbered_names_and_recordings() {
 }
 
 #[test]
-fn a_device_that_is_named_twice_is_refused_also_by_two_names() {
-    for (more, says) in [
+fn device_named_twice_is_refused_also_by_alias() {
+    for (more, expected) in [
         ("--device usb:7 --device usb:7", "are both usb:7"),
         ("--device usb --device usb:7", "usb:SERIAL"),
         ("--device usb --device usb", "usb:SERIAL"),
@@ -76,7 +76,7 @@ fn a_device_that_is_named_twice_is_refused_also_by_two_names() {
     ] {
         let reported = refused(more);
         assert!(
-            reported.contains(says) && reported.contains("hint: "),
+            reported.contains(expected) && reported.contains("hint: "),
             "{reported}"
         );
     }
@@ -100,13 +100,13 @@ fn plant_line_is_part_of_an_emulated_boards_name() {
     let (one, other) = ("--device tcp:h:1+plant:h:3", "--device tcp:h:2");
     let both = plants(&format!("{one} --device native {other}+plant:h:4"));
     assert_eq!(both, [Some("h:3".into()), None, Some("h:4".into())]);
-    for (more, says) in [
+    for (more, expected) in [
         (format!("{one} {other}"), "1 of 2 devices"),
         (format!("{one} {other}+plant:h:3"), "two devices have"),
     ] {
         let reported = refused(&more);
         assert!(
-            reported.contains(says) && reported.contains("hint: "),
+            reported.contains(expected) && reported.contains("hint: "),
             "{reported}"
         );
     }

@@ -6,7 +6,7 @@ use hapterra_core::scene::Scene;
 
 use super::devices::OneDevice;
 use crate::cli::failure::Failure;
-use crate::cli::options::placing::Asked;
+use crate::cli::options::placing::TerrainRequest;
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::waiting::shown_planning;
 use crate::phantom::PlacedTerrain;
@@ -25,9 +25,9 @@ impl<'r> InReach<'r> {
     ///
     /// # Errors
     /// The arm cannot reach the heights.
-    pub(super) fn of(asked: &Asked<'r>, arm: Calibration) -> Result<Self, Failure> {
-        let view = asked.view(&arm)?;
-        let terrain = view.terrain(asked.grid)?;
+    pub(super) fn of(request: &TerrainRequest<'r>, arm: Calibration) -> Result<Self, Failure> {
+        let view = request.view(&arm)?;
+        let terrain = view.terrain(request.grid)?;
         Ok(Self { view, terrain, arm })
     }
 }
@@ -49,10 +49,10 @@ impl<'t> Placed<'t> {
     /// No place is suitable for a tour.
     pub(super) fn new(
         device: &OneDevice,
-        (name, laid): (&str, &'t InReach<'t>),
+        (name, in_reach): (&str, &'t InReach<'t>),
         params: SurfaceParams,
     ) -> Result<Self, Failure> {
-        let (view, terrain) = (laid.view, &laid.terrain);
+        let (view, terrain) = (in_reach.view, &in_reach.terrain);
         let tour = match device.is_scripted() {
             true => Some(shown_planning(name, terrain.raster(), || {
                 PlacedTerrain::in_view(terrain, view.home_mm, params, &|| !interrupt::requested())
@@ -63,7 +63,7 @@ impl<'t> Placed<'t> {
             terrain,
             view,
             scene: view.scene(terrain, params)?,
-            arm: laid.arm,
+            arm: in_reach.arm,
             tour,
         })
     }

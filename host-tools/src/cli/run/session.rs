@@ -10,7 +10,7 @@ use super::devices::OneDevice;
 use super::placed::Placed;
 use super::watch::Watch;
 use super::{Args, OTHER_FILE};
-use crate::cli::bringup::required::{brought_up, drives_no_arm};
+use crate::cli::bringup::required::{check_brought_up, check_drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::guardian::{self, WorkerMessage};
 use crate::cli::options::placing;
@@ -18,7 +18,7 @@ use crate::cli::options::steering::PlacementControl;
 use crate::cli::session_summary::{self, SessionSummary};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
-use crate::cli::viewing::ToBeShown;
+use crate::cli::viewing::PreparedViewer;
 use crate::events::Watcher;
 use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Tcp, Timeouts, Transport, serve_plant,
@@ -26,10 +26,10 @@ use crate::link::{
 use crate::materials::Materials;
 use crate::output::{Output, folder_of};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
-use crate::place::Laid;
+use crate::place::PlacedSurface;
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Rule, Settings, TICK_COLUMNS};
-use crate::serving::{Service, told_of_last_end};
+use crate::serving::{Service, last_end_remark};
 use crate::stability;
 use crate::steering::CommandQueue;
 use heightfield::without_key;
@@ -43,7 +43,7 @@ const LINGER: Duration = Duration::from_secs(2);
 const UNTOUCHED: &str = "the virtual hand never touched the ground: choose another place with --at, or a longer --duration";
 
 /// Size limit of a recording on any disk: a day of CSV at 1 kHz.
-const MAX_RECORDED: u64 = 16 << 30;
+const MAX_RECORDED_BYTES: u64 = 16 << 30;
 
 /// A device to serve, with its inputs and outputs.
 pub(super) struct Serving<'p, 't> {
@@ -52,12 +52,12 @@ pub(super) struct Serving<'p, 't> {
     pub(super) placed: &'p Placed<'t>,
     /// Result of the query for the calibration. After a failure the session is closed, because the
     /// arm may already be armed.
-    pub(super) met: Result<(), Failure>,
+    pub(super) calibration_read: Result<(), Failure>,
     pub(super) recording: Option<Recording>,
     pub(super) commands: CommandQueue,
     /// The device's share of a common keyboard.
     pub(super) device_keys: Option<Arc<DeviceKeys>>,
-    pub(super) shown: Option<ToBeShown<'t>>,
+    pub(super) viewer: Option<PreparedViewer<'t>>,
     pub(super) events: Option<Watcher>,
 }
 
@@ -76,7 +76,7 @@ impl<'t> Serving<'_, 't> {
         std::thread::scope(|scope| {
             scope.spawn(|| move_arm(address, arm, &done));
             // Also if the session panics; otherwise the line would be served for ever.
-            let _ended = AtEnd(|| {
+            let _ended = OnDrop(|| {
                 let _ = done.set(Instant::now() + LINGER);
             });
             // The arm must run until the board has reduced its force to zero.
@@ -88,37 +88,38 @@ impl<'t> Serving<'_, 't> {
         let (args, placed, device) = (self.args, self.placed, self.device);
         let device_console = &device.device_console;
         let name = device_console.name().unwrap_or_default();
-        let tell = |line: &str| device_console.tell(line);
-        let service = service(args, (device, placed), &tell);
+        let notify = |line: &str| device_console.notify(line);
+        let service = service(args, (device, placed), &notify);
         let may_be_armed = |may| interrupt::device_may_be_armed(name, &device.address, may);
         may_be_armed(true);
-        let met = self.met;
-        let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
+        let calibration_read = self.calibration_read;
+        let opened =
+            service.open(|line| calibration_read.and_then(|()| check_servable(args, device, line)));
         // Pending messages are shown even if the session cannot be opened.
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
-        device_console.say(format!("terrain        {}: {how}", args.terrain.name()));
-        device_console.show(placing::reported(&placed.view, placed.terrain));
+        device_console.print_line(format!("terrain        {}: {how}", args.terrain.name()));
+        device_console.show(placing::describe(&placed.view, placed.terrain));
         if let Some(line) = session_summary::materials(placed.terrain) {
-            device_console.say(line);
+            device_console.print_line(line);
         }
-        device_console.say(format!(
+        device_console.print_line(format!(
             "device         {}",
             session_summary::device(&hello)
         ));
-        if let Some(line) = told_of_last_end(&hello) {
-            device_console.tell(line);
+        if let Some(line) = last_end_remark(&hello) {
+            device_console.notify(line);
         }
         let materials = placed.terrain.grid().materials();
         let table = materials.map(Materials::table);
-        stability::warn_of(&placed.scene.params, table, &hello);
-        let recording = described(self.recording, args, placed, &hello);
-        let laid = Laid {
+        stability::warn_for_materials(&placed.scene.params, table, &hello);
+        let recording = with_settings(self.recording, args, placed, &hello);
+        let placed_surface = PlacedSurface {
             view: placed.view,
             params: placed.scene.params,
         };
         let mut control = PlacementControl::new(
-            (placed.terrain, laid),
+            (placed.terrain, placed_surface),
             (&placed.arm, args.rendering.level),
             self.commands,
         );
@@ -128,23 +129,24 @@ impl<'t> Serving<'_, 't> {
             None if device_console.name().is_some() => {}
             None => {
                 if let Some(line) = control.listen(&args.commands) {
-                    device_console.tell(line);
+                    device_console.notify(line);
                 }
             }
         }
         // If the viewer does not start, the session continues.
-        let shown =
-            (self.shown).and_then(|shown| shown.start(&hello, |line| device_console.tell(line)));
+        let viewer = (self.viewer)
+            .and_then(|viewer| viewer.start(&hello, |line| device_console.notify(line)));
         let control = (control, self.device_keys.as_ref());
         let watch = Watch::new(args, (placed, device_console), &hello, recording, control);
-        let mut watch = watch.shown(shown).with_events(self.events);
+        let mut watch = watch.with_viewer(viewer).with_events(self.events);
         let end = served.serve(&mut watch);
-        let is_others = matches!(end.why, Err(LinkError::Taken));
+        let is_others = matches!(end.result, Err(LinkError::Taken));
         watch.ended(end.disarmed.is_ok() && !is_others);
         // The recording is saved first, regardless of the cause of the end.
         let log = watch.finish();
-        let kept = log.kept.or_hint(OTHER_FILE);
-        let ended = reported(end.why, end.disarmed, &tell).and(came(log.stood_still));
+        let recording_result = log.recording_result.or_hint(OTHER_FILE);
+        let ended = session_result(end.result, end.disarmed, &notify)
+            .and(check_terrain_arrived(log.has_stalled));
         may_be_armed(false);
         let summary = SessionSummary {
             ticks: log.ticks,
@@ -154,22 +156,22 @@ impl<'t> Serving<'_, 't> {
         };
         device_console.show(summary.text());
         if placed.tour.is_some() && summary.figures.force_n.count() == 0 {
-            device_console.tell(UNTOUCHED);
+            device_console.notify(UNTOUCHED);
         }
-        if let (Ok(()), Some(path)) = (&kept, &device.record) {
-            device_console.say(format!("recording      {}", path.display()));
+        if let (Ok(()), Some(path)) = (&recording_result, &device.record) {
+            device_console.print_line(format!("recording      {}", path.display()));
         }
-        if let Some(shown) = log.shown {
-            shown.end(|line| device_console.say(line));
+        if let Some(viewer) = log.viewer {
+            viewer.end(|line| device_console.print_line(line));
         }
-        ended.and(kept)
+        ended.and(recording_result)
     }
 }
 
 /// Returns an error if missing terrain ended a virtual arm's session. A real arm uses the stored
 /// tiles.
-fn came(stood_still: bool) -> Result<(), Failure> {
-    match stood_still {
+fn check_terrain_arrived(has_stalled: bool) -> Result<(), Failure> {
+    match has_stalled {
         false => Ok(()),
         true => Err("the virtual arm has waited a minute for terrain that did not arrive").or_hint(
             "try again when its server answers; what went wrong with the file is said above",
@@ -178,9 +180,9 @@ fn came(stood_still: bool) -> Result<(), Failure> {
 }
 
 /// Calls a function when it is dropped.
-struct AtEnd<F: FnMut()>(F);
+struct OnDrop<F: FnMut()>(F);
 
-impl<F: FnMut()> Drop for AtEnd<F> {
+impl<F: FnMut()> Drop for OnDrop<F> {
     fn drop(&mut self) {
         (self.0)();
     }
@@ -191,8 +193,9 @@ impl<F: FnMut()> Drop for AtEnd<F> {
 fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
     while done.get().is_none() {
-        let ended = Tcp::connect(address)
-            .and_then(|mut line| serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Gone));
+        let ended = Tcp::connect(address).and_then(|mut line| {
+            serve_plant(&mut line, &mut arm, &stop).map_err(LinkError::Disconnected)
+        });
         if let Err(why) = ended {
             tracing::info!("the plant's line at {address}: {why:?}");
             std::thread::sleep(RETRY);
@@ -202,14 +205,18 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
 
 /// Checks that a device may be served: a real board must be brought up, and a board with a virtual
 /// arm must not drive a real one.
-fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
+fn check_servable(
+    args: &Args,
+    device: &OneDevice,
+    line: &mut dyn Transport,
+) -> Result<(), Failure> {
     match (&device.plant, &device.address) {
         (_, DeviceAddress::Native) => Ok(()),
         // Even with `--unchecked`: a virtual arm's zero pose and lines would be assumed for a real
         // arm.
-        (Some(_), _) => drives_no_arm(line),
+        (Some(_), _) => check_drives_no_arm(line),
         (None, _) if args.unchecked => Ok(()),
-        (None, _) => brought_up(line),
+        (None, _) => check_brought_up(line),
     }
 }
 
@@ -217,7 +224,7 @@ fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Re
 fn service<'s, 't: 's>(
     args: &'s Args,
     (device, placed): (&'s OneDevice, &'s Placed<'t>),
-    tell: &'s dyn Fn(&str),
+    notify: &'s dyn Fn(&str),
 ) -> Service<'s, 't> {
     Service {
         terrain: placed.terrain,
@@ -235,20 +242,20 @@ fn service<'s, 't: 's>(
         connect: Box::new(move || connect(args, device, placed)),
         device: device.address.to_string(),
         retry: RETRY,
-        goes_on: &|| !interrupt::requested(),
-        tell,
+        should_continue: &|| !interrupt::requested(),
+        notify,
     }
 }
 
 /// Returns the failure of the session; if there are two, prints the first.
-fn reported(
+fn session_result(
     why: Result<(), LinkError>,
     disarmed: Result<(), LinkError>,
-    tell: &dyn Fn(&str),
+    notify: &dyn Fn(&str),
 ) -> Result<(), Failure> {
     match (why, disarmed) {
         (Err(error), Err(not_confirmed)) => {
-            tell(&not_confirmed.to_string());
+            notify(&not_confirmed.to_string());
             Err(error.into())
         }
         (why, disarmed) => Ok(why.and(disarmed)?),
@@ -264,7 +271,7 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let [tick, work, cost, late] = TICK_COLUMNS.map(Column::Count);
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
-        let output = Output::create(path)?.of_recording(most_recorded(path));
+        let output = Output::create(path)?.for_recording(max_recorded_bytes(path));
         if let Some(partial) = output.partial() {
             guardian::report(&WorkerMessage::Recording(partial.to_owned()));
         }
@@ -275,13 +282,13 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
 
 /// Returns the size limit of a recording: half of the free space at its start, so that no device
 /// can fill the disk at any rate of samples.
-fn most_recorded(path: &Path) -> u64 {
+fn max_recorded_bytes(path: &Path) -> u64 {
     let free = fs4::available_space(folder_of(path));
-    free.map_or(MAX_RECORDED, |free| MAX_RECORDED.min(free / 2))
+    free.map_or(MAX_RECORDED_BYTES, |free| MAX_RECORDED_BYTES.min(free / 2))
 }
 
 /// Adds the settings of the terrain and surface to the recording.
-fn described(
+fn with_settings(
     mut recording: Option<Recording>,
     args: &Args,
     placed: &Placed<'_>,

@@ -28,18 +28,21 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
                     let _named =
                         tracing::error_span!("device", name = device_console.name()).entered();
                     let ended = serving.serve();
-                    ended.inspect_err(|failure| device_console.tell(failure.text()))
+                    ended.inspect_err(|failure| device_console.notify(failure.text()))
                 });
                 (name, thread)
             })
             .collect();
-        threads.into_iter().filter_map(failed).collect::<Vec<_>>()
+        threads
+            .into_iter()
+            .filter_map(failure_of)
+            .collect::<Vec<_>>()
     });
     all_failures(count, failures)
 }
 
 /// Returns the failure of a thread, with the device's name; `None` after success.
-fn failed(
+fn failure_of(
     (name, thread): (String, ScopedJoinHandle<'_, Result<(), Failure>>),
 ) -> Option<(String, Failure)> {
     // A session that panics closes the device, and reports a missing confirmation.
@@ -76,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_device_that_failed_is_named_with_what_to_do() {
+    fn each_failed_device_is_named_with_a_hint() {
         assert!(all_failures(2, vec![]).is_ok());
         let lost = || Failure::new("it is gone").hint("plug it in");
         let reported = |count, failures| match all_failures(count, failures) {

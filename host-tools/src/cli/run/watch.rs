@@ -13,7 +13,7 @@ use crate::cli::options::steering::{self, PlacementControl};
 use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::device_console::DeviceConsole;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
-use crate::cli::viewing::Shown;
+use crate::cli::viewing::ViewerSession;
 use crate::events::{Event as Reported, Watcher};
 use crate::link::{Event, HostRequest, LinkStats};
 use crate::output::OutputError;
@@ -25,41 +25,41 @@ use crate::terrain::Terrain;
 
 /// Time without a tick after which missing terrain is an error. The clock of a virtual arm stops
 /// while terrain is missing.
-const STANDS_STILL: Duration = Duration::from_secs(60);
+const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 /// Interval of status lines without a terminal.
-const LINE_EVERY: Duration = Duration::from_secs(2);
+const LINE_INTERVAL: Duration = Duration::from_secs(2);
 
 /// Displays and records a running session.
 pub(super) struct Watch<'t> {
     log: SampleLog<'t>,
     stop_s: f64,
     /// Time of a virtual arm's last reported tick.
-    ticked: Option<Instant>,
+    last_tick: Option<Instant>,
     /// The latest sample and its row.
     latest: Option<(TickRecord, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
     /// Number of placements in the recording.
-    described: usize,
+    described_view: usize,
     control: PlacementControl<'t>,
     prompts: ArmingPrompts,
     line_due: Instant,
-    shown: Option<Shown<'t>>,
+    viewer: Option<ViewerSession<'t>>,
     events: Option<Watcher>,
     device_console: DeviceConsole,
 }
 
 /// Result of a session's display and recording.
-pub(super) struct Seen<'t> {
+pub(super) struct WatchResult<'t> {
     /// Number of ticks since the scene was received.
     pub(super) ticks: u64,
     pub(super) figures: Figures,
     /// True if the virtual arm's clock was stopped at the end.
-    pub(super) stood_still: bool,
+    pub(super) has_stalled: bool,
     /// Connection to the viewer, if there is one.
-    pub(super) shown: Option<Shown<'t>>,
+    pub(super) viewer: Option<ViewerSession<'t>>,
     /// Result of the recording, if there is one: complete and saved.
-    pub(super) kept: Result<(), OutputError>,
+    pub(super) recording_result: Result<(), OutputError>,
 }
 
 impl<'t> Watch<'t> {
@@ -71,30 +71,30 @@ impl<'t> Watch<'t> {
         (control, device_keys): (PlacementControl<'t>, Option<&Arc<DeviceKeys>>),
     ) -> Self {
         let (script_s, prompts) = match (&placed.tour, device_keys) {
-            (Some(tour), _) => (tour.duration_s(), ArmingPrompts::for_a_script()),
+            (Some(tour), _) => (tour.duration_s(), ArmingPrompts::for_script()),
             (None, Some(device_keys)) => (f64::MAX, ArmingPrompts::at(device_keys)),
-            (None, None) => (f64::MAX, ArmingPrompts::at_the_terminal()),
+            (None, None) => (f64::MAX, ArmingPrompts::at_terminal()),
         };
         Self {
             log: SampleLog::new(placed.terrain, device),
             stop_s: args.duration.unwrap_or(f64::MAX).min(script_s),
-            ticked: placed.tour.as_ref().map(|_| Instant::now()),
+            last_tick: placed.tour.as_ref().map(|_| Instant::now()),
             latest: None,
             recording,
             failed: None,
-            described: 0,
+            described_view: 0,
             control,
             prompts,
-            line_due: Instant::now() + LINE_EVERY,
-            shown: None,
+            line_due: Instant::now() + LINE_INTERVAL,
+            viewer: None,
             events: None,
             device_console: device_console.clone(),
         }
     }
 
     /// Returns the same watch, which also sends samples to a viewer.
-    pub(super) fn shown(self, shown: Option<Shown<'t>>) -> Self {
-        Self { shown, ..self }
+    pub(super) fn with_viewer(self, viewer: Option<ViewerSession<'t>>) -> Self {
+        Self { viewer, ..self }
     }
 
     /// Returns the same watch, which also sends events.
@@ -105,39 +105,39 @@ impl<'t> Watch<'t> {
     /// Reports the end of the session to readers of events.
     pub(super) fn ended(&self, disarmed: bool) {
         if let Some(events) = &self.events {
-            events.say(&Reported::End { disarmed });
+            events.send_now(&Reported::End { disarmed });
         }
     }
 
     /// Ends the recording, and removes the status line of the terminal.
-    pub(super) fn finish(mut self) -> Seen<'t> {
+    pub(super) fn finish(mut self) -> WatchResult<'t> {
         self.device_console.status(None);
-        self.take_marks(true);
+        self.record_marks(true);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
-        let stood_still = self.stands_still();
-        let kept = match (self.failed, self.recording) {
+        let has_stalled = self.is_stalled();
+        let recording_result = match (self.failed, self.recording) {
             (Some(error), _) => Err(error),
             (None, Some(recording)) => recording.finish(),
             (None, None) => Ok(()),
         };
-        Seen {
-            shown: self.shown,
+        WatchResult {
+            viewer: self.viewer,
             ticks,
             figures,
-            stood_still,
-            kept,
+            has_stalled,
+            recording_result,
         }
     }
 
-    fn stands_still(&self) -> bool {
-        self.ticked
-            .is_some_and(|ticked| ticked.elapsed() >= STANDS_STILL)
+    fn is_stalled(&self) -> bool {
+        self.last_tick
+            .is_some_and(|last_tick| last_tick.elapsed() >= STALL_TIMEOUT)
     }
 
     /// Records new marks; at the end also those without a reply.
-    fn take_marks(&mut self, is_over: bool) {
+    fn record_marks(&mut self, is_over: bool) {
         for mark in self.control.marks(&self.log, is_over) {
-            self.device_console.tell(steering::marked(&mark));
+            self.device_console.notify(steering::mark_text(&mark));
             if let Some(events) = &self.events {
                 events.mark(&mark);
             }
@@ -148,23 +148,26 @@ impl<'t> Watch<'t> {
     }
 
     fn record(&mut self, sample: &TickRecord) -> Record {
-        let record = self.log.take(sample);
+        let record = self.log.add(sample);
         let (view, placement) = self.log.view();
-        if let Some(shown) = &mut self.shown {
-            shown.take(sample, &record, (view, placement));
+        if let Some(viewer) = &mut self.viewer {
+            viewer.on_sample(sample, &record, (view, placement));
         }
         if let Some(events) = &mut self.events {
-            events.take(sample, &record, (view, &placement.terrain));
+            events.on_sample(sample, &record, (view, &placement.terrain));
         }
-        if view > self.described
-            && let Some(laid) = &placement.laid
+        if view > self.described_view
+            && let Some(placed_surface) = &placement.placed_surface
         {
-            self.described = view;
-            self.device_console
-                .tell(steering::reported(view, laid, &placement.terrain));
+            self.described_view = view;
+            self.device_console.notify(steering::placement_text(
+                view,
+                placed_surface,
+                &placement.terrain,
+            ));
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
-                let settings = PlacementSettings::new(number, &placement.terrain, laid);
+                let settings = PlacementSettings::new(number, &placement.terrain, placed_surface);
                 let failed = recording.view(&settings).err();
                 self.failed = self.failed.take().or(failed);
             }
@@ -182,40 +185,43 @@ impl<'t> Watch<'t> {
 }
 
 impl<'t> SessionHandler<'t> for Watch<'t> {
-    fn take(&mut self, event: Event<'_>) {
+    fn on_event(&mut self, event: Event<'_>) {
         self.prompts.on_event(&event);
         self.control.on_event(&event);
         self.log.views().on_event(&event);
-        if let Some(shown) = &mut self.shown {
-            shown.on_event(&event);
+        if let Some(viewer) = &mut self.viewer {
+            viewer.on_event(&event);
         }
         if let Event::Sample(sample) = event {
             // Ticks during the final disarm must not reset the time of a stopped clock.
-            if !self.stands_still() {
-                self.ticked = self.ticked.map(|_| Instant::now());
+            if !self.is_stalled() {
+                self.last_tick = self.last_tick.map(|_| Instant::now());
             }
             self.latest = Some((*sample, self.record(sample)));
         }
     }
 
-    fn hear(&mut self, line: &str) {
-        self.device_console.tell(line);
+    fn notify(&mut self, line: &str) {
+        self.device_console.notify(line);
     }
 
-    fn asks(&mut self) -> Vec<HostRequest> {
+    fn requests(&mut self) -> Vec<HostRequest> {
         let lines = self.prompts.lines();
-        lines.iter().for_each(|line| self.device_console.tell(line));
+        lines
+            .iter()
+            .for_each(|line| self.device_console.notify(line));
         if let Some(events) = &mut self.events {
-            events.arming(lines, self.prompts.asks());
+            events.arming(lines, self.prompts.open_question());
         }
         let (device_console, events) = (&self.device_console, &self.events);
         let refuse = |text: String| {
             if let Some(events) = events {
-                events.say(&Reported::Refused { text: &text });
+                events.send_now(&Reported::Refused { text: &text });
             }
-            device_console.tell(text);
+            device_console.notify(text);
         };
-        self.control.look(self.log.t_s(), &mut |text| refuse(text));
+        self.control
+            .update(self.log.t_s(), &mut |text| refuse(text));
         if let Some(number) = self.control.entered()
             && !self.prompts.answer(number)
         {
@@ -223,21 +229,21 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
                 "question {number} is not open: answer the one that was asked last"
             ));
         }
-        self.take_marks(false);
-        let mut asks = self.prompts.messages();
-        asks.extend(self.control.asks());
-        asks
+        self.record_marks(false);
+        let mut requests = self.prompts.requests();
+        requests.extend(self.control.requests());
+        requests
     }
 
-    fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
-        let put = self.control.put(self.log.views())?;
-        Some((put.view, put.terrain))
+    fn scene_change(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
+        let update = self.control.take_update(self.log.views())?;
+        Some((update.view, update.terrain))
     }
 
     /// Updates the status line, or prints one at intervals.
     fn show(&mut self, stats: &LinkStats) {
-        if let Some(shown) = &mut self.shown {
-            shown.look(stats);
+        if let Some(viewer) = &mut self.viewer {
+            viewer.send_due(stats);
         }
         let Some((sample, record)) = &self.latest else {
             return;
@@ -250,13 +256,13 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
         if std::io::stderr().is_terminal() {
             self.device_console.status(Some(line));
         } else if Instant::now() >= self.line_due {
-            self.line_due = Instant::now() + LINE_EVERY;
-            self.device_console.tell(line);
+            self.line_due = Instant::now() + LINE_INTERVAL;
+            self.device_console.notify(line);
         }
     }
 
     fn is_over(&self) -> bool {
-        self.failed.is_some() || self.log.t_s() >= self.stop_s || self.stands_still()
+        self.failed.is_some() || self.log.t_s() >= self.stop_s || self.is_stalled()
     }
 }
 

@@ -32,8 +32,8 @@ pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<S
         let values = match value.into_inner() {
             // The surface is in this file.
             Value::Table(_) if key == "surface" => Some(vec![path.into()]),
-            Value::Array(values) => values.iter().map(word).collect(),
-            value => word(&value).map(|word| vec![word]),
+            Value::Array(values) => values.iter().map(argument).collect(),
+            value => argument(&value).map(|word| vec![word]),
         };
         let values = values
             .ok_or_else(|| format!("{place}: {key} is a text, a number, true, false or a list"))
@@ -48,7 +48,7 @@ pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<S
 }
 
 /// Converts a value to its form on the command line.
-fn word(value: &Value) -> Option<OsString> {
+fn argument(value: &Value) -> Option<OsString> {
     match value {
         Value::String(text) => Some(text.into()),
         Value::Integer(number) => Some(number.to_string().into()),

@@ -23,7 +23,7 @@ use crate::terrain::HapticCells;
 pub(super) use recorded::differences;
 
 /// The default settings file, read if it exists.
-const USUAL_FILE: &str = "hapterra.toml";
+const DEFAULT_FILE: &str = "hapterra.toml";
 /// The commands that read a settings file.
 const COMMANDS: [&str; 3] = ["run", "demo", "replay"];
 /// Options that a settings file must not contain.
@@ -46,7 +46,7 @@ impl SettingsOption {
     pub(in crate::cli) fn file(&self) -> Option<PathBuf> {
         match &self.settings {
             Some(path) => Some(path.clone()).filter(|path| path.as_os_str() != "none"),
-            None => Some(PathBuf::from(USUAL_FILE)).filter(|path| path.exists()),
+            None => Some(PathBuf::from(DEFAULT_FILE)).filter(|path| path.exists()),
         }
     }
 }
@@ -64,7 +64,7 @@ struct Setting {
 /// The arguments of a command with its settings.
 pub(super) struct Completed {
     /// The arguments.
-    pub(super) words: Vec<OsString>,
+    pub(super) arguments: Vec<OsString>,
     /// A line that names the settings file that was read.
     pub(super) line: Option<String>,
 }
@@ -73,18 +73,21 @@ pub(super) struct Completed {
 ///
 /// # Errors
 /// A settings file or a recording cannot be read; a setting is no option, or its value is invalid.
-pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Completed, Failure> {
-    let as_typed = |words| Completed { words, line: None };
-    let command = relaxed(command);
+pub(super) fn complete(command: &Command, arguments: Vec<OsString>) -> Result<Completed, Failure> {
+    let as_typed = |arguments| Completed {
+        arguments,
+        line: None,
+    };
+    let command = with_optional_arguments(command);
     // The final parse explains errors in the user's arguments.
-    let Ok(matches) = command.clone().try_get_matches_from(&words) else {
-        return Ok(as_typed(words));
+    let Ok(matches) = command.clone().try_get_matches_from(&arguments) else {
+        return Ok(as_typed(arguments));
     };
     let Some((name, of_command)) = matches.subcommand() else {
-        return Ok(as_typed(words));
+        return Ok(as_typed(arguments));
     };
     let Some(options) = command.find_subcommand(name) else {
-        return Ok(as_typed(words));
+        return Ok(as_typed(arguments));
     };
     let mut sources = Vec::from_iter(of_recording(name, of_command)?);
     let from_file = of_file(name, of_command)?;
@@ -105,21 +108,23 @@ pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Comple
             .map(|setting| setting.name.clone())
             .collect();
         for setting in settings {
-            before.extend(words_of(&command, options, &given, &mut keys, &setting)?);
+            before.extend(arguments_of(
+                &command, options, &given, &mut keys, &setting,
+            )?);
         }
         given.extend(names);
     }
-    let place = words
+    let place = arguments
         .iter()
-        .position(|word| word == name)
+        .position(|argument| argument == name)
         .map_or(1, |at| at + 1);
-    let mut words = words;
-    words.splice(place..place, before);
-    Ok(Completed { words, line })
+    let mut arguments = arguments;
+    arguments.splice(place..place, before);
+    Ok(Completed { arguments, line })
 }
 
 /// Returns the command line with all options optional.
-fn relaxed(command: &Command) -> Command {
+fn with_optional_arguments(command: &Command) -> Command {
     let mut command = command.clone();
     for subcommand in command.get_subcommands_mut() {
         *subcommand = subcommand.clone().mut_args(|arg| arg.required(false));
@@ -163,14 +168,14 @@ fn of_recording(name: &str, matches: &ArgMatches) -> Result<Option<Vec<Setting>>
     match path.filter(|path| !ignores && path.is_file()) {
         Some(path) => {
             let settings = settings_of(path)?;
-            Ok(settings.map(|it| recorded::settings(path, &it, stated_in(matches))))
+            Ok(settings.map(|it| recorded::settings(path, &it, explicit_options(matches))))
         }
         None => Ok(None),
     }
 }
 
 /// Returns the scale and the kind of cells that the user states.
-fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
+fn explicit_options(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
     let scale = matches.try_get_one::<MapScale>("scale");
     let input = matches.try_get_many::<InputSetting>("input").ok().flatten();
     let cells = input.into_iter().flatten().find_map(InputSetting::cells);
@@ -202,7 +207,7 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
             )
         })
         .or_hint("name a recording or a FILE.toml with --settings")?;
-    let settings = recorded::settings(&path, &settings, stated_in(matches));
+    let settings = recorded::settings(&path, &settings, explicit_options(matches));
     Ok(Some((path, settings)))
 }
 
@@ -221,7 +226,7 @@ fn option<'c>(command: &'c Command, name: &str) -> Option<&'c Arg> {
 
 /// Returns the arguments of a setting; none if a given option replaces or excludes it, or the
 /// command has no such option.
-fn words_of(
+fn arguments_of(
     command: &Command,
     of: &Command,
     given: &BTreeSet<String>,
@@ -244,12 +249,12 @@ fn words_of(
         return Ok(vec![]);
     }
     let is_flag = matches!(option.get_action(), ArgAction::SetTrue);
-    let mut words = Vec::new();
+    let mut arguments = Vec::new();
     for value in &setting.values {
         if is_input && !keys.insert(key_of(value)) {
             continue;
         }
-        let word = match (is_flag, value.to_str()) {
+        let argument = match (is_flag, value.to_str()) {
             (true, Some("true")) => format!("--{name}").into(),
             (true, Some("false")) => continue,
             (true, _) => {
@@ -257,22 +262,27 @@ fn words_of(
                     .or_hint("write it without quotation marks");
             }
             (false, _) => {
-                let mut word = OsString::from(format!("--{name}="));
-                word.push(value);
-                word
+                let mut argument = OsString::from(format!("--{name}="));
+                argument.push(value);
+                argument
             }
         };
-        check(command, of.get_name(), &word, setting)?;
-        words.push(word);
+        check(command, of.get_name(), &argument, setting)?;
+        arguments.push(argument);
     }
-    Ok(words)
+    Ok(arguments)
 }
 
 /// Checks that the command accepts an argument of a setting.
-fn check(command: &Command, name: &str, word: &OsStr, setting: &Setting) -> Result<(), Failure> {
+fn check(
+    command: &Command,
+    name: &str,
+    argument: &OsStr,
+    setting: &Setting,
+) -> Result<(), Failure> {
     let program = OsStr::new("hapterra");
-    let words = [program, OsStr::new(name), word];
-    let Err(error) = command.clone().try_get_matches_from(words) else {
+    let arguments = [program, OsStr::new(name), argument];
+    let Err(error) = command.clone().try_get_matches_from(arguments) else {
         return Ok(());
     };
     let text = error.render().to_string();

@@ -18,7 +18,7 @@ use crate::terrain::HapticCells;
 pub(super) fn settings(
     path: &Path,
     recorded: &Settings,
-    (scale, stated_cells): (Option<MapScale>, Option<HapticCells>),
+    (scale, explicit_cells): (Option<MapScale>, Option<HapticCells>),
 ) -> Vec<Setting> {
     let RenderedTerrain {
         cells,
@@ -28,14 +28,14 @@ pub(super) fn settings(
         measured_at,
         ..
     } = &recorded.rendered;
-    let exaggeration = height(&recorded.rendered, scale, stated_cells.unwrap_or(*cells));
-    let max_force = FORCE.say(recorded.force.max_force_n);
+    let exaggeration = height(&recorded.rendered, scale, explicit_cells.unwrap_or(*cells));
+    let max_force = FORCE.format(recorded.force.max_force_n);
     let mut options: Vec<(&str, OsString)> = vec![
         ("input", in_words(*cells).into()),
         ("scale", MapScale::CellMm(*cell_mm).to_string().into()),
         ("exaggeration", exaggeration.to_string().into()),
         ("level", level.to_string().into()),
-        ("tip", LENGTH.say(tip_mm).into()),
+        ("tip", LENGTH.format(tip_mm).into()),
         ("max-force", max_force.into()),
         ("surface", surface_file(path).into()),
     ];
@@ -82,11 +82,11 @@ pub(in crate::cli) fn differences(
     (path, recorded): (&Path, &Settings),
 ) -> Vec<String> {
     let (rendered, force, surface) = (&recorded.rendered, &recorded.force, &rendering.surface);
-    let number = |name: &str, value: Option<f32>, recorded: f32, say: &dyn Fn(f32) -> String| {
+    let number = |name: &str, value: Option<f32>, recorded: f32, format: &dyn Fn(f32) -> String| {
         (
             name.to_owned(),
-            say(value.unwrap_or(recorded)),
-            say(recorded),
+            format(value.unwrap_or(recorded)),
+            format(recorded),
         )
     };
     let recorded_height = height(rendered, rendering.scale, cells);
@@ -125,8 +125,8 @@ pub(in crate::cli) fn differences(
         ),
         (
             "tip".into(),
-            LENGTH.say(tip_mm),
-            LENGTH.say(rendered.tip_mm),
+            LENGTH.format(tip_mm),
+            LENGTH.format(rendered.tip_mm),
         ),
         (
             "surface".into(),
@@ -137,7 +137,7 @@ pub(in crate::cli) fn differences(
             "stiffness",
             surface.stiffness,
             force.stiffness_n_per_mm,
-            &|it| STIFFNESS.say(it),
+            &|it| STIFFNESS.format(it),
         ),
         number(
             "friction",
@@ -146,7 +146,7 @@ pub(in crate::cli) fn differences(
             &|it| it.to_string(),
         ),
         number("max-force", surface.max_force, force.max_force_n, &|it| {
-            FORCE.say(it)
+            FORCE.format(it)
         }),
         (
             "materials".into(),

@@ -19,23 +19,26 @@ fn completed(text: &str, line: &str) -> Result<Vec<String>, String> {
     let file = folder.path().join("s.toml");
     fs::write(&file, text).expect("written");
     let file = file.display().to_string();
-    let words = format!("hapterra {line} --settings {file}");
-    let words = words.split_whitespace().map(OsString::from).collect();
-    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text())?;
+    let arguments = format!("hapterra {line} --settings {file}");
+    let arguments = arguments.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), arguments).map_err(|failure| failure.text())?;
     assert_eq!(completed.line, Some(format!("settings       {file}")));
-    let parsed = Cli::try_parse_from(&completed.words);
+    let parsed = Cli::try_parse_from(&completed.arguments);
     parsed.map_err(|error| error.render().to_string())?;
-    let words = completed.words.iter().map(|word| word.to_string_lossy());
-    let without = words.map(|word| word.replace(&file, "FILE"));
+    let arguments = completed
+        .arguments
+        .iter()
+        .map(|word| word.to_string_lossy());
+    let without = arguments.map(|word| word.replace(&file, "FILE"));
     Ok(without.filter(|word| word.starts_with("--")).collect())
 }
 
 #[test]
-fn settings_stand_before_the_words_of_the_user() {
+fn settings_precede_user_arguments() {
     let text = "scale = \"5m/mm\"\ntip = 2\nsurface = \"sand\"\ninput = [\"band=2\", \"cell=30m\"]\nview = true\n";
-    let words = completed(text, "run t.tif").expect("settings");
+    let arguments = completed(text, "run t.tif").expect("settings");
     assert_eq!(
-        words,
+        arguments,
         [
             "--input=band=2",
             "--input=cell=30m",
@@ -46,17 +49,17 @@ fn settings_stand_before_the_words_of_the_user() {
             "--settings"
         ]
     );
-    let words = completed("view = false\n", "run t.tif").expect("settings");
-    assert_eq!(words, ["--settings"]);
+    let arguments = completed("view = false\n", "run t.tif").expect("settings");
+    assert_eq!(arguments, ["--settings"]);
 }
 
 #[test]
 fn command_line_wins() {
     let text =
         "scale = \"5m/mm\"\ninput = [\"band=2\", \"cell=30m\"]\nat = \"1,2\"\ncrs = \"lonlat\"\n";
-    let words = completed(text, "run t.tif --scale 1mm/cell --input band=1").expect("settings");
+    let arguments = completed(text, "run t.tif --scale 1mm/cell --input band=1").expect("settings");
     assert_eq!(
-        words,
+        arguments,
         [
             "--at=1,2",
             "--crs=lonlat",
@@ -67,9 +70,9 @@ fn command_line_wins() {
         ]
     );
     // A box is fitted, so it excludes a place and a scale.
-    let words = completed(text, "run t.tif --bbox 1,2,3,4").expect("settings");
+    let arguments = completed(text, "run t.tif --bbox 1,2,3,4").expect("settings");
     assert_eq!(
-        words,
+        arguments,
         [
             "--crs=lonlat",
             "--input=band=2",
@@ -81,24 +84,27 @@ fn command_line_wins() {
 }
 
 #[test]
-fn keys_of_other_commands_are_left_alone() {
+fn keys_of_other_commands_are_ignored() {
     let text = "rounds = 3\nsilence = \"30s\"\nrows-are-ticks = true\n";
-    let words = completed(text, "demo t.tif").expect("settings");
-    assert_eq!(words, ["--rounds=3", "--settings"]);
-    let words = completed(text, "run t.tif").expect("settings");
-    assert_eq!(words, ["--silence=30s", "--settings"]);
+    let arguments = completed(text, "demo t.tif").expect("settings");
+    assert_eq!(arguments, ["--rounds=3", "--settings"]);
+    let arguments = completed(text, "run t.tif").expect("settings");
+    assert_eq!(arguments, ["--silence=30s", "--settings"]);
 }
 
 #[test]
-fn surface_may_stand_in_the_file() {
+fn settings_file_may_contain_a_surface() {
     let text = "device = \"native\"\n[surface.default]\nfriction = 0.4\n";
-    let words = completed(text, "run t.tif").expect("settings");
-    assert_eq!(words, ["--device=native", "--surface=FILE", "--settings"]);
+    let arguments = completed(text, "run t.tif").expect("settings");
+    assert_eq!(
+        arguments,
+        ["--device=native", "--surface=FILE", "--settings"]
+    );
 }
 
 #[test]
 fn errors_name_file_and_line() {
-    for (text, wanted) in [
+    for (text, expected) in [
         (
             "tip = 2\nscales = 3\n",
             "line 2: no command has an option --scales",
@@ -113,13 +119,13 @@ fn errors_name_file_and_line() {
         ("at = \"1,2\"\nbbox = \"1,2,3,4\"\n", "cannot be used with"),
     ] {
         let why = completed(text, "run t.tif").expect_err(text);
-        assert!(why.contains(wanted), "{text}: {why}");
+        assert!(why.contains(expected), "{text}: {why}");
     }
 }
 
 #[test]
 fn command_line_without_settings_is_left_unchanged() {
-    let words =
+    let arguments =
         |line: &str| -> Vec<OsString> { line.split_whitespace().map(OsString::from).collect() };
     for line in [
         "hapterra run t.tif --settings none",
@@ -128,13 +134,17 @@ fn command_line_without_settings_is_left_unchanged() {
         "hapterra",
         "hapterra run t.tif --nonsense",
     ] {
-        let completed = complete(&Cli::command(), words(line)).map_err(|failure| failure.text());
+        let completed =
+            complete(&Cli::command(), arguments(line)).map_err(|failure| failure.text());
         let completed = completed.expect(line);
-        assert_eq!((completed.words, completed.line), (words(line), None));
+        assert_eq!(
+            (completed.arguments, completed.line),
+            (arguments(line), None)
+        );
     }
     let missing = complete(
         &Cli::command(),
-        words("hapterra run t.tif --settings no.toml"),
+        arguments("hapterra run t.tif --settings no.toml"),
     );
     assert!(missing.is_err());
 }
@@ -169,9 +179,9 @@ fn replayed(more: &str) -> (crate::cli::replay::Args, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, settings) = recording(folder.path());
     let line = format!("hapterra replay t.tif {} -o x.csv {more}", path.display());
-    let words = line.split_whitespace().map(OsString::from).collect();
-    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());
-    let cli = Cli::try_parse_from(completed.expect(more).words).expect(more);
+    let arguments = line.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), arguments).map_err(|failure| failure.text());
+    let cli = Cli::try_parse_from(completed.expect(more).arguments).expect(more);
     let crate::cli::Command::Replay(args) = cli.command else {
         panic!("{more}");
     };
@@ -181,7 +191,7 @@ fn replayed(more: &str) -> (crate::cli::replay::Args, Vec<String>) {
 }
 
 #[test]
-fn options_of_a_recording_are_those_of_its_making() {
+fn recording_options_are_those_of_the_recorded_run() {
     let (args, lines) = replayed("");
     assert_eq!(lines, [""; 0]);
     let rendering = &args.rendering;
@@ -255,14 +265,14 @@ fn recorded_surface_restores_every_bit_of_its_params() {
     );
     // `run` also accepts the recording.
     let line = format!("hapterra run t.tif --settings {}", path.display());
-    let words = line.split_whitespace().map(OsString::from).collect();
-    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());
-    let words = completed.expect("a recording").words;
+    let arguments = line.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), arguments).map_err(|failure| failure.text());
+    let arguments = completed.expect("a recording").arguments;
     for word in [
         "--scale=2mm/cell",
         "--exaggeration=6mm/unit",
         "--max-force=4N",
     ] {
-        assert!(words.contains(&word.into()), "{words:?}");
+        assert!(arguments.contains(&word.into()), "{arguments:?}");
     }
 }

@@ -34,7 +34,7 @@ struct Question {
 struct Line {
     text: String,
     /// The action of Enter after this line.
-    asks: Option<Question>,
+    question: Option<Question>,
 }
 
 /// Source of Enter.
@@ -47,9 +47,9 @@ trait Enter {
 }
 
 /// A user at the terminal.
-struct AtTheTerminal;
+struct TerminalEnter;
 
-impl Enter for AtTheTerminal {
+impl Enter for TerminalEnter {
     fn forget(&mut self) {
         keyboard().forget_typed();
     }
@@ -71,9 +71,9 @@ impl Enter for Arc<DeviceKeys> {
 }
 
 /// No source of Enter.
-struct Nobody;
+struct NoEnter;
 
-impl Enter for Nobody {
+impl Enter for NoEnter {
     fn forget(&mut self) {}
 
     fn was_pressed(&mut self) -> bool {
@@ -92,12 +92,12 @@ pub(in crate::cli) struct ArmingPrompts {
     number: u32,
     report: Option<Report>,
     /// True after a reconnection, until the first report shows whether the arm is armed.
-    is_back: bool,
+    has_reconnected: bool,
     /// True while the counts of a zero pose that the user confirmed are requested.
     zeroing: bool,
-    say: Vec<HostRequest>,
+    requests: Vec<HostRequest>,
     /// True if a user arms; false for a virtual hand, which follows its script.
-    leads: bool,
+    is_interactive: bool,
     /// Lines for the user, in order.
     lines: Vec<Line>,
     line_limit: LineLimit,
@@ -105,18 +105,18 @@ pub(in crate::cli) struct ArmingPrompts {
 
 impl ArmingPrompts {
     /// Creates prompts for a virtual hand: only errors are shown.
-    pub(in crate::cli) fn for_a_script() -> Self {
+    pub(in crate::cli) fn for_script() -> Self {
         Self {
-            leads: false,
-            ..Self::listening(Nobody)
+            is_interactive: false,
+            ..Self::listening(NoEnter)
         }
     }
 
     /// Creates prompts at the terminal, if there is one.
-    pub(in crate::cli) fn at_the_terminal() -> Self {
+    pub(in crate::cli) fn at_terminal() -> Self {
         match io::stdin().is_terminal() {
-            true => Self::listening(AtTheTerminal),
-            false => Self::listening(Nobody),
+            true => Self::listening(TerminalEnter),
+            false => Self::listening(NoEnter),
         }
     }
 
@@ -135,10 +135,10 @@ impl ArmingPrompts {
             question: None,
             number: fastrand::u32(..1 << 30),
             report: None,
-            is_back: false,
+            has_reconnected: false,
             zeroing: false,
-            say: vec![],
-            leads: true,
+            requests: vec![],
+            is_interactive: true,
             lines: vec![],
             line_limit: LineLimit::new(LINES_A_SECOND),
         }
@@ -148,29 +148,31 @@ impl ArmingPrompts {
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Guard(report) => self.on_guard_report(report),
-            Event::Opened { .. } => self.is_back = self.leads,
+            Event::Opened { .. } => self.has_reconnected = self.is_interactive,
             Event::Answered { request, result } => match (request, result) {
                 (Request::Arm, Err(Refusal::Blocked(why))) => {
-                    self.tell("not armed:");
-                    self.name(*why);
-                    self.ask_for_enter(*why);
+                    self.push_line("not armed:");
+                    self.report_blockers(*why);
+                    self.prompt_for_enter(*why);
                 }
                 // The arm is already armed in its present pose.
                 (Request::Zero { .. }, Err(Refusal::NotWhileArmed)) => {}
-                (request, Err(refused)) => self.tell(format!("{request:?}: {refused}")),
+                (request, Err(refused)) => self.push_line(format!("{request:?}: {refused}")),
                 (_, Ok(())) => {}
             },
-            Event::Unanswered(ask) => {
-                self.zeroing &= **ask != HostRequest::Status;
-                self.tell(format!("the device does not answer: {ask:?} was given up"));
+            Event::Unanswered(request) => {
+                self.zeroing &= **request != HostRequest::Status;
+                self.push_line(format!(
+                    "the device does not answer: {request:?} was given up"
+                ));
             }
             Event::Status(status) if self.zeroing => {
                 self.zeroing = false;
                 let counts = status.health.sense.counts;
                 let requests = [Request::Zero { counts }, Request::Arm];
-                self.say.extend(requests.map(HostRequest::Request));
+                self.requests.extend(requests.map(HostRequest::Request));
                 let [a, b, c] = counts;
-                self.tell(format!("zeroed at {a} {b} {c} counts"));
+                self.push_line(format!("zeroed at {a} {b} {c} counts"));
             }
             _ => {}
         }
@@ -180,58 +182,61 @@ impl ArmingPrompts {
     fn on_guard_report(&mut self, report: &Report) {
         let before = self.report.replace(*report);
         let is_settled = report.mode == Mode::Disarmed || report.mode.is_driving();
-        if self.is_back && is_settled {
-            self.is_back = false;
+        if self.has_reconnected && is_settled {
+            self.has_reconnected = false;
             if report.mode == Mode::Disarmed && report.fault.is_none() {
-                self.tell("the arm is not armed any more");
-                return self.ask_for_enter(report.blockers);
+                self.push_line("the arm is not armed any more");
+                return self.prompt_for_enter(report.blockers);
             }
         }
-        let news = |r: &Report| (r.mode, r.fault, r.blockers);
-        if before.as_ref().map(news) == Some(news(report)) {
+        let state = |r: &Report| (r.mode, r.fault, r.blockers);
+        if before.as_ref().map(state) == Some(state(report)) {
             return;
         }
         let was = before.and_then(|before| before.fault);
         if let Some(fault) = report.fault.filter(|_| was != report.fault) {
             let (number, meaning) = (fault.number(), fault.meaning());
-            self.tell(format!("FAULT {number} {fault:?}: {meaning}"));
-            self.tell(format!("  {}", fault.remedy()));
-            return self.ask_for_enter(report.blockers);
+            self.push_line(format!("FAULT {number} {fault:?}: {meaning}"));
+            self.push_line(format!("  {}", fault.remedy()));
+            return self.prompt_for_enter(report.blockers);
         }
         match report.mode {
-            _ if !self.leads => {}
+            _ if !self.is_interactive => {}
             // Other blockers are refused or end in a moment.
             Mode::Requested if Blockers::BY_HAND.contains(report.blockers) => {
-                self.tell("ready to arm; waits for your hand:");
-                self.name(report.blockers);
+                self.push_line("ready to arm; waits for your hand:");
+                self.report_blockers(report.blockers);
             }
             Mode::Confirming if report.blockers.contains(Blockers::FORCE_TOO_LARGE) => {
                 let what = Blockers::FORCE_TOO_LARGE.meaning();
-                self.tell(format!("held back: {what}"));
+                self.push_line(format!("held back: {what}"));
             }
-            Mode::Ramping => self.tell("amplifiers on; force comes in"),
-            Mode::Armed => self.tell("armed"),
+            Mode::Ramping => self.push_line("amplifiers on; force comes in"),
+            Mode::Armed => self.push_line("armed"),
             Mode::Disarmed if before.is_some_and(|before| before.mode.is_driving()) => {
-                self.tell("disarmed; amplifiers off");
+                self.push_line("disarmed; amplifiers off");
             }
             _ => {}
         }
     }
 
-    fn tell(&mut self, text: impl Into<String>) {
+    fn push_line(&mut self, text: impl Into<String>) {
         let text = text.into();
-        self.lines.push(Line { text, asks: None });
+        self.lines.push(Line {
+            text,
+            question: None,
+        });
     }
 
     /// Prints each blocker with its remedy.
-    fn name(&mut self, blockers: Blockers) {
+    fn report_blockers(&mut self, blockers: Blockers) {
         for (name, meaning) in blockers.meanings() {
-            self.tell(format!("  {name}: {meaning}"));
+            self.push_line(format!("  {name}: {meaning}"));
         }
     }
 
-    fn ask_for_enter(&mut self, why: Blockers) {
-        if !self.leads {
+    fn prompt_for_enter(&mut self, why: Blockers) {
+        if !self.is_interactive {
             return;
         }
         let fault = self.report.and_then(|report| report.fault);
@@ -244,28 +249,28 @@ impl ArmingPrompts {
         };
         self.lines.push(Line {
             text,
-            asks: Some(Question { fault, zeroes }),
+            question: Some(Question { fault, zeroes }),
         });
     }
 
     /// Returns the present messages to the device.
-    pub(in crate::cli) fn messages(&mut self) -> Vec<HostRequest> {
+    pub(in crate::cli) fn requests(&mut self) -> Vec<HostRequest> {
         if self.enter.was_pressed()
             && let Some(question) = self.question.take()
         {
             self.on_enter(question);
         }
-        std::mem::take(&mut self.say)
+        std::mem::take(&mut self.requests)
     }
 
     /// Returns the number of the open question.
-    pub(in crate::cli) fn asks(&self) -> Option<u32> {
+    pub(in crate::cli) fn open_question(&self) -> Option<u32> {
         self.question.map(|_| self.number)
     }
 
     /// Answers the question with this number. Returns false if it is not open.
     pub(in crate::cli) fn answer(&mut self, number: u32) -> bool {
-        let is_open = self.asks() == Some(number);
+        let is_open = self.open_question() == Some(number);
         if is_open && let Some(question) = self.question.take() {
             self.on_enter(question);
         }
@@ -277,14 +282,14 @@ impl ArmingPrompts {
         // The user has not read about a fault after the question.
         if fault.is_some() && fault != question.fault {
             let blockers = self.report.unwrap_or_default().blockers;
-            return self.ask_for_enter(blockers);
+            return self.prompt_for_enter(blockers);
         }
         if fault.is_some() {
-            self.say
+            self.requests
                 .push(HostRequest::Request(Request::ClearFault { fault }));
         }
         self.zeroing = question.zeroes;
-        self.say.push(match question.zeroes {
+        self.requests.push(match question.zeroes {
             true => HostRequest::Status,
             false => HostRequest::Request(Request::Arm),
         });
@@ -294,22 +299,22 @@ impl ArmingPrompts {
     /// may flicker; omitted lines are counted. An omitted question counts as not asked.
     pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
         let now = Instant::now();
-        let mut stated = vec![];
+        let mut shown = vec![];
         for line in self.lines.drain(..) {
-            let Some(left_out) = self.line_limit.admit(now) else {
+            let Some(omitted) = self.line_limit.admit(now) else {
                 continue;
             };
-            if left_out > 0 {
-                stated.push(format!("({left_out} lines left out)"));
+            if omitted > 0 {
+                shown.push(format!("({omitted} lines left out)"));
             }
-            if line.asks.is_some() {
-                self.question = line.asks;
+            if line.question.is_some() {
+                self.question = line.question;
                 self.number = self.number.wrapping_add(1);
                 self.enter.forget();
             }
-            stated.push(line.text);
+            shown.push(line.text);
         }
-        stated
+        shown
     }
 }
 
@@ -328,7 +333,7 @@ mod tests {
         }
     }
 
-    fn with_a_user() -> (Sender<()>, ArmingPrompts) {
+    fn with_user() -> (Sender<()>, ArmingPrompts) {
         let (press, enter) = channel();
         (press, ArmingPrompts::listening(enter))
     }
@@ -346,43 +351,43 @@ mod tests {
     };
 
     #[test]
-    fn an_enter_from_before_the_question_is_no_answer() {
-        let (press, mut prompts) = with_a_user();
+    fn enter_before_the_question_is_no_answer() {
+        let (press, mut prompts) = with_user();
         press.send(()).expect("listening");
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
-        assert_eq!(prompts.messages(), []);
+        assert_eq!(prompts.requests(), []);
         // An Enter before the question is on the terminal is no answer either.
         press.send(()).expect("listening");
         assert!(prompts.lines().join("\n").contains("press Enter"));
-        assert_eq!(prompts.messages(), []);
+        assert_eq!(prompts.requests(), []);
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [HostRequest::Status]);
+        assert_eq!(prompts.requests(), [HostRequest::Status]);
         // A question is answered only once.
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), []);
+        assert_eq!(prompts.requests(), []);
     }
 
     #[test]
     fn answer_counts_for_the_question_it_names() {
-        let mut prompts = ArmingPrompts::listening(Nobody);
+        let mut prompts = ArmingPrompts::listening(NoEnter);
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
-        assert_eq!(prompts.asks(), None, "before it is shown");
+        assert_eq!(prompts.open_question(), None, "before it is shown");
         prompts.lines();
-        let first = prompts.asks().expect("a question");
+        let first = prompts.open_question().expect("a question");
         assert!(!prompts.answer(first.wrapping_add(1)));
         prompts.on_event(&REFUSED);
         prompts.lines();
-        let second = prompts.asks().expect("another");
+        let second = prompts.open_question().expect("another");
         assert!(!prompts.answer(first), "one that was asked before");
         assert!(prompts.answer(second) && !prompts.answer(second));
-        assert_eq!(prompts.messages(), [HostRequest::Status]);
+        assert_eq!(prompts.requests(), [HostRequest::Status]);
     }
 
     #[test]
     fn enter_pressed_before_a_fault_is_shown_does_not_clear_it() {
-        let (press, mut prompts) = with_a_user();
+        let (press, mut prompts) = with_user();
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
         prompts.lines();
@@ -393,17 +398,17 @@ mod tests {
             ..Report::default()
         };
         prompts.on_event(&Event::Guard(&report));
-        assert_eq!(prompts.messages(), []);
+        assert_eq!(prompts.requests(), []);
         assert!(prompts.lines().join("\n").contains("EncoderJump"));
         press.send(()).expect("listening");
         let fault = report.fault;
-        let wanted = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
-        assert_eq!(prompts.messages(), wanted);
+        let expected = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
+        assert_eq!(prompts.requests(), expected);
     }
 
     #[test]
     fn enter_arms_a_device_that_resumes_disarmed() {
-        let (press, mut prompts) = with_a_user();
+        let (press, mut prompts) = with_user();
         let device = crate::link::hello();
         let resumed = true;
         let opened = Event::Opened {
@@ -421,28 +426,28 @@ mod tests {
             assert_eq!(reported.contains("press Enter to arm"), asks, "{reported}");
         }
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [HostRequest::Request(Request::Arm)]);
+        assert_eq!(prompts.requests(), [HostRequest::Request(Request::Arm)]);
     }
 
     #[test]
-    fn a_device_whose_state_flickers_does_not_flood_the_terminal() {
-        let (_press, mut prompts) = with_a_user();
-        let mut stated = 0;
+    fn flickering_state_does_not_flood_the_terminal() {
+        let (_press, mut prompts) = with_user();
+        let mut shown = 0;
         for flicker in 0..10_000 {
             let report = Report {
                 fault: (flicker % 2 == 0).then_some(Fault::EncoderJump),
                 ..Report::default()
             };
             prompts.on_event(&Event::Guard(&report));
-            stated += prompts.lines().len();
+            shown += prompts.lines().len();
         }
         // Far fewer than all lines, even if the test ran slowly.
-        assert!((24..5_000).contains(&stated), "{stated} lines");
+        assert!((24..5_000).contains(&shown), "{shown} lines");
     }
 
     #[test]
     fn missing_zero_is_reported_and_enter_requests_status() {
-        let (press, mut prompts) = with_a_user();
+        let (press, mut prompts) = with_user();
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
         let reported = prompts.lines().join("\n");
@@ -450,14 +455,14 @@ mod tests {
             reported.contains("NOT_ZEROED") && reported.contains("press Enter"),
             "{reported}"
         );
-        assert_eq!(prompts.messages(), []);
+        assert_eq!(prompts.requests(), []);
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [HostRequest::Status]);
+        assert_eq!(prompts.requests(), [HostRequest::Status]);
     }
 
     #[test]
     fn scripted_run_reports_errors_without_prompts() {
-        let mut prompts = ArmingPrompts::for_a_script();
+        let mut prompts = ArmingPrompts::for_script();
         for mode in [Mode::Disarmed, Mode::Requested, Mode::Ramping, Mode::Armed] {
             let report = Report {
                 mode,
@@ -483,7 +488,7 @@ mod tests {
 
     #[test]
     fn dead_man_prompt_is_shown_once() {
-        let (_press, mut prompts) = with_a_user();
+        let (_press, mut prompts) = with_user();
         let waits = |more| Report {
             mode: Mode::Requested,
             blockers: Blockers::DEAD_MAN_RELEASED | more,
@@ -500,7 +505,7 @@ mod tests {
 
     #[test]
     fn fault_is_shown_once_and_enter_clears_it_and_arms() {
-        let (press, mut prompts) = with_a_user();
+        let (press, mut prompts) = with_user();
         let report = Report {
             fault: Some(Fault::DeadManReleased),
             blockers: Blockers::FAULT_LATCHED,
@@ -517,7 +522,7 @@ mod tests {
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
         let fault = report.fault;
-        let wanted = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
-        assert_eq!(prompts.messages(), wanted);
+        let expected = [Request::ClearFault { fault }, Request::Arm].map(HostRequest::Request);
+        assert_eq!(prompts.requests(), expected);
     }
 }

@@ -58,8 +58,8 @@ impl DeviceConsole {
     }
 
     /// Writes a line to standard output.
-    pub(in crate::cli) fn say(&self, line: impl Display) {
-        writer::say(self.named(&line.to_string()));
+    pub(in crate::cli) fn print_line(&self, line: impl Display) {
+        writer::print_line(self.with_name(&line.to_string()));
     }
 
     /// Writes whole lines to standard output.
@@ -67,13 +67,13 @@ impl DeviceConsole {
         let text = text.to_string();
         match self.several {
             None => writer::show(text),
-            Some(_) => writer::show(self.named(text.trim_end_matches('\n')) + "\n"),
+            Some(_) => writer::show(self.with_name(text.trim_end_matches('\n')) + "\n"),
         }
     }
 
     /// Writes lines to standard error.
-    pub(in crate::cli) fn tell(&self, line: impl Display) {
-        writer::tell(self.named(&line.to_string()));
+    pub(in crate::cli) fn notify(&self, line: impl Display) {
+        writer::notify(self.with_name(&line.to_string()));
     }
 
     /// Replaces or removes this device's status line.
@@ -85,13 +85,13 @@ impl DeviceConsole {
         let bottom = several.bottom.lock();
         let mut bottom = bottom.unwrap_or_else(PoisonError::into_inner);
         if let Some(own) = bottom.0.get_mut(several.index) {
-            *own = line.map(|line| self.named(&line));
+            *own = line.map(|line| self.with_name(&line));
         }
         writer::status(bottom.text());
     }
 
     /// Adds the device's name to each line of a text.
-    fn named(&self, text: &str) -> String {
+    fn with_name(&self, text: &str) -> String {
         match self.name() {
             None => text.to_owned(),
             Some(name) => {
@@ -109,15 +109,15 @@ mod tests {
     #[test]
     fn console_prefixes_lines_only_with_several_devices() {
         let alone = DeviceConsole::of_each(&["usb"]);
-        assert_eq!(alone[0].named("a\nb"), "a\nb");
+        assert_eq!(alone[0].with_name("a\nb"), "a\nb");
         assert_eq!(alone[0].name(), None);
         let two = DeviceConsole::of_each(&["native", "tcp:h:1"]);
-        assert_eq!(two[0].named("a\nb"), "[1 native] a\n[1 native] b");
-        assert_eq!(two[1].named("a"), "[2 tcp:h:1] a");
+        assert_eq!(two[0].with_name("a\nb"), "[1 native] a\n[1 native] b");
+        assert_eq!(two[1].with_name("a"), "[2 tcp:h:1] a");
     }
 
     #[test]
-    fn each_device_has_its_own_line_at_the_bottom() {
+    fn each_device_has_its_own_status_line() {
         let two = DeviceConsole::of_each(&["native", "usb:7"]);
         let bottom = || {
             let several = two[0].several.as_ref().expect("several");

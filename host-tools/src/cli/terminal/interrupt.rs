@@ -12,13 +12,13 @@ use std::thread::Builder;
 use std::time::Duration;
 
 use super::raw_mode;
-use super::writer::put;
+use super::writer::write_text;
 use crate::cli::guardian::{self, WorkerMessage};
 use crate::link::DeviceAddress;
 
 /// Signals that request an end.
 #[cfg(unix)]
-pub(in crate::cli) const ASK_FOR_AN_END: [i32; 7] = {
+pub(in crate::cli) const EXIT_SIGNALS: [i32; 7] = {
     use signal_hook::consts::signal::{
         SIGALRM, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2,
     };
@@ -35,7 +35,7 @@ static PRESSED: AtomicBool = AtomicBool::new(false);
 static MAY_BE_ARMED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// Time-out of a write to a terminal without a reader.
-const WRITTEN: Duration = Duration::from_millis(200);
+const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// Exit code of a program that was interrupted twice, by the convention of shells.
 pub(in crate::cli) const INTERRUPTED: i32 = 130;
@@ -60,7 +60,7 @@ pub fn listen() {
 
 #[cfg(unix)]
 fn handle(on_signal: fn()) -> io::Result<()> {
-    let mut signals = signal_hook::iterator::Signals::new(ASK_FOR_AN_END)?;
+    let mut signals = signal_hook::iterator::Signals::new(EXIT_SIGNALS)?;
     let wait = move || signals.forever().for_each(|_| on_signal());
     Builder::new().name("signals".into()).spawn(wait).map(drop)
 }
@@ -94,7 +94,7 @@ pub(in crate::cli) fn end_without_guardian() {
     if !IS_LISTENING.load(Ordering::Relaxed) {
         exit(INTERRUPTED);
     }
-    super::writer::tell("the process that watches this one is gone: it ends");
+    super::writer::notify("the process that watches this one is gone: it ends");
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
@@ -116,9 +116,9 @@ pub(in crate::cli) fn input_ended() {
 fn press() {
     REQUESTED.store(true, Ordering::Relaxed);
     if PRESSED.swap(true, Ordering::Relaxed) {
-        raw_mode::put_back();
+        raw_mode::restore();
         if let Some(line) = not_confirmed(&may_be_armed()) {
-            say(line);
+            print_line(line);
         }
         exit(INTERRUPTED);
     }
@@ -139,14 +139,14 @@ pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String>
 }
 
 /// Writes to a terminal; one without a reader does not delay the end.
-pub(in crate::cli) fn say(line: String) {
+pub(in crate::cli) fn print_line(line: String) {
     let (done, is_done) = channel();
     let write = move || {
-        put(io::stderr(), &line);
+        write_text(io::stderr(), &line);
         let _ = done.send(());
     };
     if Builder::new().spawn(write).is_ok() {
-        let _ = is_done.recv_timeout(WRITTEN);
+        let _ = is_done.recv_timeout(WRITE_TIMEOUT);
     }
 }
 

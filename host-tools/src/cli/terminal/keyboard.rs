@@ -16,9 +16,9 @@ use super::raw_mode;
 use crate::steering::keys::Key;
 
 /// Maximum pending lines.
-const WAITING: usize = 64;
+const MAX_WAITING: usize = 64;
 /// Interval of checks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Standard input, line by line.
 pub(in crate::cli) struct Keyboard {
@@ -42,8 +42,8 @@ pub(in crate::cli) fn keyboard() -> MutexGuard<'static, Keyboard> {
 
 impl Keyboard {
     fn listening() -> Self {
-        let (typed, lines) = sync_channel(WAITING);
-        let (press, pressed) = sync_channel(WAITING);
+        let (typed, lines) = sync_channel(MAX_WAITING);
+        let (press, pressed) = sync_channel(MAX_WAITING);
         let is_typed = io::stdin().is_terminal();
         let reads_keys = raw_mode::is_raw();
         std::thread::spawn(move || {
@@ -107,7 +107,7 @@ impl Keyboard {
     /// Waits for the next line; returns `None` if the input ends or an end is requested.
     pub(in crate::cli) fn line(&self) -> Option<String> {
         while !interrupt::requested() {
-            match self.lines.recv_timeout(LOOK) {
+            match self.lines.recv_timeout(POLL_INTERVAL) {
                 Ok(line) => return Some(line),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return None,
@@ -129,12 +129,12 @@ fn read(typed: &SyncSender<String>, is_typed: bool) {
         let Ok(line) = line else {
             return;
         };
-        let taken = match is_typed {
+        let queued = match is_typed {
             // Input beyond the limit is older than any question, so it is no answer.
             true => !matches!(typed.try_send(line), Err(TrySendError::Disconnected(_))),
             false => typed.send(line).is_ok(),
         };
-        if !taken {
+        if !queued {
             return;
         }
     }
@@ -146,8 +146,8 @@ mod tests {
 
     #[test]
     fn forget_typed_drops_typed_answers_but_not_piped_lines() {
-        let (typed, lines) = sync_channel(WAITING);
-        let (press, pressed) = sync_channel(WAITING);
+        let (typed, lines) = sync_channel(MAX_WAITING);
+        let (press, pressed) = sync_channel(MAX_WAITING);
         let mut keyboard = Keyboard {
             lines,
             pressed,
@@ -178,8 +178,8 @@ mod tests {
 
     #[test]
     fn typed_lines_become_key_presses_but_piped_lines_do_not() {
-        let (typed, lines) = sync_channel(WAITING);
-        let (press, pressed) = sync_channel(WAITING);
+        let (typed, lines) = sync_channel(MAX_WAITING);
+        let (press, pressed) = sync_channel(MAX_WAITING);
         let mut keyboard = Keyboard {
             lines,
             pressed,

@@ -6,7 +6,7 @@ use crate::output::partial_files;
 
 /// Reports on standard error the partial files of killed commands, and how to keep them. No other
 /// part of the program touches these.
-pub fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
+pub fn report<'p>(files: impl IntoIterator<Item = &'p Path>) {
     for line in files.into_iter().flat_map(lines) {
         eprintln!("{line}");
     }
@@ -14,8 +14,8 @@ pub fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
 
 /// Returns two lines for each partial file of `file`.
 fn lines(file: &Path) -> Vec<String> {
-    let found = partial_files(file).into_iter().flat_map(|left| {
-        let (path, bytes) = (left.path.display(), left.bytes);
+    let found = partial_files(file).into_iter().flat_map(|partial| {
+        let (path, bytes) = (partial.path.display(), partial.bytes);
         [
             format!(
                 "note: {path} ({bytes} bytes) is what a command that was killed had written of {}",
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_its_size_and_what_to_do_are_named() {
+    fn partial_file_is_named_with_size_and_remedy() {
         let folder = tempfile::tempdir().expect("a folder");
         let partial = folder.path().join("out.csv.a1B2c3.partial");
         std::fs::write(&partial, "t_s,x_mm").expect("written");

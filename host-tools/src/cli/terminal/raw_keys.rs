@@ -20,7 +20,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
     let (mut keys, mut chunk, mut stdin) = (Sequence::default(), [0; 64], io::stdin().lock());
     while let Ok(n @ 1..) = stdin.read(&mut chunk) {
         for byte in chunk.iter().take(n) {
-            match keys.take(*byte) {
+            match keys.push(*byte) {
                 Some(Typed::Interrupt) => interrupt::press_key(),
                 // Keys beyond the limit are dropped.
                 Some(Typed::Pressed(key)) => drop(pressed.try_send(key)),
@@ -28,7 +28,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
             }
         }
     }
-    raw_mode::put_back();
+    raw_mode::restore();
 }
 
 /// Meaning of a byte, or of the end of a sequence.
@@ -50,7 +50,7 @@ enum Sequence {
 }
 
 impl Sequence {
-    fn take(&mut self, byte: u8) -> Option<Typed> {
+    fn push(&mut self, byte: u8) -> Option<Typed> {
         let arrow = |east, north| Some(Typed::Pressed(Pressed::Key(Key::Arrow(east, north))));
         match (std::mem::take(self), byte) {
             (_, 0x03 | 0x1C) => Some(Typed::Interrupt),
@@ -85,7 +85,7 @@ mod tests {
 
     fn typed(bytes: &[u8]) -> Vec<Typed> {
         let mut keys = Sequence::default();
-        bytes.iter().filter_map(|byte| keys.take(*byte)).collect()
+        bytes.iter().filter_map(|byte| keys.push(*byte)).collect()
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! The terminal in raw mode, which sends single keys. It is always restored: when the mode is
-//! dropped, also in a panic, and before a program that is interrupted twice exits ([`put_back`]).
+//! dropped, also in a panic, and before a program that is interrupted twice exits ([`restore`]).
 
 use std::io::{self, IsTerminal};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,12 +27,12 @@ impl RawMode {
 
 impl Drop for RawMode {
     fn drop(&mut self) {
-        put_back();
+        restore();
     }
 }
 
 /// Restores the terminal if it is in raw mode.
-pub(in crate::cli) fn put_back() {
+pub(in crate::cli) fn restore() {
     if IS_RAW.swap(false, Ordering::Relaxed) {
         let _ = disable_raw_mode();
     }

@@ -11,13 +11,13 @@ use super::device_console::DeviceConsole;
 use super::keyboard::keyboard;
 use super::raw_keys::Pressed;
 use super::raw_mode::RawMode;
-use super::writer::tell;
+use super::writer::notify;
 use crate::steering::keys::Key;
 
 /// Maximum number of devices, each selected by one digit.
 pub(in crate::cli) const MAX: usize = 9;
 /// Maximum pending keys of a device; further keys are dropped.
-const WAITING: usize = 64;
+const MAX_WAITING: usize = 64;
 
 /// The keyboard of several devices.
 struct SharedKeyboard {
@@ -88,18 +88,18 @@ impl SharedKeyboard {
     }
 
     /// Distributes the keys pressed since the last call.
-    fn sort(&self) -> MutexGuard<'_, State> {
+    fn distribute(&self) -> MutexGuard<'_, State> {
         let mut state = self.state();
         for pressed in keyboard().pressed() {
-            if let Some(line) = self.take(&mut state, pressed) {
-                tell(line);
+            if let Some(line) = self.route(&mut state, pressed) {
+                notify(line);
             }
         }
         state
     }
 
     /// Distributes a pressed key. Returns a message about it, if any.
-    fn take(&self, state: &mut State, pressed: Pressed) -> Option<String> {
+    fn route(&self, state: &mut State, pressed: Pressed) -> Option<String> {
         let number = match pressed {
             Pressed::Key(Key::Char(digit)) => digit.to_digit(10).unwrap_or(0) as usize,
             _ => 0,
@@ -126,7 +126,7 @@ impl SharedKeyboard {
             }
             (Pressed::Key(key), _) => {
                 let inbox = state.inboxes.get_mut(state.chosen)?;
-                if inbox.keys.len() < WAITING {
+                if inbox.keys.len() < MAX_WAITING {
                     inbox.keys.push(key);
                 }
             }
@@ -148,14 +148,14 @@ impl DeviceKeys {
 
     /// Returns the keys except Enter that were pressed for this device since the last call.
     pub(in crate::cli) fn keys(&self) -> Vec<Key> {
-        let mut state = self.shared_keyboard.sort();
+        let mut state = self.shared_keyboard.distribute();
         let inbox = state.inboxes.get_mut(self.index);
         inbox.map_or(vec![], |inbox| std::mem::take(&mut inbox.keys))
     }
 
     /// Discards earlier answers to a question of this device, also its digit without an Enter.
     pub(in crate::cli) fn forget(&self) {
-        drop(self.shared_keyboard.sort());
+        drop(self.shared_keyboard.distribute());
         self.forget_answers();
     }
 
@@ -171,7 +171,7 @@ impl DeviceKeys {
 
     /// Returns the number of presses of Enter for this device since the last call.
     pub(in crate::cli) fn enters(&self) -> usize {
-        let mut state = self.shared_keyboard.sort();
+        let mut state = self.shared_keyboard.distribute();
         let inbox = state.inboxes.get_mut(self.index);
         inbox.map_or(0, |inbox| std::mem::take(&mut inbox.enters))
     }
@@ -198,7 +198,7 @@ mod tests {
         let mut state = shared_keyboard.state();
         let reported = pressed
             .iter()
-            .map(|key| shared_keyboard.take(&mut state, *key));
+            .map(|key| shared_keyboard.route(&mut state, *key));
         reported.collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(reported, ["[2 usb:7] is not served any more"]);
         assert_eq!(got(&device_keys[0]), (vec![], 0));
         // Even if a key is held down.
-        press(&device_keys, &[key('+'); 10 * WAITING]);
-        assert!(device_keys[0].shared_keyboard.state().inboxes[1].keys.len() <= WAITING);
+        press(&device_keys, &[key('+'); 10 * MAX_WAITING]);
+        assert!(device_keys[0].shared_keyboard.state().inboxes[1].keys.len() <= MAX_WAITING);
     }
 }

@@ -10,10 +10,10 @@ use crate::cli::failure::Failure;
 use heightfield::Raster;
 
 /// Time before the first line without a terminal, and between two lines.
-const FIRST: Duration = Duration::from_secs(1);
-const BETWEEN: Duration = Duration::from_secs(3);
+const FIRST_LINE_AFTER: Duration = Duration::from_secs(1);
+const LINE_INTERVAL: Duration = Duration::from_secs(3);
 /// Interval of updates of the status line.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Runs `work` and shows `line` meanwhile. For work before a device is served.
 pub(in crate::cli) fn shown_meanwhile<T>(
@@ -25,10 +25,10 @@ pub(in crate::cli) fn shown_meanwhile<T>(
         let (_working, ended) = channel::<()>();
         let line = &line;
         scope.spawn(move || {
-            let goes_on = |time| ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout);
+            let should_continue = |time| ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout);
             match stderr().is_terminal() {
-                true => at_bottom(line, goes_on),
-                false => in_lines(line, goes_on, |line| eprintln!("{line}")),
+                true => at_bottom(line, should_continue),
+                false => in_lines(line, should_continue, |line| eprintln!("{line}")),
             }
         });
         work()
@@ -59,27 +59,27 @@ where
     Ok(done?)
 }
 
-fn at_bottom(line: impl Fn() -> String, goes_on: impl Fn(Duration) -> bool) {
+fn at_bottom(line: impl Fn() -> String, should_continue: impl Fn(Duration) -> bool) {
     let bar = ProgressBar::new_spinner();
-    while goes_on(LOOK) {
+    while should_continue(POLL_INTERVAL) {
         bar.set_message(line());
         bar.tick();
     }
     bar.finish_and_clear();
 }
 
-/// Prints lines until `goes_on` returns false; it waits for the given time first.
+/// Prints lines until `should_continue` returns false; it waits for the given time first.
 fn in_lines(
     line: impl Fn() -> String,
-    goes_on: impl Fn(Duration) -> bool,
-    mut say: impl FnMut(String),
+    should_continue: impl Fn(Duration) -> bool,
+    mut print: impl FnMut(String),
 ) {
-    let mut time = FIRST;
+    let mut time = FIRST_LINE_AFTER;
     let mut all = Duration::ZERO;
-    while goes_on(time) {
+    while should_continue(time) {
         all += time;
-        say(format!("{} ({} s)", line(), all.as_secs()));
-        time = BETWEEN;
+        print(format!("{} ({} s)", line(), all.as_secs()));
+        time = LINE_INTERVAL;
     }
 }
 
@@ -92,27 +92,34 @@ mod tests {
     #[test]
     fn progress_lines_appear_from_first_second_until_work_ends() {
         let (blocks, waits) = (Cell::new(0), Cell::new(0));
-        let goes_on = |time| {
-            assert_eq!(time, if waits.get() == 0 { FIRST } else { BETWEEN });
+        let should_continue = |time| {
+            assert_eq!(
+                time,
+                if waits.get() == 0 {
+                    FIRST_LINE_AFTER
+                } else {
+                    LINE_INTERVAL
+                }
+            );
             waits.set(waits.get() + 1);
             blocks.set(blocks.get() + 10);
             waits.get() < 4
         };
-        let mut stated = vec![];
+        let mut lines = vec![];
         in_lines(
             || format!("{} of 40", blocks.get()),
-            goes_on,
-            |line| stated.push(line),
+            should_continue,
+            |line| lines.push(line),
         );
         assert_eq!(
-            stated,
+            lines,
             ["10 of 40 (1 s)", "20 of 40 (4 s)", "30 of 40 (7 s)"]
         );
         in_lines(String::new, |_| false, |line| panic!("{line}"));
     }
 
     #[test]
-    fn work_that_ends_ends_the_waiting() {
+    fn progress_ends_with_the_work() {
         assert_eq!(shown_meanwhile(String::new, || 7), 7);
         let panics = || shown_meanwhile(String::new, || panic!("of the work"));
         assert!(std::panic::catch_unwind(panics).is_err());

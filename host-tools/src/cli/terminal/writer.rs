@@ -17,10 +17,10 @@ use super::raw_mode;
 use heightfield::printable_text::printable_lines;
 
 /// Maximum pending lines; further lines are omitted.
-const WAITING: usize = 512;
+const MAX_WAITING: usize = 512;
 
 /// Text to write.
-enum Stated {
+enum TerminalOutput {
     /// Unchanged text for standard output.
     Out(String),
     /// A line for standard error.
@@ -32,26 +32,26 @@ enum Stated {
 }
 
 /// Queue of the writing thread; `None` if the thread cannot be started.
-static WRITER: OnceLock<Option<SyncSender<Stated>>> = OnceLock::new();
+static WRITER: OnceLock<Option<SyncSender<TerminalOutput>>> = OnceLock::new();
 
 /// Writes a line to standard output.
-pub(in crate::cli) fn say(line: impl Display) {
-    speak(Stated::Out(format!("{line}\n")));
+pub(in crate::cli) fn print_line(line: impl Display) {
+    enqueue(TerminalOutput::Out(format!("{line}\n")));
 }
 
 /// Writes to standard output, without a line end.
 pub(in crate::cli) fn show(text: impl Display) {
-    speak(Stated::Out(text.to_string()));
+    enqueue(TerminalOutput::Out(text.to_string()));
 }
 
 /// Writes a line to standard error.
-pub(in crate::cli) fn tell(line: impl Display) {
-    speak(Stated::Err(format!("{line}\n")));
+pub(in crate::cli) fn notify(line: impl Display) {
+    enqueue(TerminalOutput::Err(format!("{line}\n")));
 }
 
 /// Replaces or removes the status line.
 pub(in crate::cli) fn status(line: Option<String>) {
-    speak(Stated::Status(line));
+    enqueue(TerminalOutput::Status(line));
 }
 
 /// Waits until all output is written.
@@ -59,63 +59,63 @@ pub(in crate::cli) fn finish() {
     if let Some(Some(writer)) = WRITER.get() {
         let (done, is_done) = sync_channel(1);
         // If the thread has ended, there is nothing to wait for.
-        if writer.send(Stated::Flush(done)).is_ok() {
+        if writer.send(TerminalOutput::Flush(done)).is_ok() {
             let _ = is_done.recv();
         }
     }
 }
 
-fn speak(stated: Stated) {
+fn enqueue(output: TerminalOutput) {
     let writer = WRITER.get_or_init(|| {
-        let (writer, stated) = sync_channel(WAITING);
-        let thread = Builder::new().name("voice".into());
-        thread.spawn(move || write_all(stated)).ok().map(|_| writer)
+        let (writer, output) = sync_channel(MAX_WAITING);
+        let thread = Builder::new().name("terminal".into());
+        thread.spawn(move || write_all(output)).ok().map(|_| writer)
     });
     match writer {
         // If the queue is full or closed, this cannot be reported either.
-        Some(writer) => drop(writer.try_send(stated)),
-        None => write(stated, &mut None),
+        Some(writer) => drop(writer.try_send(output)),
+        None => write(output, &mut None),
     }
 }
 
-fn write_all(stated: Receiver<Stated>) {
+fn write_all(output: Receiver<TerminalOutput>) {
     let mut bottom = None;
-    for stated in stated {
-        write(stated, &mut bottom);
+    for output in output {
+        write(output, &mut bottom);
     }
 }
 
 /// Writes above the status line.
-fn write(stated: Stated, bottom: &mut Option<ProgressBar>) {
-    match stated {
-        Stated::Out(text) => above(bottom, || put(io::stdout(), &text)),
-        Stated::Err(line) => above(bottom, || put(io::stderr(), &line)),
-        Stated::Status(Some(line)) => {
+fn write(output: TerminalOutput, bottom: &mut Option<ProgressBar>) {
+    match output {
+        TerminalOutput::Out(text) => write_above(bottom, || write_text(io::stdout(), &text)),
+        TerminalOutput::Err(line) => write_above(bottom, || write_text(io::stderr(), &line)),
+        TerminalOutput::Status(Some(line)) => {
             let bar = bottom.get_or_insert_with(ProgressBar::new_spinner);
             bar.set_message(printable_lines(&line));
             bar.tick();
         }
-        Stated::Status(None) => {
+        TerminalOutput::Status(None) => {
             if let Some(bar) = bottom.take() {
                 bar.finish_and_clear();
             }
         }
-        Stated::Flush(done) => {
+        TerminalOutput::Flush(done) => {
             let _ = done.send(());
         }
     }
 }
 
-fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
+fn write_above(bottom: &Option<ProgressBar>, write: impl FnOnce()) {
     match bottom {
-        Some(bar) => bar.suspend(put),
-        None => put(),
+        Some(bar) => bar.suspend(write),
+        None => write(),
     }
 }
 
 /// Writes text that is safe for a terminal, and ignores errors. In raw mode the terminal needs a CR
 /// for the first column.
-pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
+pub(in crate::cli) fn write_text(mut to: impl Write, text: &str) {
     let mut text = printable_lines(text);
     if raw_mode::is_raw() {
         text = text.replace('\n', "\r\n");

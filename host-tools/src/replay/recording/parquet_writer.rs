@@ -153,9 +153,12 @@ fn empty(more: &[Column]) -> Vec<Values> {
         Column::Text(_) => Values::Texts(Vec::new()),
         Column::Count(_) => Values::Counts(Vec::new()),
     });
-    let usual = before.iter().map(numbers);
-    let usual = usual.chain([Values::Flags(Vec::new())]);
-    usual.chain(after.iter().map(numbers)).chain(more).collect()
+    let columns = before.iter().map(numbers);
+    let columns = columns.chain([Values::Flags(Vec::new())]);
+    columns
+        .chain(after.iter().map(numbers))
+        .chain(more)
+        .collect()
 }
 
 fn begin(output: Output, more: &[Column]) -> Result<SerializedFileWriter<Output>, ParquetError> {

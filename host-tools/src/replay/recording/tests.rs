@@ -75,7 +75,7 @@ fn csv_and_parquet_read_back_as_the_same_trajectory() {
 }
 
 #[test]
-fn a_parquet_recording_is_what_its_library_reads() {
+fn parquet_recording_is_read_by_its_library() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = File::open(recorded(&folder, "r.parquet")).expect("there");
     let reader = SerializedFileReader::new(file).expect("Parquet");

@@ -56,11 +56,11 @@ fn rows_a_tick_apart_are_ticks_bit_for_bit() {
         &|row| format!("{}", row as f32 / 1000.0),
         &|row| format!("{:.6}", f64::from(row) * 1e-3 + 0.000_000_4),
     ];
-    for (way, write) in write.iter().enumerate() {
+    for (variant, write) in write.iter().enumerate() {
         let times: Vec<_> = (0..5_000).map(write).collect();
         let rows: Vec<_> = (0..).zip(&times).map(|(row, t)| (&t[..], x(row))).collect();
         let ticks = by_time(&rows).expect("ticks");
-        assert_eq!(ticks.len(), rows.len(), "{way}");
+        assert_eq!(ticks.len(), rows.len(), "{variant}");
         for ((t, place), row) in ticks.iter().zip(&rows) {
             let written: f64 = row.0.parse().expect("a time");
             assert_eq!(
@@ -72,7 +72,7 @@ fn rows_a_tick_apart_are_ticks_bit_for_bit() {
 }
 
 #[test]
-fn places_between_rows_are_on_straight_lines() {
+fn positions_between_rows_are_interpolated_linearly() {
     let found = by_time(&[("2", 1.0), ("2.004", 5.0), ("2.006", 4.0)]).expect("ticks");
     let x = [1.0, 2.0, 3.0, 4.0, 5.0, 4.5, 4.0];
     let expected: Vec<_> = (0..7).map(|n| 2.0 + f64::from(n) * 1e-3).zip(x).collect();
@@ -90,7 +90,7 @@ fn places_between_rows_are_on_straight_lines() {
 
 /// 100 mm/s is 0.1 mm in each tick, whatever the jitter of the rows.
 #[test]
-fn a_steady_speed_stays_steady_through_jitter() {
+fn steady_speed_survives_jitter() {
     let times = [0.0, 0.0009, 0.0021, 0.0024, 0.0029, 0.0052, 0.006].map(|t: f64| t.to_string());
     let rows: Vec<_> = times
         .iter()
@@ -104,7 +104,7 @@ fn a_steady_speed_stays_steady_through_jitter() {
 
 /// A clock that is 0.1 % slow: 10,000 of its rows last 10,010 ticks.
 #[test]
-fn a_drifting_clock_gains_a_tick_in_a_thousand() {
+fn slow_clock_gains_a_tick_in_a_thousand() {
     let times: Vec<_> = (0..=10_000)
         .map(|row| (f64::from(row) * 1.001e-3).to_string())
         .collect();
@@ -124,7 +124,7 @@ fn a_drifting_clock_gains_a_tick_in_a_thousand() {
 }
 
 #[test]
-fn rates_from_1_hz_to_100_khz_last_as_long() {
+fn duration_is_the_same_from_1_hz_to_100_khz() {
     for hz in [
         1_u32, 10, 90, 333, 999, 1_000, 1_001, 3_000, 10_000, 100_000,
     ] {
@@ -177,7 +177,7 @@ fn ticks_end_with_the_last_row_not_after_it() {
 }
 
 #[test]
-fn times_that_cannot_be_right_are_errors() {
+fn impossible_times_are_errors() {
     for (rows, expected) in [
         (
             &[("0", 0.0), ("0.002", 1.0), ("0.001", 2.0)][..],
@@ -214,13 +214,13 @@ fn times_that_cannot_be_right_are_errors() {
             "line 3, column t_s: the HIP moves during a gap",
         ),
     ] {
-        let stated = by_time(rows).expect_err("is wrong");
-        assert!(stated.contains(expected), "{rows:?}: {stated}");
+        let message = by_time(rows).expect_err("is wrong");
+        assert!(message.contains(expected), "{rows:?}: {message}");
     }
 }
 
 #[test]
-fn rest_is_rendered_and_a_repeated_row_left_out() {
+fn rest_is_rendered_and_repeated_rows_are_omitted() {
     let rows = [
         ("0", 1.0),
         ("0", 1.0),
@@ -240,7 +240,7 @@ fn rest_is_rendered_and_a_repeated_row_left_out() {
 }
 
 #[test]
-fn rows_without_times_are_ticks_and_so_are_rows_of_one_time() {
+fn rows_without_or_with_equal_times_are_ticks() {
     let text = "x_mm,y_mm,z_mm\n5,7,-1\n6,7,-1\n6,7,-1\n";
     let (_folder, mut ticks) = ticks_of(text, Pace::ByTime, 4000);
     let found = read(&mut ticks).expect("ticks");
@@ -296,7 +296,7 @@ fn row_by_row_pace_makes_each_row_one_tick() {
 }
 
 #[test]
-fn a_recording_has_whole_ticks_between_its_rows() {
+fn recording_rows_are_whole_ticks_apart() {
     let rows = [("0.25", 1.0), ("0.2501", 2.0), ("0.2504", 8.0)];
     let found = recorded(&rows, 10_000).expect("ticks");
     let expected = [
@@ -320,9 +320,9 @@ fn a_recording_has_whole_ticks_between_its_rows() {
     ] {
         match recorded(rows, tick_hz) {
             Ok(ticks) => assert_eq!((ticks.len(), expected), (4, "")),
-            Err(stated) => assert!(
-                !expected.is_empty() && stated.contains(expected),
-                "{stated}"
+            Err(message) => assert!(
+                !expected.is_empty() && message.contains(expected),
+                "{message}"
             ),
         }
     }
@@ -331,10 +331,10 @@ fn a_recording_has_whole_ticks_between_its_rows() {
         .map(|row| (f64::from(row) * 1.003e-3).to_string())
         .collect();
     let rows: Vec<_> = times.iter().map(|t| (&t[..], 0.0)).collect();
-    let stated = recorded(&rows, 1000).expect_err("drifts");
+    let message = recorded(&rows, 1000).expect_err("drifts");
     assert!(
-        stated.contains("line 6, column t_s: 0.004012 s"),
-        "{stated}"
+        message.contains("line 6, column t_s: 0.004012 s"),
+        "{message}"
     );
 }
 

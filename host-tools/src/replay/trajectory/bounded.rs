@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_pass_and_an_endless_one_does_not() {
+    fn endless_line_is_an_error() {
         let line = [&[b'1'; MAX][..], b"\n"].concat();
         let mut whole = Vec::new();
         let mut lines = Bounded::new(io::Cursor::new(line.repeat(3)));

@@ -11,19 +11,20 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// A stream whose first bytes were already read and are returned again. Positions count from its
 /// beginning.
-pub(super) struct Again<R> {
+pub(super) struct Rewound<R> {
     head: Cursor<Vec<u8>>,
-    rest: BufReader<Bounded<R>>,
+    remaining: BufReader<Bounded<R>>,
 }
 
 /// Reads the comments before the first other line. Returns them without their `#` and a space after
 /// it, and the stream from its beginning.
-pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
-    let mut rest = BufReader::with_capacity(1 << 16, Bounded::new(stream));
+pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Rewound<R>)> {
+    let mut remaining = BufReader::with_capacity(1 << 16, Bounded::new(stream));
     let (mut head, mut comments) = (Vec::new(), String::new());
     while head.len() < MAX_LINE_BYTES {
         let from = head.len();
-        rest.by_ref()
+        remaining
+            .by_ref()
             .take((MAX_LINE_BYTES - from) as u64)
             .read_until(b'\n', &mut head)?;
         let line = head.get(from..).unwrap_or_default();
@@ -35,23 +36,23 @@ pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
         comments += &String::from_utf8_lossy(comment);
     }
     let head = Cursor::new(head);
-    Ok((comments, Again { head, rest }))
+    Ok((comments, Rewound { head, remaining }))
 }
 
-impl<R: Read> Read for Again<R> {
+impl<R: Read> Read for Rewound<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         match self.head.read(into)? {
-            0 => self.rest.read(into),
+            0 => self.remaining.read(into),
             read => Ok(read),
         }
     }
 }
 
-impl<R: Seek> Seek for Again<R> {
+impl<R: Seek> Seek for Rewound<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         // The bytes in `head` are part of the stream.
         self.head.set_position(self.head.get_ref().len() as u64);
-        self.rest.seek(to)
+        self.remaining.seek(to)
     }
 }
 
@@ -137,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_are_separated_and_all_bytes_are_kept() {
+    fn comments_are_separated_without_loss_of_bytes() {
         for (text, expected) in [
             (
                 &b"# a = 1\n#\n#b\r\nt_s\n0\n# later\n"[..],
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn views_between_rows_are_found_and_other_remarks_are_not() {
+    fn placements_between_rows_are_found_among_comments() {
         let text = "# a = 1\n# [[view]]\nt_s\n0\n# [[view]]\n# number = 1\n1\n# a remark\n\
                     # [[view]]\n2\n# [[mark]]\n# t_s = 1\n# [[view]]\r\n# number = 2\r\n3\n";
         let found = later(text.as_bytes()).expect("in memory");
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_are_no_rows_are_counted() {
+    fn non_row_lines_are_counted() {
         for (text, count) in [("1,2\n", 0), ("\n# a\n \r\n1,2\n", 3), ("", 0), ("#", 1)] {
             assert_eq!(lines_before_a_row(text.as_bytes()), count, "{text:?}");
         }

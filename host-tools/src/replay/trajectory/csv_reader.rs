@@ -4,12 +4,12 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
 
-use super::comments::{self, Again};
+use super::comments::{self, Rewound};
 use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of, row};
 
 /// Rows of a CSV file, read one by one.
 pub(super) struct Rows<R> {
-    reader: csv::Reader<Again<R>>,
+    reader: csv::Reader<Rewound<R>>,
     record: ByteRecord,
     /// The columns to read.
     read: &'static [&'static str],

@@ -12,7 +12,7 @@ use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of, row};
 use crate::replay::settings::KEY;
 
 /// Rows read at a time.
-const AT_A_TIME: usize = 4096;
+const BATCH_ROWS: usize = 4096;
 
 /// Rows of a Parquet file, read in batches.
 pub(super) struct Rows {
@@ -106,12 +106,12 @@ impl Rows {
             values.clear();
         }
         for (column, values) in self.columns.iter_mut().zip(&mut self.read) {
-            let read = column.read_records(AT_A_TIME, None, None, values);
+            let read = column.read_records(BATCH_ROWS, None, None, values);
             read.map_err(unreadable)?;
         }
         self.views.clear();
         if let Some(column) = &mut self.view {
-            let read = column.read_records(AT_A_TIME, None, None, &mut self.views);
+            let read = column.read_records(BATCH_ROWS, None, None, &mut self.views);
             read.map_err(unreadable)?;
         }
         if self.read.first().is_some_and(|values| !values.is_empty()) {

@@ -25,7 +25,7 @@ fn message(text: &str) -> String {
 }
 
 #[test]
-fn forgiving_about_white_space_line_ends_and_marks() {
+fn white_space_line_ends_and_byte_order_marks_are_ignored() {
     let plain = rows("t_s,x_mm,y_mm,z_mm\n0,1,2.5,-3e1\n0.001,4,5,6\n").expect("plain");
     assert_eq!(plain.len(), 2);
     assert_eq!(plain[0].hip_mm, [1.0, 2.5, -30.0]);
@@ -43,7 +43,7 @@ fn forgiving_about_white_space_line_ends_and_marks() {
 }
 
 #[test]
-fn a_path_may_have_no_times() {
+fn trajectory_may_have_no_times() {
     let plain = rows("x_mm,y_mm,z_mm\n1,2.5,-3e1\n4,5,6\n").expect("plain");
     let places: Vec<_> = plain.iter().map(|row| (row.t_s, row.hip_mm)).collect();
     assert_eq!(places, [(None, [1.0, 2.5, -30.0]), (None, [4.0, 5.0, 6.0])]);
@@ -59,22 +59,22 @@ fn a_path_may_have_no_times() {
 }
 
 #[test]
-fn earlier_names_of_states_are_read_as_today_s() {
+fn earlier_state_names_are_updated() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");
     let text = "t_s,x_mm,y_mm,z_mm,contact,state\n0,1,2,3,0,waiting\n1,1,2,3,0,letting go\n2,1,2,3,0,unseeded\n3,1,2,3,0,free\n";
     std::fs::write(&path, text).expect("written");
     let read = RecordedColumns::read(&path).expect("a recording");
-    let wanted = ["unseeded", "releasing", "unseeded", "free"].map(String::from);
+    let states = ["unseeded", "releasing", "unseeded", "free"].map(String::from);
     let last = read.columns.last();
     assert_eq!(
         last,
-        Some(&("state".into(), ColumnValues::Texts(wanted.into())))
+        Some(&("state".into(), ColumnValues::Texts(states.into())))
     );
 }
 
 #[test]
-fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
+fn cut_recording_has_the_rows_before_the_cut() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");
     let whole =
@@ -138,7 +138,7 @@ fn parse_error_names_file_line_and_column() {
 }
 
 #[test]
-fn a_header_after_comments_is_named_with_its_line() {
+fn header_error_after_comments_has_its_line() {
     let wrong = message("# one\n# two\ntime,x,y,z\n");
     assert!(wrong.contains("line 3 is not the header"), "{wrong}");
 }

@@ -68,9 +68,9 @@ impl Terrain<'_> {
         let ([west, south], along, nodes) = ball.samples_for(first, side);
         let mut heights = vec![f64::NAN; along * along];
         // West of the raster there are no columns to read.
-        let beside = west.min(0).unsigned_abs() as usize;
+        let skipped = west.min(0).unsigned_abs() as usize;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(along)) {
-            let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
+            let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(skipped..)) else {
                 continue;
             };
             let west = west.max(0) as u32;

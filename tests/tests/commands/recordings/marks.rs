@@ -16,9 +16,9 @@ fn run(folder: &Folder, record: &str) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, commands, record] =
         ["hills.tif", "commands", record].map(|name| folder.text(name));
-    let words = ["run", &terrain, "--device", "native", "--duration", "5s"];
+    let arguments = ["run", &terrain, "--device", "native", "--duration", "5s"];
     let more = ["--commands", &commands, "--out", &record];
-    folder.runs(&[&words[..], &more].concat())
+    folder.runs(&[&arguments[..], &more].concat())
 }
 
 fn marks_of(folder: &Folder, name: &str) -> Vec<Mark> {
@@ -27,7 +27,7 @@ fn marks_of(folder: &Folder, name: &str) -> Vec<Mark> {
 }
 
 #[test]
-fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
+fn mark_has_tick_time_and_host_clock() {
     let folder = Folder::new();
     let printed = run(&folder, "felt.csv");
     let [began, ended] = ["commands", "felt.csv"].map(|name| changed_at_unix_s(&folder.path(name)));
@@ -84,12 +84,12 @@ fn marks_survive_replays_in_both_forms() {
 }
 
 #[test]
-fn a_demo_keeps_its_marks() {
+fn demo_recording_has_its_marks() {
     let folder = Folder::new();
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));
-    let words = ["demo", &terrain, "--out", &out, "--duration", "5s"];
-    folder.runs(&[&words[..], &["--commands", &commands]].concat());
+    let arguments = ["demo", &terrain, "--out", &out, "--duration", "5s"];
+    folder.runs(&[&arguments[..], &["--commands", &commands]].concat());
     let marks = marks_of(&folder, "demo/hills.csv");
     let texts: Vec<_> = marks.iter().map(|mark| mark.text.as_str()).collect();
     assert_eq!(texts, TEXTS);

@@ -24,13 +24,13 @@ const SETTINGS: [&str; 6] = [
 ];
 
 #[test]
-fn a_recording_is_replayed_with_its_own_settings() {
+fn recording_is_replayed_with_its_own_settings() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let (terrain, input) = (folder.text("hills.tif"), folder.text("in.csv"));
     let replayed = folder.text("felt.csv");
-    let words = ["replay", &terrain, &input, "-o", &replayed];
-    folder.runs(&[&words[..], &SETTINGS].concat());
+    let arguments = ["replay", &terrain, &input, "-o", &replayed];
+    folder.runs(&[&arguments[..], &SETTINGS].concat());
     let text = folder.read("felt.csv");
     assert!(rows(&text).iter().any(|row| row["contact"] == "1"));
     for part in [
@@ -67,7 +67,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
 }
 
 #[test]
-fn a_recording_of_another_terrain_is_refused() {
+fn recording_of_another_terrain_is_refused() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
@@ -163,12 +163,12 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
 fn run_recording_replays_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
-    let words = [
+    let arguments = [
         "run", &terrain, "--tip", "0", "--device", "native", "--out", &record,
     ];
     folder.runs(
         &[
-            &words[..],
+            &arguments[..],
             &[
                 "--duration",
                 "6s",
@@ -215,11 +215,11 @@ pub(crate) fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
 }
 
 #[test]
-fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
+fn location_far_from_the_middle_replays_with_its_own_cells() {
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
     let [terrain, out] = ["hills.asc", "demo"].map(|name| folder.text(name));
-    let words = [
+    let arguments = [
         "demo",
         &terrain,
         "--out",
@@ -229,7 +229,7 @@ fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
         "--surface",
         UNCONTROLLED,
     ];
-    folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
+    folder.runs(&[&arguments[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
     let text = folder.read("demo/hills.csv");
     assert!(text.contains("# measured_at = [13.0, 56.0]"), "{text}");
     is_reproduced(&folder, "hills.asc", "demo/hills.csv");
@@ -239,8 +239,8 @@ fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
     let with = |share: f64| {
         let other = cell_m.parse::<f64>().expect("metres") * (1.0 + share);
         folder.write("other.csv", &text.replace(cell_m, &other.to_string()));
-        let words = ["hills.asc", "other.csv", "again.csv"].map(|name| folder.text(name));
-        folder.run(&["replay", &words[0], &words[1], "-o", &words[2]])
+        let arguments = ["hills.asc", "other.csv", "again.csv"].map(|name| folder.text(name));
+        folder.run(&["replay", &arguments[0], &arguments[1], "-o", &arguments[2]])
     };
     assert!(with(1e-7).status.success(), "{}", output_text(&with(1e-7)));
     let reported = output_text(&with(1e-5));
@@ -265,7 +265,7 @@ fn python() -> Option<(String, &'static str)> {
 }
 
 #[test]
-fn a_parquet_recording_is_opened_by_polars_or_pandas() {
+fn parquet_recording_is_opened_by_polars_or_pandas() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
@@ -308,7 +308,7 @@ fn a_parquet_recording_is_opened_by_polars_or_pandas() {
     assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), "400");
 }
 
-fn exists_as_before(path: &Path, bytes: &[u8]) {
+fn assert_unchanged(path: &Path, bytes: &[u8]) {
     assert!(
         std::fs::read(path).expect("there") == bytes,
         "{}",
@@ -373,11 +373,11 @@ fn commands_refuse_to_overwrite_their_input() {
     let by_file = ["--commands", &steer, "--out", &steer];
     let reported = folder.fails(&[&["run", &hills], &native[..], &by_file].concat());
     assert!(reported.contains("it is the input"), "{reported}");
-    exists_as_before(&folder.path("steer.txt"), b"at 1 zoom 2\n");
-    exists_as_before(&folder.path("hills.tif"), &terrain);
-    exists_as_before(&folder.path("in.csv"), &trajectory);
-    exists_as_before(&folder.path("dem.png"), &picture);
-    exists_as_before(&folder.path("arm.toml"), &record);
+    assert_unchanged(&folder.path("steer.txt"), b"at 1 zoom 2\n");
+    assert_unchanged(&folder.path("hills.tif"), &terrain);
+    assert_unchanged(&folder.path("in.csv"), &trajectory);
+    assert_unchanged(&folder.path("dem.png"), &picture);
+    assert_unchanged(&folder.path("arm.toml"), &record);
 }
 
 /// Sidecars that are read with a terrain: header, reference system, world file, mask, overviews.
@@ -398,15 +398,15 @@ fn commands_refuse_to_overwrite_sidecars_of_their_input() {
         let [terrain, output, input] = [terrain, beside, "in.csv"].map(|name| folder.text(name));
         std::fs::write(&output, text).expect("written");
         let native = ["--device", "native", "--duration", "1s"];
-        for words in [
+        for arguments in [
             &["replay", &terrain, &input, "-o", &output][..],
             &[&["run", &terrain, "--out", &output], &native[..]].concat(),
             &["view", &input, &terrain, "--rrd", &output],
         ] {
-            let reported = folder.fails(words);
+            let reported = folder.fails(arguments);
             assert!(reported.contains("it is the input"), "{beside}: {reported}");
         }
-        exists_as_before(Path::new(&output), text.as_bytes());
+        assert_unchanged(Path::new(&output), text.as_bytes());
     }
     // The recording of float.flt would be its header.
     std::fs::rename(folder.path("float.hdr"), folder.path("float.csv")).expect("renamed");
@@ -414,11 +414,11 @@ fn commands_refuse_to_overwrite_sidecars_of_their_input() {
     let (terrain, here) = (folder.text("float.flt"), folder.text("."));
     let reported = folder.fails(&["demo", &terrain, "--device", "native", "--out", &here]);
     assert!(reported.contains("it is the input"), "{reported}");
-    exists_as_before(&folder.path("float.hdr"), header.as_bytes());
+    assert_unchanged(&folder.path("float.hdr"), header.as_bytes());
 }
 
 #[test]
-fn a_calibration_file_is_text_and_show_prints_it() {
+fn calibration_file_is_text_and_printed_by_show() {
     let folder = Folder::new();
     let arm = folder.text("arm.toml");
     let native = [
@@ -481,12 +481,12 @@ fn closed_output_pipe_causes_no_panic() {
         ],
         &["replay", &hills, &input, "-o", &out, "-vvv"],
     ];
-    for words in commands {
+    for arguments in commands {
         for closed in ["stdout", "both"] {
             let (reader, writer) = std::io::pipe().expect("a pipe");
             drop(reader);
             let mut command = Command::new(hapterra_binary());
-            command.args(words).stdin(std::process::Stdio::null());
+            command.args(arguments).stdin(std::process::Stdio::null());
             if closed == "both" {
                 command.stderr(writer.try_clone().expect("cloned"));
             } else {
@@ -497,12 +497,12 @@ fn closed_output_pipe_causes_no_panic() {
             let reported = output_text(&run);
             assert!(
                 !reported.contains("panicked"),
-                "{words:?}, {closed}: {reported}"
+                "{arguments:?}, {closed}: {reported}"
             );
             // A crash is 101; a list without hardware is 1.
             assert!(
                 matches!(run.status.code(), Some(0 | 1)),
-                "{words:?}, {closed}: {reported}"
+                "{arguments:?}, {closed}: {reported}"
             );
         }
     }
@@ -510,14 +510,14 @@ fn closed_output_pipe_causes_no_panic() {
 
 /// A full disk causes no crash either, for messages or files.
 #[test]
-fn an_output_that_cannot_be_written_is_no_crash() {
+fn unwritable_output_causes_no_crash() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let [hills, input, out, file] =
         ["hills.tif", "in.csv", "none/out", "in.csv/out"].map(|name| folder.text(name));
     let native = ["--device", "native", "--duration", "0.1s"];
     let of_files = |out: &str| -> [Vec<String>; 4] {
-        let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
+        let owned = |arguments: &[&str]| arguments.iter().map(|&word| word.to_owned()).collect();
         [
             owned(&["replay", &hills, &input, "-o", out]),
             owned(&[&["run", &hills, "--out", out][..], &native].concat()),
@@ -534,9 +534,9 @@ fn an_output_that_cannot_be_written_is_no_crash() {
             owned(&["replay", &hills, &input, "-o", &format!("{out}.parquet")]),
         ]
     };
-    for words in of_files(&out).iter().chain(&of_files(&file)) {
-        let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        let reported = folder.fails(&words);
+    for arguments in of_files(&out).iter().chain(&of_files(&file)) {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let reported = folder.fails(&arguments);
         assert!(
             reported.contains("cannot write") && reported.contains("hint: "),
             "{reported}"
@@ -561,7 +561,7 @@ fn an_output_that_cannot_be_written_is_no_crash() {
         ]
         .concat(),
     );
-    for words in [
+    for arguments in [
         &["info", &hills][..],
         &["info", "--json", &hills],
         &["list"],
@@ -573,19 +573,19 @@ fn an_output_that_cannot_be_written_is_no_crash() {
         &["replay", &hills, &input, "-o", "-"],
     ] {
         let run = Command::new(hapterra_binary())
-            .args(words)
+            .args(arguments)
             .stdout(full.try_clone().expect("cloned"))
             .output()
             .expect("it runs");
         let reported = output_text(&run);
-        assert!(!reported.contains("panicked"), "{words:?}: {reported}");
+        assert!(!reported.contains("panicked"), "{arguments:?}: {reported}");
         assert!(
             matches!(run.status.code(), Some(0 | 1)),
-            "{words:?}: {reported}"
+            "{arguments:?}: {reported}"
         );
         // A lost report is not a success.
-        if ["info", "status", "calibrate"].contains(&words[0]) {
-            assert_eq!(run.status.code(), Some(1), "{words:?}");
+        if ["info", "status", "calibrate"].contains(&arguments[0]) {
+            assert_eq!(run.status.code(), Some(1), "{arguments:?}");
             assert!(reported.contains("cannot write the report"), "{reported}");
         }
     }
@@ -624,8 +624,8 @@ fn unusual_outputs_and_options_work_or_are_reported() {
     );
     // A failed demo leaves no files.
     let demo = folder.text("demo");
-    let words = ["demo", &hills, "--device", "emulated:none.elf"];
-    let reported = folder.fails(&[&words[..], &["--out", &demo]].concat());
+    let arguments = ["demo", &hills, "--device", "emulated:none.elf"];
+    let reported = folder.fails(&[&arguments[..], &["--out", &demo]].concat());
     assert!(
         reported.contains("none.elf") && !folder.path("demo").exists(),
         "{reported}"
@@ -645,7 +645,7 @@ fn unusual_outputs_and_options_work_or_are_reported() {
 }
 
 #[test]
-fn exaggeration_is_given_once_and_defaults_to_true_scale() {
+fn exaggeration_is_stated_once_and_defaults_to_true_scale() {
     let folder = Folder::new();
     let hills = folder.text("hills.tif");
     for (more, expected) in [
@@ -666,8 +666,8 @@ fn exaggeration_is_given_once_and_defaults_to_true_scale() {
             ],
             &["run", &hills, "--device", "native", "--duration", "0.1s"],
         ];
-        for words in commands {
-            let run = folder.run(&[words, more].concat());
+        for arguments in commands {
+            let run = folder.run(&[arguments, more].concat());
             let reported = String::from_utf8_lossy(&run.stdout).into_owned();
             assert!(
                 run.status.success() && reported.contains(expected),

@@ -30,26 +30,26 @@ impl Folder {
         self.path(name).to_str().expect("a plain path").to_owned()
     }
 
-    pub(super) fn run(&self, words: &[&str]) -> Output {
+    pub(super) fn run(&self, arguments: &[&str]) -> Output {
         let mut command = Command::new(hapterra_binary());
-        let command = command.args(words).env_remove("HAPTERRA_MPS2_ELF");
+        let command = command.args(arguments).env_remove("HAPTERRA_MPS2_ELF");
         command.output().expect("started")
     }
 
     /// Runs a command that succeeds. Returns its standard error.
-    pub(super) fn runs(&self, words: &[&str]) -> String {
-        let run = self.run(words);
-        assert!(run.status.success(), "{words:?}: {}", output_text(&run));
+    pub(super) fn runs(&self, arguments: &[&str]) -> String {
+        let run = self.run(arguments);
+        assert!(run.status.success(), "{arguments:?}: {}", output_text(&run));
         output_text(&run)
     }
 
     /// Runs a command that fails. Returns its messages.
-    pub(super) fn fails(&self, words: &[&str]) -> String {
-        let run = self.run(words);
+    pub(super) fn fails(&self, arguments: &[&str]) -> String {
+        let run = self.run(arguments);
         assert_eq!(
             run.status.code(),
             Some(1),
-            "{words:?}: {}",
+            "{arguments:?}: {}",
             output_text(&run)
         );
         output_text(&run)

@@ -30,7 +30,7 @@ const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nat 4.7 
 fn demo(folder: &Folder) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));
-    let words = [
+    let arguments = [
         "demo",
         &terrain,
         "--out",
@@ -40,7 +40,7 @@ fn demo(folder: &Folder) -> String {
         "--surface",
         UNCONTROLLED,
     ];
-    let run = folder.run(&[&words[..], &["--commands", &commands]].concat());
+    let run = folder.run(&[&arguments[..], &["--commands", &commands]].concat());
     assert!(run.status.success(), "{}", output_text(&run));
     output_text(&run)
 }
@@ -180,9 +180,9 @@ fn parquet_recording_of_placements_is_replayed() {
     folder.write("commands", "at 3.5 zoom 2\nat 4.5 reset\n");
     let names = ["hills.tif", "replayed.parquet", "commands"].map(|name| folder.text(name));
     let [terrain, record, commands] = &names;
-    let words = ["run", terrain, "--device", "native", "--out", record];
+    let arguments = ["run", terrain, "--device", "native", "--out", record];
     let more = ["--commands", commands, "--duration", "6s"];
-    let run = folder.run(&[&words[..], &more].concat());
+    let run = folder.run(&[&arguments[..], &more].concat());
     assert!(run.status.success(), "{}", output_text(&run));
     assert!(
         output_text(&run).contains("view 2: "),
@@ -204,10 +204,10 @@ fn commands_are_read_from_stdin_and_missing_file_is_an_error() {
     use std::io::Write;
     let folder = Folder::of(SIZE);
     let [terrain, record] = ["hills.tif", "replayed.csv"].map(|name| folder.text(name));
-    let words = ["run", &terrain, "--device", "native", "--out", &record];
+    let arguments = ["run", &terrain, "--device", "native", "--out", &record];
     let more = ["--duration", "4.5s", "--commands"];
     let mut command = Command::new(hapterra_binary());
-    let command = command.args(words).args(more).arg("-");
+    let command = command.args(arguments).args(more).arg("-");
     let child = command
         .stdin(Stdio::piped())
         .stderr(Stdio::piped())
@@ -235,7 +235,7 @@ fn commands_are_read_from_stdin_and_missing_file_is_an_error() {
     let text = folder.read("replayed.csv");
     assert_eq!(rows(&text).last().expect("rows")["view"], "1");
     let none = folder.text("none");
-    let run = folder.run(&[&words[..], &more, &[&none]].concat());
+    let run = folder.run(&[&arguments[..], &more, &[&none]].concat());
     assert_eq!(run.status.code(), Some(1));
     assert!(
         output_text(&run).contains("none") && output_text(&run).contains("--commands"),
@@ -258,7 +258,7 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     folder.write("commands", pans);
     let names = ["hills.asc", "demo", "commands", "demo/hills.csv"].map(|name| folder.text(name));
     let [terrain, out, commands, recording] = &names;
-    let words = [
+    let arguments = [
         "demo",
         terrain,
         "--out",
@@ -270,7 +270,7 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
         "--commands",
         commands,
     ];
-    folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
+    folder.runs(&[&arguments[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
     let text = folder.read("demo/hills.csv");
     let settings = Settings::from_toml(&comments(&text))
         .expect("read")
@@ -290,10 +290,10 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
         let measured = latitude(view);
         // Of longitude, and as large in the hand as before.
         let narrower = view.cell_m.expect("known") / first_m;
-        let wanted = measured.to_radians().cos() / 56.0_f64.to_radians().cos();
+        let expected = measured.to_radians().cos() / 56.0_f64.to_radians().cos();
         assert!(
-            (narrower / wanted - 1.0).abs() < 1e-3,
-            "{narrower} {wanted}"
+            (narrower / expected - 1.0).abs() < 1e-3,
+            "{narrower} {expected}"
         );
         assert!((view.cell_mm / settings.rendered.cell_mm / narrower - 1.0).abs() < 1e-9);
         assert_eq!(view.exaggeration, settings.rendered.exaggeration);
@@ -360,11 +360,11 @@ fn replay_of_a_steep_saw_equals_the_live_forces() {
         ["hills.asc", "replayed.csv", "commands", "again.csv"].map(|name| folder.text(name));
     for pan in ["", "at 4.0 pan 2 1\n"] {
         folder.write("commands", pan);
-        let words = [
+        let arguments = [
             "run", &terrain, "--tip", "0", "--device", "native", "--out", &record,
         ];
         let more = ["--duration", "9s", "--at", "13,56", "--exaggeration", "9"];
-        folder.runs(&[&words[..], &more, &["--commands", &commands]].concat());
+        folder.runs(&[&arguments[..], &more, &["--commands", &commands]].concat());
         folder.runs(&["replay", &terrain, &record, "-o", &again]);
         let [live_text, again_text] = ["replayed.csv", "again.csv"].map(|name| folder.read(name));
         let (live, again) = (rows(&live_text), rows(&again_text));

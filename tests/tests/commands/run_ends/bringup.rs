@@ -19,10 +19,10 @@ use hapterra_tests::timeouts::{HANG, end_of};
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
 /// Tasks after which Enter is pressed.
 const CONFIRMED: [Task; 2] = [Task::ZeroPose, Task::HoldLoosely];
-const SEEN: [Task; 1] = [Task::PressDeadMan];
+const DETECTED: [Task; 1] = [Task::PressDeadMan];
 
 /// Starts a device at a virtual bench, whose user does the tasks that are sent.
-fn at_a_bench() -> (SocketDevice, Sender<Task>) {
+fn start_at_bench() -> (SocketDevice, Sender<Task>) {
     let (send, tasks) = channel();
     let served = SocketDevice::with(move || {
         let mut user = VirtualUser::new(Wiring::RIGHT);
@@ -39,9 +39,9 @@ fn log(served: &SocketDevice, file: &Path) {
     let link = Tcp::connect(&served.address.to_string()).expect("there");
     let control = ControlSession::open(Box::new(link), HANG).expect("answers");
     let mut log = Log::default();
-    _ = log.meet(Identity::of(control.device(), Some(&RECORD)));
+    _ = log.update_identity(Identity::of(control.device(), Some(&RECORD)));
     for step in Step::ALL.into_iter().filter(|s| *s != Step::FirstTouch) {
-        log.take(step, true, String::new());
+        log.add(step, true, String::new());
     }
     log.write(file).expect("written");
 }
@@ -61,14 +61,14 @@ fn armed(served: &SocketDevice, bench: &Sender<Task>, folder: &Path) -> Child {
         .expect("it runs");
     let mut keys = child.stdin.take().expect("piped");
     let mut lines = BufReader::new(child.stdout.take().expect("piped"));
-    while !lead(&mut lines, &mut keys, served, bench) {}
+    while !do_next_task(&mut lines, &mut keys, served, bench) {}
     child.stdout = Some(lines.into_inner());
     child.stdin = Some(keys);
     child
 }
 
 /// Does the task of the next line. Returns true if the arm is armed and must be moved now.
-fn lead(
+fn do_next_task(
     lines: &mut impl BufRead,
     keys: &mut ChildStdin,
     served: &SocketDevice,
@@ -76,7 +76,7 @@ fn lead(
 ) -> bool {
     let mut line = String::new();
     assert!(lines.read_line(&mut line).expect("text") > 0, "it ended");
-    for task in CONFIRMED.into_iter().chain(SEEN) {
+    for task in CONFIRMED.into_iter().chain(DETECTED) {
         if line.contains(&format!("> {task}")) {
             bench.send(task).expect("a bench");
             // The tip is moved there.
@@ -92,7 +92,7 @@ fn lead(
 #[test]
 fn single_signal_disarms_and_ends_bringup() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (served, bench) = at_a_bench();
+    let (served, bench) = start_at_bench();
     let child = armed(&served, &bench, folder.path());
     signal(&child, "INT");
     let output = end_of(child);
@@ -105,7 +105,7 @@ fn single_signal_disarms_and_ends_bringup() {
 #[test]
 fn unconfirmed_bringup_end_warns_to_switch_amplifiers_off() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (served, bench) = at_a_bench();
+    let (served, bench) = start_at_bench();
     let child = armed(&served, &bench, folder.path());
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
@@ -117,7 +117,7 @@ fn unconfirmed_bringup_end_warns_to_switch_amplifiers_off() {
 #[test]
 fn second_signal_ends_bringup_and_warns_of_an_armed_arm() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (served, bench) = at_a_bench();
+    let (served, bench) = start_at_bench();
     let child = armed(&served, &bench, folder.path());
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
@@ -133,7 +133,7 @@ fn second_signal_ends_bringup_and_warns_of_an_armed_arm() {
 #[test]
 fn bringup_with_closed_output_pipe_ends_disarmed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (served, bench) = at_a_bench();
+    let (served, bench) = start_at_bench();
     let mut child = armed(&served, &bench, folder.path());
     drop((child.stdout.take(), child.stderr.take()));
     // The next line is written when the tip is down.

@@ -147,7 +147,9 @@ fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
         is_on.store(drive.enabled, Ordering::Relaxed);
         sense.dead_man = is_pressed.load(Ordering::Relaxed);
     };
-    Native::for_replay().restless().meddled_with(Box::new(hand))
+    Native::for_replay()
+        .free_running()
+        .with_fault_injector(Box::new(hand))
 }
 
 /// Returns the truncated recording.
@@ -274,7 +276,7 @@ fn worker_that_does_not_react_to_ctrl_c_is_killed() {
 /// Ctrl-C in a terminal reaches both processes, but counts as one: the worker may still close its
 /// session, and is not ended at once.
 #[test]
-fn signal_to_both_processes_is_pressed_once() {
+fn signal_to_both_processes_counts_once() {
     let armed = Armed::new();
     armed.served.deaf.store(true, Ordering::Relaxed);
     armed.kill_worker("INT");

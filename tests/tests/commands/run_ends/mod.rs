@@ -18,7 +18,7 @@ use hapterra_tests::socket_device::{SocketDevice, command, output_text, signal, 
 use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
-fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
+fn signal_closes_the_session_with_confirmation() {
     for name in ["INT", "TERM", "HUP"] {
         let folder = tempfile::tempdir().expect("a folder");
         let served = SocketDevice::start();
@@ -34,7 +34,7 @@ fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
 }
 
 #[test]
-fn the_end_of_the_time_is_a_goodbye_too() {
+fn end_of_duration_closes_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let child = start(&served, folder.path(), &["--duration", "0.5s"]);
@@ -58,15 +58,15 @@ fn unconfirmed_disarm_is_reported_and_the_run_fails() {
         let output = end_of(child);
         let text = output_text(&output);
         assert_eq!(output.status.code(), Some(1), "{name}: {text}");
-        let says = "did not confirm that it is disarmed: switch the amplifiers off";
-        assert!(text.contains(says), "{name}: {text}");
+        let warning = "did not confirm that it is disarmed: switch the amplifiers off";
+        assert!(text.contains(warning), "{name}: {text}");
         assert!(folder.path().join("felt.csv").exists(), "{name}: {text}");
         assert_eq!(served.last_end(), SessionEnd::Replaced, "{name}");
     }
 }
 
 #[test]
-fn the_second_signal_ends_it_at_once_with_the_same_word() {
+fn second_signal_exits_at_once_with_the_same_warning() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let child = start(&served, folder.path(), &[]);
@@ -81,7 +81,7 @@ fn the_second_signal_ends_it_at_once_with_the_same_word() {
 }
 
 #[test]
-fn a_silence_that_no_device_keeps_to_is_refused() {
+fn silence_time_out_of_range_is_refused() {
     for seconds in ["4", "3601", "soon"] {
         let output = Command::new(hapterra_binary())
             .args(["run", "x.tif", "--silence", seconds])
@@ -149,7 +149,7 @@ fn failed_start_warns_that_the_arm_may_be_armed() {
 }
 
 #[test]
-fn a_signal_before_it_has_begun_is_heeded() {
+fn signal_during_start_ends_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     served.deaf.store(true, Ordering::Relaxed);

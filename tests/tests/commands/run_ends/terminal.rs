@@ -50,7 +50,7 @@ pub(super) fn modes(end: &File) -> LocalModes {
 }
 
 #[test]
-fn a_terminal_window_that_is_closed_is_a_goodbye() {
+fn closed_terminal_window_closes_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let (mut window, end) = terminal();
@@ -81,7 +81,7 @@ fn closed_output_does_not_stop_the_run() {
 }
 
 #[test]
-fn a_disk_that_is_full_costs_its_lines_and_nothing_else() {
+fn full_disk_loses_only_output_lines() {
     let full = || OpenOptions::new().write(true).open("/dev/full");
     // Not every system has one.
     let (Ok(out), Ok(err)) = (full(), full()) else {
@@ -162,7 +162,7 @@ fn keys_change_the_placement_and_ctrl_c_restores_the_terminal() {
 }
 
 #[test]
-fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
+fn second_ctrl_c_and_signal_restore_the_terminal() {
     for ends_by in ["interrupts", "signal"] {
         let folder = tempfile::tempdir().expect("a folder");
         let served = SocketDevice::start();
@@ -207,10 +207,10 @@ fn enter_and_keys_affect_only_the_selected_device() {
         .spawn()
         .expect("it runs");
     let name = |number: usize| format!("[{number} tcp:{}] ", served[number - 1].address);
-    let asks = |number| format!("and press {number} and then Enter");
+    let prompt = |number| format!("and press {number} and then Enter");
     // Both prompt for their zero poses, in either order.
     let mut shown = shows(&mut window, "hold it there and press");
-    while ![1, 2].iter().all(|number| shown.contains(&asks(*number))) {
+    while ![1, 2].iter().all(|number| shown.contains(&prompt(*number))) {
         shown += &shows(&mut window, "and then Enter");
     }
     // For neither of them.

@@ -34,7 +34,7 @@ fn force_fades_at_edge_of_stored_tiles_after_host_leaves() {
     assert!(bed.sample(PRESSED).force_n.z > 0.8);
     bed.session = None;
     let passed = 4_000;
-    bed.device.borrow_mut().pass(passed);
+    bed.device.borrow_mut().run_ticks(passed);
     {
         let log = bed.log.borrow();
         let alone = &log[PRESSED as usize..];
@@ -77,9 +77,9 @@ fn goodbye_lets_the_force_out_gently_and_switches_off() {
     let terrain = on_plane(&raster);
     let mut bed = Bed::new(&terrain, press(2.0).finish(), NOTHING).run(PRESSED);
     let session = bed.session.as_mut().expect("open");
-    session.say_goodbye(&mut |_| {}).expect("confirmed");
-    assert!(!bed.device.borrow().drive().enabled, "as it says");
-    bed.device.borrow_mut().pass(300);
+    session.close(&mut |_| {}).expect("confirmed");
+    assert!(!bed.device.borrow().outputs().enabled, "as it says");
+    bed.device.borrow_mut().run_ticks(300);
     let log = bed.log.borrow();
     let off = bed.off_at() as usize;
     assert!((90..130).contains(&(off - PRESSED as usize)), "{off}");

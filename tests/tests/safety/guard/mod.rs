@@ -41,13 +41,13 @@ fn arming_needs_the_switch_and_ramps_over_two_seconds() {
 }
 
 #[test]
-fn a_switch_held_from_the_beginning_never_arms() {
+fn switch_held_from_the_start_never_arms() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let held: Wrong = |_, sense| sense.dead_man = true;
     let bed = Bed::new(&terrain, press(1.0).finish(), held).run(PRESSED);
     assert!(bed.log.borrow().iter().all(|(_, drive)| !drive.enabled));
-    let last = bed.reports.last().expect("told");
+    let last = bed.reports.last().expect("reported");
     assert_eq!(last.blockers, Blockers::DEAD_MAN_STILL_HELD);
 }
 
@@ -96,7 +96,7 @@ fn fault_in_contact_zeroes_output_within_tick_and_latches() {
         );
         let end = bed.samples.last().expect("samples");
         assert_eq!((end.fault, end.mode), (Some(fault), Mode::Disarmed));
-        let report = bed.reports.last().expect("told");
+        let report = bed.reports.last().expect("reported");
         assert!(report.blockers.contains(Blockers::FAULT_LATCHED));
     }
 }
@@ -112,15 +112,15 @@ fn rearming_after_fault_needs_clear_command_and_new_press() {
     };
     let script = press(0.1).finish().wait(30.0);
     let mut bed = Bed::new(&terrain, script, wrong).run(PRESSED + 700);
-    bed.ask(Request::Arm);
+    bed.request(Request::Arm);
     bed = bed.run(PRESSED + 900);
     let refused = Err(Refusal::Blocked(Blockers::FAULT_LATCHED));
     assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
     let fault = Some(Fault::DeadManReleased);
-    bed.ask(Request::ClearFault { fault });
-    bed.ask(Request::Arm);
+    bed.request(Request::ClearFault { fault });
+    bed.request(Request::Arm);
     bed = bed.run(5_890);
-    let report = bed.reports.last().expect("told");
+    let report = bed.reports.last().expect("reported");
     assert_eq!(report.blockers, Blockers::DEAD_MAN_STILL_HELD);
     assert!(!bed.log.borrow()[5_880].1.enabled);
     bed = bed.run(8_300);
@@ -129,7 +129,7 @@ fn rearming_after_fault_needs_clear_command_and_new_press() {
 }
 
 #[test]
-fn an_encoder_that_slips_away_runs_into_the_joint_limits() {
+fn slipping_encoder_trips_the_joint_limits() {
     let raster = plane();
     let terrain = on_plane(&raster);
     // Counts that are lost slowly, without a jump.
@@ -153,7 +153,7 @@ fn an_encoder_that_slips_away_runs_into_the_joint_limits() {
 }
 
 #[test]
-fn a_dead_encoder_under_load_is_found() {
+fn dead_encoder_under_load_is_detected() {
     let raster = plane();
     let terrain = on_plane(&raster);
     thread_local! {
@@ -203,7 +203,7 @@ fn motors_that_work_hard_are_derated_and_stay_cool_enough() {
 }
 
 #[test]
-fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
+fn force_drops_for_a_fast_hand_and_ends_for_a_thrown_arm() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let [x, y] = MIDDLE_MM;
@@ -211,9 +211,9 @@ fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
         let far = [x + 130.0, y, PLANE_MM + 20.0];
         let near = [x - 130.0, y, PLANE_MM + 20.0];
         Script::start([x, y, PLANE_MM + 20.0])
-            .go(near, 100.0)
-            .go(far, speed)
-            .go(near, speed)
+            .line_to(near, 100.0)
+            .line_to(far, speed)
+            .line_to(near, speed)
     };
     let bed = Bed::new(&terrain, sweep(1_300.0), NOTHING).run(BEGIN + 3_000);
     bed.check_bounds();
@@ -254,8 +254,8 @@ fn boot_fault_must_be_cleared_before_arming() {
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::WatchdogReset));
     let fault = Some(Fault::WatchdogReset);
-    bed.ask(Request::ClearFault { fault });
-    bed.ask(Request::Arm);
+    bed.request(Request::ClearFault { fault });
+    bed.request(Request::Arm);
     bed = bed.run(3_300);
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
 
@@ -267,17 +267,17 @@ fn boot_fault_must_be_cleared_before_arming() {
     let fault = bed.reports.last().and_then(|r| r.fault);
     assert_eq!(fault, Some(Fault::CalibrationCorrupt));
     let fault = Some(Fault::CalibrationCorrupt);
-    bed.ask(Request::ClearFault { fault });
-    bed.ask(Request::Arm);
+    bed.request(Request::ClearFault { fault });
+    bed.request(Request::Arm);
     bed = bed.run(700);
     let refused = Err(Refusal::Blocked(Blockers::NO_CALIBRATION));
     assert_eq!(bed.answers.last().map(|(_, result)| *result), Some(refused));
-    bed.ask(Request::SetCalibration {
+    bed.request(Request::SetCalibration {
         calibration: Calibration::PREMIUM_1_5,
     });
-    bed.ask(Request::StoreCalibration);
+    bed.request(Request::StoreCalibration);
     bed = bed.run(1_500);
-    bed.ask(Request::Arm);
+    bed.request(Request::Arm);
     bed = bed.run(4_200);
     assert_eq!(bed.samples.last().map(|s| s.mode), Some(Mode::Armed));
     assert_eq!(*bed.device.borrow().memory(), good);

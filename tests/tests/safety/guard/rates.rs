@@ -24,7 +24,7 @@ fn arming_ramp_and_force_are_unchanged_at_10_khz() {
     let off = Rc::new(RefCell::new(None));
     let seen = Rc::clone(&off);
     let released = 10 * PRESSED;
-    let device = Native::new(StoppedClock::<10>, Some(Box::new(rig.arming()))).meddled_with(
+    let device = Native::new(StoppedClock::<10>, Some(Box::new(rig.arming()))).with_fault_injector(
         Box::new(move |tick, sense, drive| {
             if tick > released && !drive.enabled {
                 seen.borrow_mut().get_or_insert(tick - 1);

@@ -61,15 +61,14 @@ impl<'t> Bed<'t> {
         let rig = rig.expect("in reach").arming();
         let log = Log::default();
         let seen = Rc::clone(&log);
-        let device = Native::started(StoppedClock, Some(Box::new(rig)), stored, boot).meddled_with(
-            Box::new(move |tick, sense, drive| {
+        let device = Native::started(StoppedClock, Some(Box::new(rig)), stored, boot)
+            .with_fault_injector(Box::new(move |tick, sense, drive| {
                 if let Some(last) = seen.borrow_mut().last_mut() {
                     last.1 = *drive;
                 }
                 wrong(tick, sense);
                 seen.borrow_mut().push((*sense, GuardOutputs::default()));
-            }),
-        );
+            }));
         let home = terrain.scale().to_grid(home_mm).expect("addressable");
         let params = SurfaceParams::PREMIUM;
         Self {
@@ -115,7 +114,7 @@ impl<'t> Bed<'t> {
         polled.expect("goes on");
     }
 
-    pub(crate) fn ask(&mut self, request: Request) {
+    pub(crate) fn request(&mut self, request: Request) {
         self.session.as_mut().expect("open").request(request);
     }
 

@@ -212,7 +212,7 @@ fn device_receives_tiles_only_after_they_are_loaded() {
     let terrain = terrain(&raster);
     let home = GridPoint::new([640, 640, 100], Vec3::ZERO);
     let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Points, home);
-    let mut device = Native::for_replay().restless();
+    let mut device = Native::for_replay().free_running();
     let is_mute = Rc::default();
     let line = Line {
         device: &mut device,
@@ -239,5 +239,5 @@ fn device_receives_tiles_only_after_they_are_loaded() {
     wait_until("a tile that has come", || read_all(&mut session) > 0);
     is_mute.set(false);
     wait_until("more tiles", || read_all(&mut session) > 3);
-    session.say_goodbye(&mut |_| {}).expect("confirmed");
+    session.close(&mut |_| {}).expect("confirmed");
 }

@@ -15,11 +15,11 @@ use super::quantity::{FORCE, STIFFNESS};
 use super::recording::settings_of;
 use super::terrain_file::ReadingOptions;
 use crate::cli::failure::{Failure, Hint, OrHint};
-use crate::materials::{ClassMaterial, Looks, Materials};
+use crate::materials::{ClassMaterial, ClassMaterials, Materials};
 use crate::named_surfaces::{NAMED_SURFACES, NamedSurface};
-use crate::place::STIFFEST_N_PER_MM;
+use crate::place::MAX_STIFFNESS_N_PER_MM;
 use heightfield::{Raster, files_read_with};
-use numbers::{check, over, reported, rubbed};
+use numbers::{check, failure_of, with_coefficient, with_entry};
 use table::{MaterialEntry, PassivityName, ShadingName, TableFile};
 
 /// Surface of a terrain.
@@ -90,7 +90,7 @@ pub struct Surface {
     /// The scene's surface parameters; the default class if the ground has classes.
     pub params: SurfaceParams,
     /// The classes of the ground, if any.
-    looks: Option<Looks>,
+    class_materials: Option<ClassMaterials>,
 }
 
 impl SurfaceOptions {
@@ -123,12 +123,12 @@ impl SurfaceOptions {
             params.stiffness_n_per_mm = stiffness;
         }
         if let Some(mu) = self.friction {
-            params.friction = rubbed(&params.friction, mu);
+            params.friction = with_coefficient(&params.friction, mu);
         }
         if let Some(force) = self.max_force {
             params.max_force_n = force;
         }
-        check(&Material::of(params)).map_err(|why| reported(&why))?;
+        check(&Material::of(params)).map_err(|why| failure_of(&why))?;
         let limit = params.max_force_n;
         if !(limit.is_finite() && limit >= 0.0) {
             return Err(format!("a largest force of {limit} N is not valid"))
@@ -143,42 +143,48 @@ impl SurfaceOptions {
             return Err(format!("{} is no recording, and no .toml", file.display()))
                 .or_hint("name a recording, or a surface in a FILE.toml, with --surface");
         };
-        let looks = settings.materials.as_ref().map(|it| it.looks.clone());
-        if self.friction.is_some() && looks.is_some() {
+        let class_materials = settings
+            .materials
+            .as_ref()
+            .map(|it| it.class_materials.clone());
+        if self.friction.is_some() && class_materials.is_some() {
             return Err("--friction: each of the recorded materials has its own")
                 .or_hint("leave it out, or name a table that states it with --surface");
         }
         let params = settings.params();
-        Ok(Surface { params, looks })
+        Ok(Surface {
+            params,
+            class_materials,
+        })
     }
 
     /// Returns the surface of a table: the options replace numbers of its default, and the classes
     /// replace both.
     fn of_table(&self, file: &Path) -> Result<Surface, Failure> {
         let table = TableFile::open(file)?;
-        let (line, look) = &table.default;
-        let of_classes = table.classes.iter().map(|(_, line, look)| (*line, look));
-        for (line, look) in std::iter::once((*line, look)).chain(of_classes) {
-            self.check_stiffness(look, (file, line))?;
+        let (line, entry) = &table.default;
+        let of_classes = table.classes.iter().map(|(_, line, entry)| (*line, entry));
+        for (line, entry) in std::iter::once((*line, entry)).chain(of_classes) {
+            self.check_stiffness(entry, (file, line))?;
         }
-        let usual = Material::of(&SurfaceParams::PREMIUM);
-        let mut default = over(&usual, look, (file, *line, "the default"))?;
+        let material = Material::of(&SurfaceParams::PREMIUM);
+        let mut default = with_entry(&material, entry, (file, *line, "the default"))?;
         if let Some(stiffness) = self.stiffness {
             default.stiffness_n_per_mm = stiffness;
         }
         if let Some(mu) = self.friction {
-            default.friction = rubbed(&default.friction, mu);
+            default.friction = with_coefficient(&default.friction, mu);
         }
         if default.stiffness_n_per_mm == 0.0 {
             return Err("[default] has no stiffness, and a placement scales all stiffnesses by it")
                 .or_hint("state stiffness in [default]");
         }
-        let classes = table.classes.iter().map(|(class, line, look)| {
+        let classes = table.classes.iter().map(|(class, line, entry)| {
             let what = format!("class {class}");
             Ok(ClassMaterial {
                 class: *class,
-                name: look.name.clone(),
-                material: over(&default, look, (file, *line, &what))?,
+                name: entry.name.clone(),
+                material: with_entry(&default, entry, (file, *line, &what))?,
             })
         });
         let class = classes.collect::<Result<_, Failure>>()?;
@@ -198,7 +204,7 @@ impl SurfaceOptions {
         };
         Ok(Surface {
             params: default.params(&scene),
-            looks: Some(Looks { default, class }),
+            class_materials: Some(ClassMaterials { default, class }),
         })
     }
 
@@ -206,16 +212,16 @@ impl SurfaceOptions {
     /// or the command line allow.
     fn check_stiffness(
         &self,
-        look: &MaterialEntry,
+        entry: &MaterialEntry,
         (file, line): (&Path, usize),
     ) -> Result<(), Failure> {
-        let most = STIFFEST_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
-        let Some(stiffness) = look.stiffness.filter(|asked| *asked > most) else {
+        let max = MAX_STIFFNESS_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
+        let Some(stiffness) = entry.stiffness.filter(|stiffness| *stiffness > max) else {
             return Ok(());
         };
         let place = format!("{}, line {line}:", file.display());
         Err(Failure::new(format!(
-            "a stiffness of {stiffness} N/mm: a table may ask for {most} N/mm at most"
+            "a stiffness of {stiffness} N/mm: a table may ask for {max} N/mm at most"
         ))
         .hint(format!(
             "if you trust the table, say --stiffness {stiffness}"
@@ -229,7 +235,7 @@ impl Surface {
     const fn of(params: &SurfaceParams) -> Self {
         Self {
             params: *params,
-            looks: None,
+            class_materials: None,
         }
     }
 
@@ -245,9 +251,11 @@ impl Surface {
         terrain: (&str, &Raster),
         reading: &ReadingOptions,
     ) -> Result<Option<Materials>, Failure> {
-        let has_classes = |looks: &&Looks| !looks.class.is_empty();
-        let (file, looks) = match (&options.materials, &self.looks) {
-            (None, looks) if looks.as_ref().is_some_and(|it| has_classes(&it)) => {
+        let has_classes = |class_materials: &&ClassMaterials| !class_materials.class.is_empty();
+        let (file, class_materials) = match (&options.materials, &self.class_materials) {
+            (None, class_materials)
+                if class_materials.as_ref().is_some_and(|it| has_classes(&it)) =>
+            {
                 return Err("the surface lists several classes, but no class raster is given")
                     .or_hint("name the raster with --materials");
             }
@@ -256,11 +264,15 @@ impl Surface {
                 return Err("--materials without surfaces for its classes")
                     .or_hint("name a table with --surface FILE.toml; docs/worldcover.toml is one");
             }
-            (Some(file), Some(looks)) => (file, looks.clone()),
+            (Some(file), Some(class_materials)) => (file, class_materials.clone()),
         };
         let classes = Raster::open(file, &reading.of_classes()?).map_err(of_classes)?;
         let name = file.display().to_string();
-        Ok(Some(Materials::over(terrain, (&name, classes), looks)?))
+        Ok(Some(Materials::over(
+            terrain,
+            (&name, classes),
+            class_materials,
+        )?))
     }
 }
 

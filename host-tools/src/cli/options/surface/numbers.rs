@@ -10,7 +10,7 @@ use super::texture;
 use crate::cli::failure::Failure;
 
 /// Returns a friction with another coefficient, also for static friction.
-pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
+pub(super) fn with_coefficient(friction: &Friction, mu: f32) -> Friction {
     Friction {
         viscous_s: friction.viscous_s,
         ..Friction::coulomb(mu)
@@ -19,32 +19,32 @@ pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
 
 /// Returns a material with a table's numbers in place of its own. A stated friction also sets the
 /// static part.
-pub(super) fn over(
+pub(super) fn with_entry(
     material: &Material,
-    look: &MaterialEntry,
+    entry: &MaterialEntry,
     (file, line, what): (&Path, usize, &str),
 ) -> Result<Material, Failure> {
     let before = &material.friction;
     let friction = Friction {
-        dynamic_mu: look.friction.unwrap_or(before.dynamic_mu),
-        static_mu: look
+        dynamic_mu: entry.friction.unwrap_or(before.dynamic_mu),
+        static_mu: entry
             .static_friction
-            .or(look.friction)
+            .or(entry.friction)
             .unwrap_or(before.static_mu),
-        viscous_s: look.viscous_friction.unwrap_or(before.viscous_s),
+        viscous_s: entry.viscous_friction.unwrap_or(before.viscous_s),
     };
-    let made = texture::texture(look, &material.texture).and_then(|texture| {
+    let made = texture::texture(entry, &material.texture).and_then(|texture| {
         let material = Material {
-            stiffness_n_per_mm: look.stiffness.unwrap_or(material.stiffness_n_per_mm),
+            stiffness_n_per_mm: entry.stiffness.unwrap_or(material.stiffness_n_per_mm),
             friction,
-            damping_ns_per_m: look.damping.unwrap_or(material.damping_ns_per_m),
+            damping_ns_per_m: entry.damping.unwrap_or(material.damping_ns_per_m),
             texture,
         };
         check(&material).map(|()| material)
     });
     made.map_err(|why| {
         let place = format!("{}, line {line}, {what}:", file.display());
-        reported(&why).about(Some(&place))
+        failure_of(&why).about(Some(&place))
     })
 }
 
@@ -67,9 +67,9 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
         ..Damping::NONE
     };
     if !damping.is_valid() {
-        let (damping, most) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
+        let (damping, max) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
         return Err(format!(
-            "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
+            "a damping of {damping} N·s/m: damping from 0 to {max} N·s/m"
         ));
     }
     let stiffness = material.stiffness_n_per_mm;
@@ -82,7 +82,7 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
 }
 
 /// Returns the failure with a message and a hint.
-pub(super) fn reported(why: &str) -> Failure {
+pub(super) fn failure_of(why: &str) -> Failure {
     let (what, next_step) = why
         .split_once(": ")
         .unwrap_or((why, "choose another number"));

@@ -149,8 +149,8 @@ impl TableFile {
             why,
         };
         let mut classes: Vec<(i64, usize, MaterialEntry)> = Vec::new();
-        for (number, look) in written.class {
-            let line = line_of(look.span().start);
+        for (number, entry) in written.class {
+            let line = line_of(entry.span().start);
             let class = number.parse::<i64>().map_err(|_| {
                 bad(
                     line,
@@ -160,7 +160,7 @@ impl TableFile {
             if let Some((_, other, _)) = classes.iter().find(|(known, ..)| *known == class) {
                 return Err(bad(line, format!("class {class} is in line {other}, too")));
             }
-            classes.push((class, line, look.into_inner()));
+            classes.push((class, line, entry.into_inner()));
         }
         classes.sort_by_key(|(class, ..)| *class);
         if let Some((class, line, _)) = classes.get(MAX_CLASSES) {
@@ -172,16 +172,16 @@ impl TableFile {
                 ),
             ));
         }
-        let default = written.default.map_or_else(Default::default, |look| {
-            (line_of(look.span().start), look.into_inner())
+        let default = written.default.map_or_else(Default::default, |entry| {
+            (line_of(entry.span().start), entry.into_inner())
         });
-        let is_unprintable = |look: &MaterialEntry| {
-            let name = look.name.as_deref().unwrap_or_default();
+        let is_unprintable = |entry: &MaterialEntry| {
+            let name = entry.name.as_deref().unwrap_or_default();
             printable(name) != name
         };
-        let of_classes = classes.iter().map(|(_, line, look)| (*line, look));
+        let of_classes = classes.iter().map(|(_, line, entry)| (*line, entry));
         let mut all = std::iter::once((default.0, &default.1)).chain(of_classes);
-        if let Some((line, _)) = all.find(|(_, look)| is_unprintable(look)) {
+        if let Some((line, _)) = all.find(|(_, entry)| is_unprintable(entry)) {
             let why = "its name has a character that does not print; leave it out";
             return Err(bad(line, why.to_owned()));
         }
@@ -225,12 +225,12 @@ mod tests {
         let table = read(text).expect("a table");
         assert_eq!(table.shading, ShadingName::Smooth);
         assert_eq!(table.passivity, PassivityName::Off);
-        let look = &table.default.1;
+        let entry = &table.default.1;
         assert_eq!(
-            (look.stiffness, look.viscous_friction),
+            (entry.stiffness, entry.viscous_friction),
             (Some(0.6), Some(0.01))
         );
-        assert_eq!(look.texture_amplitude, Some(0.2));
+        assert_eq!(entry.texture_amplitude, Some(0.2));
         let settings = "device = \"usb\"\n\n[surface.default]\nfriction = 0.4\n";
         let table = read(settings).expect("a table");
         assert_eq!(table.default.1.friction, Some(0.4));
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_table_is_not_read_to_its_end() {
+    fn oversized_table_is_refused_unread() {
         let file = tempfile::NamedTempFile::new().expect("a file");
         // A sparse file, which needs no disk space.
         file.as_file().set_len(1 << 40).expect("sparse");
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn table_error_names_its_line() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("[default]\nfrictoin = 1\n", ["line 2", "frictoin"]),
             ("[class.10]\n\n[class.trees]\n", ["line 3", "whole number"]),
             ("[class.10]\n[class.010]\n", ["line 1", "class 10"]),
@@ -280,7 +280,7 @@ mod tests {
         ] {
             let why = read(text).expect_err(text);
             assert!(
-                wanted.iter().all(|part| why.contains(part)),
+                expected.iter().all(|part| why.contains(part)),
                 "{text}: {why}"
             );
         }

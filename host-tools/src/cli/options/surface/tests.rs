@@ -15,7 +15,7 @@ fn load(options: SurfaceOptions, text: &str) -> Result<Surface, String> {
 }
 
 #[test]
-fn class_takes_from_the_default_and_the_options() {
+fn class_inherits_the_default_and_the_options() {
     let options = SurfaceOptions {
         stiffness: Some(0.7),
         friction: Some(0.2),
@@ -25,14 +25,14 @@ fn class_takes_from_the_default_and_the_options() {
     let surface = load(options, text).expect("a table");
     assert_eq!(surface.params.stiffness_n_per_mm, 0.7);
     assert_eq!(surface.params.friction, Friction::coulomb(0.2));
-    let looks = surface.looks.expect("classes");
-    assert_eq!(looks.default, Material::of(&surface.params));
-    let [two, three] = &looks.class[..] else {
-        panic!("{looks:?}");
+    let class_materials = surface.class_materials.expect("classes");
+    assert_eq!(class_materials.default, Material::of(&surface.params));
+    let [two, three] = &class_materials.class[..] else {
+        panic!("{class_materials:?}");
     };
     assert_eq!((two.class, three.class), (2, 3));
     assert_eq!(two.material.stiffness_n_per_mm, 0.9);
-    assert_eq!(two.material.texture, looks.default.texture);
+    assert_eq!(two.material.texture, class_materials.default.texture);
     assert_eq!(three.material.stiffness_n_per_mm, 0.7);
     assert_eq!(three.material.friction, Friction::coulomb(0.5));
     assert_eq!(three.material.texture.pattern, Pattern::Grain);
@@ -53,7 +53,7 @@ fn scene_has_shading_and_passivity() {
 
 #[test]
 fn numbers_that_no_surface_has_are_refused_with_class_and_line() {
-    for (text, wanted) in [
+    for (text, expected) in [
         (
             "\n[class.7]\nfriction = -1\n",
             "line 2, class 7: a friction of -1",
@@ -73,45 +73,49 @@ fn numbers_that_no_surface_has_are_refused_with_class_and_line() {
         ),
     ] {
         let why = load(SurfaceOptions::default(), text).expect_err(text);
-        assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
+        assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
 }
 
 #[test]
 fn options_that_no_surface_has_are_refused() {
-    let usual = SurfaceOptions::default;
-    for (options, wanted) in [
+    let default = SurfaceOptions::default;
+    for (options, expected) in [
         (
             SurfaceOptions {
                 friction: Some(-0.1),
-                ..usual()
+                ..default()
             },
             "a friction of -0.1",
         ),
         (
             SurfaceOptions {
                 friction: Some(f32::NAN),
-                ..usual()
+                ..default()
             },
             "a friction of NaN",
         ),
         (
             SurfaceOptions {
                 stiffness: Some(-1.0),
-                ..usual()
+                ..default()
             },
             "a stiffness of -1",
         ),
         (
             SurfaceOptions {
                 max_force: Some(-1.0),
-                ..usual()
+                ..default()
             },
             "force of -1",
         ),
     ] {
-        let why = options.load().map(|it| it.params).expect_err(wanted).text();
-        assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
+        let why = options
+            .load()
+            .map(|it| it.params)
+            .expect_err(expected)
+            .text();
+        assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
 }
 
@@ -197,13 +201,13 @@ fn raster_or_classes_alone_are_refused() {
     };
     assert_eq!(with(None, None), Ok(false));
     assert_eq!(with(None, Some("[default]\nfriction = 0.1")), Ok(false));
-    for (materials, text, wanted) in [
+    for (materials, text, expected) in [
         (Some("c.tif"), None, "--surface FILE.toml"),
         (None, Some("[class.1]"), "--materials"),
         (Some("no/c.tif"), Some("[class.1]"), "no/c.tif"),
     ] {
         let why = with(materials, text).expect_err("one alone");
-        assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
+        assert!(why.contains(expected) && why.contains("hint: "), "{why}");
     }
     let options = SurfaceOptions {
         surface: Some(SurfaceChoice::File("no/t.toml".into())),

@@ -5,17 +5,17 @@ use hapterra_core::force::{Pattern, Texture};
 use super::table::{MaterialEntry, TextureName};
 
 /// Default distance between ridges, mm.
-const USUAL_WAVELENGTH_MM: f32 = 1.0;
+const DEFAULT_WAVELENGTH_MM: f32 = 1.0;
 /// Default amplitude: a fraction of the wavelength, and its maximum, mm.
-const USUAL_PART: f32 = 0.1;
-const USUAL_MOST_MM: f32 = 0.2;
+const DEFAULT_AMPLITUDE_SHARE: f32 = 0.1;
+const MAX_DEFAULT_AMPLITUDE_MM: f32 = 0.2;
 
 /// Returns a material's texture, based on the default's. A stated pattern replaces all numbers.
 ///
 /// # Errors
 /// Numbers without a texture, or numbers too small to feel or too large to render.
-pub(super) fn texture(look: &MaterialEntry, default: &Texture) -> Result<Texture, String> {
-    let pattern = look
+pub(super) fn texture(entry: &MaterialEntry, default: &Texture) -> Result<Texture, String> {
+    let pattern = entry
         .texture
         .map_or(default.pattern, |texture| match texture {
             TextureName::None => Pattern::None,
@@ -23,31 +23,32 @@ pub(super) fn texture(look: &MaterialEntry, default: &Texture) -> Result<Texture
             TextureName::Grating => Pattern::Grating,
         });
     if pattern == Pattern::None {
-        return match first_number(look) {
+        return match first_number(entry) {
             None => Ok(Texture::NONE),
             Some(number) => Err(format!(
                 "{number} of no texture: add texture = \"grain\" or \"grating\", or leave it out"
             )),
         };
     }
-    if pattern == Pattern::Grain && look.texture_direction.is_some() {
+    if pattern == Pattern::Grain && entry.texture_direction.is_some() {
         return Err(
             "texture_direction of grain, which is alike in all directions: leave it out, or choose texture = \"grating\""
                 .to_owned(),
         );
     }
-    let inherited = look.texture.is_none().then_some(default);
-    let wavelength_mm = look.texture_wavelength;
+    let inherited = entry.texture.is_none().then_some(default);
+    let wavelength_mm = entry.texture_wavelength;
     let wavelength_mm = wavelength_mm.or(inherited.map(|it| it.wavelength_mm));
-    let wavelength_mm = wavelength_mm.unwrap_or(USUAL_WAVELENGTH_MM);
-    let amplitude_mm = look.texture_amplitude;
+    let wavelength_mm = wavelength_mm.unwrap_or(DEFAULT_WAVELENGTH_MM);
+    let amplitude_mm = entry.texture_amplitude;
     let amplitude_mm = amplitude_mm.or(inherited.map(|it| it.amplitude_mm));
-    let direction_deg = look.texture_direction;
+    let direction_deg = entry.texture_direction;
     let direction_deg = direction_deg.or(inherited.map(|it| it.direction_deg));
-    let seed = look.texture_seed.or(inherited.map(|it| it.seed));
+    let seed = entry.texture_seed.or(inherited.map(|it| it.seed));
     checked(Texture {
         pattern,
-        amplitude_mm: amplitude_mm.unwrap_or((USUAL_PART * wavelength_mm).min(USUAL_MOST_MM)),
+        amplitude_mm: amplitude_mm
+            .unwrap_or((DEFAULT_AMPLITUDE_SHARE * wavelength_mm).min(MAX_DEFAULT_AMPLITUDE_MM)),
         wavelength_mm,
         direction_deg: direction_deg.unwrap_or(0.0),
         seed: seed.unwrap_or(0),
@@ -55,15 +56,15 @@ pub(super) fn texture(look: &MaterialEntry, default: &Texture) -> Result<Texture
 }
 
 /// Returns the name of the first stated number.
-fn first_number(look: &MaterialEntry) -> Option<&'static str> {
-    let stated = [
-        (look.texture_amplitude.is_some(), "texture_amplitude"),
-        (look.texture_wavelength.is_some(), "texture_wavelength"),
-        (look.texture_direction.is_some(), "texture_direction"),
-        (look.texture_seed.is_some(), "texture_seed"),
+fn first_number(entry: &MaterialEntry) -> Option<&'static str> {
+    let numbers = [
+        (entry.texture_amplitude.is_some(), "texture_amplitude"),
+        (entry.texture_wavelength.is_some(), "texture_wavelength"),
+        (entry.texture_direction.is_some(), "texture_direction"),
+        (entry.texture_seed.is_some(), "texture_seed"),
     ];
-    let mut stated = stated.into_iter().filter(|(is_stated, _)| *is_stated);
-    stated.next().map(|(_, name)| name)
+    let mut numbers = numbers.into_iter().filter(|(is_stated, _)| *is_stated);
+    numbers.next().map(|(_, name)| name)
 }
 
 /// Returns a texture if its numbers can be felt and rendered.
@@ -80,10 +81,10 @@ fn checked(texture: Texture) -> Result<Texture, String> {
             "a texture with a wavelength of {wavelength} mm: texture_wavelength from {shortest}, a few encoder counts, to {longest} mm"
         ));
     }
-    let most = (wavelength * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
-    if !(amplitude > 0.0 && amplitude <= most) {
+    let max = (wavelength * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
+    if !(amplitude > 0.0 && amplitude <= max) {
         return Err(format!(
-            "a texture of {amplitude} mm with a wavelength of {wavelength} mm: texture_amplitude above 0 and up to {most} mm, which is an eighth of the wavelength, and {} mm at most",
+            "a texture of {amplitude} mm with a wavelength of {wavelength} mm: texture_amplitude above 0 and up to {max} mm, which is an eighth of the wavelength, and {} mm at most",
             Texture::MAX_AMPLITUDE_MM
         ));
     }
@@ -98,34 +99,37 @@ fn checked(texture: Texture) -> Result<Texture, String> {
 mod tests {
     use super::*;
 
-    fn asked(texture: Option<TextureName>, numbers: [Option<f32>; 3]) -> Result<Texture, String> {
+    fn texture_with(
+        texture: Option<TextureName>,
+        numbers: [Option<f32>; 3],
+    ) -> Result<Texture, String> {
         let [texture_amplitude, texture_wavelength, texture_direction] = numbers;
-        let look = MaterialEntry {
+        let entry = MaterialEntry {
             texture,
             texture_amplitude,
             texture_wavelength,
             texture_direction,
             ..MaterialEntry::default()
         };
-        super::texture(&look, &Texture::NONE)
+        super::texture(&entry, &Texture::NONE)
     }
 
     #[test]
     fn unset_texture_options_use_defaults() {
-        assert_eq!(asked(None, [None; 3]), Ok(Texture::NONE));
-        let grain = asked(Some(TextureName::Grain), [None; 3]).expect("valid");
+        assert_eq!(texture_with(None, [None; 3]), Ok(Texture::NONE));
+        let grain = texture_with(Some(TextureName::Grain), [None; 3]).expect("valid");
         assert_eq!((grain.amplitude_mm, grain.wavelength_mm), (0.1, 1.0));
         for wavelength in [0.25, 0.3, 7.0, 100.0] {
             let numbers = [None, Some(wavelength), Some(-30.0)];
-            let grating = asked(Some(TextureName::Grating), numbers).expect("valid");
+            let grating = texture_with(Some(TextureName::Grating), numbers).expect("valid");
             assert!(grating.amplitude_mm <= 0.2 && grating.direction_deg == -30.0);
         }
     }
 
     #[test]
-    fn a_class_takes_what_it_does_not_state_from_the_default() {
+    fn class_texture_inherits_unstated_numbers() {
         let numbers = [Some(0.1), Some(1.5), Some(20.0)];
-        let default = asked(Some(TextureName::Grating), numbers).expect("valid");
+        let default = texture_with(Some(TextureName::Grating), numbers).expect("valid");
         let higher = MaterialEntry {
             texture_amplitude: Some(0.15),
             ..MaterialEntry::default()
@@ -148,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_with_what_to_do() {
+    fn invalid_texture_is_refused_with_a_remedy() {
         let (grain, grating) = (Some(TextureName::Grain), Some(TextureName::Grating));
         let bad = [
             (None, [Some(0.1), None, None], "of no texture"),
@@ -174,9 +178,9 @@ mod tests {
             (grating, [None, None, Some(f32::NAN)], "direction NaN°"),
             (grating, [None, None, Some(400.0)], "direction 400°"),
         ];
-        for (pattern, numbers, wanted) in bad {
-            let why = asked(pattern, numbers).expect_err(wanted);
-            assert!(why.contains(wanted) && why.contains(": "), "{why}");
+        for (pattern, numbers, expected) in bad {
+            let why = texture_with(pattern, numbers).expect_err(expected);
+            assert!(why.contains(expected) && why.contains(": "), "{why}");
         }
     }
 }

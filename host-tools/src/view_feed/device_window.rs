@@ -9,7 +9,7 @@ use hapterra_view_stream::Tiles;
 /// ([`hapterra_core::terrain::Window`]). A tile that was lost in transit counts as stored until it
 /// is sent again.
 #[derive(Debug, Default)]
-pub(super) struct HeldTiles {
+pub(super) struct DeviceWindow {
     side: i32,
     /// Haptic cells along the side of a cell of the level: a haptic tile is shown as the tile of
     /// the level around it.
@@ -19,7 +19,7 @@ pub(super) struct HeldTiles {
     has_changed: bool,
 }
 
-impl HeldTiles {
+impl DeviceWindow {
     /// Creates an empty window of `side` × `side` tiles.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
@@ -40,14 +40,14 @@ impl HeldTiles {
     }
 
     /// Sets the tile that the loop lacks now.
-    pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
+    pub(super) fn set_missing(&mut self, tile: Option<TileIndex>) {
         let tile = tile.map(|tile| self.of_level(tile));
         self.has_changed |= self.awaited != tile;
         self.awaited = tile;
     }
 
     /// Changes to a placement whose haptic cells have another size.
-    pub(super) fn go_over(&mut self, parts: u32) {
+    pub(super) fn change_placement(&mut self, parts: u32) {
         self.parts = parts as i32;
     }
 
@@ -86,7 +86,7 @@ impl HeldTiles {
     }
 
     /// Marks the change as pending again, because it was not sent to the viewer.
-    pub(super) fn not_told(&mut self) {
+    pub(super) fn mark_unsent(&mut self) {
         self.has_changed = true;
     }
 }
@@ -96,18 +96,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tile_takes_the_place_of_the_one_in_its_slot() {
-        let mut held = HeldTiles::new(4, 1);
+    fn tile_replaces_the_one_in_its_slot() {
+        let mut held = DeviceWindow::new(4, 1);
         assert_eq!(held.take_change(), Some(Tiles::default()));
         let slots =
             [(0, 0), (4, 0), (-4, 8), (1, 0)].map(|(c, r)| held.sent(TileKey::new(0, c, r)).0);
         assert_eq!(slots, [0, 0, 0, 1]);
-        held.lacks(Some(TileIndex::new(2, 3)));
+        held.set_missing(Some(TileIndex::new(2, 3)));
         let tiles = held.take_change().expect("it has changed");
         assert_eq!(tiles.held, [[-4, 8], [1, 0]]);
         assert_eq!(tiles.awaited, [[2, 3]]);
         held.sent(TileKey::new(0, 1, 0));
-        held.lacks(Some(TileIndex::new(2, 3)));
+        held.set_missing(Some(TileIndex::new(2, 3)));
         assert_eq!(held.take_change(), None);
         held.clear();
         assert_eq!(held.take_change().expect("empty").held, [[0; 2]; 0]);
@@ -116,12 +116,12 @@ mod tests {
     /// A tile under a ball is a part of a tile of the level.
     #[test]
     fn haptic_tiles_are_shown_as_the_tile_around_them() {
-        let mut held = HeldTiles::new(4, 3);
+        let mut held = DeviceWindow::new(4, 3);
         for (col, row, slot, shown) in [(0, 0, 0, (0, 0)), (2, 5, 4, (0, 1)), (3, 3, 5, (1, 1))] {
             let key = TileKey::new(1, shown.0, shown.1);
             assert_eq!(held.sent(TileKey::new(1, col, row)), (slot, key));
         }
-        held.lacks(Some(TileIndex::new(8, 0)));
+        held.set_missing(Some(TileIndex::new(8, 0)));
         let tiles = held.take_change().expect("it has changed");
         assert_eq!(tiles.held, [[0, 0], [0, 1], [1, 1]]);
         assert_eq!(tiles.awaited, [[2, 0]]);

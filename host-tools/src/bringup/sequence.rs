@@ -11,11 +11,11 @@ use crate::link::ControlSession;
 
 /// Progress of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Walked {
+pub enum SequenceEnd {
     /// The log is complete.
-    ToTheEnd,
+    Complete,
     /// The board was without power: open a new session, then continue.
-    BoardWasOff,
+    BoardPoweredOff,
 }
 
 /// Reason why the sequence ended early.
@@ -37,52 +37,52 @@ pub enum BringupError {
     Log(#[from] LogError),
 }
 
-/// Runs the steps that are not in the log, and calls `keep` with the log after each.
+/// Runs the steps that are not in the log, and calls `save` with the log after each.
 ///
 /// # Errors
 /// [`BringupError`].
-pub fn walk(
+pub fn run_sequence(
     control: &mut ControlSession<'_>,
     attendant: &mut dyn Attendant,
     log: &mut Log,
-    keep: &mut dyn FnMut(&Log) -> Result<(), LogError>,
-) -> Result<Walked, BringupError> {
-    let mut board = Board::new(control, attendant.stops());
+    save: &mut dyn FnMut(&Log) -> Result<(), LogError>,
+) -> Result<SequenceEnd, BringupError> {
+    let mut board = Board::new(control, attendant.stop_check());
     let record = board.calibration().map_err(BringupError::Halt)?;
-    if let Some(why) = log.meet(Identity::of(board.device(), record.as_ref())) {
-        attendant.hear(&format!("{why}: what was found of it no longer counts"));
+    if let Some(why) = log.update_identity(Identity::of(board.device(), record.as_ref())) {
+        attendant.notify(&format!("{why}: what was found of it no longer counts"));
     }
     while let Some(step) = log.next() {
         let (number, of, title) = (step.number(), Step::ALL.len(), step.title());
-        attendant.hear(&format!("step {number} of {of}: {title}"));
-        let result = steps::go(step, &mut board, attendant);
+        attendant.notify(&format!("step {number} of {of}: {title}"));
+        let result = steps::run_step(step, &mut board, attendant);
         match &result {
             Ok(reported) => {
-                attendant.hear(&format!("passed: {reported}"));
-                log.take(step, true, reported.clone());
+                attendant.notify(&format!("passed: {reported}"));
+                log.add(step, true, reported.clone());
             }
-            Err(Halt::Found(finding)) => log.take(step, false, finding.to_string()),
+            Err(Halt::Found(finding)) => log.add(step, false, finding.to_string()),
             Err(_) => {}
         }
         match &result {
             Ok(_) => attendant.may_be_armed(false),
-            Err(_) => leave(&mut board, attendant),
+            Err(_) => disarm_or_report(&mut board, attendant),
         }
-        keep(log)?;
+        save(log)?;
         match result {
-            Ok(_) if step == Step::EnableLine => return Ok(Walked::BoardWasOff),
+            Ok(_) if step == Step::EnableLine => return Ok(SequenceEnd::BoardPoweredOff),
             Ok(_) => {}
             Err(Halt::Found(finding)) => return Err(BringupError::Found { step, finding }),
             Err(halt) => return Err(BringupError::Halt(halt)),
         }
     }
-    Ok(Walked::ToTheEnd)
+    Ok(SequenceEnd::Complete)
 }
 
 /// Disarms the board after a failed step; informs the attendant unless the board confirms it.
-fn leave(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) {
-    match board.leave() {
+fn disarm_or_report(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) {
+    match board.disarm_and_clear() {
         Ok(()) => attendant.may_be_armed(false),
-        Err(not_confirmed) => attendant.hear(&not_confirmed.to_string()),
+        Err(not_confirmed) => attendant.notify(&not_confirmed.to_string()),
     }
 }

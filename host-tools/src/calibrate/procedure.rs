@@ -4,13 +4,13 @@ use hapterra_core::phantom::Calibration;
 
 use super::arm::Arm;
 use super::fit_error::FitError;
-use super::gravity::{Still, fit_gravity};
-use super::ratios::{Check, Direction, fit_ratios};
+use super::gravity::{StaticPose, fit_gravity};
+use super::ratios::{Direction, RulerMove, fit_ratios};
 use super::review::Review;
 
 /// Distance of the move along the ruler, mm.
-const ABOUT_MM: f64 = 80.0;
-/// Largest change between two looks of an encoder at rest.
+const MOVE_MM: f64 = 80.0;
+/// Largest change between two readings of an encoder at rest.
 const STILL_COUNTS: u32 = 3;
 /// Number of poses for the weight.
 const POSES: usize = 4;
@@ -18,7 +18,7 @@ const POSES: usize = 4;
 /// The user's side of a calibration: moves the arm, and reads ruler and scale.
 pub trait Attendant {
     /// Receives a message.
-    fn hear(&mut self, line: &str);
+    fn notify(&mut self, line: &str);
 
     /// Moves the arm into its zero pose and holds it there.
     ///
@@ -44,7 +44,7 @@ pub trait Attendant {
     ///
     /// # Errors
     /// [`Stopped`].
-    fn agrees(&mut self, review: &Review) -> Result<bool, Stopped>;
+    fn confirm_record(&mut self, review: &Review) -> Result<bool, Stopped>;
 }
 
 /// The attendant stopped the calibration.
@@ -54,7 +54,7 @@ pub struct Stopped;
 
 /// Reason why a calibration gives no record.
 #[derive(Debug, thiserror::Error)]
-pub enum WalkError<E: std::error::Error + 'static> {
+pub enum ProcedureError<E: std::error::Error + 'static> {
     /// The attendant stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -81,78 +81,78 @@ pub struct Plan {
 /// Runs a calibration from a record. `counts` reads the encoders.
 ///
 /// # Errors
-/// [`WalkError`].
-pub fn walk<E: std::error::Error + 'static>(
+/// [`ProcedureError`].
+pub fn run_procedure<E: std::error::Error + 'static>(
     before: &Calibration,
     plan: Plan,
     attendant: &mut dyn Attendant,
     counts: &mut dyn FnMut() -> Result<[i32; 3], E>,
-) -> Result<Review, WalkError<E>> {
-    let mut walk = Walk {
+) -> Result<Review, ProcedureError<E>> {
+    let mut procedure = Procedure {
         attendant,
         counts,
         zero: [0; 3],
     };
-    walk.zero()?;
+    procedure.zero()?;
     let mut review = Review {
         before: *before,
         after: *before,
-        zero: walk.zero,
+        zero: procedure.zero,
         ratios: None,
         gravity: None,
     };
     if plan.ratios {
-        let fit = fit_ratios(before, &walk.checks()?)?;
+        let fit = fit_ratios(before, &procedure.moves()?)?;
         fit.apply(&mut review.after);
         review.ratios = Some(fit);
     }
     if plan.gravity {
-        let poses = walk.poses(&review.after)?;
+        let poses = procedure.poses(&review.after)?;
         if !poses.is_empty() {
             let fit = fit_gravity(&review.after, &poses)?;
             fit.apply(&mut review.after);
             review.gravity = Some(fit);
         }
     }
-    match walk.attendant.agrees(&review)? {
+    match procedure.attendant.confirm_record(&review)? {
         true => Ok(review),
-        false => Err(WalkError::Refused),
+        false => Err(ProcedureError::Refused),
     }
 }
 
-struct Walk<'a, E> {
+struct Procedure<'a, E> {
     attendant: &'a mut dyn Attendant,
     counts: &'a mut dyn FnMut() -> Result<[i32; 3], E>,
     zero: [i32; 3],
 }
 
-impl<E: std::error::Error + 'static> Walk<'_, E> {
-    fn zero(&mut self) -> Result<(), WalkError<E>> {
+impl<E: std::error::Error + 'static> Procedure<'_, E> {
+    fn zero(&mut self) -> Result<(), ProcedureError<E>> {
         self.attendant.zero_pose()?;
-        self.zero = self.still_counts()?;
+        self.zero = self.counts_at_rest()?;
         Ok(())
     }
 
-    fn checks(&mut self) -> Result<Vec<Check>, WalkError<E>> {
-        let mut checks = Vec::new();
+    fn moves(&mut self) -> Result<Vec<RulerMove>, ProcedureError<E>> {
+        let mut moves = Vec::new();
         for direction in Direction::ALL {
             if direction != Direction::ALL[0] {
                 self.attendant.zero_pose()?;
             }
             let from = self.since_zero()?;
-            let mm = self.attendant.move_along(direction, ABOUT_MM)?;
+            let mm = self.attendant.move_along(direction, MOVE_MM)?;
             let to = self.since_zero()?;
-            checks.push(Check {
+            moves.push(RulerMove {
                 from,
                 to,
                 direction,
                 mm,
             });
         }
-        Ok(checks)
+        Ok(moves)
     }
 
-    fn poses(&mut self, record: &Calibration) -> Result<Vec<Still>, WalkError<E>> {
+    fn poses(&mut self, record: &Calibration) -> Result<Vec<StaticPose>, ProcedureError<E>> {
         let arm = Arm::of(record);
         let rad_per_count = 1.0 / record.counts_per_radian().as_dvec3();
         let mut poses = Vec::new();
@@ -160,7 +160,7 @@ impl<E: std::error::Error + 'static> Walk<'_, E> {
             let Some([up, towards]) = self.attendant.hold_still(number)? else {
                 break;
             };
-            poses.push(Still {
+            poses.push(StaticPose {
                 q_rad: arm.angles(rad_per_count, self.since_zero()?).to_array(),
                 force_n: [towards, 0.0, up],
             });
@@ -168,24 +168,24 @@ impl<E: std::error::Error + 'static> Walk<'_, E> {
         Ok(poses)
     }
 
-    fn since_zero(&mut self) -> Result<[i32; 3], WalkError<E>> {
-        let counts = self.still_counts()?;
+    fn since_zero(&mut self) -> Result<[i32; 3], ProcedureError<E>> {
+        let counts = self.counts_at_rest()?;
         Ok(std::array::from_fn(|i| {
             counts[i].wrapping_sub(self.zero[i])
         }))
     }
 
     /// Returns the counts once the arm is at rest.
-    fn still_counts(&mut self) -> Result<[i32; 3], WalkError<E>> {
+    fn counts_at_rest(&mut self) -> Result<[i32; 3], ProcedureError<E>> {
         let mut reported = false;
         loop {
-            let once = (self.counts)().map_err(WalkError::Counts)?;
-            let again = (self.counts)().map_err(WalkError::Counts)?;
+            let once = (self.counts)().map_err(ProcedureError::Counts)?;
+            let again = (self.counts)().map_err(ProcedureError::Counts)?;
             if (0..3).all(|i| once[i].abs_diff(again[i]) <= STILL_COUNTS) {
                 return Ok(again);
             }
             if !reported {
-                self.attendant.hear("the arm moves: hold it still");
+                self.attendant.notify("the arm moves: hold it still");
             }
             reported = true;
         }
