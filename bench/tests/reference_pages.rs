@@ -232,8 +232,7 @@ fn faults_are_those_of_the_code() {
             &format!("**{} {fault:?}**: {meaning} {remedy}", fault.number()),
         );
     }
-    page +=
-        "\n## Blockers\n\nA blocker prevents arming while its cause exists.\n\n";
+    page += "\n## Blockers\n\nA blocker prevents arming while its cause exists.\n\n";
     for (name, meaning) in Blockers::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }

@@ -76,7 +76,8 @@ impl Setting {
         let give_mm = 1e3 * PRESS_FORCE_N * self.grasp.hand().compliance_m_per_n();
         let pressed = PLANE_MM - wall_mm - give_mm;
         let begin = Script::start([east, north, PLANE_MM + START_HEIGHT_MM]);
-        let press = |script: Script, up_mm: f64| script.line_to([east, north, up_mm], APPROACH_MM_S);
+        let press =
+            |script: Script, up_mm: f64| script.line_to([east, north, up_mm], APPROACH_MM_S);
         let (arm, clutch_s, in_s) = match entry {
             Entry::Ramp => {
                 let script = press(begin, pressed).wait(RAMP_S + OBSERVATION_S);

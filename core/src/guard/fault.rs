@@ -102,10 +102,14 @@ impl Fault {
             Self::EncoderJump => "an encoder moved farther in a tick than the arm can",
             Self::Hardware => "the encoder or amplifier hardware did not answer",
             Self::EmergencyStop => "the emergency stop was pressed, or its wire broke",
-            Self::DeadManReleased => "the dead-man switch was released while the amplifiers were on",
+            Self::DeadManReleased => {
+                "the dead-man switch was released while the amplifiers were on"
+            }
             Self::MotorTooHot => "a motor winding is too hot",
             Self::JointLimit => "a joint's reading is beyond its stops",
-            Self::Linkage => "the readings of joints 2 and 3 are a pose that the linkage does not allow",
+            Self::Linkage => {
+                "the readings of joints 2 and 3 are a pose that the linkage does not allow"
+            }
             Self::NoMotion => "a motor pushed and its encoder did not move",
             Self::TooFast => "the tip stayed above twice the speed limit",
             Self::TaskStalled => "a task on the board stopped, so the watchdog was not fed",
@@ -119,7 +123,9 @@ impl Fault {
             Self::OutputsNotAsSet => {
                 "the converter's settings do not read back as they were written"
             }
-            Self::StackOverflow => "the board's program overran its stack, then the board was reset",
+            Self::StackOverflow => {
+                "the board's program overran its stack, then the board was reset"
+            }
             Self::JogRanAway => "a joint moved faster or farther than a jog permits",
             Self::TickGap => "more than one and a half periods passed between two ticks",
         }
@@ -136,7 +142,9 @@ impl Fault {
             }
             Self::Hardware => "check supply and cables of encoders and amplifiers",
             Self::EmergencyStop => "make sure that the arm is safe, then release the stop",
-            Self::DeadManReleased => "nothing is wrong: clear the fault, arm, and press the switch again",
+            Self::DeadManReleased => {
+                "nothing is wrong: clear the fault, arm, and press the switch again"
+            }
             Self::MotorTooHot => "let the motors cool for some minutes; lower the force",
             Self::JointLimit => "zero the arm again; check ratios and signs of the calibration",
             Self::Linkage => "zero the arm again; check the encoder of joint 2 or 3",

@@ -49,10 +49,14 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 
 /// Returns the last request to the clutch.
 fn requested_hold(steering: &mut Steering<'_>) -> Option<ClutchMode> {
-    steering.requests().into_iter().rev().find_map(|request| match request {
-        HostRequest::Request(Request::Clutch { hold }) => Some(hold),
-        _ => None,
-    })
+    steering
+        .requests()
+        .into_iter()
+        .rev()
+        .find_map(|request| match request {
+            HostRequest::Request(Request::Clutch { hold }) => Some(hold),
+            _ => None,
+        })
 }
 
 fn answer(steering: &mut Steering<'_>, hold: ClutchMode) {

@@ -490,7 +490,9 @@ impl<'t> Simulation<'t> {
             (LinkError::Version { .. }, _) if self.other_device => {
                 self.step = Step::Ended(End::Reported);
             }
-            (LinkError::Silent(_) | LinkError::HostSilent, _) if self.resumptions < MAX_RESUMPTIONS => {
+            (LinkError::Silent(_) | LinkError::HostSilent, _)
+                if self.resumptions < MAX_RESUMPTIONS =>
+            {
                 self.resumptions += 1;
                 if let Step::Disarming(_) | Step::Requesting = self.step {
                     self.close();

@@ -639,7 +639,10 @@ fn assert_violates<T: std::fmt::Debug>(invariant: Invariant, verdict: Result<T, 
 #[test]
 fn other_bits_are_found() {
     let (scene, observed, mut buffers) = run_scene(Supply::Preloaded);
-    assert_eq!(metamorphic::repeated(&scene, &observed, &mut buffers), Ok(true));
+    assert_eq!(
+        metamorphic::repeated(&scene, &observed, &mut buffers),
+        Ok(true)
+    );
     for forged in other_bits(&observed) {
         let verdict = metamorphic::repeated(&scene, &forged, &mut buffers);
         assert_violates(Invariant::Repeatable, verdict);

@@ -85,7 +85,7 @@ fn largest_turn(rendered: &[TickRecord], max_motion: f32) -> f32 {
 
 /// Returns the work of the force on a HIP along its path, mJ.
 fn gained_mj(rendered: &[TickRecord]) -> f64 {
-    let gives = rendered.windows(2).map(|pair| {
+    let works = rendered.windows(2).map(|pair| {
         let force = 0.5 * (pair[0].force_n + pair[1].force_n).as_dvec3();
         let (from, to) = (position(&pair[0].hip), position(&pair[1].hip));
         force.dot([0, 1, 2].map(|i| to[i] - from[i]).into())

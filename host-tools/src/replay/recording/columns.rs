@@ -29,7 +29,10 @@ pub const COLUMNS: [(&[&str], &str); 12] = [
         &[TICK, WORK],
         "`run`: number of the tick; its contact work in work units",
     ),
-    (&[COST], "`run`: duration of the previous tick, in counts of the device's clock"),
+    (
+        &[COST],
+        "`run`: duration of the previous tick, in counts of the device's clock",
+    ),
     (&[LATE], "`run`: number of late ticks so far"),
     (&["mode"], "`run`, `demo`: progress of arming"),
     (

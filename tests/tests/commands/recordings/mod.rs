@@ -203,7 +203,7 @@ fn demo_recording_replays_bit_by_bit() {
 }
 
 /// Writes a terrain of ten degrees from south to north, hills.asc, whose cells differ in size.
-pub(crate) fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
+fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
     let mut text = "ncols 60\nnrows 101\nxllcenter 10\nyllcenter 55\ncellsize 0.1\n".to_owned();
     for row in 0..101 {
         let heights = (0..60).map(|column| height(column, row).to_string());
