@@ -21,7 +21,7 @@ use hapterra_firmware::board::GuardInputs;
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
-use hapterra_firmware::monitor::{Monitor, Part};
+use hapterra_firmware::monitor::{Monitor, WatchedPart};
 use hapterra_firmware::native::{
     FULL_SCALE_A, StoppedClock, VirtualAmplifiersOff, VirtualEncoders,
 };
@@ -135,7 +135,8 @@ impl Board {
 
     /// Returns true if the watchdog is fed now: loop and link have both run since the last check.
     pub fn is_alive(&mut self) -> bool {
-        self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link])
+        self.monitor
+            .may_feed_watchdog(&[WatchedPart::Tick, WatchedPart::Link])
     }
 
     fn settle(&mut self) {
