@@ -80,9 +80,9 @@
 //! | state | accepts | exit |
 //! | --- | --- | --- |
 //! | closed | hello | hello: open |
-//! | open | everything | bye: leaving. Detach: detached, which is answered. `silence_s` without a frame of this session while armed, or during arming: ended, after a command to disarm. Hello of another session: open, replaced |
-//! | leaving | heartbeat, status, calibration, bye | the amplifiers are off and the telemetry is sent: it sends goodbye and is ended. Hello of another session: open |
-//! | detached | detach: answered by detached; bye | bye: leaving. `silence_s` while armed, as in open: ended, after a command to disarm. Hello of another session: open |
+//! | open | everything | bye: closing. Detach: detached, which is answered. `silence_s` without a frame of this session while armed, or during arming: ended, after a command to disarm. Hello of another session: open, replaced |
+//! | closing | heartbeat, status, calibration, bye | the amplifiers are off and the telemetry is sent: it sends goodbye and is ended. Hello of another session: open |
+//! | detached | detach: answered by detached; bye | bye: closing. `silence_s` while armed, as in open: ended, after a command to disarm. Hello of another session: open |
 //! | ended | bye: answered by goodbye; detach: answered by detached; close: the emulated board ends its program | hello of another session: open |
 //!
 //! - A hello of the open session is answered and changes nothing. A hello of an ended session, or
