@@ -73,7 +73,7 @@ fn own_checkout_is_built_from_any_folder() {
     let root = fs::canonicalize(root.expect("a folder above")).expect("there");
     let started = format!("\n{}\n", root.display());
     assert!(
-        format!("\n{output_text}").contains(&started),
+        format!("\n{text}").contains(&started),
         "{started}: {text}"
     );
     assert!(text.contains("source         "), "{text}");
