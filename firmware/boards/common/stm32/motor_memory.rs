@@ -23,7 +23,7 @@ pub(crate) fn begin(cause: ResetCause) -> Temperatures {
     // temperatures.
     let found = unsafe { ptr::read_volatile((&raw const COPIES).cast::<Copies>()) };
     let (temperatures, copies) = motor_memory::begin(cause, &found);
-    copies.into_iter().enumerate().for_each(keep);
+    copies.into_iter().enumerate().for_each(store_copy);
     temperatures
 }
 
