@@ -32,22 +32,15 @@ fn image_fits_only_its_board() {
             continue;
         };
         let output = check(board, &image);
-        let output_text = output_text(&output);
-        assert!(output.status.success(), "{board}: {output_text}");
-        assert!(
-            output_text.contains("flash") && output_text.contains("RAM"),
-            "{output_text}"
-        );
+        let text = output_text(&output);
+        assert!(output.status.success(), "{board}: {text}");
+        assert!(text.contains("flash") && text.contains("RAM"), "{text}");
         for (other, _) in images.iter().filter(|(other, _)| *other != board) {
             let output = check(other, &image);
-            let output_text = output_text(&output);
-            assert_eq!(
-                output.status.code(),
-                Some(1),
-                "{board} as {other}: {output_text}"
-            );
-            assert!(output_text.contains("built for"), "{output_text}");
-            assert!(output_text.contains("--board"), "{output_text}");
+            let text = output_text(&output);
+            assert_eq!(output.status.code(), Some(1), "{board} as {other}: {text}");
+            assert!(text.contains("built for"), "{text}");
+            assert!(text.contains("--board"), "{text}");
         }
     }
 }
@@ -75,14 +68,11 @@ fn own_checkout_is_built_from_any_folder() {
         .env("CARGO", &cargo)
         .output()
         .expect("it runs");
-    let output_text = output_text(&output);
+    let text = output_text(&output);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let root = fs::canonicalize(root.expect("a folder above")).expect("there");
     let started = format!("\n{}\n", root.display());
-    assert!(
-        format!("\n{output_text}").contains(&started),
-        "{started}: {output_text}"
-    );
-    assert!(output_text.contains("source         "), "{output_text}");
-    assert_eq!(output.status.code(), Some(1), "{output_text}");
+    assert!(format!("\n{text}").contains(&started), "{started}: {text}");
+    assert!(text.contains("source         "), "{text}");
+    assert_eq!(output.status.code(), Some(1), "{text}");
 }
