@@ -72,10 +72,7 @@ fn own_checkout_is_built_from_any_folder() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let root = fs::canonicalize(root.expect("a folder above")).expect("there");
     let started = format!("\n{}\n", root.display());
-    assert!(
-        format!("\n{text}").contains(&started),
-        "{started}: {text}"
-    );
+    assert!(format!("\n{text}").contains(&started), "{started}: {text}");
     assert!(text.contains("source         "), "{text}");
     assert_eq!(output.status.code(), Some(1), "{text}");
 }
