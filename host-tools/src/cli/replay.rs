@@ -406,5 +406,8 @@ fn replay<'t>(
     if let Some(feed) = feed {
         viewing::end(feed, |line| eprintln!("{line}"));
     }
-    Ok((summary?, ticks))
+    let summary = summary?;
+    // The viewer shows more of the terrain than the trajectory needs.
+    replayed.terrain.check_complete()?;
+    Ok((summary, ticks))
 }
