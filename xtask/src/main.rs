@@ -55,25 +55,25 @@ cargo xtask COMMAND
                          `cargo test` and select programs, as `--test link`
   lint                   formatting, clippy and documentation, warnings as errors
   census [--write]       words, options, public items, circles of files and lines of code, beside
-                         the kept table and the bounds; --write: keep these
+                         the stored table and the bounds; --write: store these
   docs [--write]         the reference, figures and links of the book, and the book
                          itself where mdBook is installed; --write: write the reference anew
   setup                  only find or install what the commands need
-  size [BOARD]           build the images and hold them to their flash and RAM budgets
+  size [BOARD]           build the images and compare them with their flash and RAM budgets
   panics [BOARD]         build the images and prove that no interrupt can panic
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
-                         targets and the kept table; --write: keep these
-  cycles [--write|--all] cycles of a tick on the boards' chips, at most, beside the kept table;
+                         targets and the stored table; --write: store these
+  cycles [--write|--all] cycles of a tick on the boards' chips, at most, beside the stored table;
                          --all: of all 12,500 random scenes
-  soak MINUTES [--seed N] [--rough]  random scenes on all cores, every tick judged in f64
+  soak MINUTES [--seed N] [--rough]  random scenes on all cores, every tick checked in f64
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
-                         the closed loop with everything going wrong at random, 10,000 s of
-                         arm time unless told otherwise; writes log/campaign.md
+                         the closed loop with faults injected at random, 10,000 s of arm time
+                         by default; writes log/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
-                         device time unless told otherwise; writes log/link-campaign.md
-  fuzz TARGET MINUTES    libFuzzer on `terrain` (files of every format), `text` (recordings,
+                         device time by default; writes log/link-campaign.md
+  fuzz TARGET MINUTES    run libFuzzer on `terrain` (files of every format), `text` (recordings,
                          calibrations, tables, commands), `tick`, `tile` or `wire`; installs
                          cargo-fuzz and a nightly compiler where they are missing
   miri                   core's tests under Miri, where it can run
@@ -107,7 +107,7 @@ fn command() -> Result<ExitCode> {
     }
     let mut words = lexopt::Parser::from_env();
     let Some(word) = words.next()? else {
-        bail!("say what to do:\n\n{HELP}");
+        bail!("name a command:\n\n{HELP}");
     };
     let name = match word {
         Value(name) => name.string()?,
@@ -139,9 +139,9 @@ fn command() -> Result<ExitCode> {
         }
         "fuzz" => {
             let target = words.value()?.string()?;
-            let minutes = words
-                .value()
-                .map_err(|_| anyhow::anyhow!("say for how many minutes"))?;
+            let minutes = words.value().map_err(|_| {
+                anyhow::anyhow!("name the target and the minutes: cargo xtask fuzz TARGET MINUTES")
+            })?;
             fuzz::fuzz(&target, &minutes.string()?)?;
         }
         "view" => match words.next()? {
@@ -153,7 +153,7 @@ fn command() -> Result<ExitCode> {
         "page" => match words.next()? {
             Some(Long("test")) => page::test()?,
             Some(other) => return Err(other.unexpected().into()),
-            None => bail!("say: cargo xtask page --test, or cargo xtask demo --touch"),
+            None => bail!("type: cargo xtask page --test, or cargo xtask demo --touch"),
         },
         "python" => match flag(&mut words, &["test"])? {
             Some(_) => python::test()?,
