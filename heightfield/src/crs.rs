@@ -9,6 +9,7 @@
 mod by_gdal;
 mod datum;
 mod definition;
+mod lookup;
 mod projection;
 mod shift;
 mod system;

@@ -20,26 +20,36 @@ pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
 /// Max cached texts: tiles of one terrain have the same text, and PROJ takes half a second to
 /// compare one with all EPSG systems.
 const MAX_REMEMBERED: usize = 16;
-static REMEMBERED: Mutex<Vec<(String, Option<ReferenceSystem>)>> = Mutex::new(Vec::new());
+static REMEMBERED: Mutex<Vec<(String, ByText)>> = Mutex::new(Vec::new());
 
-/// Returns the system of a text.
-pub(super) fn of_text(text: &str) -> Option<ReferenceSystem> {
-    let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, system)) = remembered().iter().find(|(known, _)| known == text) {
-        return system.clone();
-    }
-    let system = found_by_text(text);
-    let mut remembered = remembered();
-    remembered.truncate(MAX_REMEMBERED - 1);
-    remembered.insert(0, (text.to_owned(), system.clone()));
-    system
+/// A text's system in libgdal.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ByText {
+    /// EPSG's code of the same system, if PROJ finds one.
+    pub(super) code: Option<u16>,
+    /// The system as the text describes it.
+    pub(super) described: Option<ReferenceSystem>,
 }
 
-fn found_by_text(text: &str) -> Option<ReferenceSystem> {
+/// Returns the system of a text; an empty one if libgdal is missing or does not understand it.
+pub(super) fn of_text(text: &str) -> ByText {
+    let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, found)) = remembered().iter().find(|(known, _)| known == text) {
+        return found.clone();
+    }
+    let found = found_by_text(text).unwrap_or_default();
+    let mut remembered = remembered();
+    remembered.truncate(MAX_REMEMBERED - 1);
+    remembered.insert(0, (text.to_owned(), found.clone()));
+    found
+}
+
+fn found_by_text(text: &str) -> Option<ByText> {
     let found = gdal().ok()?.reference_of_text(text).ok()?;
-    let code = found.epsg.and_then(|code| u16::try_from(code).ok());
-    let known = code.and_then(ReferenceSystem::from_code);
-    known.or_else(|| described(&found))
+    Some(ByText {
+        code: found.epsg.and_then(|code| u16::try_from(code).ok()),
+        described: described(&found),
+    })
 }
 
 fn described(found: &SpatialReference) -> Option<ReferenceSystem> {

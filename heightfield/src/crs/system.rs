@@ -4,8 +4,7 @@
 use super::datum::{Datum, LonLat};
 use super::projection::Projection;
 use super::unit::Unit;
-use super::wkt::Node;
-use super::{Globe, Vertical, by_gdal, definition};
+use super::Globe;
 use crate::tangents::Tangents;
 
 /// Valid lengths of a map's unit on the ground within the projection's area.
@@ -33,40 +32,6 @@ pub struct ReferenceSystem {
 }
 
 impl ReferenceSystem {
-    /// Returns the system with an EPSG code; `None` if the code is unknown.
-    #[must_use]
-    pub fn from_code(code: u16) -> Option<Self> {
-        definition::of_code(code)
-    }
-
-    /// Reads the system that a text describes, and the vertical system that may follow it. A code
-    /// in the text overrides its parameters, which other programs round. Without a code, the
-    /// projection comes from libgdal, if it is installed.
-    pub(crate) fn from_wkt(text: &str) -> (Option<Self>, Option<Vertical>) {
-        let text = text.trim().trim_end_matches('\0');
-        let Some((root, second)) = Node::parse_both(text) else {
-            return (None, None);
-        };
-        let up = second.as_ref().and_then(Vertical::of);
-        (
-            root.horizontal().and_then(|node| Self::of_node(node, text)),
-            up.or_else(|| Vertical::of_compound(&root)),
-        )
-    }
-
-    fn of_node(node: &Node, text: &str) -> Option<Self> {
-        let by_code = node.epsg().and_then(Self::from_code);
-        // A unit beside a code overrides the code's, as in GDAL.
-        let by_code = by_code.map(|system| match (node.is_projected(), node.unit()) {
-            (true, Some(metres)) => system.in_units_of(metres),
-            _ => system,
-        });
-        by_code.or_else(|| by_gdal::of_text(text)).or_else(|| {
-            let unit = node.unit_of_places().unwrap_or(Unit::Angle(1.0));
-            Some(Self::new(node.name()?, unit, Datum::of(node.base(), None)))
-        })
-    }
-
     /// Returns a system with only a name, a unit and perhaps a datum.
     pub(crate) fn new(name: &str, unit: Unit, datum: Option<Datum>) -> Self {
         Self {

@@ -4,7 +4,8 @@
 //! - [`options`]: options that several subcommands share;
 //! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: error messages and their remedies;
-//! - `guardian`: the process that disarms the arm if the serving process dies;
+//! - `guardian`: the process that disarms the arm if the serving process dies; `worker_pipe`: what
+//!   the serving process reports to it;
 //! - [`report`]: the result that a command prints;
 //! - `settings`: settings files and recordings in place of options;
 //! - `old_subcommands` and `old_options`: names of earlier versions, and their replacements;
@@ -37,6 +38,7 @@ pub mod status;
 pub mod terminal;
 pub mod view;
 pub mod viewing;
+mod worker_pipe;
 
 use std::ffi::OsString;
 use std::io::Write as _;
@@ -147,7 +149,7 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
             1
         })?;
     // The guardian has already printed it.
-    if let Some(line) = line.filter(|_| !guardian::is_worker()) {
+    if let Some(line) = line.filter(|_| !worker_pipe::is_worker()) {
         eprintln!("{line}");
     }
     P::try_parse_from(&arguments).map_err(|mut error| {

@@ -29,11 +29,8 @@ mod close;
 mod process;
 #[cfg(unix)]
 mod worker;
-mod worker_message;
 
 use std::ffi::OsString;
-
-pub(in crate::cli) use worker_message::WorkerMessage;
 
 /// Starts this program again as the worker, and returns its exit code when it ends; `None` in the
 /// worker itself. `program` is the command that starts it.
@@ -48,28 +45,4 @@ pub(in crate::cli) fn watch(program: &[OsString], arguments: &[OsString]) -> Opt
         let _ = (program, arguments);
         None
     }
-}
-
-/// Returns true in a worker whose guardian counts the presses of Ctrl-C.
-pub(in crate::cli) fn counts_presses() -> bool {
-    #[cfg(unix)]
-    return worker::is_worker();
-    #[cfg(not(unix))]
-    false
-}
-
-/// Returns true in a process that a guardian started.
-pub(in crate::cli) fn is_worker() -> bool {
-    #[cfg(unix)]
-    return worker::has_guardian();
-    #[cfg(not(unix))]
-    false
-}
-
-/// Sends a message to the guardian, if there is one.
-pub(in crate::cli) fn report(message: &WorkerMessage) {
-    #[cfg(unix)]
-    worker::report(message);
-    #[cfg(not(unix))]
-    let _ = message;
 }

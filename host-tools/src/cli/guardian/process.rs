@@ -18,9 +18,10 @@ use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::signal_name;
 
-use super::{WorkerMessage, close, worker};
+use super::close;
 use crate::cli::failure::Failure;
 use crate::cli::terminal::interrupt::{self, EXIT_SIGNALS, INTERRUPTED};
+use crate::cli::worker_pipe::{self, WorkerMessage};
 
 /// Interval of checks.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -78,7 +79,7 @@ impl Watch {
         let child = Command::new(program)
             .args(words)
             .args(arguments)
-            .env(worker::VARIABLE, format!("{me}:{presses_fd}:{news_fd}"))
+            .env(worker_pipe::VARIABLE, format!("{me}:{presses_fd}:{news_fd}"))
             .spawn()?;
         Ok(Self {
             child,

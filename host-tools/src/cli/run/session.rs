@@ -12,7 +12,7 @@ use super::watch::Watch;
 use super::{Args, OTHER_FILE};
 use crate::cli::bringup::required::{check_brought_up, check_drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::guardian::{self, WorkerMessage};
+use crate::cli::worker_pipe::{self, WorkerMessage};
 use crate::cli::options::placing;
 use crate::cli::options::steering::PlacementControl;
 use crate::cli::session_summary::{self, SessionSummary};
@@ -273,7 +273,7 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let recording = device.record.as_deref().map(|path| {
         let output = Output::create(path)?.for_recording(max_recorded_bytes(path));
         if let Some(partial) = output.partial() {
-            guardian::report(&WorkerMessage::Recording(partial.to_owned()));
+            worker_pipe::report(&WorkerMessage::Recording(partial.to_owned()));
         }
         Recording::new(output, &columns)
     });

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use super::raw_mode;
 use super::writer::write_text;
-use crate::cli::guardian::{self, WorkerMessage};
+use crate::cli::worker_pipe::{self, WorkerMessage};
 use crate::link::DeviceAddress;
 
 /// Signals that request an end.
@@ -51,7 +51,7 @@ pub fn listen() {
     ONCE.call_once(|| match handle(on_signal) {
         Ok(()) => {
             IS_LISTENING.store(true, Ordering::Relaxed);
-            guardian::report(&WorkerMessage::Listening);
+            worker_pipe::report(&WorkerMessage::Listening);
         }
         // Then Ctrl-C ends the program at once, as without a handler.
         Err(error) => tracing::debug!("cannot listen to Ctrl-C: {error}"),
@@ -73,7 +73,7 @@ fn handle(on_signal: fn()) -> io::Result<()> {
 /// Handles a signal. In a terminal Ctrl-C reaches the worker and its guardian, which sends it on.
 /// The signal alone only requests an end; presses from the guardian are counted.
 fn on_signal() {
-    match guardian::counts_presses() {
+    match worker_pipe::counts_presses() {
         true => REQUESTED.store(true, Ordering::Relaxed),
         false => press(),
     }
@@ -100,14 +100,14 @@ pub(in crate::cli) fn end_without_guardian() {
 
 /// Handles Ctrl-C as a key.
 pub(super) fn press_key() {
-    guardian::report(&WorkerMessage::Pressed);
+    worker_pipe::report(&WorkerMessage::Pressed);
     press();
 }
 
 /// Requests an end because the program that sends commands has ended. A press at the same time is
 /// the first, because in a terminal Ctrl-C reaches both programs.
 pub(in crate::cli) fn input_ended() {
-    guardian::report(&WorkerMessage::InputEnded);
+    worker_pipe::report(&WorkerMessage::InputEnded);
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
@@ -162,7 +162,7 @@ pub(in crate::cli) fn device_may_be_armed(name: &str, address: &DeviceAddress, m
     if *address != DeviceAddress::Native {
         let address = address.to_string();
         SERVES.set(may.then(|| address.clone()));
-        guardian::report(&match may {
+        worker_pipe::report(&match may {
             true => WorkerMessage::MayBeArmed(address),
             false => WorkerMessage::Settled(address),
         });
@@ -179,7 +179,7 @@ fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
 pub fn requested() -> bool {
     let requested = REQUESTED.load(Ordering::Relaxed);
     if requested && let Some(address) = SERVES.take() {
-        guardian::report(&WorkerMessage::Leaving(address));
+        worker_pipe::report(&WorkerMessage::Leaving(address));
     }
     requested
 }

@@ -30,7 +30,7 @@ mod lines {
 
     impl WorkerMessage {
         /// Returns the line, without its line end.
-        pub(in crate::cli::guardian) fn line(&self) -> Vec<u8> {
+        pub(in crate::cli) fn line(&self) -> Vec<u8> {
             let (word, rest): (&str, &[u8]) = match self {
                 Self::Listening => ("listening", b""),
                 Self::Pressed => ("pressed", b""),
@@ -44,7 +44,7 @@ mod lines {
         }
 
         /// Parses a line; returns `None` if it is no message.
-        pub(in crate::cli::guardian) fn read(line: &[u8]) -> Option<Self> {
+        pub(in crate::cli) fn read(line: &[u8]) -> Option<Self> {
             let space = line.iter().position(|byte| *byte == b' ')?;
             let (word, rest) = (line.get(..space)?, line.get(space + 1..)?);
             let text = || String::from_utf8_lossy(rest).into_owned();
