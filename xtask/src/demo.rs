@@ -6,10 +6,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::board::EMULATED;
-use crate::image;
-use crate::run::{command_line, hapterra, report, root, timed};
-use crate::setup::{gdal, qemu, toolchain};
+use crate::emulation::{Emulation, emulation};
+use crate::run::{command_line, hapterra, report, root};
+use crate::setup::gdal;
 use crate::view;
 
 /// Request of the user.
@@ -25,12 +24,6 @@ pub(crate) struct Request {
     pub(crate) out: Option<PathBuf>,
     /// Arguments that are passed to `hapterra demo` unchanged.
     pub(crate) extra: Vec<OsString>,
-}
-
-/// The emulated board, ready to start.
-pub(crate) struct Emulation {
-    pub(crate) image: PathBuf,
-    pub(crate) qemu: PathBuf,
 }
 
 /// Builds the programs and runs `hapterra demo`; returns its exit code.
@@ -62,16 +55,6 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
         .with_context(|| format!("cannot start `{}`", command_line(&command)))?;
     // `None`: ended by a signal.
     Ok(status.code().unwrap_or(1))
-}
-
-/// Builds the image, and installs QEMU if possible.
-pub(crate) fn emulation() -> Result<Emulation> {
-    let toolchain = toolchain::ready()?;
-    let qemu = qemu::ready()?;
-    let image = timed("building the emulated board's image", || {
-        image::build(toolchain, EMULATED)
-    })?;
-    Ok(Emulation { image, qemu })
 }
 
 fn emulation_or_report() -> Option<Emulation> {

@@ -10,6 +10,7 @@ mod counts;
 mod demo;
 mod deny;
 mod docs;
+mod emulation;
 mod flash;
 mod fuzz;
 mod image;

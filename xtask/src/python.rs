@@ -10,7 +10,7 @@ use crate::run::{
     cargo, output, report, root, run, run_quietly, target_dir, tested_programs, timed,
     without_own_variables,
 };
-use crate::{demo, deny};
+use crate::{deny, emulation};
 
 /// Options for the published wheel and the tested one. With the same versions, features and
 /// profile, most crates of the registry are already built for the workspace's tests.
@@ -63,7 +63,7 @@ pub(crate) fn test() -> Result<()> {
         .args(["-m", "pytest"])
         .env("HAPTERRA_LAB", lab)
         .current_dir(root().join("python"));
-    match demo::emulation() {
+    match emulation::emulation() {
         Ok(board) => {
             tests.env(EMULATED.elf_variable, board.image);
             tests.env("HAPTERRA_QEMU", board.qemu);

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
-use crate::demo::emulation;
+use crate::emulation::emulation;
 use crate::deny;
 use crate::run::{built, cargo, on_path, report, root, run, tested_programs, timed};
 use crate::setup::packages::{self, found_or_installed};

@@ -12,7 +12,7 @@ use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Limits, WORKING_SHARE};
 
 use super::contact_loop::{CELL_MM, HOME, LoopTick, PLANE_MM};
-use super::trial::Setting;
+use super::setting::Setting;
 use hapterra::phantom::{HeldPhantom, OutOfReach, Script};
 
 /// The press, N.

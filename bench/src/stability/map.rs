@@ -10,12 +10,10 @@ use hapterra_core::rate::TickRate;
 use super::bounds::AtTip;
 use super::entry::EntryOutcome;
 use super::grasp::Grasp;
+use super::setting::{Column, Setting};
 use super::tap::{TAP_SPEEDS_M_S, Taps};
-use super::trial::{PressOutcome, Setting, Trial, Verdict};
+use super::trial::{PressOutcome, Trial, Verdict};
 use hapterra::phantom::{OutOfReach, PhantomModel};
-
-/// A rate, a damping, and the arm's friction as a fraction of the model's.
-pub type Column = (TickRate, Damping, f64);
 
 /// Trials of every stiffness in every grasp with every damping at every rate.
 pub struct Map {

@@ -3,6 +3,7 @@
 //!
 //! - [`grasp`]: how the hand holds the tip;
 //! - `contact_loop`: the tick and the arm, step by step;
+//! - [`setting`]: rate, surface, grasp and delay of a trial;
 //! - `surface_work`: the energy that the surface gives;
 //! - [`tap`]: taps at a stated speed;
 //! - [`trial`]: results of a press and of taps: limit cycle, and energy from the surface;
@@ -20,6 +21,7 @@ pub mod entry;
 pub mod grasp;
 pub mod map;
 pub mod picture;
+pub mod setting;
 mod surface_work;
 pub mod tap;
 pub mod trial;

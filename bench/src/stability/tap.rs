@@ -2,7 +2,7 @@
 
 use super::contact_loop::{HOME, PLANE_MM};
 use super::grasp::Grasp;
-use super::trial::Setting;
+use super::setting::Setting;
 use hapterra::phantom::{OutOfReach, Script};
 
 /// Speeds of the tip at contact, m/s.

@@ -8,8 +8,9 @@ use super::bounds::AtTip;
 use super::entry::Entry;
 use super::grasp::Grasp;
 use super::map::Plan;
+use super::setting::Setting;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
-use super::trial::{PressOutcome, Setting, Trial, Verdict};
+use super::trial::{PressOutcome, Trial, Verdict};
 use hapterra::phantom::PhantomModel;
 use hapterra::stability::{
     LONG_US, RAMP_UP_N_PER_MM, RAMP_UP_N_PER_MM_LONG, SHORT_US, STABLE_N_PER_MM,

@@ -1,10 +1,10 @@
 //! A horizontal reference system: its name, its code, and the longitude and latitude of its
 //! coordinates.
 
+use super::Globe;
 use super::datum::{Datum, LonLat};
 use super::projection::Projection;
 use super::unit::Unit;
-use super::Globe;
 use crate::tangents::Tangents;
 
 /// Valid lengths of a map's unit on the ground within the projection's area.

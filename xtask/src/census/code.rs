@@ -109,25 +109,65 @@ pub(super) fn import_cycles(source: &Path) -> Result<Vec<Vec<String>>> {
     Ok(import_cycles)
 }
 
-/// Returns the modules beside `name` that its `use` lines contain, before its tests.
+/// Returns the modules beside `name` that its `use` declarations contain, before its tests.
 fn imports<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'t str> {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
-    let mut found = vec![];
+    let inside = |a: &str, b: &str| b.is_empty() || a == b || a.starts_with(&format!("{b}::"));
+    let paths = declarations(text).iter().flat_map(|path| expanded(path));
+    paths
+        .filter_map(|path| longest_module(&absolute(name, &path)?, all))
+        .filter(|module| !inside(name, module) && !inside(module, name))
+        .collect()
+}
+
+/// Returns the paths of the `use` declarations in a text, without white space.
+fn declarations(text: &str) -> Vec<String> {
+    let is_visibility = |before: &str| {
+        before.is_empty()
+            || before == "pub "
+            || (before.starts_with("pub(") && before.ends_with(") "))
+    };
+    let (mut found, mut is_open) = (vec![], false);
     for line in text.lines().map(str::trim_start) {
-        let line = line.strip_prefix("pub ").unwrap_or(line);
-        let Some(path) = line.strip_prefix("use ") else {
-            continue;
-        };
-        let path = absolute(name, path.trim_end_matches(';'));
-        let Some(module) = path.and_then(|path| longest_module(&path, all)) else {
-            continue;
-        };
-        let inside = |a: &str, b: &str| b.is_empty() || a == b || a.starts_with(&format!("{b}::"));
-        if !inside(name, module) && !inside(module, name) {
-            found.push(module);
+        let path = line.split_once("use ");
+        if let Some((_, path)) = path.filter(|(before, _)| is_visibility(before)) {
+            found.push(path.to_owned());
+            is_open = true;
+        } else if is_open && let Some(last) = found.last_mut() {
+            *last += line;
+        }
+        is_open &= !line.contains(';');
+    }
+    let path = |path: String| {
+        let path = path.split(';').next().unwrap_or_default();
+        path.replace(" as ", "::as::").replace(' ', "")
+    };
+    found.into_iter().map(path).collect()
+}
+
+/// Returns the single paths of a path with groups: `a::{b, c}` is `a::b` and `a::c`.
+fn expanded(path: &str) -> Vec<String> {
+    let Some((before, group)) = path.split_once('{') else {
+        return vec![path.to_owned()];
+    };
+    let group = group.strip_suffix('}').unwrap_or(group);
+    let (mut parts, mut part, mut depth) = (vec![], String::new(), 0);
+    for letter in group.chars() {
+        match letter {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        match letter {
+            ',' if depth == 0 => parts.push(std::mem::take(&mut part)),
+            _ => part.push(letter),
         }
     }
-    found
+    parts.push(part);
+    let parts = parts.iter().filter(|part| !part.is_empty());
+    parts
+        .flat_map(|part| expanded(&format!("{before}{part}")))
+        .collect()
 }
 
 /// Returns a path of a `use` from the crate's root; `None` for other crates.
@@ -148,7 +188,6 @@ fn absolute(name: &str, path: &str) -> Option<String> {
 
 /// Returns the innermost module on a path.
 fn longest_module<'t>(path: &str, all: &'t BTreeMap<String, String>) -> Option<&'t str> {
-    let path = path.split(['{', ' ']).next()?.trim_end_matches("::");
     let ends = path.match_indices("::").map(|(end, _)| end);
     let mut prefixes: Vec<&str> = ends.map(|end| &path[..end]).collect();
     prefixes.push(path);
@@ -185,7 +224,7 @@ mod tests {
             fs::write(path, text).expect("written");
         };
         write("lib.rs", "pub mod a;\npub use a::A;\n");
-        write("a.rs", "use crate::b::{B, C};\nuse std::fmt;\n");
+        write("a.rs", "use crate::{\n    b::{B, C},\n};\nuse std::fmt;\n");
         write("b/mod.rs", "mod inner;\npub use inner::B;\n");
         write("b/inner.rs", "use super::C;\nuse super::super::c::D;\n");
         write("c.rs", "use crate::d::deep;\n");
@@ -194,7 +233,7 @@ mod tests {
             "b/mod.rs",
             "use crate::c::D;\n#[cfg(test)]\nmod tests {\n    use crate::a::A;\n}\n",
         );
-        write("d.rs", "use crate::a::A;\n");
+        write("d.rs", "pub(crate) use super::{a, b::B};\n");
         assert_eq!(
             import_cycles(folder.path()).expect("read"),
             [["a", "b", "c", "d"]]
