@@ -77,7 +77,7 @@ pub struct Args {
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<f64>,
 
-    /// Disarm after this time without a message from here, such as 10s
+    /// Disarm after this time without a message from here
     ///
     /// The device does so by itself; a number alone is in seconds.
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = silence)]
