@@ -17,7 +17,7 @@ const HAND_MM: f64 = 7.0;
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Rendering {
-    /// Ground metres per device mm (5m/mm), or size of a cell (1.5mm/cell)
+    /// Ground metres per device mm (5m/mm), or mm per cell (1.5mm/cell)
     ///
     /// [default: replay 1mm/cell; else the terrain is fitted to the workspace, and with --at it is
     /// 1mm/cell] mm/cell is the size of a haptic cell; a number alone is in m/mm.
