@@ -6,8 +6,8 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
-use crate::emulation::emulation;
 use crate::deny;
+use crate::emulation::emulation;
 use crate::run::{built, cargo, on_path, report, root, run, tested_programs, timed};
 use crate::setup::packages::{self, found_or_installed};
 

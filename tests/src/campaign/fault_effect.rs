@@ -72,7 +72,7 @@ impl InjectedFault {
         random: &mut Random,
     ) {
         let jump = self.sign * (130 + (5_000.0 * self.size) as i32);
-        let elapsed = (now - self.ticks.start + 1) as i32;
+        let elapsed_ticks = (now - self.ticks.start + 1) as i32;
         let counts = &mut inputs.counts;
         match self.kind {
             Kind::EncoderJump => {
@@ -91,14 +91,14 @@ impl InjectedFault {
             // Below the limit for a tick, whatever the hand adds, but above a real tip's speed.
             Kind::EncoderRunaway => {
                 let count = &mut counts[self.axis];
-                let runaway = *count + self.sign * 110 * elapsed;
+                let runaway = *count + self.sign * 110 * elapsed_ticks;
                 *count = match self.held {
                     Some(last) => last + (runaway - last).clamp(-127, 127),
                     None => *count + self.sign * 60,
                 };
                 self.held = Some(*count);
             }
-            Kind::EncoderBeyondLimits => counts[self.axis] += self.sign * 12 * elapsed,
+            Kind::EncoderBeyondLimits => counts[self.axis] += self.sign * 12 * elapsed_ticks,
             Kind::EmergencyStop => inputs.emergency_stop = true,
             Kind::Clutch => inputs.clutch = true,
             Kind::DeadManReleased | Kind::DeadManBounce => inputs.dead_man = false,

@@ -46,7 +46,7 @@ mod tests {
             );
         }
         assert!(is_in_flash(
-            "_ZN13hapterra_core7haptics16Haptics$LT$_$GT$10take_scene17h9bE"
+            "_ZN13hapterra_core7haptics16Haptics$LT$_$GT$9set_scene17h9bE"
         ));
         assert!(!is_in_flash(
             "_ZN13hapterra_core4feel4Feel12with_effects17h8c6b8f46a38d6445E"

@@ -79,7 +79,10 @@ impl Watch {
         let child = Command::new(program)
             .args(words)
             .args(arguments)
-            .env(worker_pipe::VARIABLE, format!("{me}:{presses_fd}:{news_fd}"))
+            .env(
+                worker_pipe::VARIABLE,
+                format!("{me}:{presses_fd}:{news_fd}"),
+            )
             .spawn()?;
         Ok(Self {
             child,

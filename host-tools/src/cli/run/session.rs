@@ -12,13 +12,13 @@ use super::watch::Watch;
 use super::{Args, OTHER_FILE};
 use crate::cli::bringup::required::{check_brought_up, check_drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::worker_pipe::{self, WorkerMessage};
 use crate::cli::options::placing;
 use crate::cli::options::steering::PlacementControl;
 use crate::cli::session_summary::{self, SessionSummary};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::cli::viewing::PreparedViewer;
+use crate::cli::worker_pipe::{self, WorkerMessage};
 use crate::events::Watcher;
 use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Tcp, Timeouts, Transport, serve_plant,

@@ -28,7 +28,7 @@ pub(super) struct ActiveMaterial {
     class: u8,
     from: Coefficients,
     /// Ticks of the change up to now.
-    elapsed: u32,
+    elapsed_ticks: u32,
     coefficients: Coefficients,
     /// Error bound of the numbers at the start of the change.
     uncertainty: Coefficients,
@@ -50,7 +50,7 @@ impl ActiveMaterial {
         Self {
             class: 0,
             from: coefficients,
-            elapsed: SETTLED_TICKS,
+            elapsed_ticks: SETTLED_TICKS,
             coefficients,
             uncertainty: [0.0; 5],
             texture,
@@ -77,7 +77,7 @@ impl ActiveMaterial {
     }
 
     fn total_uncertainty(&self) -> Coefficients {
-        match self.elapsed < SETTLED_TICKS {
+        match self.elapsed_ticks < SETTLED_TICKS {
             true => std::array::from_fn(|i| {
                 self.uncertainty[i] + REMAINDER * (self.from[i] + self.coefficients[i])
             }),
@@ -90,7 +90,7 @@ impl ActiveMaterial {
     pub(super) fn may_have_friction(&self) -> bool {
         let [_, was_static, was_dynamic, was_viscous, _] = self.from;
         let was_rough = was_static + was_dynamic + was_viscous > 0.0;
-        !self.friction().is_none() || (self.elapsed < SETTLED_TICKS && was_rough)
+        !self.friction().is_none() || (self.elapsed_ticks < SETTLED_TICKS && was_rough)
     }
 
     /// Returns the damping, N·s/m.
@@ -135,12 +135,19 @@ impl ActiveMaterial {
 
     /// Returns true if the change to this material is complete.
     pub(super) fn is_settled(&self) -> bool {
-        self.elapsed >= SETTLED_TICKS && self.fade_ticks == FADE_TICKS
+        self.elapsed_ticks >= SETTLED_TICKS && self.fade_ticks == FADE_TICKS
     }
 
     /// Returns true if it behaves like another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
-        let reported = |one: &Self| (one.class, one.elapsed, one.fade_ticks, one.was_rendered);
+        let reported = |one: &Self| {
+            (
+                one.class,
+                one.elapsed_ticks,
+                one.fade_ticks,
+                one.was_rendered,
+            )
+        };
         let speed = |one: &Self| {
             one.texture_oracle
                 .as_ref()
@@ -152,7 +159,7 @@ impl ActiveMaterial {
             && self.texture == other.texture
             && (speed(self) - speed(other)).abs() < 1e-9
             && pairs(|one| &one.coefficients)
-            && (self.elapsed >= SETTLED_TICKS || pairs(|one| &one.from))
+            && (self.elapsed_ticks >= SETTLED_TICKS || pairs(|one| &one.from))
     }
 
     /// Returns the possible materials after another tick with these classes nearest to the proxy:
@@ -191,17 +198,18 @@ impl ActiveMaterial {
         let mut next = self.clone();
         if class != self.class {
             next.uncertainty = self.total_uncertainty();
-            (next.class, next.from, next.elapsed) = (class, self.coefficients, 0);
+            (next.class, next.from, next.elapsed_ticks) = (class, self.coefficients, 0);
         }
         let target = coefficients(materials, class);
         let texture = materials.table[usize::from(class)].texture;
         if !self.was_rendered {
-            (next.elapsed, next.coefficients, next.was_rendered) = (SETTLED_TICKS, target, true);
+            (next.elapsed_ticks, next.coefficients, next.was_rendered) =
+                (SETTLED_TICKS, target, true);
             next.set_texture(&texture, materials.cell_mm, FADE_TICKS);
             return vec![next];
         }
-        next.elapsed = (next.elapsed + 1).min(SETTLED_TICKS);
-        let share = f64::from(next.elapsed.min(CHANGE_TICKS)) / f64::from(CHANGE_TICKS);
+        next.elapsed_ticks = (next.elapsed_ticks + 1).min(SETTLED_TICKS);
+        let share = f64::from(next.elapsed_ticks.min(CHANGE_TICKS)) / f64::from(CHANGE_TICKS);
         next.coefficients =
             std::array::from_fn(|i| next.from[i] + (target[i] - next.from[i]) * share);
         next.fade_texture(&texture, materials.cell_mm)
