@@ -74,7 +74,7 @@ pub(crate) fn output_of(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
     process.args([
         "--exact",
-        "opened::child_process_opens_and_reads_the_file",
+        "buckets::opened::child_process_opens_and_reads_the_file",
         "--nocapture",
     ]);
     // The user who runs the tests may have keys as well.
