@@ -113,7 +113,9 @@ pub(super) fn import_cycles(source: &Path) -> Result<Vec<Vec<String>>> {
 fn imports<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'t str> {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
     let inside = |a: &str, b: &str| b.is_empty() || a == b || a.starts_with(&format!("{b}::"));
-    let paths = declarations(text).iter().flat_map(|path| expanded(path));
+    let paths = declarations(text)
+        .into_iter()
+        .flat_map(|path| expanded(&path));
     paths
         .filter_map(|path| longest_module(&absolute(name, &path)?, all))
         .filter(|module| !inside(name, module) && !inside(module, name))
