@@ -89,7 +89,7 @@ const MAX_STEPS: usize = 20;
 /// Fits the ratios to the checks by least squares. Starts at a record's ratios and tries all signs.
 ///
 /// Recovers ratios within 0.1 % from exact readings, within 1 % from readings 0.5 mm off over 80 mm
-/// (`tests/tests/commands/calibrate.rs`).
+/// (`tests/tests/sessions/calibrate.rs`).
 ///
 /// # Errors
 /// [`FitError::NotMoved`], [`FitError::NoRatios`].

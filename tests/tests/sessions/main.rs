@@ -1,4 +1,4 @@
-//! The commands of `hapterra`, from start to end: sessions, recordings, replay, bring-up.
+//! Sessions of `hapterra` from start to end: with a device, in recordings and replay, bring-up.
 
 mod bringup;
 mod calibrate;
