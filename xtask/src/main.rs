@@ -139,10 +139,14 @@ fn command() -> Result<ExitCode> {
             }
         }
         "fuzz" => {
-            let target = words.value()?.string()?;
-            let minutes = words.value().map_err(|_| {
-                anyhow::anyhow!("name the target and the minutes: cargo xtask fuzz TARGET MINUTES")
-            })?;
+            let mut word = || {
+                words.value().map_err(|_| {
+                    anyhow::anyhow!(
+                        "name the target and the minutes: cargo xtask fuzz TARGET MINUTES"
+                    )
+                })
+            };
+            let (target, minutes) = (word()?.string()?, word()?);
             fuzz::fuzz(&target, &minutes.string()?)?;
         }
         "view" => match words.next()? {

@@ -134,7 +134,7 @@ const HALVES: [&[&str]; 2] = [
 struct Failed {
     /// Cargo's arguments for it: `-p PACKAGE --lib`.
     target: String,
-    /// The names of its failed tests; empty if it did not come so far.
+    /// The names of its failed tests; empty if it was aborted, or was not built.
     tests: Vec<String>,
 }
 
@@ -211,6 +211,8 @@ struct Failures {
     failed: Vec<Failed>,
     /// Failed tests of the running program.
     tests: Vec<String>,
+    /// True if that program has printed its result: it ran all of its tests.
+    is_complete: bool,
 }
 
 impl Failures {
@@ -218,7 +220,9 @@ impl Failures {
     fn read(&mut self, line: &str) {
         if begins_program(line) {
             self.tests.clear();
+            self.is_complete = false;
         }
+        self.is_complete |= line.starts_with("test result: ");
         let test = line.strip_prefix("test ");
         if let Some(test) = test.and_then(|line| line.strip_suffix(" ... FAILED")) {
             self.tests.push(test.to_owned());
@@ -229,9 +233,10 @@ impl Failures {
             target.strip_suffix('`')
         });
         if let Some(target) = target {
+            let tests = std::mem::take(&mut self.tests);
             self.failed.push(Failed {
                 target: target.to_owned(),
-                tests: std::mem::take(&mut self.tests),
+                tests: if self.is_complete { tests } else { vec![] },
             });
         }
     }
@@ -247,7 +252,7 @@ fn repeat(Failed { target, tests }: &Failed, quick: bool) -> String {
     // The name of an example is a place in a file, with spaces.
     let tests = match tests.join(" ") {
         tests if tests.is_empty() || kind == "--doc" => String::new(),
-        tests => format!(" -- {tests}"),
+        tests => format!(" -- --exact {tests}"),
     };
     format!("cargo xtask test{quick} -- {kind}{tests}    # {package}")
 }
@@ -291,11 +296,14 @@ mod tests {
             "test fallback::late ... ok",
             "test usb::stalls ... FAILED",
             "test usb::resets ... FAILED",
+            "test result: FAILED. 1 passed; 2 failed",
             "error: test failed, to rerun pass `-p hapterra-tests --test link`",
             "     Running tests/docs.rs (target/debug/deps/docs-1)",
+            "test links ... FAILED",
             "error: test failed, to rerun pass `-p hapterra-tests --test docs`",
             "   Doc-tests hapterra_core",
             "test core/src/crc.rs - crc (line 5) ... FAILED",
+            "test result: FAILED. 0 passed; 1 failed",
             "error: doctest failed, to rerun pass `-p hapterra-core --doc`",
             "error: 3 targets failed:",
             "    `-p hapterra-tests --test link`",
@@ -308,7 +316,7 @@ mod tests {
             .map(|failed| repeat(failed, false))
             .collect();
         let expected = [
-            "cargo xtask test -- --test link -- usb::stalls usb::resets    # hapterra-tests",
+            "cargo xtask test -- --test link -- --exact usb::stalls usb::resets    # hapterra-tests",
             "cargo xtask test -- --test docs    # hapterra-tests",
             "cargo xtask test -- --doc    # hapterra-core",
         ];

@@ -8,7 +8,8 @@ use plotters::style::{Color, RGBColor};
 use plotters_backend::text_anchor::HPos;
 
 use super::grasp::Grasp;
-use super::map::{self, Column, Map};
+use super::map::{self, Map};
+use super::setting::Column;
 use super::tap::TAP_SPEEDS_M_S;
 use super::trial::{Trial, Verdict};
 use hapterra::picture::axes::{self, Area, Titles};

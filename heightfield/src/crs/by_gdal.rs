@@ -1,7 +1,5 @@
 //! Reference systems that this crate does not have, from libgdal's PROJ, if it is installed.
 
-use std::sync::{Mutex, PoisonError};
-
 use heightfield_gdal::{AxisUnit, SpatialReference};
 
 use super::datum::Datum;
@@ -17,13 +15,7 @@ pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
     described(&found).map(|system| system.with_code(code))
 }
 
-/// Max cached texts: tiles of one terrain have the same text, and PROJ takes half a second to
-/// compare one with all EPSG systems.
-const MAX_REMEMBERED: usize = 16;
-static REMEMBERED: Mutex<Vec<(String, ByText)>> = Mutex::new(Vec::new());
-
 /// A text's system in libgdal.
-#[derive(Clone, Debug, Default)]
 pub(super) struct ByText {
     /// EPSG's code of the same system, if PROJ finds one.
     pub(super) code: Option<u16>,
@@ -31,20 +23,9 @@ pub(super) struct ByText {
     pub(super) described: Option<ReferenceSystem>,
 }
 
-/// Returns the system of a text; an empty one if libgdal is missing or does not understand it.
-pub(super) fn of_text(text: &str) -> ByText {
-    let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, found)) = remembered().iter().find(|(known, _)| known == text) {
-        return found.clone();
-    }
-    let found = found_by_text(text).unwrap_or_default();
-    let mut remembered = remembered();
-    remembered.truncate(MAX_REMEMBERED - 1);
-    remembered.insert(0, (text.to_owned(), found.clone()));
-    found
-}
-
-fn found_by_text(text: &str) -> Option<ByText> {
+/// Returns the system of a text; `None` if libgdal is missing or does not understand it. PROJ takes
+/// half a second to compare a text with all EPSG systems.
+pub(super) fn of_text(text: &str) -> Option<ByText> {
     let found = gdal().ok()?.reference_of_text(text).ok()?;
     Some(ByText {
         code: found.epsg.and_then(|code| u16::try_from(code).ok()),

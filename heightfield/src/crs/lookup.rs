@@ -1,11 +1,17 @@
 //! The reference system of a code or a text: a code from `definition`, a text without a known code
 //! from libgdal (`by_gdal`).
 
+use std::sync::{Mutex, PoisonError};
+
 use super::datum::Datum;
 use super::system::ReferenceSystem;
 use super::unit::Unit;
 use super::wkt::Node;
 use super::{Vertical, by_gdal, definition};
+
+/// Max cached texts: tiles of one terrain have the same text, and libgdal is slow to identify it.
+const MAX_REMEMBERED: usize = 16;
+static REMEMBERED: Mutex<Vec<(String, Option<ReferenceSystem>)>> = Mutex::new(Vec::new());
 
 impl ReferenceSystem {
     /// Returns the system with an EPSG code; `None` if the code is unknown.
@@ -44,7 +50,15 @@ impl ReferenceSystem {
 
     /// Returns the system of a text by libgdal: by its code, if libgdal finds one that is known.
     fn by_gdal(text: &str) -> Option<Self> {
-        let found = by_gdal::of_text(text);
-        found.code.and_then(Self::from_code).or(found.described)
+        let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, system)) = remembered().iter().find(|(known, _)| known == text) {
+            return system.clone();
+        }
+        let system = by_gdal::of_text(text)
+            .and_then(|found| found.code.and_then(Self::from_code).or(found.described));
+        let mut remembered = remembered();
+        remembered.truncate(MAX_REMEMBERED - 1);
+        remembered.insert(0, (text.to_owned(), system.clone()));
+        system
     }
 }

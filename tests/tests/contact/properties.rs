@@ -16,7 +16,7 @@ use proptest::test_runner::{FileFailurePersistence, RngSeed};
 
 const REGRESSIONS: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
-    "/tests/properties.proptest-regressions"
+    "/tests/contact/properties.proptest-regressions"
 );
 /// Patches along a side.
 const SIDE: usize = 6;

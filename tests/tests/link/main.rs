@@ -6,6 +6,5 @@ mod hostile_device;
 mod link_campaign;
 mod link_faults;
 mod link_model;
-mod streaming;
 mod usb;
 mod wiring;

@@ -130,7 +130,8 @@ fn declarations(text: &str) -> Vec<String> {
             || (before.starts_with("pub(") && before.ends_with(") "))
     };
     let (mut found, mut is_open) = (vec![], false);
-    for line in text.lines().map(str::trim_start) {
+    for line in text.lines() {
+        let line = line.split("//").next().unwrap_or_default().trim();
         let path = line.split_once("use ");
         if let Some((_, path)) = path.filter(|(before, _)| is_visibility(before)) {
             found.push(path.to_owned());

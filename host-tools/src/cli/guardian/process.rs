@@ -72,7 +72,7 @@ impl Watch {
         fcntl_setfd(&its_presses, FdFlags::empty())?;
         fcntl_setfd(&its_messages, FdFlags::empty())?;
         let descriptors = (its_presses.as_raw_fd(), its_messages.as_raw_fd());
-        let (me, (presses_fd, news_fd)) = (std::process::id(), descriptors);
+        let (me, (presses_fd, messages_fd)) = (std::process::id(), descriptors);
         // Saved before the worker changes the modes.
         let terminal = tcgetattr(io::stdin()).ok();
         let (program, words) = program.split_first().ok_or(ErrorKind::NotFound)?;
@@ -81,7 +81,7 @@ impl Watch {
             .args(arguments)
             .env(
                 worker_pipe::VARIABLE,
-                format!("{me}:{presses_fd}:{news_fd}"),
+                format!("{me}:{presses_fd}:{messages_fd}"),
             )
             .spawn()?;
         Ok(Self {

@@ -110,7 +110,7 @@ fn next_placement_is_prefetched_around_the_hip() {
     );
 }
 
-/// `cargo test -p hapterra-url-tests --test prefetch -- --ignored --nocapture`: counts checks, one
+/// `cargo test -p hapterra-url-tests --test urls prefetch -- --ignored --nocapture`: counts checks, one
 /// every 10 ms along 3000 cells, without the tile under the HIP; answers take 100 ms.
 #[test]
 #[ignore = "it prints figures, and takes as long as the hand"]
