@@ -13,8 +13,8 @@ pub(super) const MIN_STEP: f32 = 6e-8;
 /// Length below which a Newton step may be rounding alone, and is compared with the rounding of its
 /// slope.
 pub(super) const DOUBTFUL_STEP: f32 = 1e-3;
-/// Distance from a patch's border within which a place counts as neither inside nor on it: ten
-/// times the error of the convex patch's closest point.
+/// Distance from a patch's border within which a place of a convex patch counts as neither inside nor
+/// on it, ten times the error of its closest point. The tolerance for "on the border" is [`BESIDE`].
 pub(super) const BORDER: f32 = 1e-6;
 /// Distance from an edge, in multiples of the resolution, within which a place is beside it and the
 /// patch beyond is searched as well.

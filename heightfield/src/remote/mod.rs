@@ -14,6 +14,8 @@
 //! Reading stops if a file changes on its server, because old and new pages do not match.
 //!
 //! `object_store` makes the requests; only `store`, `servers`, `requests` and `errors` use it.
+//! `servers` has the connections, their time-outs and the retries; `redirects` the permitted
+//! redirects.
 //! Without the feature `remote`, files at URLs cannot be opened (`disabled`).
 
 #[cfg(not(feature = "remote"))]

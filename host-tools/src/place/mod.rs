@@ -2,8 +2,9 @@
 //!
 //! [`Target`] and [`PlacementOptions`] are the user's request. [`Reach`] is the workspace of an
 //! arm, from its calibration. [`Placement::new`] computes from both and a grid the place under the
-//! home position, scale, level and heights, which determine terrain and scene. [`PlacementChange`]
-//! changes the placement during a session.
+//! home position, scale, level and heights, which determine terrain and scene; `fit` searches for
+//! the largest cell with which a terrain fits the workspace. [`PlacementChange`] changes the
+//! placement during a session.
 
 mod change;
 mod coordinates;

@@ -5,8 +5,8 @@
 //!
 //! - `images`, `layout`, `index`, `budget`: the directories of a file, the type and arrangement of
 //!   its samples, the offsets of its strips and tiles, and the memory that these lists may take;
-//! - `gdal_metadata`, `georef`, `geo_keys`, `user_defined`, `describe`: no-data, scale and unit;
-//!   the place of the samples and their reference system;
+//! - `gdal_metadata`: no-data, scale and unit; `georef`, `user_defined`: the place of the samples and
+//!   their reference system, from the keys that `geo_keys` reads; `describe`: all of these;
 //! - `band`, `samples`, `masks`: the heights of a band, and which of them are no-data;
 //! - `blocks`, `uncompressed`, `unpack`, `unpacked_on_disk`: parts of large images, read on access;
 //! - `blended_overviews`: detection of overviews averaged with no-data values, which are ignored;
