@@ -93,7 +93,7 @@ impl RemoteFile {
             let work = async move { file.load(needed).await };
             let file = self.clone();
             spawn(self.background, work, move |result| {
-                file.on_received(run, result)
+                file.on_received(run, result);
             });
         }
     }

@@ -187,7 +187,7 @@ fn stored(
             Err(why) => {
                 storage_remarks = Some(StorageRemark::MemoryReason(
                     why + peak_memory_remark(&image.layout),
-                ))
+                ));
             }
         }
     }
