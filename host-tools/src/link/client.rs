@@ -395,7 +395,7 @@ impl<'t> Client<'t> {
             ProtocolEvent::SceneChange => self.resolve_view(true, on),
             ProtocolEvent::SceneAck => self.on_scene_ack(now, out, on),
             ProtocolEvent::Answered(request, message) => {
-                self.on_answered(now, request, &message, out, on)
+                self.on_answered(now, request, &message, out, on);
             }
             ProtocolEvent::Other(message) => self.on_message(now, message, out, on),
         }

@@ -150,7 +150,7 @@ impl<'r> Steering<'r> {
         match event {
             Event::Sample(sample) => self.on_sample(sample),
             Event::SceneChangeResult { view, accepted } => {
-                self.on_scene_change_result(view, *accepted)
+                self.on_scene_change_result(view, *accepted);
             }
             Event::Opened { resumed, .. } => {
                 // A session's end releases its clutch, and a restarted device starts with this

@@ -52,7 +52,7 @@ impl Tiles {
             (Event::SceneChangeResult { accepted: true, .. }, _) => self.requested = Some(vec![]),
             // More tiles than a window holds are not sent within a few samples.
             (Event::TileSent(key), Some(requested)) if requested.len() < MAX_REQUESTED => {
-                requested.push(*key)
+                requested.push(*key);
             }
             (Event::TileSent(key), None) => self.sent(*key),
             (Event::Opened { resumed: false, .. }, _) => self.forget(),

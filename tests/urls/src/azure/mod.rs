@@ -83,7 +83,7 @@ impl Service for Microsoft {
         let authorization = request.headers.get(AUTHORIZATION);
         match authorization.map(|authorization| authorization.to_str().unwrap_or_default()) {
             Some(authorization) if authorization.starts_with("Bearer ") => {
-                principal::check(authorization)?
+                principal::check(authorization)?;
             }
             Some(authorization) => shared_key::check(account, request, authorization)?,
             None if sas::is_in(request) => sas::check(account, request, bucket(&path))?,
