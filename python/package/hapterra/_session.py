@@ -272,10 +272,10 @@ class Session:
     def error(self, message: str) -> DeviceError:
         """Returns an error with the command's lines, or the command's own error if it ended with
         one."""
-        told = list(self._lines)
+        lines = list(self._lines)
         has_ended = self.has_ended or self._child.returncode is not None
-        if has_ended and any(line.startswith("error: ") for line in told):
-            failure = error("\n".join(told), self._child.wait())
+        if has_ended and any(line.startswith("error: ") for line in lines):
+            failure = error("\n".join(lines), self._child.wait())
             return DeviceError(failure.message, failure.hint)
         reasons = self.arming[-8:] + self.refused[-1:]
         return DeviceError("\n".join([message, *reasons]))
@@ -307,11 +307,11 @@ class Session:
         self._on_event({"event": "over"})
         _SESSIONS.discard(self)
         if not self.is_disarmed:
-            told = "\n".join(self._lines)
+            lines = "\n".join(self._lines)
             # If nothing was opened, nothing was armed.
-            if self.view >= 0 or _NOT_CONFIRMED in told:
+            if self.view >= 0 or _NOT_CONFIRMED in lines:
                 message = "the board did not confirm that it is disarmed: " + _NOT_CONFIRMED
-                raise NotDisarmedError(f"{message}\n{told}")
+                raise NotDisarmedError(f"{message}\n{lines}")
         if code:
             raise self.error(f"hapterra ended with exit code {code}")
 

@@ -93,7 +93,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     assert_eq!(
         scene_answers(&rig).len(),
         3,
-        "nobody waits for an answer to that"
+        "an earlier change gets no answer"
     );
 }
 
