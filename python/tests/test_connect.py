@@ -1,5 +1,6 @@
 """Devices: a native one through the command, and a command that a test simulates."""
 
+import contextlib
 import itertools
 import os
 import re
@@ -8,6 +9,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from pathlib import Path
 
@@ -155,6 +157,65 @@ def test_buffer_keeps_the_newest_and_counts():
         buffer.put(number)
     buffer.close()
     assert list(buffer) == [7, 8, 9] and buffer.dropped == 7
+
+
+def interrupt_at(step):
+    """Returns a trace function that raises KeyboardInterrupt at a numbered step of the package or
+    of the standard library's threads, as Ctrl-C may."""
+    steps = itertools.count()
+
+    def trace(frame, event, _):
+        if not frame.f_code.co_filename.endswith(("_session.py", "threading.py")):
+            return None
+        frame.f_trace_opcodes = True
+        if event == "opcode" and next(steps) == step:
+            raise KeyboardInterrupt
+        return trace
+
+    return trace
+
+
+def interrupted_read(buffer, step):
+    """Reads in this thread until Ctrl-C at a numbered step. Returns True if that step exists."""
+    sys.settrace(interrupt_at(step))
+    try:
+        for _ in buffer:
+            pass
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(None)
+    return False
+
+
+def test_ctrl_c_at_any_step_of_a_reader_blocks_no_writer():
+    for step in itertools.count():
+        buffer = Buffer(3)
+        buffer.put(0)
+        threading.Timer(0.05, buffer.close).start()
+        was_interrupted = interrupted_read(buffer, step)
+        writer = threading.Thread(target=buffer.put, args=(1,), daemon=True)
+        writer.start()
+        writer.join(10)
+        assert not writer.is_alive(), f"step {step}"
+        if not was_interrupted:
+            break
+    assert step > 10
+
+
+def test_ctrl_c_at_any_step_of_a_wait_blocks_no_event():
+    session = fake_session(code="input()")
+    event = {"event": "refused", "text": "no"}
+    for step in range(60):
+        sys.settrace(interrupt_at(step))
+        with contextlib.suppress(KeyboardInterrupt):
+            session.wait(lambda: False, 0.1)
+        sys.settrace(None)
+        reader = threading.Thread(target=session._handle_event, args=(event,), daemon=True)
+        reader.start()
+        reader.join(10)
+        assert not reader.is_alive(), f"step {step}"
+    session.close_input()
 
 
 # Python processes that are killed.

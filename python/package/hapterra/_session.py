@@ -14,6 +14,7 @@ import collections
 import contextlib
 import json
 import os
+import queue
 import re
 import socket
 import subprocess
@@ -35,6 +36,8 @@ _CONFIRM_TIMEOUT_S = 20.0
 #: Time-out for the command's last lines after the board is disarmed, s: a viewer that still runs
 #: keeps standard error open.
 _STDERR_TIMEOUT_S = 1.0
+#: Interval of checks whether something has changed, s.
+_POLL_INTERVAL_S = 0.02
 #: Lines of the command that an error may quote.
 _MAX_LINES = 200
 #: Lines that are never passed on, and those that a quiet session does not pass on. A recording that
@@ -61,35 +64,40 @@ def refuse_in_fork(pid: int) -> None:
 
 
 class Buffer(Generic[_T]):
-    """A queue of the newest items; drops the oldest if they are not read."""
+    """A queue of the newest items; drops the oldest if they are not read.
+
+    One thread writes. It shares no lock of Python with the readers: Ctrl-C in a reader can leave
+    such a lock held, and then no event of the session is handled any more.
+    """
 
     def __init__(self, size: int) -> None:
-        self._items: collections.deque[_T] = collections.deque(maxlen=size)
-        self._changed = threading.Condition()
-        self._open = True
+        if size < 1:
+            raise ValueError(f"buffer={size}: give a number of items from 1")
+        self._items: queue.SimpleQueue[_T] = queue.SimpleQueue()
+        self._size, self._open = size, True
         self.dropped = 0
 
     def put(self, item: _T) -> None:
         """Adds an item. Never waits for a reader."""
-        with self._changed:
-            self.dropped += len(self._items) == self._items.maxlen
-            self._items.append(item)
-            self._changed.notify()
+        while self._items.qsize() >= self._size:
+            with contextlib.suppress(queue.Empty):
+                self._items.get_nowait()
+                self.dropped += 1
+        self._items.put(item)
 
     def close(self) -> None:
         """Ends the iteration of readers after the last item."""
-        with self._changed:
-            self._open = False
-            self._changed.notify_all()
+        self._open = False
 
     def __iter__(self) -> Iterator[_T]:
         while True:
-            with self._changed:
-                while self._open and not self._items:
-                    self._changed.wait(0.5)
-                if not self._items:
-                    return
-                item = self._items.popleft()
+            was_open = self._open
+            try:
+                item = self._items.get(timeout=_POLL_INTERVAL_S)
+            except queue.Empty:
+                if was_open:
+                    continue
+                return
             yield item
 
 
@@ -112,17 +120,15 @@ class Session:
     ) -> None:
         self._on_event, self._is_quiet = on_event, is_quiet
         self._pid = os.getpid()
-        self._changed = threading.Condition()
         self._lines: collections.deque[str] = collections.deque(maxlen=_MAX_LINES)
         #: As the column ``mode`` of a recording.
         self.mode = "disarmed"
         self.fault: int | None = None
         #: The current placement, counted from 0.
         self.view = -1
-        #: Number of the last question, its lines, and True while it needs an answer.
-        self._question_number: int | None = None
-        self._question: list[str] = []
-        self.asks = False
+        #: Number of the open question and its lines; number of the last one that was taken.
+        self._question: tuple[int, list[str]] | None = None
+        self._taken: int | None = None
         #: The last lines about arming.
         self.arming: list[str] = []
         self.refused: list[str] = []
@@ -195,40 +201,45 @@ class Session:
             return
         if kind == "sample" and (event["mode"], event["view"]) == (self.mode, self.view):
             return
-        with self._changed:
-            if kind == "sample":
-                # Lines that reported a change may have been dropped.
-                self.mode, self.view = event["mode"], event["view"]
-            elif kind == "limits":
-                self.mode, self.fault = event["mode"], event["fault"]
-            elif kind == "view":
-                self.view = event["view"]
-            elif kind == "arming":
-                lines, number = event["lines"], event["asks"]
-                self.arming = (self.arming + lines)[-_MAX_LINES:]
-                if number is None:
-                    self.asks = False
-                elif number == self._question_number:
-                    self._question += [line for line in lines if line not in self._question]
-                else:
-                    self._question_number, self._question, self.asks = number, list(lines), True
-            elif kind == "refused":
-                self.refused.append(event["text"])
-            elif kind == "mark":
-                self.marks.append(event)
-            elif kind == "end":
-                # The guardian may have confirmed it meanwhile.
-                if event["disarmed"]:
-                    self.mode, self._disarmed = "disarmed", True
-            self._changed.notify_all()
+        if kind == "sample":
+            # Lines that reported a change may have been dropped.
+            self.mode, self.view = event["mode"], event["view"]
+        elif kind == "limits":
+            self.mode, self.fault = event["mode"], event["fault"]
+        elif kind == "view":
+            self.view = event["view"]
+        elif kind == "arming":
+            self._handle_arming(event["lines"], event["asks"])
+        elif kind == "refused":
+            self.refused.append(event["text"])
+        elif kind == "mark":
+            self.marks.append(event)
+        elif kind == "end":
+            # The guardian may have confirmed it meanwhile.
+            if event["disarmed"]:
+                self.mode, self._disarmed = "disarmed", True
+
+    def _handle_arming(self, lines: list[str], number: int | None) -> None:
+        self.arming = (self.arming + lines)[-_MAX_LINES:]
+        if number is None:
+            self._question = None
+            return
+        before = self._question[1] if self._question and self._question[0] == number else []
+        self._question = number, before + [line for line in lines if line not in before]
+
+    @property
+    def asks(self) -> bool:
+        """Returns True if there is an open question that was not taken."""
+        question = self._question
+        return question is not None and question[0] != self._taken
 
     def take_question(self) -> tuple[int, str] | None:
         """Returns the number and the lines of the open question, once."""
-        with self._changed:
-            if not self.asks or self._question_number is None:
-                return None
-            self.asks = False
-            return self._question_number, "\n".join(self._question)
+        question = self._question
+        if question is None or question[0] == self._taken:
+            return None
+        self._taken = question[0]
+        return question[0], "\n".join(question[1])
 
     @property
     def is_disarmed(self) -> bool:
@@ -260,14 +271,13 @@ class Session:
             self._child.stdin.close()
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
-        """Waits until ``is_it`` is true, the session is over, or ``timeout`` seconds have passed.
-        Returns True if ``is_it`` is true."""
+        """Waits until ``condition()`` is true, the session is over, or ``timeout`` seconds have
+        passed. Returns True if it is true."""
+        # No lock: Ctrl-C could leave it held, and the thread that handles events would wait for it.
         until = time.monotonic() + timeout
-        with self._changed:
-            while not condition() and not self.has_ended and time.monotonic() < until:
-                # The end of the notifying thread itself sends no notification.
-                self._changed.wait(min(0.1, until - time.monotonic()))
-            return condition()
+        while not condition() and not self.has_ended and time.monotonic() < until:
+            time.sleep(_POLL_INTERVAL_S)
+        return condition()
 
     def error(self, message: str) -> DeviceError:
         """Returns an error with the command's lines, or the command's own error if it ended with
