@@ -4,7 +4,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use hapterra_tests::figures::check;
+use hapterra_tests::figures::{check, renewed};
 use hapterra_tests::repository;
 
 /// Longest line of a page, characters.
@@ -39,12 +39,19 @@ fn pages_and(root: &[&str]) -> Vec<(PathBuf, String)> {
 #[test]
 fn figures_on_the_pages_are_those_of_the_tables() {
     let mut stale = Vec::new();
-    for (page, text) in pages_and(&["README.md", "CHANGELOG.md"]) {
+    let writes = std::env::var("HAPTERRA_DOCS").is_ok_and(|mode| mode == "write");
+    for (page, mut text) in pages_and(&["README.md", "CHANGELOG.md"]) {
+        let new = renewed(&text, repository());
+        if writes && new != text {
+            std::fs::write(&page, &new).expect("the page can be written");
+            text = new;
+        }
         let (figures, wrong) = check(&text, repository());
         println!("{}: {figures} figures from tables", page.display());
         stale.extend(wrong.iter().map(|why| format!("{}: {why}", page.display())));
     }
-    assert!(stale.is_empty(), "{}", stale.join("\n"));
+    let command = "to renew the figures: cargo xtask docs --write";
+    assert!(stale.is_empty(), "{}\n{command}", stale.join("\n"));
 }
 
 /// Returns the text without its blocks of code.
@@ -172,13 +179,18 @@ fn cut_tables_are_found() {
     assert!(cut_tables(&code).is_empty());
 }
 
-/// Checks a page with this table.
-fn reported(page: &str) -> (usize, Vec<String>) {
+/// Returns a folder with a table.
+fn folder() -> tempfile::TempDir {
     const TABLE: &str = "state,median,share\nsliding,1218,0.04567\n\"chain, free\",1144,2.04e-6\n\
                          twice,1,1\ntwice,2,2\nempty,,1\n";
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("t.csv"), TABLE).expect("written");
-    check(page, folder.path())
+    folder
+}
+
+/// Checks a page with this table.
+fn reported(page: &str) -> (usize, Vec<String>) {
+    check(page, folder().path())
 }
 
 fn figure(place: &str, shown: &str) -> String {
@@ -222,6 +234,21 @@ fn cells_of_a_table_are_compared() {
     assert!(wrong[0].contains("2 rows are named, 1 shown"), "{wrong:?}");
     let (_, wrong) = reported(&table("| sliding | 1,218 |\n| free | 1144 | |"));
     assert!(wrong[0].contains("number of columns"), "{wrong:?}");
+}
+
+#[test]
+fn stale_figures_are_renewed_in_their_form() {
+    let stale = "Of <!-- from t.csv: sliding, median -->999, some <!-- from t.csv: sliding, share -->0.05.\n\
+                 <!-- table t.csv: -, median, share\nsliding\nchain, free\n-->\n\
+                 | state | median | share |\n| --- | --- | --- |\n\
+                 | sliding | 1,000,000 | 0.04 |\n| free | 1000 | 3.1e-5 |\n\n\
+                 None: <!-- from t.csv: gliding, median -->7.\n";
+    let new = renewed(stale, folder().path());
+    let expected = stale
+        .replace("-->999,", "-->1,218,")
+        .replace("1,000,000 | 0.04", "1,218 | 0.05")
+        .replace("1000 | 3.1e-5", "1144 | 2.0e-6");
+    assert_eq!(new, expected);
 }
 
 #[test]
