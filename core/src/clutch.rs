@@ -23,6 +23,17 @@
 //! follows it, the ground sinks by that distance. So a clutch that is held only for a new placement
 //! ([`ClutchMode::InPlace`]) keeps the terrain in its place relative to the arm: the point that was
 //! under the tip when the clutch opened is there when it closes, and the press returns.
+//!
+//! A placement may also change under a pressing hand, with the clutch closed
+//! ([`SceneChange::in_contact`](crate::scene::SceneChange::in_contact)):
+//!
+//! ```text
+//!         a change arrives            its terrain has arrived          the force has turned
+//! Closed ─────────────────▶ Waiting ─────────────────────────▶ Turning ────────────────────▶ Closed
+//! ```
+//!
+//! While the force turns, it is at most the larger of the forces before and after. It does work over
+//! the hand's motion, in half a second more than a spring if the hand moves with it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -31,11 +42,17 @@ use crate::contact::Contact;
 use crate::grid::GridPoint;
 use crate::guard::{FADE_MS, Limits};
 use crate::rate::TickRate;
+use crate::scalar::{clamp_length, larger};
 use crate::scene::Scene;
 use crate::terrain::Window;
 
 /// Duration of the ramp-up to full force, ms.
 const RAMP_UP_MS: u32 = 500;
+/// Maximum ratio of the difference of two placements' forces to that of the new one: a force that
+/// decreases more does so at the guard's rate.
+const MAX_TURN_RATIO: f32 = 20.0;
+/// Ticks after a change in which the force stays.
+const SETTLING_TICKS: u8 = 8;
 /// Maximum motion of the hand, mm, for which the terrain stays in its place; for any motion beyond
 /// that the terrain follows the hand. A hand that yields under 1.2 N moves some 5 mm.
 const MAX_OFFSET_MM: f32 = 10.0;
@@ -58,6 +75,10 @@ pub enum ClutchMode {
 enum State {
     /// The clutch has no effect.
     Closed,
+    /// As closed, while a placement waits to change under the pressing hand.
+    Waiting,
+    /// The placement has changed under the hand: the force turns to that of the new one.
+    Turning,
     /// The force fades out.
     Opening,
     /// The HIP stays at its place over the terrain for any motion of the tip. `tip_mm` is the tip's
@@ -66,6 +87,68 @@ enum State {
     Open { hip: GridPoint, tip_mm: Vec3 },
     /// The force ramps up.
     Closing,
+}
+
+/// Difference of the force before a change of placement under the hand and after it. It decreases
+/// to zero, and with the force itself: a hand that leaves the surface feels nothing of it.
+#[derive(Clone, Copy, Debug, Default)]
+struct ForceTurn {
+    /// The force before, until the first tick after the change.
+    from_n: Option<Vec3>,
+    /// Ticks in which the force stays, because the proxy still finds its place on the new surface.
+    begins: u8,
+    /// Maximum of the forces before and after the change, N.
+    max_n: f32,
+    rest_n: Vec3,
+    /// Maximum ratio of the difference to the force.
+    max_ratio: f32,
+    /// Decrease in a tick, N; `None` for a closing clutch's, until the first tick after the change.
+    step_n: Option<f32>,
+}
+
+impl ForceTurn {
+    /// Returns true if the force is that of the placement alone.
+    fn is_over(&self) -> bool {
+        self.from_n.is_none() && self.rest_n == Vec3::ZERO
+    }
+
+    /// Returns the difference to add to the force of this tick. While the tile under the proxy is
+    /// late, the surface stays, and the part of the difference along the force stays, too.
+    fn advance(&mut self, target_n: Vec3, ramp_step: f32, has_tile: bool) -> Vec3 {
+        if let Some(from_n) = self.from_n {
+            self.begins = self.begins.saturating_sub(1);
+            if self.begins == 0 {
+                self.from_n = None;
+            }
+            self.rest_n = from_n - target_n;
+            self.max_n = larger(from_n.length(), target_n.length());
+            let rest = self.rest_n.length();
+            let ratio = rest / target_n.length();
+            // Not for NaN, and not without a force.
+            if ratio > 1.0 && ratio < MAX_TURN_RATIO {
+                self.max_ratio = ratio;
+            }
+            if self.begins == 0 {
+                self.step_n.get_or_insert(rest * ramp_step);
+            }
+        } else {
+            // A late tile holds the part of the rest that stands for the height of the fallback,
+            // and never one that pushes the hand sideways.
+            let held_n = match has_tile {
+                true => Vec3::ZERO,
+                false => (self.rest_n).project_onto_normalized(target_n.normalize_or_zero()),
+            };
+            let step_n = self.step_n.unwrap_or(f32::INFINITY);
+            let turning_n = self.rest_n - held_n;
+            let turning = turning_n.length();
+            self.rest_n = match turning > step_n {
+                true => held_n + turning_n * ((turning - step_n) / turning),
+                false => held_n,
+            };
+        }
+        self.rest_n = clamp_length(self.rest_n, self.max_ratio * target_n.length());
+        self.rest_n
+    }
 }
 
 /// The clutch of an arm's scene.
@@ -84,6 +167,8 @@ pub(crate) struct Clutch {
     ramp: f32,
     /// Share of the force in the last tick.
     share: f32,
+    /// Rest of the force of the placement before.
+    turn: ForceTurn,
     /// The clutch's limits of the last tick.
     limits: Limits,
     /// Decrease of the share in a tick: the same as for disarming.
@@ -102,6 +187,7 @@ impl Clutch {
             pending_shift_mm: Vec3::ZERO,
             ramp: 1.0,
             share: 1.0,
+            turn: ForceTurn::default(),
             limits: Limits::empty(),
             fade_step: 1.0 / rate.ticks(FADE_MS) as f32,
             ramp_step: 1.0 / rate.ticks(RAMP_UP_MS) as f32,
@@ -151,11 +237,62 @@ impl Clutch {
         if !self.is_held() {
             return;
         }
-        if let State::Closed | State::Closing = self.state {
+        if let State::Closed | State::Waiting | State::Turning | State::Closing = self.state {
             self.state = State::Opening;
             self.follows_hand = false;
         }
         self.follows_hand |= self.input || self.host == ClutchMode::WithHand;
+    }
+
+    /// Waits for a change of placement under the pressing hand. A clutch that is held, or closes,
+    /// goes on.
+    pub(crate) fn wait_for_change(&mut self) {
+        if matches!(self.state, State::Closed | State::Turning) {
+            self.state = State::Waiting;
+        }
+    }
+
+    /// Ends the wait for a change of placement.
+    pub(crate) fn cancel_change(&mut self) {
+        if matches!(self.state, State::Waiting) {
+            self.state = State::Turning;
+        }
+    }
+
+    /// Returns true if the clutch is closed, and a placement may change under the hand: the force
+    /// has turned to that of the current one.
+    pub(crate) fn may_change_in_contact(&self) -> bool {
+        matches!(self.state, State::Waiting) && self.turn.is_over()
+    }
+
+    /// Continues with the force that the motors have, N, and turns it to that of the new placement:
+    /// by `step_n` in a tick, or as slowly as the clutch closes.
+    pub(crate) fn turn_from(&mut self, force_n: Vec3, step_n: Option<f32>) {
+        self.state = State::Turning;
+        self.turn = ForceTurn {
+            from_n: Some(force_n),
+            begins: SETTLING_TICKS,
+            rest_n: Vec3::ZERO,
+            max_n: 0.0,
+            max_ratio: 1.0,
+            step_n,
+        };
+    }
+
+    /// Returns the force of a tick after a change of placement under the hand.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn turned(&mut self, target_n: Vec3, has_tile: bool) -> Vec3 {
+        let rest_n = self.turn.advance(target_n, self.ramp_step, has_tile);
+        if self.turn.is_over() && matches!(self.state, State::Turning) {
+            self.state = State::Closed;
+            self.limits = Limits::empty();
+        }
+        if rest_n == Vec3::ZERO || !target_n.is_finite() {
+            return target_n;
+        }
+        let max_n = larger(self.turn.max_n, target_n.length());
+        clamp_length(target_n + rest_n, max_n)
     }
 
     /// Moves the HIP of an open clutch.
@@ -193,10 +330,13 @@ impl Clutch {
         drives: bool,
     ) -> GridPoint {
         let is_held = self.is_held();
+        if !drives {
+            self.turn = ForceTurn::default();
+        }
         let from_home_mm = |scene: &Scene| scene.home.to(&tip) * scene.cell_mm;
         let mut hip = tip;
         match &mut self.state {
-            State::Closed => {}
+            State::Closed | State::Waiting | State::Turning => {}
             State::Opening => {
                 self.ramp -= self.fade_step;
                 if self.ramp <= 0.0 {
@@ -245,9 +385,9 @@ impl Clutch {
             false => Limits::empty(),
         };
         match self.state {
-            State::Closed => Limits::empty(),
+            State::Closed | State::Waiting => Limits::empty(),
             State::Open { .. } => by.union(Limits::CLUTCH_OPEN),
-            State::Opening | State::Closing => by.union(Limits::CLUTCH_MOVES),
+            State::Opening | State::Closing | State::Turning => by.union(Limits::CLUTCH_MOVES),
         }
     }
 }

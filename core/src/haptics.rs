@@ -150,6 +150,8 @@ pub struct Haptics<'t, const D: usize> {
     pub(crate) point: Option<HipCommand>,
     pub(crate) renderer: Renderer,
     pub(crate) window: Window<'t, D>,
+    /// A change of placement that waits for its terrain.
+    pub(crate) pending: Option<SceneChange>,
 }
 
 impl<'t, const D: usize> Haptics<'t, D> {
@@ -189,6 +191,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             view: 0,
             point: None,
             window: Window::new(tiles),
+            pending: None,
         }
     }
 
@@ -233,6 +236,18 @@ impl<'t, const D: usize> Haptics<'t, D> {
         Ok(back.or_else(|| self.window.take_spare()))
     }
 
+    /// Returns one more tile buffer that has become free, if any.
+    pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
+        self.window.take_spare()
+    }
+
+    /// Returns the epoch of the scene, or of the change that waits for its terrain.
+    #[must_use]
+    pub fn epoch(&self) -> Option<u32> {
+        let pending = self.pending.as_ref().map(|change| &change.scene);
+        pending.or(self.scene.as_ref()).map(|scene| scene.epoch)
+    }
+
     /// Replaces the arm's settings between ticks. The arm should be disarmed; otherwise it is
     /// switched off.
     pub fn configure(&mut self, mechanism: Kinematics) {
@@ -263,6 +278,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// Sets a scene, or drops the current one; the force ramps down. A refused scene also drops the
     /// current one, because its sender assumes it to be set.
     fn set_scene(&mut self, scene: Option<Scene>) -> Result<(), RefusedScene> {
+        self.cancel_change();
         let is_requested = scene.is_some();
         let scene = scene.filter(|scene| self.renderer.can_render(scene));
         match &scene {
@@ -286,39 +302,23 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// Sets another placement without a step in force: the clutch of an arm is open, and a replay
-    /// drives no arm. A proxy in contact starts on the surface at its position relative to the
-    /// hand, as deep as before.
-    fn set_placement(&mut self, view: &SceneChange) -> Result<(), RefusedScene> {
-        let &SceneChange { scene, hip, .. } = view;
+    /// Sets another placement, with an open clutch or in a replay at once, and under a pressing hand
+    /// when its terrain has arrived. Otherwise it acts as another scene.
+    fn set_placement(&mut self, change: &SceneChange) -> Result<(), RefusedScene> {
+        self.cancel_change();
         let before = self.scene.as_ref();
-        let may_change = before.is_some_and(|before| {
-            before.source == scene.source
-                && (scene.source == Source::Points || self.clutch.is_open())
-        });
-        let displacement = before
-            .zip(self.renderer.contact().displacement())
-            .map(|(before, displacement)| displacement * (before.cell_mm / scene.cell_mm));
-        if !may_change || !self.renderer.can_render(&scene) {
-            return self.set_scene(Some(scene));
+        let is_same_source = before.is_some_and(|before| before.source == change.scene.source);
+        if !is_same_source || !self.renderer.can_render(&change.scene) {
+            return self.set_scene(Some(change.scene));
         }
-        if !view.keeps_tiles {
-            self.window.reset(scene.level, scene.size, scene.top);
+        let is_point = change.scene.source == Source::Points;
+        if is_point || self.clutch.is_open() {
+            self.apply_change(change);
+        } else if change.in_contact.is_some() {
+            self.wait_for_change(change);
+        } else {
+            return self.set_scene(Some(change.scene));
         }
-        let has_other_fallback = before.is_none_or(|before| before.fallback != scene.fallback);
-        if has_other_fallback || !view.keeps_tiles {
-            self.window.set_fallback(scene.fallback);
-        }
-        // The link can deliver any bits.
-        let hip = hip.normalised();
-        self.renderer.set_scene(
-            Some(&scene),
-            displacement.map(|displacement| (hip, displacement)),
-        );
-        self.clutch.set_hip(hip);
-        self.scene = Some(scene);
-        self.point = None;
-        self.view = view.number;
         Ok(())
     }
 
@@ -333,6 +333,18 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// Stores a tile. In a scene of an arm it is refused if its slot holds the tile under the
     /// proxy, or a tile next to it: it was requested for a place that the proxy has left.
     fn store_tile(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
+        if let Some(change) = &self.pending {
+            if tile
+                .key()
+                .is_some_and(|key| self.window.expects_in_next(key))
+            {
+                return self.window.take_for_next(tile);
+            }
+            // The window still has the tiles of the current placement.
+            if !change.keeps_tiles {
+                return Some(tile);
+            }
+        }
         let level = self.window.level();
         let of_arm = self
             .scene

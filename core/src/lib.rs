@@ -53,7 +53,7 @@
 //! 8. [`tick`] combines them in one pure function, called 1,000 to 10,000 times a second
 //!    ([`rate::TickRate`]): counts, pose, HIP, force, guard, currents. `renderer.rs` combines
 //!    contact and effects, also for `replay.rs`; `haptics.rs` applies commands and scene changes
-//!    between ticks.
+//!    between ticks, and `change_in_contact.rs` those under a pressing hand.
 //! 9. [`wire`] defines the messages between the device and the host.
 //!
 //! [`crc`] is separate: the check sum of frames and records.
@@ -71,6 +71,7 @@ mod cases;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod change_in_contact;
 pub mod clutch;
 pub mod contact;
 pub mod crc;

@@ -88,6 +88,17 @@ impl MotionSource<'_> {
     }
 }
 
+/// Contact that continues in another placement.
+#[derive(Clone, Copy)]
+pub(crate) struct ContactOnset {
+    /// Place over or under the surface; the height does not count.
+    pub at: GridPoint,
+    /// Vector from the HIP to the proxy, cells.
+    pub displacement: Vec3,
+    /// Share of the force at the start.
+    pub fade: f32,
+}
+
 /// State that a tick changes.
 #[derive(Clone)]
 struct RenderState {
@@ -164,9 +175,8 @@ impl Renderer {
     }
 
     /// Sets a scene that [`Self::can_render`] accepts, or none. All effects are created here.
-    /// `onset` is the HIP after a change of placement, and the displacement with which the proxy
-    /// starts on the surface, cells.
-    pub(crate) fn set_scene(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
+    /// `onset` is the contact that continues after a change of placement.
+    pub(crate) fn set_scene(&mut self, scene: Option<&Scene>, onset: Option<ContactOnset>) {
         self.state.effects = scene.and_then(|scene| self.effects_of(scene));
         self.restart_contact(scene, onset);
     }
@@ -176,16 +186,17 @@ impl Renderer {
         self.restart_contact(scene, None);
     }
 
-    fn restart_contact(&mut self, scene: Option<&Scene>, onset: Option<(GridPoint, Vec3)>) {
+    fn restart_contact(&mut self, scene: Option<&Scene>, onset: Option<ContactOnset>) {
         let settings = ContactSettings::AT_1_KHZ
             .at_rate(self.rate)
             .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm));
         (self.point, self.progress) = (None, Progress::Done(None));
         self.state.contact = match onset {
-            Some((hip, displacement)) => {
-                let at = GridPoint::new(hip.cell(), hip.frac() + displacement);
-                Contact::onset(settings, at, displacement)
-            }
+            Some(ContactOnset {
+                at,
+                displacement,
+                fade,
+            }) => Contact::onset(settings, at, displacement, fade),
             None => Contact::new(settings),
         };
         if let Some(scene) = scene {

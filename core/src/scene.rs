@@ -69,8 +69,11 @@ impl Scene {
     }
 }
 
-/// Change of placement for an arm that stays armed: another place, scale, height or stiffness. It
-/// is set while the clutch is open, and rendered when the clutch closes.
+/// Change of placement for an arm that stays armed: another place, scale, height or stiffness.
+///
+/// It is set while the clutch is open, and rendered when the clutch closes. With
+/// [`Self::in_contact`] it is rendered under the pressing hand, with the force that the hand feels,
+/// as soon as the fallback of the new scene has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneChange {
     /// Number of the placement in its scene, from 1, wrapping; tick records repeat it.
@@ -84,6 +87,47 @@ pub struct SceneChange {
     pub hip: GridPoint,
     /// True if the tiles on the device stay valid: only place and surface parameters differ.
     pub keeps_tiles: bool,
+    /// Set for a change under a pressing hand, with the clutch closed: where the new placement is
+    /// touched.
+    pub in_contact: Option<ContactMap>,
+}
+
+impl SceneChange {
+    /// Maximum ratio of the force before a change under a pressing hand to that of the new surface.
+    pub const MAX_FORCE_RATIO: f32 = 10.0;
+
+    /// Returns true if the force can turn from a surface's to that of this placement under a
+    /// pressing hand. Otherwise the clutch has to be open.
+    #[must_use]
+    pub fn may_turn_from(&self, before: &SurfaceParams) -> bool {
+        let after = &self.scene.params;
+        let [soft, hard] = [before, after].map(|params| params.stiffness_n_per_mm);
+        // With tiles that blend, the force would rise as fast as they do.
+        let is_harder = hard > soft || after.max_force_n > before.max_force_n;
+        (self.keeps_tiles || !is_harder) && soft <= Self::MAX_FORCE_RATIO * hard
+    }
+}
+
+/// Map of the proxy to the place where a new placement is touched: the point `from` of the old
+/// placement is at `to` in the new one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactMap {
+    /// The proxy when the host computed the change, cells of the old placement.
+    pub from: GridPoint,
+    /// The same place, cells of the new placement.
+    pub to: GridPoint,
+    /// Cells of the new placement for a cell of the old one: east, north and up.
+    pub scale: Vec3,
+}
+
+impl ContactMap {
+    /// Returns the place in the new placement for a proxy of the old one.
+    #[must_use]
+    pub fn place(&self, proxy: &GridPoint) -> GridPoint {
+        // The link can deliver any bits.
+        let moved = self.from.normalised().to(proxy) * self.scale;
+        GridPoint::new(self.to.cell(), self.to.frac() + moved).normalised()
+    }
 }
 
 /// Time for which the mark pin of a board is high, ms.

@@ -100,16 +100,15 @@ impl<const D: usize> Haptics<'_, D> {
 
     /// Returns the requested force at the HIP, N, terrain frame.
     fn target_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
-        let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) else {
+        let placed = match self.clutch.is_closed() {
+            true => None,
+            false => self.tick_clutch(pose),
+        };
+        let (Some(mechanism), Some(scene)) = (&self.mechanism, &self.scene) else {
             write_empty(sample);
             return Vec3::ZERO;
         };
-        let mut hip = place(mechanism, scene, pose);
-        if !self.clutch.is_closed() {
-            let in_contact = (self.renderer.contact_mut(), &self.window);
-            let drives = self.guard.mode().is_driving();
-            hip = self.clutch.tick(hip, scene, in_contact, drives);
-        }
+        let hip = placed.unwrap_or_else(|| place(mechanism, scene, pose));
         let arm = MotionSource::Arm {
             guard: &self.guard,
             mechanism,
@@ -121,7 +120,14 @@ impl<const D: usize> Haptics<'_, D> {
         if self.renderer.has_effects() && self.renderer.created_mj() > 0.0 {
             self.guard.add_limits(Limits::ENERGY_DISSIPATED);
         }
-        target_n
+        match self.clutch.is_closed() {
+            true => target_n,
+            false => {
+                let patch = self.renderer.contact().patch();
+                let has_tile = patch.is_none_or(|cell| self.window.has_tile(cell));
+                self.clutch.turned(target_n, has_tile)
+            }
+        }
     }
 
     /// Sets the currents, A, for a force and for the arm's weight.
@@ -224,7 +230,7 @@ pub(crate) fn write_empty(sample: &mut TickRecord) {
 }
 
 /// Returns the tip's position over the terrain.
-fn place(mechanism: &Kinematics, scene: &Scene, pose: &Pose) -> GridPoint {
+pub(crate) fn place(mechanism: &Kinematics, scene: &Scene, pose: &Pose) -> GridPoint {
     let moved_mm = to_terrain_frame(pose.tip_mm() - mechanism.home_mm());
     GridPoint::new(
         scene.home.cell(),

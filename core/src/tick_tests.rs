@@ -16,6 +16,8 @@ use crate::terrain::{
     CoarseTile, Fallback, FieldSize, RequestHint, TILE_SAMPLES, Tile, TileKey, TileRequester,
 };
 
+#[path = "tick_tests/in_contact.rs"]
+mod in_contact;
 #[path = "tick_tests/materials.rs"]
 mod materials;
 #[path = "tick_tests/textured.rs"]
@@ -63,6 +65,12 @@ struct Device<'t, const D: usize> {
     hint: RequestHint,
     served: usize,
     dead_man: bool,
+    /// The fallback whose tiles are served, and the level of its scene.
+    fallback: Option<(Fallback, u8)>,
+    /// Height of the fallback over the ground.
+    fallback_rise: f32,
+    /// True if the tiles of the field itself are late.
+    is_slow: bool,
 }
 
 impl<'t, const D: usize> Device<'t, D> {
@@ -87,6 +95,9 @@ impl<'t, const D: usize> Device<'t, D> {
             hint: RequestHint::default(),
             served: 0,
             dead_man: false,
+            fallback: None,
+            fallback_rise: 0.0,
+            is_slow: false,
         }
     }
 
@@ -128,15 +139,36 @@ impl<'t, const D: usize> Device<'t, D> {
             hip: outcome.sample.hip.column(),
             velocity: [0.0; 2],
         };
-        while let Some(key) = self.requester.next_request(outcome.sample.tick, &self.hint) {
+        while let Some(key) = self.next_request(outcome.sample.tick) {
             self.serve(key);
         }
         outcome
     }
 
+    /// Returns the next tile to request; only those of the fallback while a placement waits.
+    fn next_request(&mut self, now: u32) -> Option<TileKey> {
+        let pending = self.haptics.pending.as_ref();
+        match self.is_slow || pending.is_some_and(|change| !change.keeps_tiles) {
+            true => self.requester.next_of_fallback(now, &self.hint),
+            false => self.requester.next_request(now, &self.hint),
+        }
+    }
+
     fn serve(&mut self, key: TileKey) {
+        if self.spare.is_empty() {
+            self.spare.extend(self.haptics.take_spare());
+        }
         let tile = self.spare.pop().expect("as many spares as requests");
-        tile.fill_from(key, 0, self.size, self.height).unwrap();
+        match self.coarse(key) {
+            Some(CoarseTile { first, shift }) => {
+                let at = |of: i32, n: usize| of + ((n as i32) << shift);
+                let height = |col, row| {
+                    self.fallback_rise + (self.height)(at(first.x, col), at(first.y, row))
+                };
+                tile.fill(key, 0, height).unwrap();
+            }
+            None => tile.fill_from(key, 0, self.size, self.height).unwrap(),
+        }
         let first = key.index.first_cell();
         let materials = (0..TILE_SAMPLES * TILE_SAMPLES).map(|i| {
             let (col, row) = ((i % TILE_SAMPLES) as i32, (i / TILE_SAMPLES) as i32);
@@ -146,18 +178,25 @@ impl<'t, const D: usize> Device<'t, D> {
             tile.set_materials(4, materials).expect("of the table");
         }
         self.requester.received(key);
-        let spent = self
-            .haptics
-            .accept(Command::Tile(tile))
-            .expect("taken")
-            .unwrap();
-        assert_ne!(
-            spent.key(),
-            Some(key),
-            "the window refused what it had requested"
-        );
-        self.spare.push(spent);
+        let spent = self.haptics.accept(Command::Tile(tile)).expect("taken");
+        let mut free = spent;
+        while let Some(spent) = free {
+            assert_ne!(
+                spent.key(),
+                Some(key),
+                "the window refused what it had requested"
+            );
+            self.spare.push(spent);
+            free = self.haptics.take_spare();
+        }
         self.served += 1;
+    }
+
+    /// Returns the fallback's tile with this key, if any.
+    fn coarse(&self, key: TileKey) -> Option<CoarseTile> {
+        let (fallback, level) = self.fallback?;
+        let mut parts = [Some(fallback.wide), fallback.near].into_iter().flatten();
+        parts.find(|part| part.key(level) == key)
     }
 
     /// Renders one point, in as many ticks as needed.

@@ -86,6 +86,7 @@ impl TickLoop {
                 scene,
                 hip,
                 keeps_tiles: before.is_some() == scene.materials.is_some(),
+                in_contact: None,
             }))
         })
     }

@@ -65,7 +65,7 @@ bitflags! {
         const EDGE_FADING = 1 << 8;
         /// The clutch is open: there is no force, and the HIP stays where it is over the terrain.
         const CLUTCH_OPEN = 1 << 9;
-        /// The clutch opens or closes: the force ramps down, or up again.
+        /// The clutch opens or closes, or a placement changes under the hand: the force ramps.
         const CLUTCH_MOVES = 1 << 10;
         /// The clutch is held by the board's clutch input.
         const CLUTCH_INPUT = 1 << 11;
@@ -141,7 +141,7 @@ impl Limits {
             }
             Self::CLUTCH_OPEN => "the clutch is open: no force",
             Self::CLUTCH_MOVES => {
-                "the force ramps down before a change of placement, or up after one"
+                "the clutch opens or closes, or the placement changes under the hand: the force ramps"
             }
             Self::CLUTCH_INPUT => "the clutch switch at the board is held",
             Self::ENERGY_DISSIPATED => {

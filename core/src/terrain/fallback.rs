@@ -1,7 +1,7 @@
 //! The fallback: a coarse copy of the terrain in the arm's reach, rendered where a tile is missing.
 //!
 //! It has a wide tile under the whole reach and a near one with finer samples around the home pose,
-//! where the hand is most of the time. Where both exist, the near one is rendered. The host sets
+//! where the hand is most of the time, or around the place of a change in contact. Where both exist, the near one is rendered. The host sets
 //! the samples on its border to the heights of the wide one, where that has any, so there is no
 //! step between them.
 
@@ -19,7 +19,7 @@ use crate::scalar::{larger, smaller};
 pub struct Fallback {
     /// Tile under the whole reach of the arm.
     pub wide: CoarseTile,
-    /// Finer tile around the home pose, if any.
+    /// Finer tile around the home pose or the touched place, if any.
     pub near: Option<CoarseTile>,
 }
 
@@ -47,7 +47,8 @@ impl Fallback {
     }
 }
 
-/// The fallback of a window: its place, and its tiles that have arrived.
+/// The fallback of a window: its place, and its tiles that have arrived. The one in use, or the one
+/// of the next scene.
 pub(super) struct FallbackSlots<'t> {
     /// Place of the fallback, if the scene has one.
     place: Option<Fallback>,
@@ -67,6 +68,11 @@ impl<'t> FallbackSlots<'t> {
         for tile in self.tiles.iter_mut().flatten() {
             tile.vacate();
         }
+    }
+
+    /// Returns true if it is at this place.
+    pub(super) fn is_at(&self, place: Option<Fallback>) -> bool {
+        self.place.is_some() && self.place == place
     }
 
     pub(super) const fn is_set(&self) -> bool {

@@ -171,6 +171,20 @@ impl<const D: usize> TileRequester<D> {
     /// Returns the next tile to request at tick `now`, most urgent first; `None` if no tile is
     /// needed or enough requests are open. Call until `None`.
     pub fn next_request(&mut self, now: u32, hint: &RequestHint) -> Option<TileKey> {
+        if let Some(key) = self.next_of_fallback(now, hint) {
+            return Some(key);
+        }
+        if self.pending.is_full() {
+            return None;
+        }
+        let key = self.most_urgent(hint)?;
+        self.pending.push((key, now)).ok()?;
+        Some(key)
+    }
+
+    /// As [`Self::next_request`], without new requests for tiles of the field itself: for a device
+    /// that renders another placement until the fallback has arrived.
+    pub fn next_of_fallback(&mut self, now: u32, hint: &RequestHint) -> Option<TileKey> {
         if let Some(key) = self.next_repeat(now, hint) {
             return Some(key);
         }
@@ -178,10 +192,8 @@ impl<const D: usize> TileRequester<D> {
             return None;
         }
         let mut fallback = self.fallback.iter().flatten();
-        let key = match fallback.find(|(key, is_stored)| !is_stored && !self.is_pending(*key)) {
-            Some((key, _)) => *key,
-            None => self.most_urgent(hint)?,
-        };
+        let is_needed = |(key, is_stored): &&(TileKey, bool)| !is_stored && !self.is_pending(*key);
+        let (key, _) = *fallback.find(is_needed)?;
         self.pending.push((key, now)).ok()?;
         Some(key)
     }

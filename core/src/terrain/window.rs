@@ -88,6 +88,9 @@ pub struct Window<'t, const D: usize> {
     pyramid: MaxPyramid<D>,
     pub(super) fallback: FallbackSlots<'t>,
     pub(super) tile_blend: TileBlend<D>,
+    /// The fallback of the next scene, and its level; it is not rendered.
+    next: FallbackSlots<'t>,
+    next_level: u8,
 }
 
 impl<'t, const D: usize> Window<'t, D> {
@@ -109,6 +112,8 @@ impl<'t, const D: usize> Window<'t, D> {
             size,
             top,
             fallback: FallbackSlots::EMPTY,
+            next: FallbackSlots::EMPTY,
+            next_level: 0,
             tile_blend: TileBlend::NONE,
         };
         for key in size.tiles() {
@@ -328,6 +333,13 @@ impl<'t, const D: usize> Window<'t, D> {
         let tile = &*self.slots[wrap::<D>(index.row)][wrap::<D>(index.col)];
         // `install` accepts tiles of the field's level only.
         tile.is_surface_of(index).then_some(tile)
+    }
+
+    /// Returns true if the cell's tile has arrived, whether it still blends or not.
+    pub(crate) fn has_tile(&self, cell: Cell) -> bool {
+        let index = TileIndex::containing(cell);
+        let tile = &*self.slots[wrap::<D>(index.row)][wrap::<D>(index.col)];
+        tile.key().is_some_and(|key| key.index == index)
     }
 
     /// Returns true if the cell is in the field, with or without data.

@@ -18,7 +18,7 @@ use crate::force::{
 };
 use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
-use crate::scene::{Scene, SceneChange, Source, TickRecord};
+use crate::scene::{ContactMap, Scene, SceneChange, Source, TickRecord};
 use crate::terrain::{CoarseTile, Fallback, FieldSize, TileIndex, TileKey};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
@@ -164,6 +164,7 @@ fn scene_change_and_clutch_bytes() {
         scene,
         hip: GridPoint::new([1, 2, -1], Vec3::ZERO),
         keeps_tiles: true,
+        in_contact: None,
     };
     let scene = bytes(&ToDevice::Scene(scene)).split_off(1);
     let expected = [
@@ -171,9 +172,32 @@ fn scene_change_and_clutch_bytes() {
         scene,
         std::vec![2, 4, 1],
         [float(0.0), float(0.0), float(0.0)].concat(),
-        std::vec![1],
+        std::vec![1, 0],
     ];
     assert_eq!(bytes(&ToDevice::SceneChange(view)), expected.concat());
+    let place = |x| GridPoint::new([x, 0, 0], Vec3::ZERO);
+    let in_contact = SceneChange {
+        in_contact: Some(ContactMap {
+            from: place(1),
+            to: place(2),
+            scale: Vec3::splat(2.0),
+        }),
+        ..view
+    };
+    let zeros = [float(0.0), float(0.0), float(0.0)].concat();
+    let mut expected = expected.concat();
+    expected.pop();
+    expected.extend(
+        [
+            &[1, 2, 0, 0][..],
+            &zeros,
+            &[4, 0, 0],
+            &zeros,
+            &float(2.0).repeat(3),
+        ]
+        .concat(),
+    );
+    assert_eq!(bytes(&ToDevice::SceneChange(in_contact)), expected);
     let holds = [
         (ClutchMode::Released, 0),
         (ClutchMode::WithHand, 1),
@@ -275,7 +299,7 @@ fn host_hello_bytes() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 14, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 15, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -304,7 +328,7 @@ fn device_hello_bytes() {
         },
     });
     let expected = [
-        std::vec![0, 14, 9, 8, 1, b'b'],
+        std::vec![0, 15, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

@@ -61,8 +61,8 @@ pub enum ToDevice<'a> {
     /// Closes the session without a change to arm or scene: the host has only read. Answered by
     /// [`ToHost::Detached`].
     Detach,
-    /// A new placement of the present scene, while the clutch is open ([`Request::Clutch`]): the
-    /// arm stays armed. Answered by [`ToHost::SceneAck`] with the epoch of the new scene.
+    /// A new placement of the present scene, while the clutch is open ([`Request::Clutch`]) or under
+    /// a pressing hand: the arm stays armed. Answered by [`ToHost::SceneAck`] with the epoch of the new scene.
     SceneChange(SceneChange),
     /// The same as [`Self::Scene`], for a scene with materials.
     #[serde(borrow)]

@@ -171,6 +171,14 @@ where
             // The queue has room for all buffers.
             let _ = self.ends.spent.enqueue(tile);
         }
+        self.return_spares();
+    }
+
+    /// Returns the buffers that the window no longer needs.
+    fn return_spares(&mut self) {
+        while let Some(tile) = self.haptics.take_spare() {
+            let _ = self.ends.spent.enqueue(tile);
+        }
     }
 
     fn render(&mut self, watchdog_live: bool) -> GuardOutputs {
@@ -193,9 +201,14 @@ where
         if let Some(held) = self.clutch_input.tick(sense.clutch) {
             self.apply_command(Command::ClutchInput(held));
         }
+        let view = self.outcome.sample.view;
         self.run_tick(&sense, watchdog_live);
         let drive = self.outcome.drive;
         self.drive(&drive);
+        if self.outcome.sample.view != view {
+            // A placement has changed in this tick, and left the fallback of the one before.
+            self.return_spares();
+        }
         let is_rendered = self.haptics.source() == HipSource::Encoders;
         if is_rendered && self.reporter.is_sample_due(&self.outcome.sample) {
             let record = self.record(None);
@@ -248,7 +261,7 @@ where
         let (report, marked) = (self.haptics.report(), self.mark.latest());
         if self.reporter.is_report_due(&report, marked.number) && self.ends.health.ready() {
             let health = self.haptics.health(sense, drive);
-            let epoch = self.haptics.scene().map(|scene| scene.epoch);
+            let epoch = self.haptics.epoch();
             // `ready` has found room.
             let _ = self.ends.health.enqueue(LoopReport {
                 health,

@@ -227,6 +227,7 @@ impl<const D: usize> Link<'_, D> {
     /// Discards the state that depends on positions in one scene.
     fn clear_positions(&mut self) {
         self.view = 0;
+        self.is_changing = false;
         self.clutch = HostClutch::Released;
         self.request_hint = None;
         self.points.clear();

@@ -14,7 +14,8 @@
 //!   and keeps the scene and all stored tiles, so that a returning host continues where it was.
 //! - If the host falls silent, the arm renders the stored tiles until the host's time-out; then it
 //!   is disarmed.
-//! - A placement changes only while no force is rendered; the arm stays armed.
+//! - A placement changes while no force is rendered, or under a pressing hand with the force that
+//!   the hand feels; the arm stays armed.
 //! - A goodbye is answered once the amplifiers are off.
 
 mod commands;
@@ -108,6 +109,9 @@ pub struct Link<'t, const D: usize> {
     materials: Option<LoopMaterials>,
     /// Number of the latest placement; samples with another number are older.
     view: u8,
+    /// True if the latest placement changes in contact: until its samples come, only its fallback
+    /// is requested.
+    is_changing: bool,
     clutch: HostClutch,
     requester: TileRequester<D>,
     /// Millisecond in which the tile requester last found nothing to request; cleared by any
@@ -147,6 +151,7 @@ impl<'t, const D: usize> Link<'t, D> {
             scene: None,
             materials: None,
             view: 0,
+            is_changing: false,
             clutch: HostClutch::default(),
             requester: TileRequester::new(),
             nothing_to_request_at: None,

@@ -73,6 +73,9 @@ impl<'t, const D: usize> Link<'t, D> {
         while self.tx.has_room() {
             // A tile that was requested before has its buffer already.
             let key = match self.spare.len() > self.requester.in_flight() {
+                true if self.waits_for_change() => {
+                    self.requester.next_of_fallback(now, &request_hint)
+                }
                 true => self.requester.next_request(now, &request_hint),
                 false => self.requester.next_repeat(now, &request_hint),
             };

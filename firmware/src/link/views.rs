@@ -62,8 +62,10 @@ impl<const D: usize> Link<'_, D> {
         if !is_again && !(1..MAX_AHEAD).contains(&ahead) {
             return;
         }
-        let may_come =
-            || self.has_materials_of(&view.scene) && self.may_change_placement(&view.scene);
+        let may_come = || {
+            self.has_materials_of(&view.scene)
+                && (self.may_change_placement(&view.scene) || self.may_change_in_contact(&view))
+        };
         let accepted = is_again || (view.scene.is_valid() && may_come());
         if accepted && !is_again {
             self.apply_placement(view, room);
@@ -87,7 +89,26 @@ impl<const D: usize> Link<'_, D> {
         })
     }
 
+    /// Returns true if the loop may change the placement under the pressing hand, when the tiles of
+    /// its fallback have arrived.
+    fn may_change_in_contact(&self, view: &SceneChange) -> bool {
+        let is_of_arm = |scene: &Scene| scene.source == Source::Encoders;
+        view.in_contact.is_some()
+            && is_of_arm(&view.scene)
+            && self.scene.as_ref().is_some_and(is_of_arm)
+            && view.scene.materials.is_none()
+            && self.clutch == HostClutch::Released
+            && self.last_record.sample.view == self.view
+    }
+
+    /// Returns true if the loop still renders the placement before the latest one, whose tiles are
+    /// all that it has room for.
+    pub(super) fn waits_for_change(&self) -> bool {
+        self.is_changing && self.last_record.sample.view != self.view
+    }
+
     fn apply_placement(&mut self, view: SceneChange, room: CommandRoom) {
+        self.is_changing = view.in_contact.is_some() && !view.keeps_tiles;
         let (scene, at) = (view.scene, view.hip.column());
         if !view.keeps_tiles {
             self.requester.reset(scene.level, scene.size);

@@ -116,6 +116,7 @@ impl Bench<'_> {
             scene,
             hip: GridPoint::default(),
             keeps_tiles: true,
+            in_contact: None,
         };
         self.client.put_view(self.now, view, terrain, &mut self.out);
         scene.epoch

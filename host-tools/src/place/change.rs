@@ -161,6 +161,9 @@ pub struct Changed<'r> {
     /// The HIP, device millimetres of the new placement. Its height over the place under the hand
     /// is unchanged.
     pub hip_mm: [f64; 3],
+    /// The place about which the placement changes, device millimetres of the new placement; `None`
+    /// if its height is unknown or it has none.
+    pub place_mm: Option<[f64; 3]>,
     /// True if the heights under the hand have been read. Otherwise the HIP keeps its old height,
     /// and the same changes give the right one after the heights have been read.
     pub ground_is_known: bool,
@@ -198,6 +201,7 @@ impl Bounds {
         let terrain_after =
             terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
         let (hip_mm, ground_is_known) = hip_after((terrain, &terrain_after), hand, at_mm, at);
+        let place_mm = place_on(&terrain_after, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];
         let was = (before.view.scale, terrain.grid());
@@ -205,6 +209,7 @@ impl Bounds {
         Ok(Changed {
             placed_surface,
             ground_is_known,
+            place_mm,
             terrain: terrain_after,
             hip_mm,
         })
@@ -303,6 +308,15 @@ fn hip_after(
         .map_or(0.0, |(before, after)| after - before);
     let hip_mm = [east + offset(0), north + offset(1), hand.hip_mm[2] + risen];
     (hip_mm, before_is_known && after_is_known)
+}
+
+/// Returns a place on a terrain, device millimetres, from haptic cells of level 0; `None` if its
+/// height is unknown or it has none.
+fn place_on(terrain: &Terrain<'_>, at: [f64; 2]) -> Option<[f64; 3]> {
+    let cell_mm = terrain.scale_of_level_0().cell_mm();
+    let [east, north] = at.map(|cells| cells * cell_mm);
+    let (height, _) = ground_of(terrain, [east, north], at);
+    Some([east, north, height?])
 }
 
 /// Returns the ground height in mm at a place, given in millimetres and in haptic cells of level 0,

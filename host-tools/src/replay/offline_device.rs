@@ -91,6 +91,7 @@ impl<'t> OfflineDevice<'t> {
             scene,
             hip,
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
+            in_contact: None,
         };
         self.terrain = terrain.clone();
         if self.published.is_some() {

@@ -4,8 +4,10 @@ use std::time::{Duration, Instant};
 
 use hapterra_core::clutch::ClutchMode;
 use hapterra_core::contact::ContactState;
-use hapterra_core::guard::Limits;
-use hapterra_core::scene::{SceneChange, Source, TickRecord};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::{Limits, Mode};
+use hapterra_core::scene::{ContactMap, SceneChange, Source, TickRecord};
+use hapterra_core::terrain::TileIndex;
 use hapterra_core::wire::request::Request;
 
 use super::Steer;
@@ -19,7 +21,23 @@ const MAX_WAITING: usize = 64;
 /// millisecond.
 const MAX_SAMPLES_TO_OPEN: u32 = 5_000;
 
-/// Maximum wait for the ground under the hand in the new placement, with the clutch open.
+/// Samples after which the clutch is opened for a placement that was to change in contact. Its
+/// coarse tiles usually arrive within 50 ms.
+const MAX_SAMPLES_IN_CONTACT: u32 = 300;
+
+/// Maximum wait for the ground of the new placement with the clutch closed, or for the tile under
+/// the hand in the current one.
+const MAX_GROUND_WAIT_IN_CONTACT: Duration = Duration::from_millis(300);
+
+/// Limits under which a placement does not change in contact.
+const NOT_IN_CONTACT: Limits = Limits::CLUTCH_INPUT
+    .union(Limits::CLUTCH_OPEN)
+    .union(Limits::CLUTCH_MOVES)
+    .union(Limits::EDGE_FADING)
+    .union(Limits::TERRAIN_MISSING);
+
+/// Maximum wait for the ground under the hand in the new placement with the clutch open, or for the
+/// force to turn.
 const MAX_GROUND_WAIT: Duration = Duration::from_secs(2);
 
 /// A placement to set on the device.
@@ -30,6 +48,9 @@ pub struct PlacementUpdate<'r> {
     pub terrain: Terrain<'r>,
     /// Place, scale and surface parameters.
     pub placed_surface: PlacedSurface,
+    /// The place about which the placement changes, device millimetres of the new one.
+    /// `None` if its height is unknown.
+    place_mm: Option<[f64; 3]>,
 }
 
 /// Stage of a change.
@@ -42,8 +63,15 @@ enum Stage<'r> {
     Opening { samples: u32, answered: bool },
     /// The clutch is open.
     Open,
-    /// This placement was sent; with its terrain.
-    Applying(Box<(PlacedSurface, Terrain<'r>)>),
+    /// This placement was sent; with its terrain. It changes in contact, or with an open clutch.
+    Applying {
+        next: Box<(PlacedSurface, Terrain<'r>)>,
+        /// The changes, if the placement changes in contact.
+        in_contact: Option<Vec<PlacementChange>>,
+    },
+    /// The device was sent a placement that changes in contact, and had rendered the one before in
+    /// `samples` samples since then.
+    InContact { samples: u32 },
     /// The clutch was released, and is still reported open.
     Closing,
 }
@@ -66,6 +94,8 @@ pub struct Steering<'r> {
     requested_hold: ClutchMode,
     /// Start of the wait for the ground of the new placement.
     waiting_since: Option<Instant>,
+    /// Time since which the force turns to that of the current placement.
+    turning_since: Option<Instant>,
     stage: Stage<'r>,
     requests: Vec<HostRequest>,
     update: Option<PlacementUpdate<'r>>,
@@ -87,6 +117,7 @@ impl<'r> Steering<'r> {
             must_measure: false,
             requested_hold: ClutchMode::Released,
             waiting_since: None,
+            turning_since: None,
             stage: Stage::Idle,
             requests: vec![],
             update: None,
@@ -155,8 +186,14 @@ impl<'r> Steering<'r> {
             Event::Opened { resumed, .. } => {
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
-                self.stage = Stage::Idle;
                 self.requested_hold = ClutchMode::Released;
+                self.requests.clear();
+                self.update = None;
+                // A resumed device may still wait for the terrain of the latest placement.
+                self.stage = match resumed {
+                    true => Stage::InContact { samples: 0 },
+                    false => Stage::Idle,
+                };
                 if !resumed {
                     self.number = 0;
                 }
@@ -170,7 +207,7 @@ impl<'r> Steering<'r> {
                 }
             }
             Event::Unanswered(HostRequest::Request(Request::Clutch { .. })) => {
-                self.give_up("the device does not answer: the view stays as it was");
+                self.give_up("the device does not answer: no further change is made");
             }
             _ => {}
         }
@@ -198,6 +235,14 @@ impl<'r> Steering<'r> {
         });
     }
 
+    fn open_clutch(&mut self) {
+        self.hold_clutch();
+        self.stage = Stage::Opening {
+            samples: 0,
+            answered: false,
+        };
+    }
+
     fn release_clutch(&mut self) {
         self.request_clutch(ClutchMode::Released);
         self.stage = Stage::Closing;
@@ -207,21 +252,37 @@ impl<'r> Steering<'r> {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
         let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
         let is_held_by_input = by_input && is_open;
-        if is_held_by_input && !self.by_input && matches!(self.stage, Stage::Idle) {
-            self.must_measure = self.hand(sample).has_other_cell_size(&self.terrain);
+        if matches!(self.stage, Stage::InContact { .. }) && sample.view == self.number {
+            self.stage = Stage::Idle;
         }
-        self.by_input = is_held_by_input;
+        // After a change that is under way, the measurement is of the new placement.
+        if matches!(self.stage, Stage::Idle) {
+            if is_held_by_input && !self.by_input {
+                self.must_measure |= self.hand(sample).has_other_cell_size(&self.terrain);
+            }
+            self.by_input = is_held_by_input;
+        }
+        self.by_input &= is_held_by_input;
         // The user has taken the clutch during a change of placement: the terrain follows the hand.
         if self.held && self.requested_hold == ClutchMode::InPlace {
             self.hold_clutch();
         }
+        let is_turning = sample.limits.contains(Limits::CLUTCH_MOVES) && !by_input;
+        let is_idle = matches!(self.stage, Stage::Idle) && !self.held;
+        if is_idle && (self.waits_for_turn(is_turning) || self.changes_in_contact(sample)) {
+            return;
+        }
+        self.waiting_since = self.waiting_since.filter(|_| !is_idle);
+        self.turning_since = None;
         match &mut self.stage {
             Stage::Idle if self.held || self.must_measure || !self.waiting.is_empty() => {
-                self.hold_clutch();
-                self.stage = Stage::Opening {
-                    samples: 0,
-                    answered: false,
-                };
+                self.open_clutch();
+            }
+            Stage::InContact { samples } => {
+                *samples += 1;
+                if self.held || !presses(sample) || *samples > MAX_SAMPLES_IN_CONTACT {
+                    self.open_clutch();
+                }
             }
             Stage::Opening { answered: true, .. } if is_open && sample.view == self.number => {
                 self.stage = Stage::Open;
@@ -230,7 +291,7 @@ impl<'r> Steering<'r> {
             Stage::Opening { samples, .. } => {
                 *samples += 1;
                 if *samples > MAX_SAMPLES_TO_OPEN {
-                    self.give_up("the device does not open its clutch: the view stays as it was");
+                    self.give_up("the device does not open its clutch: no further change is made");
                 }
             }
             Stage::Open if sample.view == self.number => self.advance(sample),
@@ -238,6 +299,17 @@ impl<'r> Steering<'r> {
             Stage::Closing if !is_open || by_input => self.stage = Stage::Idle,
             _ => {}
         }
+    }
+
+    /// Returns true if the force still turns to that of the current placement. The wait has an end:
+    /// the force does not turn while the tile under the hand is late.
+    fn waits_for_turn(&mut self, is_turning: bool) -> bool {
+        self.turning_since = match is_turning {
+            true => self.turning_since.or_else(|| Some(Instant::now())),
+            false => None,
+        };
+        self.turning_since
+            .is_some_and(|since| since.elapsed() < MAX_GROUND_WAIT)
     }
 
     /// Continues with an open clutch: sends the next placement, or releases the clutch.
@@ -268,12 +340,78 @@ impl<'r> Steering<'r> {
         match next {
             Ok(None) => {}
             Ok(Some(update)) => {
-                self.stage =
-                    Stage::Applying(Box::new((update.placed_surface, update.terrain.clone())));
-                self.update = Some(update);
+                self.apply(update, None);
             }
             Err(why) => self.lines.push(format!("the view stays as it was: {why}")),
         }
+    }
+
+    /// Sends a placement; with its changes if it changes in contact.
+    fn apply(&mut self, update: PlacementUpdate<'r>, in_contact: Option<Vec<PlacementChange>>) {
+        self.stage = Stage::Applying {
+            next: Box::new((update.placed_surface, update.terrain.clone())),
+            in_contact,
+        };
+        self.update = Some(update);
+    }
+
+    /// Sends the changes that wait, if they can be made under the pressing hand, or waits for its
+    /// new ground. Returns false if the clutch has to be opened for them.
+    fn changes_in_contact(&mut self, sample: &TickRecord) -> bool {
+        let is_free = !self.held && !self.must_measure && !self.waiting.is_empty();
+        let is_current = sample.view == self.number && !sample.limits.intersects(NOT_IN_CONTACT);
+        if !is_free || !is_current || !presses(sample) {
+            return false;
+        }
+        let since = *self.waiting_since.get_or_insert_with(Instant::now);
+        if sample.limits.contains(Limits::TERRAIN_COARSE) {
+            // The proxy is on another surface than the ground that the change is computed from.
+            return since.elapsed() < MAX_GROUND_WAIT_IN_CONTACT;
+        }
+        let mut update = match self.next_view(&self.waiting, sample, true) {
+            Ok(Some(update)) => update,
+            Ok(None) => return since.elapsed() < MAX_GROUND_WAIT_IN_CONTACT,
+            Err(_) => return false,
+        };
+        let Some(in_contact) = self.contact_map(&update, sample) else {
+            return false;
+        };
+        let (view, reach_mm) = (&mut update.view, update.placed_surface.view.reach_mm);
+        let touched = in_contact.to.column();
+        // The window has the tiles around the proxy; those elsewhere may have no room beside them.
+        let tile = |point: &GridPoint| TileIndex::containing(point.column());
+        view.keeps_tiles &= tile(&in_contact.from) == tile(&in_contact.to);
+        view.scene = update
+            .terrain
+            .with_fallback_around(view.scene, reach_mm, touched);
+        let may_turn = view.may_turn_from(&self.now.params);
+        if !may_turn || view.scene.fallback.is_none() || view.scene.materials.is_some() {
+            return false;
+        }
+        view.in_contact = Some(in_contact);
+        let changes = std::mem::take(&mut self.waiting);
+        self.waiting_since = None;
+        self.apply(update, Some(changes));
+        true
+    }
+
+    /// Returns the map of the proxy to the new placement.
+    fn contact_map(&self, update: &PlacementUpdate<'r>, sample: &TickRecord) -> Option<ContactMap> {
+        let side = |terrain: &Terrain<'_>| {
+            let cells = terrain.scale().cell_mm() / terrain.scale_of_level_0().cell_mm();
+            terrain.grid().side_m().unwrap_or(1.0) * cells
+        };
+        let across = side(&self.terrain) / side(&update.terrain);
+        // Height of a unit, in cells.
+        let unit = |terrain: &Terrain<'_>| {
+            terrain.scale().height_mm_per_unit() / terrain.scale().cell_mm()
+        };
+        let up = unit(&update.terrain) / unit(&self.terrain);
+        Some(ContactMap {
+            from: sample.proxy,
+            to: update.terrain.scale().to_grid(update.place_mm?)?,
+            scale: [across, across, up].map(|scale| scale as f32).into(),
+        })
     }
 
     /// Returns the position of the hand in a sample, in the current placement.
@@ -300,6 +438,7 @@ impl<'r> Steering<'r> {
             placed_surface,
             terrain,
             hip_mm,
+            place_mm,
             ground_is_known,
         } = changed.map_err(|why| why.to_string())?;
         if waits && !ground_is_known {
@@ -316,27 +455,45 @@ impl<'r> Steering<'r> {
             scene: terrain.with_fallback(scene, placed_surface.view.reach_mm),
             hip,
             keeps_tiles: terrain.has_tiles_of(&self.terrain),
+            in_contact: None,
         };
         Ok(Some(PlacementUpdate {
             view,
             terrain,
             placed_surface,
+            place_mm,
         }))
     }
 
     fn on_scene_change_result(&mut self, view: &SceneChange, accepted: bool) {
-        let Stage::Applying(update) = &self.stage else {
+        let stage = std::mem::replace(&mut self.stage, Stage::Open);
+        let Stage::Applying { next, in_contact } = stage else {
+            self.stage = stage;
             return;
         };
-        if accepted {
-            self.number = view.number;
-            (self.now, self.terrain) = (**update).clone();
-        } else {
-            let line = "the device refused the placement: it stays as it was";
-            self.lines.push(line.to_owned());
+        match in_contact {
+            _ if accepted => {
+                self.number = view.number;
+                (self.now, self.terrain) = *next;
+                if in_contact.is_some() {
+                    self.stage = Stage::InContact { samples: 0 };
+                }
+            }
+            Some(changes) => {
+                self.waiting.splice(..0, changes);
+                self.open_clutch();
+            }
+            None => {
+                let line = "the device refused the placement: it stays as it was";
+                self.lines.push(line.to_owned());
+            }
         }
-        self.stage = Stage::Open;
     }
+}
+
+/// Returns true if the hand presses into the terrain with the force of an armed arm.
+fn presses(sample: &TickRecord) -> bool {
+    sample.state == ContactState::Touching && sample.mode == Mode::Armed
 }
 
 #[cfg(test)]

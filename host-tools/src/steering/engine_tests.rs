@@ -139,7 +139,7 @@ fn unopened_clutch_or_silent_device_times_out() {
             }
             let reported = steering.lines();
             assert!(
-                reported.len() == 1 && reported[0].contains("stays as it was"),
+                reported.len() == 1 && reported[0].contains("no further change is made"),
                 "{reported:?}"
             );
             assert_eq!(requested_hold(steering), Some(ClutchMode::Released));
@@ -275,4 +275,168 @@ fn far_clutch_motion_measures_cells_again() {
             assert!(is_at_rest);
         });
     }
+}
+
+/// Returns a sample of a hand that presses on the middle of the plane, 2 mm deep.
+fn pressing(steering: &Steering<'_>, limits: Limits) -> TickRecord {
+    let scale = steering.terrain.scale();
+    let mm = 32.0 * scale.cell_mm();
+    let [proxy, hip] = [0.0, -2.0].map(|dz| {
+        let ground = scale.height_mm_per_unit() * 32.0;
+        scale.to_grid([mm, mm, ground + dz]).expect("on the grid")
+    });
+    TickRecord {
+        limits,
+        view: steering.number,
+        mode: Mode::Armed,
+        state: ContactState::Touching,
+        hip,
+        proxy,
+        ..TickRecord::default()
+    }
+}
+
+fn press(steering: &mut Steering<'_>, limits: Limits, count: usize) {
+    let sample = pressing(steering, limits);
+    (0..count).for_each(|_| steering.on_event(&Event::Sample(&sample)));
+}
+
+/// Zooms under a pressing hand, and returns the change that is sent.
+fn zoom_in_contact(steering: &mut Steering<'_>) -> SceneChange {
+    steering.steer(ZOOM);
+    press(steering, Limits::empty(), 1);
+    assert_eq!(requested_hold(steering), None);
+    let view = steering.take_update().expect("a view").view;
+    assert!(view.in_contact.is_some());
+    view
+}
+
+#[test]
+fn change_under_a_pressing_hand_needs_no_clutch() {
+    with(|steering| {
+        let view = zoom_in_contact(steering);
+        let map = view.in_contact.expect("a map");
+        let [from, to] = [map.from, map.to].map(|at| at.relative_to([0; 3]));
+        assert!(
+            (to - from).length() < 1e-3 && (map.scale - 1.0).length() < 1e-6,
+            "{map:?}"
+        );
+        report_result(steering, &view, true);
+        // The device still renders the placement before, until the coarse tiles have arrived.
+        let before = TickRecord {
+            view: 0,
+            ..pressing(steering, Limits::empty())
+        };
+        (0..20).for_each(|_| steering.on_event(&Event::Sample(&before)));
+        assert!(!steering.is_settled());
+        press(steering, Limits::CLUTCH_MOVES, 3);
+        assert!(steering.is_settled());
+        // The next change waits until the force has turned.
+        steering.steer(ZOOM);
+        press(steering, Limits::CLUTCH_MOVES, 3);
+        assert!(steering.take_update().is_none());
+        press(steering, Limits::empty(), 1);
+        assert_eq!(steering.take_update().expect("a view").view.number, 2);
+        assert_eq!(requested_hold(steering), None);
+    });
+}
+
+#[test]
+fn refused_change_under_a_pressing_hand_opens_the_clutch() {
+    with(|steering| {
+        let view = zoom_in_contact(steering);
+        report_result(steering, &view, false);
+        assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
+        answer(steering, ClutchMode::InPlace);
+        press(steering, Limits::CLUTCH_OPEN, 1);
+        let view = steering.take_update().expect("a view").view;
+        assert_eq!((view.number, view.in_contact), (1, None));
+    });
+}
+
+/// The hand lifts off while the device waits for the terrain, or the terrain does not arrive.
+#[test]
+fn change_that_is_not_made_in_contact_opens_the_clutch() {
+    for lifts in [true, false] {
+        with(|steering| {
+            let view = zoom_in_contact(steering);
+            report_result(steering, &view, true);
+            let waits = TickRecord {
+                view: 0,
+                state: match lifts {
+                    true => ContactState::Free,
+                    false => ContactState::Touching,
+                },
+                ..pressing(steering, Limits::empty())
+            };
+            let count = 1 + if lifts { 0 } else { MAX_SAMPLES_IN_CONTACT };
+            (0..count).for_each(|_| steering.on_event(&Event::Sample(&waits)));
+            assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
+        });
+    }
+}
+
+#[test]
+fn change_waits_for_the_tile_under_the_pressing_hand() {
+    with(|steering| {
+        steering.steer(ZOOM);
+        press(steering, Limits::TERRAIN_COARSE, 20);
+        assert!(steering.take_update().is_none() && requested_hold(steering).is_none());
+        press(steering, Limits::empty(), 1);
+        assert!(steering.take_update().is_some());
+    });
+    with(|steering| {
+        steering.steer(ZOOM);
+        press(steering, Limits::TERRAIN_COARSE, 1);
+        steering.waiting_since = Instant::now().checked_sub(MAX_GROUND_WAIT_IN_CONTACT);
+        press(steering, Limits::TERRAIN_COARSE, 1);
+        assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
+    });
+    // A force that does not turn, because the tile in the current placement is late.
+    with(|steering| {
+        press(steering, Limits::CLUTCH_MOVES, 1);
+        steering.steer(ZOOM);
+        steering.turning_since = Instant::now().checked_sub(MAX_GROUND_WAIT);
+        press(steering, Limits::CLUTCH_MOVES, 1);
+        assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
+    });
+}
+
+/// The device has not answered a change before the link was lost. Its session's end released the
+/// clutch, and a request for it is no longer known to the engine.
+#[test]
+fn lost_link_leaves_no_request_for_the_clutch() {
+    with(|steering| {
+        let view = zoom_in_contact(steering);
+        report_result(steering, &view, false);
+        let device = &hello();
+        let resumed = true;
+        steering.on_event(&Event::Opened { device, resumed });
+        assert_eq!(requested_hold(steering), None);
+        press(steering, Limits::empty(), 1);
+        assert!(steering.take_update().is_some(), "the change still waits");
+    });
+}
+
+/// The board's switch is held again while a change waits; after it the cells are measured.
+#[test]
+fn second_hold_of_the_board_input_is_measured() {
+    let raster = degrees();
+    let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
+    with_raster(&raster, |steering| {
+        let near = sample_at(steering, 0.1, held);
+        steering.on_event(&Event::Sample(&near));
+        assert!(requested_hold(steering).is_none());
+        steering.stage = Stage::InContact { samples: 0 };
+        let waits = TickRecord {
+            view: 9,
+            mode: Mode::Armed,
+            state: ContactState::Touching,
+            ..sample_at(steering, 0.1, Limits::empty())
+        };
+        steering.on_event(&Event::Sample(&waits));
+        let far = sample_at(steering, 80.0, held);
+        steering.on_event(&Event::Sample(&far));
+        assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
+    });
 }

@@ -140,6 +140,7 @@ mod tests {
                 scene,
                 hip,
                 keeps_tiles: true,
+                in_contact: None,
             };
             let (view, accepted) = (&view, false);
             views.on_event(&Event::SceneChangeResult { view, accepted });

@@ -16,6 +16,9 @@ use super::{Terrain, TileBuffer, identity};
 /// Power of two by which the near tile's samples are closer than the wide one's: it reaches a
 /// quarter as far.
 const NEAR_SHIFT: u8 = 2;
+/// The same in a change of placement in contact: the hand touches the near tile until the others
+/// have arrived.
+const NEAR_SHIFT_IN_CONTACT: u8 = 4;
 
 impl Terrain<'_> {
     /// Returns a scene of this terrain with a fallback under the arm's whole reach. `reach_mm` is
@@ -27,20 +30,43 @@ impl Terrain<'_> {
     #[must_use]
     pub fn with_fallback(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
         let mut scene = Scene {
-            fallback: self.fallback_of(&scene, reach_mm),
+            fallback: match self.is_small() {
+                true => None,
+                false => self.fallback_of(&scene, reach_mm, (scene.home.column(), NEAR_SHIFT)),
+            },
             ..scene
         };
         scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
         scene
     }
 
-    fn fallback_of(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Fallback> {
+    /// Returns a scene with a fallback as [`Self::with_fallback`], for a change of placement in
+    /// contact: its near tile is around the touched cell, and a small terrain has a fallback, too.
+    #[must_use]
+    pub fn with_fallback_around(&self, scene: Scene, reach_mm: [f64; 4], touched: Cell) -> Scene {
+        let mut scene = Scene {
+            fallback: self.fallback_of(&scene, reach_mm, (touched, NEAR_SHIFT_IN_CONTACT)),
+            ..scene
+        };
+        scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
+        scene
+    }
+
+    /// Returns true if a device stores all of the terrain.
+    fn is_small(&self) -> bool {
         let size = self.size();
-        if size.iter().all(|cells| *cells <= 2 * TILE_CELLS as i32) {
-            return None;
-        }
+        size.iter().all(|cells| *cells <= 2 * TILE_CELLS as i32)
+    }
+
+    /// Returns the fallback; its near tile has this middle and is finer by this shift.
+    fn fallback_of(
+        &self,
+        scene: &Scene,
+        reach_mm: [f64; 4],
+        (middle, shift): (Cell, u8),
+    ) -> Option<Fallback> {
         let wide = self.wide_tile(scene, reach_mm)?;
-        let near = near(&wide, scene.home.column());
+        let near = near(&wide, middle, shift);
         let fallback = Fallback { wide, near };
         fallback.is_valid(self.level()).then_some(fallback)
     }
@@ -173,19 +199,19 @@ impl Terrain<'_> {
 
 /// Returns the finer tile within a wide one, centred on a cell as far as possible; `None` if it
 /// would not be finer. Its samples include the borders of the wide one's cells.
-fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
-    let shift = wide.shift.saturating_sub(NEAR_SHIFT);
+fn near(wide: &CoarseTile, middle: Cell, finer: u8) -> Option<CoarseTile> {
+    let shift = wide.shift.saturating_sub(finer);
     let near = CoarseTile {
         shift: shift.max(CoarseTile::MIN_SHIFT),
         ..*wide
     };
     let side = |tile: &CoarseTile| (TILE_CELLS as i32) << tile.shift;
-    let from = |home: i32, first: i32| {
-        let middle = home.saturating_sub(first).saturating_sub(side(&near) / 2);
-        let off = middle.clamp(0, side(wide) - side(&near));
+    let from = |middle: i32, first: i32| {
+        let off = middle.saturating_sub(first).saturating_sub(side(&near) / 2);
+        let off = off.clamp(0, side(wide) - side(&near));
         first + off / near.spacing() * near.spacing()
     };
-    let first = Cell::new(from(home.x, wide.first.x), from(home.y, wide.first.y));
+    let first = Cell::new(from(middle.x, wide.first.x), from(middle.y, wide.first.y));
     (near.shift < wide.shift).then_some(CoarseTile { first, ..near })
 }
 

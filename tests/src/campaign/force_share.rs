@@ -63,6 +63,8 @@ impl Share {
         self.clutch = match (self.clutch.filter(|_| last.is_some()), moves, is_open) {
             (_, _, true) => Some(Clutch::Open),
             (_, false, false) => Some(Clutch::Closed),
+            // A placement has changed under the hand: the force turns, and no share is known.
+            (Some(Clutch::Closed), ..) if last.is_some_and(|last| last.view != sample.view) => None,
             (Some(Clutch::Closed), ..) => Some(Clutch::Opening(1.0 - OPENS)),
             (Some(Clutch::Opening(share)), ..) => Some(Clutch::Opening(share - OPENS)),
             (Some(Clutch::Open), ..) => Some(Clutch::Closing(0.0)),

@@ -10,7 +10,7 @@ use hapterra_core::grid::{Cell, GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, GuardInputs};
 use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source};
+use hapterra_core::scene::{ContactMap, HipCommand, Scene, SceneChange, Source};
 use hapterra_core::terrain::{CoarseTile, Fallback, FieldSize, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
@@ -19,8 +19,9 @@ use super::materials;
 
 /// Tiles along the side of the window.
 const SIDE: usize = 2;
-/// Additional buffers: one in transfer, and those that a fallback keeps.
-const SPARE_TILES: usize = 3;
+/// Additional buffers: one in transfer, and those that the fallbacks of a scene and of the next one
+/// keep.
+const SPARE_TILES: usize = 5;
 
 /// Runs an input, and checks every tick.
 ///
@@ -52,10 +53,8 @@ pub fn run(data: &[u8]) {
                     scene,
                     hip: position(&mut bytes),
                     keeps_tiles: kind.is_multiple_of(2),
+                    in_contact: (kind == 253).then(|| contact_map(&mut bytes)),
                 };
-                if is_taken(&scene, &table) {
-                    params = scene.params;
-                }
                 spare.extend(haptics.accept(Command::SceneChange(view)).ok().flatten());
                 ticks = None;
             }
@@ -97,7 +96,7 @@ pub fn run(data: &[u8]) {
                 spare.extend(haptics.accept(Command::Scene(scene)).ok().flatten());
             }
             1 | 2 => {
-                let tile = spare.pop().expect("a fallback keeps two at most");
+                let tile = spare.pop().expect("two fallbacks keep four at most");
                 fill(tile, &mut bytes);
                 if kind % 16 >= 8 {
                     materials::fill(tile, &table, &mut bytes);
@@ -132,6 +131,7 @@ pub fn run(data: &[u8]) {
                 spare.extend(haptics.accept(Command::Zero([0; 3])).ok().flatten());
             }
         }
+        spare.extend(std::iter::from_fn(|| haptics.take_spare()));
         let counts = [
             bytes.int(),
             i32::from(bytes.byte()),
@@ -151,7 +151,17 @@ pub fn run(data: &[u8]) {
         let is_next = ticks.is_none_or(|ticks: u32| outcome.sample.tick == ticks + 1);
         assert!(is_next, "{ticks:?}, then {outcome:?}");
         ticks = Some(outcome.sample.tick);
+        // A change of placement may have waited for this tick.
+        params = haptics.scene().map_or(params, |scene| scene.params);
         check(&outcome, &params);
+    }
+}
+
+fn contact_map(bytes: &mut Bytes<'_>) -> ContactMap {
+    ContactMap {
+        from: position(bytes),
+        to: position(bytes),
+        scale: Vec3::new(bytes.float(), bytes.float(), bytes.float()),
     }
 }
 

@@ -1,12 +1,13 @@
 //! Hostile programs: one that sends to the device, and one that answers a host.
 
+use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchMode;
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source, TickRecord};
+use hapterra_core::scene::{ContactMap, HipCommand, Scene, SceneChange, Source, TickRecord};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::materials::{MaterialScene, MaterialTile, TileMaterials};
@@ -110,6 +111,11 @@ fn host_message<'b>(random: &mut Random) -> ToDevice<'b> {
                 scene: host_scene(random, epoch),
                 hip: GridPoint::default(),
                 keeps_tiles: random.below(2) == 0,
+                in_contact: (random.below(2) == 0).then(|| ContactMap {
+                    from: GridPoint::default(),
+                    to: GridPoint::new([word(random), word(random), 0], Vec3::ZERO),
+                    scale: Vec3::splat(f32::from_bits(random.bits() as u32)),
+                }),
             }),
         },
         8 => {

@@ -462,6 +462,7 @@ impl<'t> Simulation<'t> {
             scene,
             hip: scene.home,
             keeps_tiles: true,
+            in_contact: None,
         };
         let mut out = vec![];
         let terrain = self.terrain.clone();

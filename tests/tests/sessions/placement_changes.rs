@@ -58,19 +58,36 @@ struct Touching<'t> {
     pedal: Rc<Cell<bool>>,
 }
 
+/// Returns an arm without joint friction: the friction, 0.05 N at the tip, holds the hand at any
+/// force within that of its press, which depends on the direction of the last motion.
+fn arm_without_friction() -> PhantomModel {
+    PhantomModel::premium_1_5().with_friction(0.0)
+}
+
 /// Plays at the smallest scale, level 8, with a hand that presses on the middle for this time.
 fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>) -> T) -> T {
+    pressed_by(arm_without_friction(), raster, seconds, play)
+}
+
+/// As [`pressed`], by a hand that holds this arm.
+fn pressed_by<T>(
+    arm: PhantomModel,
+    raster: &Raster,
+    seconds: f64,
+    play: impl FnOnce(&mut Touching<'_>) -> T,
+) -> T {
     let options = PlacementOptions {
         target: Target::Whole,
         sizing: Sizing::CellMm(1.05 * RESOLUTION_MM / 256.0),
         level: Some(8),
         ..PlacementOptions::default()
     };
-    pressed_at(raster, &options, seconds, play)
+    pressed_at(arm, raster, &options, seconds, play)
 }
 
 /// Plays with a hand that presses on a placement's home position for this time.
 fn pressed_at<T>(
+    model: PhantomModel,
     raster: &Raster,
     options: &PlacementOptions,
     seconds: f64,
@@ -89,7 +106,6 @@ fn pressed_at<T>(
     let touch = Touch::start(&surface, &hand, wall, [east, north], 10.0);
     let script: Script = touch.press(PUSH_N, seconds).finish();
     let home_mm = view.home_mm;
-    let model = PhantomModel::premium_1_5();
     let arm = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let pedal = Rc::new(Cell::new(false));
     let foot = Rc::clone(&pedal);
@@ -239,7 +255,7 @@ fn remaining_press_share() -> f32 {
 #[test]
 fn force_makes_no_step_while_zooming_through_eight_levels() {
     let raster = hills();
-    pressed(&raster, 60.0, |touching| {
+    pressed_by(PhantomModel::premium_1_5(), &raster, 60.0, |touching| {
         let before = touching.last();
         assert_rendered(&before, "at the beginning");
         assert!((before.force_n.length() - PUSH_N as f32).abs() < 0.05);
@@ -551,58 +567,64 @@ fn check_far_pan(axis: usize) {
         level: Some(0),
         ..PlacementOptions::default()
     };
-    pressed_at(&raster, &options, 60.0, |touching| {
-        let first = touching.last();
-        assert_rendered(&first, "at the beginning");
-        let began = touching.samples.len();
-        // The effect of an empty change on a hand on such a slope.
-        touching.change(PlacementChange::Stiffness(1.0));
-        let max = max_ratio(&touching.samples[began..]);
-        let began = touching.samples.len();
-        let expected = [[1.0, 0.0], [0.0, 1.0]][axis];
-        let is_true = |sample: &TickRecord, where_: &str| {
-            let rendered = slope_of_force(sample);
-            eprintln!("{where_}: {rendered:?}");
-            for (rendered, expected) in rendered.iter().zip(expected) {
-                assert!(
-                    (rendered - expected).abs() < 1e-3,
-                    "{where_}: {rendered} for {expected}"
-                );
-            }
-        };
-        is_true(&first, "in the south");
-        let ground = |touching: &Touching<'_>| {
-            let terrain = touching.steering.terrain();
-            let (cell, at) = (terrain.scale().cell_mm(), touching.last().proxy);
-            let [x, y, _] = terrain.scale().to_mm(&at).map(|mm| mm / cell);
-            terrain.grid().to_ground([x, y])
-        };
-        let [_, south] = ground(touching);
-        let metres = |north_m: f64| PlacementChange::PanGround {
-            east_m: 0.0,
-            north_m,
-        };
-        let there = touching.change(metres(310_000.0));
-        assert_pressed(&there, &first, "panned to the north");
-        assert!(ground(touching)[1] - south > 2.7, "{:?}", ground(touching));
-        is_true(&there, "in the north");
-        let scale = |touching: &Touching<'_>| {
-            let view = &touching.steering.now().view;
-            (view.ground_m_per_mm().expect("known"), view.exaggeration)
-        };
-        let (m_per_mm, times) = scale(touching);
-        assert!((times.expect("known") - 1.0).abs() < 1e-9);
-        let back = touching.change(metres(-310_000.0));
-        assert_pressed(&back, &first, "panned back");
-        is_true(&back, "in the south again");
-        assert!((scale(touching).0 / m_per_mm - 1.0).abs() < 1e-12);
-        // Beside the hand nothing else is measured: the same tiles are used.
-        let cells = touching.steering.terrain().clone();
-        touching.change(PlacementChange::Stiffness(0.9));
-        assert!(touching.steering.terrain().has_tiles_of(&cells));
-        assert_eq!(touching.messages, [""; 0]);
-        check_press(&touching.samples[began..], GENTLE_N, max + 0.01);
-    });
+    pressed_at(
+        PhantomModel::premium_1_5(),
+        &raster,
+        &options,
+        60.0,
+        |touching| {
+            let first = touching.last();
+            assert_rendered(&first, "at the beginning");
+            let began = touching.samples.len();
+            // The effect of an empty change on a hand on such a slope.
+            touching.change(PlacementChange::Stiffness(1.0));
+            let max = max_ratio(&touching.samples[began..]);
+            let began = touching.samples.len();
+            let expected = [[1.0, 0.0], [0.0, 1.0]][axis];
+            let is_true = |sample: &TickRecord, where_: &str| {
+                let rendered = slope_of_force(sample);
+                eprintln!("{where_}: {rendered:?}");
+                for (rendered, expected) in rendered.iter().zip(expected) {
+                    assert!(
+                        (rendered - expected).abs() < 1e-3,
+                        "{where_}: {rendered} for {expected}"
+                    );
+                }
+            };
+            is_true(&first, "in the south");
+            let ground = |touching: &Touching<'_>| {
+                let terrain = touching.steering.terrain();
+                let (cell, at) = (terrain.scale().cell_mm(), touching.last().proxy);
+                let [x, y, _] = terrain.scale().to_mm(&at).map(|mm| mm / cell);
+                terrain.grid().to_ground([x, y])
+            };
+            let [_, south] = ground(touching);
+            let metres = |north_m: f64| PlacementChange::PanGround {
+                east_m: 0.0,
+                north_m,
+            };
+            let there = touching.change(metres(310_000.0));
+            assert_pressed(&there, &first, "panned to the north");
+            assert!(ground(touching)[1] - south > 2.7, "{:?}", ground(touching));
+            is_true(&there, "in the north");
+            let scale = |touching: &Touching<'_>| {
+                let view = &touching.steering.now().view;
+                (view.ground_m_per_mm().expect("known"), view.exaggeration)
+            };
+            let (m_per_mm, times) = scale(touching);
+            assert!((times.expect("known") - 1.0).abs() < 1e-9);
+            let back = touching.change(metres(-310_000.0));
+            assert_pressed(&back, &first, "panned back");
+            is_true(&back, "in the south again");
+            assert!((scale(touching).0 / m_per_mm - 1.0).abs() < 1e-12);
+            // Beside the hand nothing else is measured: the same tiles are used.
+            let cells = touching.steering.terrain().clone();
+            touching.change(PlacementChange::Stiffness(0.9));
+            assert!(touching.steering.terrain().has_tiles_of(&cells));
+            assert_eq!(touching.messages, [""; 0]);
+            check_press(&touching.samples[began..], GENTLE_N, max + 0.01);
+        },
+    );
 }
 
 /// Returns the largest force of some samples, relative to the first.

@@ -18,16 +18,23 @@ pub(super) struct Onset {
     at: GridPoint,
     /// Vector from the HIP to the proxy, cells.
     displacement: Vec3,
+    /// Share of the force at the start.
+    fade: f32,
 }
 
 impl Contact {
     /// Creates a contact whose proxy begins on the surface at the column of a place, with the
     /// vector `displacement` from the HIP to it, cells. No force is rendered before the terrain
-    /// there is known and [`Contact::place_on_surface`] has placed the HIP.
+    /// there is known and [`Contact::place_on_surface`] has placed the HIP; then this share of it,
+    /// which grows to all.
     #[must_use]
-    pub fn onset(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
+    pub fn onset(settings: ContactSettings, at: GridPoint, displacement: Vec3, fade: f32) -> Self {
         Self {
-            onset: Some(Onset { at, displacement }),
+            onset: Some(Onset {
+                at,
+                displacement,
+                fade,
+            }),
             ..Self::new(settings)
         }
     }
@@ -53,16 +60,20 @@ impl Contact {
     /// Puts the proxy of a landing contact onto the surface as soon as the terrain there is known,
     /// and returns the HIP at the same depth as before. At no-data there is no contact.
     ///
-    /// The force fades in as after a late tile.
     #[must_use]
     pub fn place_on_surface<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
     ) -> Option<GridPoint> {
-        let Onset { at, displacement } = self.onset.as_ref()?;
+        let Onset {
+            at,
+            displacement,
+            fade,
+        } = self.onset.as_ref()?;
         let (cell, frac) = (at.column(), at.frac());
         let (u, v) = (frac.x, frac.y);
         let point = SurfacePoint { cell, u, v };
+        let fade = *fade;
         match window.ground(cell) {
             CellContent::Missing => return None,
             CellContent::NoData => self.onset = None,
@@ -70,7 +81,7 @@ impl Contact {
                 let surface = position_on(window, &point)?;
                 let hip = GridPoint::new(surface.cell(), surface.frac() - *displacement);
                 self.onset = None;
-                self.phase = Phase::OnSurface(OnSurface::at(point, 0.0));
+                self.phase = Phase::OnSurface(OnSurface::at(point, fade));
                 self.hip = hip;
                 return Some(hip);
             }
@@ -112,8 +123,12 @@ mod tests {
         let field = Field::<2>::filled(&mut tiles, FieldSize::new(40, 40), wall);
         // Three cells deep in the wall from the west, relative to the proxy.
         let displacement = Vec3::new(-3.0, 0.1, 0.0);
-        let mut contact =
-            Contact::onset(ContactSettings::AT_1_KHZ, column(10.5, 20.5), displacement);
+        let mut contact = Contact::onset(
+            ContactSettings::AT_1_KHZ,
+            column(10.5, 20.5),
+            displacement,
+            0.0,
+        );
         assert!(contact.is_onset_pending());
         let hip = contact
             .place_on_surface(&field.window)
@@ -138,8 +153,12 @@ mod tests {
         let mut tiles = buffers::<2>();
         let mut field = Field::<2>::empty(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
         let displacement = Vec3::new(40.0, 0.0, 1.0);
-        let mut contact =
-            Contact::onset(ContactSettings::AT_1_KHZ, column(60.5, 5.5), displacement);
+        let mut contact = Contact::onset(
+            ContactSettings::AT_1_KHZ,
+            column(60.5, 5.5),
+            displacement,
+            0.0,
+        );
         let hip = GridPoint::new([20, 5, 1], Vec3::splat(0.5));
         for _ in 0..3 {
             assert_eq!(contact.place_on_surface(&field.window), None);
@@ -166,8 +185,12 @@ mod tests {
             if x > 20 { f32::NAN } else { 0.0 }
         });
         let displacement = Vec3::new(0.0, 0.0, 1.0);
-        let mut contact =
-            Contact::onset(ContactSettings::AT_1_KHZ, column(30.5, 5.5), displacement);
+        let mut contact = Contact::onset(
+            ContactSettings::AT_1_KHZ,
+            column(30.5, 5.5),
+            displacement,
+            0.0,
+        );
         assert_eq!(contact.place_on_surface(&field.window), None);
         let output = *contact.step(&field.window, &column(30.5, 5.5));
         assert_eq!(

@@ -5,7 +5,7 @@ use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::scalar::larger;
 use crate::terrain::fallback::Fallback;
-use crate::terrain::index::{TILE_CELLS, TileIndex};
+use crate::terrain::index::{TILE_CELLS, TileIndex, TileKey};
 use crate::terrain::tile::Tile;
 use crate::terrain::tile_blend::{Allowance, TileBlend, within};
 
@@ -17,10 +17,50 @@ struct BlendedHeight {
 }
 
 impl<'t, const D: usize> Window<'t, D> {
-    /// Sets the field's fallback, or none; the stored tiles are rendered unchanged. The buffers of
+    /// Stores the fallback of the next scene beside the current one, or drops it.
+    pub(crate) fn expect_fallback(&mut self, fallback: Option<Fallback>, level: u8) {
+        self.next.set_place(fallback);
+        self.next_level = level;
+    }
+
+    /// Returns true if a tile belongs to the fallback of the next scene.
+    pub(crate) fn expects_in_next(&self, key: TileKey) -> bool {
+        self.next.part(Some(key), self.next_level).is_some()
+    }
+
+    /// Stores a tile of the next scene's fallback, and returns the replaced buffer, if any.
+    #[must_use]
+    pub(crate) fn take_for_next(&mut self, tile: &'t mut Tile) -> Option<&'t mut Tile> {
+        match self.next.part(tile.key(), self.next_level) {
+            Some(part) => self.next.put(part, tile),
+            None => Some(tile),
+        }
+    }
+
+    /// Returns true if all tiles of the next scene's fallback have arrived.
+    pub(crate) fn has_next(&self) -> bool {
+        self.next.loaded().is_some()
+    }
+
+    /// Returns the samples at the corners of a cell of the next scene, from its fallback; `None`
+    /// before all its tiles have arrived.
+    pub(crate) fn corners_of_next(&self, cell: Cell) -> Option<Corners> {
+        let next = self.next.loaded()?;
+        let base = next.base();
+        let heights = next.corners(cell, base);
+        Some(Corners { base, heights })
+    }
+
+    /// Sets the field's fallback, or none; the stored tiles are rendered unchanged. If it was
+    /// expected, its tiles that have arrived are kept. The buffers of
     /// the previous fallback are kept for this one ([`Self::take_spare`]).
     pub fn set_fallback(&mut self, fallback: Option<Fallback>) {
-        self.fallback.set_place(fallback);
+        if self.next.is_at(fallback) {
+            core::mem::swap(&mut self.fallback, &mut self.next);
+            self.next.set_place(None);
+        } else {
+            self.fallback.set_place(fallback);
+        }
         self.tile_blend = TileBlend::NONE;
         for row in 0..D {
             for col in 0..D {
@@ -37,7 +77,8 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Returns one buffer that the fallback no longer needs, if any. There may be another.
     #[must_use]
     pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
-        self.fallback.take_spare()
+        let spare = self.fallback.take_spare();
+        spare.or_else(|| self.next.take_spare())
     }
 
     /// Stores a requested tile, of the field or of the fallback. Returns a buffer, if one is left

@@ -23,6 +23,7 @@ fn view(number: u8, hip: GridPoint) -> SceneChange {
         },
         hip,
         keeps_tiles: false,
+        in_contact: None,
     }
 }
 

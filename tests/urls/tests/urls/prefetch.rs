@@ -95,6 +95,7 @@ fn next_placement_is_prefetched_around_the_hip() {
         scene,
         hip: at(3500),
         keeps_tiles: true,
+        in_contact: None,
     };
     client.put_view(Duration::ZERO, view, terrain.clone(), &mut vec![]);
     let after = before + VIEW_REQUESTS;

@@ -1,0 +1,642 @@
+//! Changes of the placement under a pressing hand.
+
+use super::*;
+use crate::clutch::ClutchMode;
+use crate::contact::Friction;
+use crate::scene::{ContactMap, SceneChange};
+
+/// Counts of the axes for a tip some 5 mm deep in the ground.
+const DEEP: i32 = -170;
+
+/// Slopes of all directions, up to 20 degrees, with detail of 3 cells.
+fn ground(x: i32, y: i32) -> f32 {
+    let (x, y) = (f64::from(x), f64::from(y));
+    let detail = 0.3 * (x * 2.1).sin() * (y * 1.9).cos();
+    (5.5 + 3.0 * (x * 0.09).sin() * (y * 0.08).cos() + detail) as f32
+}
+
+/// The same ground in cells of twice and of half the size.
+fn coarser(x: i32, y: i32) -> f32 {
+    0.5 * ground(2 * x, 2 * y)
+}
+
+fn finer(x: i32, y: i32) -> f32 {
+    let (x, y) = (f64::from(x) * 0.5, f64::from(y) * 0.5);
+    let detail = 0.3 * (x * 2.1).sin() * (y * 1.9).cos();
+    2.0 * (5.5 + 3.0 * (x * 0.09).sin() * (y * 0.08).cos() + detail) as f32
+}
+
+/// A fallback under the whole field, and a near part around its middle.
+fn fallback(size: i32) -> Fallback {
+    let part = |first, shift| CoarseTile {
+        first: Cell::new(first, first),
+        shift,
+    };
+    Fallback {
+        wide: part(0, 5 + u8::from(size > 1024)),
+        near: Some(part(size / 2 - 64, 2)),
+    }
+}
+
+/// An armed arm that presses into the ground.
+struct Pressing<'t> {
+    device: Device<'t, 4>,
+    last: Outcome,
+    counts: [i32; 3],
+    /// Tremor of the hand: its power of two, in counts.
+    tremor: u32,
+}
+
+impl<'t> Pressing<'t> {
+    fn new(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
+        let mut device = Device::<4>::armed(tiles, height);
+        let path = (0..=420).chain((DEEP..420).rev());
+        let last = path.map(|n| device.tick([0, n, 0])).last();
+        Self {
+            device,
+            last: last.expect("ticks"),
+            counts: [0, DEEP, 0],
+            tremor: 1,
+        }
+    }
+
+    /// Runs a tick, and returns the change of the force in it, N.
+    fn tick(&mut self) -> f32 {
+        // An arm without any motion is a fault.
+        let random = self.last.sample.tick.wrapping_mul(0x9E37_79B9);
+        let tremor = (random >> (32 - self.tremor)) as i32;
+        let counts = self.counts.map(|count| count >> self.tremor << self.tremor);
+        self.counts = counts.map(|count| count | tremor);
+        let now = self.device.tick(self.counts);
+        assert_eq!((now.sample.mode, now.sample.fault), (Mode::Armed, None));
+        let change = (now.sample.force_n - self.last.sample.force_n).length();
+        self.last = now;
+        change
+    }
+
+    /// Sends a change under the hand, whose tiles will be served.
+    fn change(&mut self, change: SceneChange, height: fn(i32, i32) -> f32) {
+        let scene = change.scene;
+        self.device.size = scene.size;
+        self.device.height = height;
+        self.device.fallback = scene.fallback.map(|fallback| (fallback, scene.level));
+        if !change.keeps_tiles {
+            self.device.requester.reset(scene.level, scene.size);
+        }
+        self.device.requester.set_fallback(scene.fallback);
+        self.device.requester.clear_pending();
+        self.send(Command::SceneChange(change));
+    }
+
+    /// Sends a command, and takes the buffers that have become free.
+    fn send(&mut self, command: Command<'t>) {
+        let free = self.device.haptics.accept(command).expect("valid");
+        self.device.spare.extend(free);
+    }
+
+    /// Returns the change to a field with cells of 2^-`finer` of the present ones, of the same size
+    /// in the hand: a zoom by 2^`finer`.
+    fn zoom(&self, number: u8, level: u8, finer: i32) -> SceneChange {
+        let before = self.device.haptics.scene.expect("a scene");
+        let scale = (finer as f32).exp2();
+        let size = (SIZE as f32 * scale) as i32;
+        let proxy = self.last.sample.proxy;
+        let to = GridPoint::new([0; 3], proxy.relative_to([0; 3]) * scale);
+        SceneChange {
+            number,
+            scene: Scene {
+                epoch: 100 + u32::from(number),
+                level,
+                size: FieldSize::new(size, size),
+                fallback: Some(fallback(size)),
+                ..before
+            },
+            hip: to,
+            keeps_tiles: false,
+            in_contact: Some(ContactMap {
+                from: proxy,
+                to,
+                scale: Vec3::splat(scale),
+            }),
+        }
+    }
+}
+
+/// Maximum change of the force in a tick of a still hand, N: a fifth of the guard's slew. The force
+/// and a flat surface change it by 0.025 N each; facets that tilt while they blend add to that.
+const GENTLE_N: f32 = 0.2;
+
+#[test]
+fn zoom_under_a_pressing_hand_keeps_the_force() {
+    for (zoom, height) in [(-1, coarser as fn(i32, i32) -> f32), (1, finer)] {
+        let mut tiles = buffers::<4>();
+        let mut arm = Pressing::new(&mut tiles, ground);
+        let before = arm.last.sample;
+        let force_n = before.force_n.length();
+        assert!(
+            force_n > 1.0 && before.state == ContactState::Touching,
+            "{before:?}"
+        );
+        let level = if zoom < 0 { 1 } else { 0 };
+        let change = arm.zoom(1, level, zoom);
+        arm.change(change, height);
+        let (mut min, mut max_step) = (force_n, 0.0_f32);
+        for tick in 0..600 {
+            max_step = max_step.max(arm.tick());
+            let sample = arm.last.sample;
+            min = min.min(sample.force_n.length());
+            assert_eq!(sample.view, u8::from(tick > 0), "tick {tick}");
+            assert!(
+                !sample
+                    .limits
+                    .intersects(Limits::CLUTCH_OPEN | Limits::TERRAIN_MISSING)
+            );
+        }
+        assert!(max_step <= GENTLE_N, "zoom {zoom}: {max_step} N in a tick");
+        assert!(min > 0.5 * force_n, "zoom {zoom}: {min} of {force_n} N");
+        let after = arm.last.sample;
+        assert_eq!(after.limits, Limits::empty(), "on the new tiles");
+        let place = change.in_contact.expect("a map").place(&before.proxy);
+        let moved = place.to(&after.proxy).truncate().length();
+        assert!(moved < 8.0, "zoom {zoom}: {moved} cells");
+        assert!(arm.device.haptics.clutch.is_closed());
+    }
+}
+
+/// Runs ticks in which the placement does not change.
+fn stays(arm: &mut Pressing<'_>, view: u8, ticks: usize) {
+    for tick in 0..ticks {
+        let change = arm.tick();
+        let sample = &arm.last.sample;
+        assert!(
+            change <= GENTLE_N,
+            "{tick}: {change} N in a tick: {sample:?}"
+        );
+        assert_eq!(sample.view, view);
+    }
+}
+
+#[test]
+fn eight_levels_out_and_in_keep_the_force() {
+    fn plane_and_detail(x: i32, y: i32) -> f32 {
+        let (x, y) = (f64::from(x), f64::from(y));
+        (5.5 + 0.2 * (x * 0.7).sin() * (y * 0.6).cos()) as f32
+    }
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane_and_detail);
+    let (mut min, mut max) = (f32::MAX, 0.0_f32);
+    for (number, level) in (1..=8)
+        .chain((0..8).rev())
+        .enumerate()
+        .map(|(n, l)| (n as u8 + 1, l))
+    {
+        // The same detail in cells at every level: the ground is as rough at each scale.
+        let mut change = arm.zoom(number, level, 0);
+        change.scene.top = 7;
+        arm.change(change, plane_and_detail);
+        for _ in 0..300 {
+            max = max.max(arm.tick());
+            min = min.min(arm.last.sample.force_n.length());
+        }
+        assert_eq!(arm.last.sample.view, number);
+        assert_eq!(arm.last.sample.limits, Limits::empty());
+    }
+    assert!(max <= GENTLE_N && min > 1.0, "{max} N in a tick, {min} N");
+}
+
+#[test]
+fn change_waits_for_its_terrain_and_the_press() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, ground);
+    let change = arm.zoom(1, 0, 1);
+    // Its tiles do not come: the requester does not know of them.
+    arm.device.send(Command::SceneChange(change));
+    stays(&mut arm, 0, 50);
+    assert!(!arm.device.haptics.clutch.is_closed());
+    assert_eq!(arm.device.haptics.epoch(), Some(101));
+    // A tile of the new field is refused while the window has those of the old one.
+    let tile = arm.device.spare.pop().expect("a spare one");
+    let key = TileKey::new(0, 3, 3);
+    tile.fill(key, 0, |_, _| 0.0).expect("in range");
+    let back = arm
+        .device
+        .haptics
+        .accept(Command::Tile(tile))
+        .expect("taken");
+    arm.device.spare.push(back.expect("refused"));
+    // The hand lifts, and the terrain arrives.
+    arm.counts = [0, 420, 0];
+    for n in DEEP..=420 {
+        arm.counts = [0, n, 0];
+        arm.last = arm.device.tick(arm.counts);
+    }
+    assert_eq!(arm.last.sample.state, ContactState::Free);
+    arm.change(change, finer);
+    for _ in 0..20 {
+        arm.last = arm.device.tick(arm.counts);
+        assert_eq!(arm.last.sample.view, 0, "nothing presses");
+    }
+    // The clutch opens, and the change is made as always.
+    arm.device.send(Command::Clutch(ClutchMode::InPlace));
+    for _ in 0..150 {
+        arm.last = arm.device.tick(arm.counts);
+    }
+    assert_eq!(arm.last.sample.view, 1);
+    assert!(arm.last.sample.limits.contains(Limits::CLUTCH_OPEN));
+    arm.device.send(Command::Clutch(ClutchMode::Released));
+    for _ in 0..520 {
+        arm.last = arm.device.tick(arm.counts);
+    }
+    assert_eq!(arm.last.sample.limits, Limits::empty());
+}
+
+#[test]
+fn change_without_heights_under_the_hand_is_not_made() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, ground);
+    let change = arm.zoom(1, 0, 1);
+    arm.change(change, |_, _| f32::NAN);
+    stays(&mut arm, 0, 100);
+    let n = arm.last.sample.force_n;
+    assert!(n.length() > 1.0, "{n}");
+}
+
+#[test]
+fn buffers_return_after_changes() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, ground);
+    let spare = arm.device.spare.len();
+    for number in 1..=20 {
+        arm.change(arm.zoom(number, 0, 0), ground);
+        stays(&mut arm, number - 1, 1);
+        stays(&mut arm, number, 120);
+        arm.device.spare.extend(arm.device.haptics.take_spare());
+        arm.device.spare.extend(arm.device.haptics.take_spare());
+        assert_eq!(arm.device.spare.len(), spare - 2, "two for the fallback");
+    }
+    // A change that is replaced before its terrain has arrived, and one that is cancelled.
+    let change = arm.zoom(21, 1, -1);
+    arm.device.send(Command::SceneChange(change));
+    let wide = change.scene.fallback.expect("one").wide.key(1);
+    let tile = arm.device.spare.pop().expect("a spare one");
+    tile.fill(wide, 0, |_, _| 0.0).expect("in range");
+    arm.device.send(Command::Tile(tile));
+    arm.change(arm.zoom(22, 0, 0), ground);
+    stays(&mut arm, 20, 1);
+    stays(&mut arm, 22, 120);
+    arm.device.spare.extend(arm.device.haptics.take_spare());
+    arm.device.spare.extend(arm.device.haptics.take_spare());
+    assert_eq!(arm.device.spare.len(), spare - 2);
+    let mut again = scene(Source::Encoders);
+    again.epoch = 900;
+    arm.device.requester.reset(0, again.size);
+    let mut free = arm
+        .device
+        .haptics
+        .accept(Command::Scene(again))
+        .expect("valid");
+    while let Some(tile) = free {
+        arm.device.spare.push(tile);
+        free = arm.device.haptics.take_spare();
+    }
+    assert_eq!(arm.device.spare.len(), spare);
+}
+
+#[test]
+fn stiffness_changes_the_force_gradually_and_not_the_depth() {
+    for times in [2.0, 0.5] {
+        let mut tiles = buffers::<4>();
+        let mut arm = Pressing::new(&mut tiles, plane);
+        let before = arm.last.sample;
+        let mut change = arm.zoom(1, 0, 0);
+        change.scene.params.stiffness_n_per_mm *= times;
+        change.scene.fallback = None;
+        change.keeps_tiles = true;
+        arm.device.send(Command::SceneChange(change));
+        stays(&mut arm, 1, 400);
+        let halfway = arm.last.sample.limits;
+        assert_eq!(halfway, Limits::CLUTCH_MOVES, "half a second, as a clutch");
+        stays(&mut arm, 1, 200);
+        let after = arm.last.sample;
+        assert_eq!(after.limits, Limits::empty());
+        let near = |a: f32, b: f32| (a - b).abs() < 0.01 * b;
+        let [was_n, is_n] = [before, after].map(|sample| sample.force_n.length());
+        assert!(near(is_n, times * was_n), "{times}: {is_n} of {was_n} N");
+        let [was, is] = [before, after].map(|sample| sample.hip.to(&sample.proxy).length());
+        assert!(near(is, was), "{times}: {is} of {was} cells");
+    }
+}
+
+fn rough(x: i32, y: i32) -> f32 {
+    let (x, y) = (f64::from(x), f64::from(y));
+    (5.5 + 0.2 * (x * 0.8).sin() * (y * 0.9).cos()) as f32
+}
+
+#[test]
+fn late_tiles_after_a_change_keep_the_force() {
+    for (late_ticks, rise) in [(50, 3.0), (1_000, 3.0), (300, 0.3), (300, -0.3)] {
+        let mut tiles = buffers::<4>();
+        let mut arm = Pressing::new(&mut tiles, rough);
+        arm.tremor = 2;
+        arm.device.fallback_rise = rise;
+        for number in 1..=6 {
+            let before = arm.last.sample.force_n.length();
+            arm.device.is_slow = true;
+            arm.change(arm.zoom(number, 0, 0), |x, y| rough(x + 1, y + 2));
+            for tick in 0..late_ticks + 700 {
+                arm.device.is_slow = tick < late_ticks;
+                let change = arm.tick();
+                let force_n = arm.last.sample.force_n.length();
+                let at = std::format!("{rise}, {number}, {tick}: {force_n} of {before} N");
+                assert!(change <= GENTLE_N, "{at}: {change} N in a tick");
+                assert!((force_n / before - 1.0).abs() < 0.1, "{at}");
+            }
+            assert_eq!(arm.last.sample.view, number);
+            assert_eq!(arm.last.sample.limits, Limits::empty());
+        }
+    }
+}
+
+/// A slope of 60 degrees under a fallback that is too high.
+#[test]
+fn change_on_a_slope_keeps_the_force() {
+    fn slope(x: i32, _: i32) -> f32 {
+        5.5 + 1.732 * (x - 320) as f32
+    }
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, slope);
+    arm.device.fallback_rise = 3.0;
+    let before = arm.last.sample.force_n.length();
+    arm.change(arm.zoom(1, 0, 0), slope);
+    for tick in 0..500 {
+        assert!(arm.tick() <= GENTLE_N);
+        let force_n = arm.last.sample.force_n.length();
+        assert!(
+            (force_n / before - 1.0).abs() < 0.05,
+            "{tick}: {force_n} of {before} N"
+        );
+    }
+    assert_eq!(arm.last.sample.view, 1);
+}
+
+/// A still hand on flat ground presses, reduces its force after a change, and clutches.
+#[test]
+fn old_force_does_not_return() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    arm.change(arm.zoom(1, 0, 0), plane);
+    stays(&mut arm, 0, 1);
+    stays(&mut arm, 1, 60);
+    while arm.last.sample.force_n.length() > 0.3 {
+        arm.counts[1] += 2;
+        arm.tick();
+    }
+    arm.send(Command::Clutch(ClutchMode::InPlace));
+    for _ in 0..150 {
+        arm.tick();
+        assert!(
+            arm.last.sample.force_n.length() < 0.4,
+            "{:?}",
+            arm.last.sample
+        );
+    }
+}
+
+/// The force at its limit, under a fallback that is too high, would not follow the surface; and on
+/// a fallback the hand is not where the new placement was computed.
+#[test]
+fn change_at_the_limit_or_on_the_fallback_is_not_made() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut change = arm.zoom(1, 0, 0);
+    change.scene.params.max_force_n = 4.0;
+    arm.device.fallback_rise = 4.0;
+    arm.change(change, plane);
+    stays(&mut arm, 0, 100);
+
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    arm.change(arm.zoom(1, 0, 0), plane);
+    stays(&mut arm, 0, 1);
+    stays(&mut arm, 1, 60);
+    arm.device.is_slow = true;
+    for _ in 0..800 {
+        arm.counts[0] += 4;
+        arm.tick();
+    }
+    assert_eq!(arm.last.sample.limits, Limits::TERRAIN_COARSE);
+    arm.change(arm.zoom(2, 0, 0), plane);
+    stays(&mut arm, 1, 60);
+}
+
+/// The hand slides while the terrain of a pan is late, and the new ground has another slope.
+#[test]
+fn slide_before_a_pan_keeps_the_force() {
+    fn slope(x: i32, _: i32) -> f32 {
+        5.5 + (x - 320) as f32
+    }
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    let change = arm.zoom(1, 0, 0);
+    arm.device.send(Command::SceneChange(change));
+    let began = arm.last.sample.proxy;
+    for _ in 0..250 {
+        arm.counts[0] += 2;
+        arm.tick();
+    }
+    let slid = began.to(&arm.last.sample.proxy);
+    assert!(slid.x > 10.0 && arm.last.sample.view == 0, "{slid}");
+    let before = arm.last.sample.force_n.length();
+    arm.change(change, slope);
+    for tick in 0..300 {
+        arm.tick();
+        let force_n = arm.last.sample.force_n.length();
+        // The proxy slides down the slope, until the force is along its normal.
+        let ratio = force_n / before;
+        assert!(
+            (0.65..1.05).contains(&ratio),
+            "{tick}: {force_n} of {before} N"
+        );
+    }
+    assert_eq!(arm.last.sample.view, 1);
+}
+
+/// Friction is set to zero together with a zoom, and the tiles are late: the force of the friction
+/// ends all the same.
+#[test]
+fn late_tile_holds_no_force_sideways() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    dragged(&mut arm);
+    arm.device.is_slow = true;
+    let mut change = arm.zoom(2, 0, 1);
+    change.scene.params.friction = Friction::NONE;
+    arm.change(change, |x, y| 2.0 * plane(x, y));
+    stays(&mut arm, 1, 1);
+    stays(&mut arm, 2, 600);
+    let after = arm.last.sample.force_n;
+    assert!(after.truncate().length() < 0.01 && after.z > 2.0, "{after}");
+}
+
+/// Nothing of an old force remains in an arm that is not driven.
+#[test]
+fn disarming_ends_the_turn_of_the_force() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    arm.device.fallback_rise = 2.0;
+    arm.device.is_slow = true;
+    arm.change(arm.zoom(1, 0, 0), plane);
+    stays(&mut arm, 0, 1);
+    stays(&mut arm, 1, 100);
+    assert!(!arm.device.haptics.clutch.is_closed());
+    arm.send(Command::Disarm);
+    for _ in 0..300 {
+        arm.last = arm.device.tick(arm.counts);
+    }
+    assert!(arm.device.haptics.clutch.is_closed());
+}
+
+/// Drags the hand over rubber, by 9 mm, with placement number 1.
+fn dragged(arm: &mut Pressing<'_>) {
+    let mut rubber = arm.zoom(1, 0, 0);
+    rubber.scene.params.friction = Friction::coulomb(2.0);
+    rubber.scene.fallback = None;
+    rubber.keeps_tiles = true;
+    arm.device.send(Command::SceneChange(rubber));
+    stays(arm, 1, 700);
+    for _ in 0..150 {
+        arm.counts[0] += 2;
+        arm.tick();
+    }
+    stays(arm, 1, 100);
+}
+
+#[test]
+fn friction_keeps_its_force_in_a_change() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    dragged(&mut arm);
+    let before = arm.last.sample.force_n;
+    assert!(before.truncate().length() > before.z, "{before}");
+    arm.change(arm.zoom(2, 0, 1), |x, y| 2.0 * plane(x, y));
+    stays(&mut arm, 1, 1);
+    stays(&mut arm, 2, 900);
+    let after = arm.last.sample.force_n;
+    assert!(
+        (after - before).length() < 0.05 * before.length(),
+        "{before} then {after}"
+    );
+}
+
+#[test]
+fn change_that_would_drop_or_raise_the_force_is_not_made() {
+    for times in [0.05, 2.0] {
+        let mut tiles = buffers::<4>();
+        let mut arm = Pressing::new(&mut tiles, plane);
+        let mut change = arm.zoom(1, 0, 0);
+        change.scene.params.stiffness_n_per_mm *= times;
+        arm.change(change, plane);
+        stays(&mut arm, 0, 200);
+    }
+}
+
+#[test]
+fn change_in_the_air_keeps_the_height_over_the_ground() {
+    fn hill(x: i32, y: i32) -> f32 {
+        (5.5 + 0.3 * f64::from(x - 320) + 0.1 * f64::from(y - 320)) as f32
+    }
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, hill);
+    let change = arm.zoom(1, 0, 1);
+    arm.device.send(Command::SceneChange(change));
+    // The hand lifts before the terrain has arrived, and moves away.
+    for n in DEEP..=420 {
+        arm.last = arm.device.tick([n - DEEP, n, 0]);
+    }
+    arm.counts = [420 - DEEP, 420, 0];
+    let above_mm = |sample: &TickRecord, scale: f32| {
+        let at = sample.hip.relative_to([0; 3]);
+        let ground = 5.5 * scale + 0.3 * (at.x - 320.0 * scale) + 0.1 * (at.y - 320.0 * scale);
+        at.z - ground
+    };
+    let before = above_mm(&arm.last.sample, 1.0);
+    arm.device.send(Command::Clutch(ClutchMode::InPlace));
+    for _ in 0..150 {
+        arm.last = arm.device.tick(arm.counts);
+    }
+    assert_eq!(arm.last.sample.view, 1);
+    let after = above_mm(&arm.last.sample, 2.0);
+    assert!(
+        before > 5.0 && (after - before).abs() < 0.01,
+        "{after} of {before} mm"
+    );
+}
+
+/// A number from 0 to 1 by a simple generator, for tests.
+fn random(state: &mut u32) -> f32 {
+    *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+    (*state >> 8) as f32 / (1 << 24) as f32
+}
+
+/// Random changes, also to places without terrain and beyond its borders, during a random motion of
+/// a hand that presses, lifts and clutches.
+#[test]
+fn random_changes_make_no_step_and_lose_no_buffer() {
+    let heights = [ground, coarser, finer, |x: i32, y: i32| {
+        match (x ^ y) & 64 {
+            0 => 5.0,
+            _ => f32::NAN,
+        }
+    }];
+    let mut tiles = std::vec![Tile::VACANT; 16 + 5];
+    let mut arm = Pressing::new(&mut tiles, ground);
+    let (all, state) = (arm.device.spare.len(), &mut 7);
+    let mut counts = [0, 0];
+    for n in 0..cases(400, 40) {
+        let zoom = (random(state) * 7.0) as i32 - 3;
+        let size = (SIZE as f32 * (zoom as f32).exp2()) as i32;
+        let mut change = arm.zoom((n as u8).wrapping_add(1), (random(state) * 3.0) as u8, zoom);
+        let map = change.in_contact.as_mut().expect("a map");
+        if random(state) < 0.5 {
+            let at = |state: &mut u32| (random(state) * 1.2 * size as f32) as i32;
+            map.to = GridPoint::new([at(state), at(state), 5], Vec3::splat(0.3));
+        }
+        change.scene.params.stiffness_n_per_mm = 0.1 + random(state);
+        // As the link, which refuses another change before this one is made.
+        let is_made = arm.last.sample.view == n as u8;
+        change.keeps_tiles = is_made && random(state) < 0.2;
+        if change.keeps_tiles {
+            let before = arm.device.haptics.scene.expect("a scene");
+            (change.scene.level, change.scene.size) = (before.level, before.size);
+        }
+        let height = match change.keeps_tiles {
+            true => arm.device.height,
+            false => heights[(random(state) * 4.0) as usize],
+        };
+        arm.change(change, height);
+        let clutch = random(state);
+        for tick in 0..200 {
+            let to = 60.0 * (0.02 * (n * 200 + tick) as f32).sin() + DEEP as f32 * random(state);
+            arm.counts[1] += (to as i32 - arm.counts[1]).clamp(-2, 2);
+            arm.tick();
+            let sample = &arm.last.sample;
+            // The guard would hide a step of the force.
+            let is_limited = sample.limits.contains(Limits::SLEW_LIMITED);
+            assert!(!is_limited, "change {n}, tick {tick}: {sample:?}");
+            if sample.state == ContactState::Free && tick > 20 {
+                assert!(sample.force_n.length() < 1.0, "in the air: {sample:?}");
+            }
+            match tick {
+                100 if clutch < 0.3 => arm.send(Command::Clutch(ClutchMode::InPlace)),
+                150 => arm.send(Command::Clutch(ClutchMode::Released)),
+                _ => {}
+            }
+        }
+        counts[usize::from(arm.last.sample.view == change.number)] += 1;
+        arm.device
+            .spare
+            .extend(core::iter::from_fn(|| arm.device.haptics.take_spare()));
+        assert!(arm.device.spare.len() + 4 >= all, "change {n}");
+    }
+    assert!(counts[0] > 4 && counts[1] > 4, "both occur: {counts:?}");
+}
