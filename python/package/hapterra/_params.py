@@ -16,9 +16,9 @@ class Params:
 
     stiffness, N/mm; friction and static_friction; viscous_friction, s; damping, N·s/m; shading,
     "none" or "smooth"; texture, "none", ("grain", AMPLITUDE, WAVELENGTH) or ("grating", AMPLITUDE,
-    WAVELENGTH, DIRECTION), mm and degrees. Setting one returns when the force has ramped down and
-    the surface has changed; the force then ramps up over half a second. What the device refuses is
-    a DeviceError, and the surface stays as it was. Setting friction sets static_friction, too. A
+    WAVELENGTH, DIRECTION), mm and degrees. Setting one returns when the surface has changed; the
+    force then turns to that of the new surface over half a second. What the device refuses is a
+    DeviceError, and the surface stays as it was. Setting friction sets static_friction, too. A
     change that is not confirmed in time may still take effect: its value is unknown then, and reading
     it a DeviceError, until it is set again. Stiffness is set by its ratio to what it was, so an
     unknown one takes ``device.command("reset")``.
