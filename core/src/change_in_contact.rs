@@ -103,9 +103,11 @@ impl<const D: usize> Haptics<'_, D> {
         let after_n = force_n(&scene.params, after_mm);
         // A force at its limit does not follow a surface that blends.
         let is_cut_off = !change.keeps_tiles && after_n > scene.params.max_force_n;
+        // The part that presses on the new surface: not that along it, or away from it.
+        let pressed_n = scene.params.stiffness_n_per_mm * after_mm.dot(normal);
         // False for NaN.
-        let is_near = before_n <= SceneChange::MAX_FORCE_RATIO * after_n;
-        if is_cut_off || !is_near {
+        let stays_pressed = before_n <= SceneChange::MAX_FORCE_RATIO * pressed_n;
+        if is_cut_off || !stays_pressed {
             return None;
         }
         let onset = ContactOnset {

@@ -102,7 +102,7 @@ struct ForceTurn {
     rest_n: Vec3,
     /// Maximum ratio of the difference to the force.
     max_ratio: f32,
-    /// Decrease in a tick, N; `None` for a closing clutch's, until the first tick after the change.
+    /// Decrease in a tick, N, and at least that of a closing clutch; `None` for that one.
     step_n: Option<f32>,
 }
 
@@ -129,7 +129,9 @@ impl ForceTurn {
                 self.max_ratio = ratio;
             }
             if self.begins == 0 {
-                self.step_n.get_or_insert(rest * ramp_step);
+                // Also on a soft surface, no slower than a closing clutch.
+                let slowest_n = rest * ramp_step;
+                self.step_n = Some(larger(self.step_n.unwrap_or(slowest_n), slowest_n));
             }
         } else {
             // A late tile holds the part of the rest that stands for the height of the fallback,

@@ -379,6 +379,42 @@ fn change_on_a_slope_keeps_the_force() {
     assert_eq!(arm.last.sample.view, 1);
 }
 
+/// A pan from a slope of 60 degrees to the opposite one: the force before would pull the hand off
+/// the new surface.
+#[test]
+fn change_to_an_opposite_slope_is_not_made() {
+    fn slope(x: i32, _: i32) -> f32 {
+        5.5 + 1.732 * (x - 320) as f32
+    }
+    fn opposite(x: i32, _: i32) -> f32 {
+        5.5 - 1.732 * (x - 320) as f32
+    }
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, slope);
+    let mut change = arm.zoom(1, 0, 0);
+    let map = change.in_contact.as_mut().expect("a map");
+    let at = map.to.relative_to([0; 3]);
+    let height = 5.5 - 1.732 * (at.x - 320.0);
+    map.to = GridPoint::new([0; 3], at.with_z(height)).normalised();
+    arm.change(change, opposite);
+    stays(&mut arm, 0, 200);
+}
+
+/// On a surface of a fifth of the stiffness, the force turns as fast as a clutch closes.
+#[test]
+fn force_turns_on_a_soft_surface_in_half_a_second() {
+    let mut tiles = buffers::<4>();
+    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut change = arm.zoom(1, 0, 0);
+    change.scene.params.stiffness_n_per_mm *= 0.2;
+    arm.change(change, plane);
+    stays(&mut arm, 0, 1);
+    stays(&mut arm, 1, 300);
+    assert!(!arm.device.haptics.clutch.is_closed());
+    stays(&mut arm, 1, 260);
+    assert!(arm.device.haptics.clutch.is_closed());
+}
+
 /// A still hand on flat ground presses, reduces its force after a change, and clutches.
 #[test]
 fn old_force_does_not_return() {
