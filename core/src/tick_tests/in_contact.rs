@@ -400,13 +400,13 @@ fn change_to_an_opposite_slope_is_not_made() {
     stays(&mut arm, 0, 200);
 }
 
-/// On a surface of a fifth of the stiffness, the force turns as fast as a clutch closes.
+/// On a surface of a ninth of the stiffness, the force turns as fast as a clutch closes.
 #[test]
 fn force_turns_on_a_soft_surface_in_half_a_second() {
     let mut tiles = buffers::<4>();
     let mut arm = Pressing::new(&mut tiles, plane);
     let mut change = arm.zoom(1, 0, 0);
-    change.scene.params.stiffness_n_per_mm *= 0.2;
+    change.scene.params.stiffness_n_per_mm *= 0.11;
     arm.change(change, plane);
     stays(&mut arm, 0, 1);
     stays(&mut arm, 1, 300);
