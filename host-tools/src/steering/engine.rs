@@ -25,9 +25,12 @@ const MAX_SAMPLES_TO_OPEN: u32 = 5_000;
 /// coarse tiles usually arrive within 50 ms.
 const MAX_SAMPLES_IN_CONTACT: u32 = 300;
 
-/// Maximum wait for the ground of the new placement with the clutch closed, or for the tile under
-/// the hand in the current one.
-const MAX_GROUND_WAIT_IN_CONTACT: Duration = Duration::from_millis(300);
+/// Samples to wait for the ground of the new placement with the clutch closed, or for the tile under
+/// the hand in the current one; a sample is a millisecond.
+const MAX_SAMPLES_WITHOUT_GROUND: u32 = 300;
+
+/// Samples to wait for the force to turn to that of the current placement.
+const MAX_SAMPLES_TURNING: u32 = 2_000;
 
 /// Limits under which a placement does not change in contact.
 const NOT_IN_CONTACT: Limits = Limits::CLUTCH_INPUT
@@ -36,8 +39,7 @@ const NOT_IN_CONTACT: Limits = Limits::CLUTCH_INPUT
     .union(Limits::EDGE_FADING)
     .union(Limits::TERRAIN_MISSING);
 
-/// Maximum wait for the ground under the hand in the new placement with the clutch open, or for the
-/// force to turn.
+/// Maximum wait for the ground under the hand in the new placement, with the clutch open.
 const MAX_GROUND_WAIT: Duration = Duration::from_secs(2);
 
 /// A placement to set on the device.
@@ -94,8 +96,10 @@ pub struct Steering<'r> {
     requested_hold: ClutchMode,
     /// Start of the wait for the ground of the new placement.
     waiting_since: Option<Instant>,
-    /// Time since which the force turns to that of the current placement.
-    turning_since: Option<Instant>,
+    /// Samples of the present wait for the ground, with the clutch closed.
+    without_ground: u32,
+    /// Samples since the force began to turn to that of the current placement.
+    turning: u32,
     stage: Stage<'r>,
     requests: Vec<HostRequest>,
     update: Option<PlacementUpdate<'r>>,
@@ -117,7 +121,8 @@ impl<'r> Steering<'r> {
             must_measure: false,
             requested_hold: ClutchMode::Released,
             waiting_since: None,
-            turning_since: None,
+            without_ground: 0,
+            turning: 0,
             stage: Stage::Idle,
             requests: vec![],
             update: None,
@@ -273,7 +278,7 @@ impl<'r> Steering<'r> {
             return;
         }
         self.waiting_since = self.waiting_since.filter(|_| !is_idle);
-        self.turning_since = None;
+        (self.without_ground, self.turning) = (0, 0);
         match &mut self.stage {
             Stage::Idle if self.held || self.must_measure || !self.waiting.is_empty() => {
                 self.open_clutch();
@@ -304,12 +309,11 @@ impl<'r> Steering<'r> {
     /// Returns true if the force still turns to that of the current placement. The wait has an end:
     /// the force does not turn while the tile under the hand is late.
     fn waits_for_turn(&mut self, is_turning: bool) -> bool {
-        self.turning_since = match is_turning {
-            true => self.turning_since.or_else(|| Some(Instant::now())),
-            false => None,
+        self.turning = match is_turning {
+            true => self.turning + 1,
+            false => 0,
         };
-        self.turning_since
-            .is_some_and(|since| since.elapsed() < MAX_GROUND_WAIT)
+        is_turning && self.turning <= MAX_SAMPLES_TURNING
     }
 
     /// Continues with an open clutch: sends the next placement, or releases the clutch.
@@ -363,14 +367,15 @@ impl<'r> Steering<'r> {
         if !is_free || !is_current || !presses(sample) {
             return false;
         }
-        let since = *self.waiting_since.get_or_insert_with(Instant::now);
+        self.without_ground += 1;
+        let waits = self.without_ground <= MAX_SAMPLES_WITHOUT_GROUND;
         if sample.limits.contains(Limits::TERRAIN_COARSE) {
             // The proxy is on another surface than the ground that the change is computed from.
-            return since.elapsed() < MAX_GROUND_WAIT_IN_CONTACT;
+            return waits;
         }
         let mut update = match self.next_view(&self.waiting, sample, true) {
             Ok(Some(update)) => update,
-            Ok(None) => return since.elapsed() < MAX_GROUND_WAIT_IN_CONTACT,
+            Ok(None) => return waits,
             Err(_) => return false,
         };
         let Some(in_contact) = self.contact_map(&update, sample) else {
@@ -390,7 +395,7 @@ impl<'r> Steering<'r> {
         }
         view.in_contact = Some(in_contact);
         let changes = std::mem::take(&mut self.waiting);
-        self.waiting_since = None;
+        self.without_ground = 0;
         self.apply(update, Some(changes));
         true
     }

@@ -387,16 +387,20 @@ fn change_waits_for_the_tile_under_the_pressing_hand() {
     });
     with(|steering| {
         steering.steer(ZOOM);
-        press(steering, Limits::TERRAIN_COARSE, 1);
-        steering.waiting_since = Instant::now().checked_sub(MAX_GROUND_WAIT_IN_CONTACT);
+        press(
+            steering,
+            Limits::TERRAIN_COARSE,
+            MAX_SAMPLES_WITHOUT_GROUND as usize,
+        );
+        assert_eq!(requested_hold(steering), None);
         press(steering, Limits::TERRAIN_COARSE, 1);
         assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
     });
     // A force that does not turn, because the tile in the current placement is late.
     with(|steering| {
-        press(steering, Limits::CLUTCH_MOVES, 1);
         steering.steer(ZOOM);
-        steering.turning_since = Instant::now().checked_sub(MAX_GROUND_WAIT);
+        press(steering, Limits::CLUTCH_MOVES, MAX_SAMPLES_TURNING as usize);
+        assert_eq!(requested_hold(steering), None);
         press(steering, Limits::CLUTCH_MOVES, 1);
         assert_eq!(requested_hold(steering), Some(ClutchMode::InPlace));
     });
