@@ -1,16 +1,17 @@
 //! Changes of the placement during a session.
 //!
 //! ```text
-//! keys ─────┐
-//!           ├─ Steer ─ Steering ─ clutch held ─ placement changed ─ clutch let go
+//! keys ─────┐             ┌─ the hand presses: placement changed in contact
+//!           ├─ Steer ─ Steering ─ otherwise: clutch held ─ placement changed ─ clutch released
 //! commands ─┘             ▲                                        │
 //!                         └──────────── samples ───────────────────┘
 //! ```
 //!
 //! [`Steer`] is the user's request, from every source: [`command`] reads lines of text, [`keys`]
-//! reads keys. [`Steering`] executes both. It requests the device to hold its clutch, waits until
-//! there is no force, computes the next placement from the positions of HIP and proxy
-//! ([`crate::place::Bounds::apply`]), puts it in force, and releases the clutch.
+//! reads keys. [`Steering`] executes both. It computes the next placement from the positions of HIP
+//! and proxy ([`crate::place::Bounds::apply`]). Under a pressing hand it sends the placement at once,
+//! and the device changes it without losing the force. Otherwise it requests the device to hold its
+//! clutch, waits until there is no force, sends the placement, and releases the clutch.
 
 pub mod command;
 mod engine;
