@@ -1,5 +1,7 @@
 //! `hapterra-lab stability`: how stiff a surface may be before it is unstable.
 
+use std::collections::BTreeSet;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::ValueHint;
@@ -11,10 +13,11 @@ use hapterra::output::{Output, OutputError};
 use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
-use crate::stability::map::{Map, Plan};
+use crate::stability::map::Plan;
 use crate::stability::picture;
 
 const OTHER_FILE: &str = "name another file with --out";
+const OTHER_LIMITS: &str = "name another file with --limits";
 const OTHER_PICTURE: &str = "name another file with --picture";
 
 /// Arguments of `hapterra-lab stability`.
@@ -59,6 +62,10 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
 
+    /// File for the limits, as CSV
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub limits: Option<PathBuf>,
+
     /// File for a picture of it, as PNG
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub picture: Option<PathBuf>,
@@ -96,24 +103,22 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     plan.stiffness_n_per_mm.dedup();
     plan.arm_frictions.sort_by(f64::total_cmp);
     plan.arm_frictions.dedup();
-    if args.out.is_some() && args.out == args.picture {
-        return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
+    let files: Vec<_> = [&args.out, &args.limits, &args.picture]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    if files.iter().collect::<BTreeSet<_>>().len() < files.len() {
+        return Err(Failure::new("two outputs have the same file").hint(OTHER_FILE));
     }
-    partial_files::report(
-        { args.out.iter() }
-            .chain(&args.picture)
-            .map(PathBuf::as_path),
-    );
+    partial_files::report(files.into_iter());
     // An output that cannot be written is reported before the trials.
     if let Some(path) = &args.picture {
         drop(Output::create(path).or_hint(OTHER_PICTURE)?);
     }
-    let csv = args
-        .out
-        .as_deref()
-        .map(Output::create)
-        .transpose()
-        .or_hint(OTHER_FILE)?;
+    let create = |path: &Option<PathBuf>| path.as_deref().map(Output::create).transpose();
+    let csv = create(&args.out).or_hint(OTHER_FILE)?;
+    let limits = create(&args.limits).or_hint(OTHER_LIMITS)?;
     let progress = progress::bar(Some(0), "{bar:30} {pos}/{len} trials, {eta} left");
     interrupt::listen();
     let map = plan.map(&|of| {
@@ -126,7 +131,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let map = map.ok_or_else(|| Failure::new("interrupted: no limits are printed"))?;
     report::put(&map.summary())?;
     if let Some(csv) = csv {
-        write(csv, &map).or_hint(OTHER_FILE)?;
+        write(csv, |to| map.write_csv(to)).or_hint(OTHER_FILE)?;
+    }
+    if let Some(limits) = limits {
+        write(limits, |to| map.write_limits(to)).or_hint(OTHER_LIMITS)?;
     }
     if let Some(path) = &args.picture {
         let drawn = picture::draw(&map).and_then(|canvas| canvas.save(path));
@@ -157,8 +165,11 @@ fn dampings(args: &Args) -> Vec<Damping> {
     values.into_iter().flat_map(with_each).collect()
 }
 
-fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {
-    let written = map.write_csv(&mut csv);
+fn write(
+    mut csv: Output,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let written = write(&mut csv);
     written.map_err(|source| OutputError {
         path: csv.path().to_owned(),
         source,

@@ -10,6 +10,7 @@
 //! - [`entry`]: presses while the force ramps up;
 //! - [`bounds`]: stiffness that is passive in theory;
 //! - [`map`]: many trials, and their table;
+//! - `limits`: the limits that follow, as a table;
 //! - [`picture`]: the table as a picture.
 //!
 //! Friction of the surface is left out: it reduces limit cycles. The warnings of `hapterra run` use
@@ -19,6 +20,7 @@ pub mod bounds;
 mod contact_loop;
 pub mod entry;
 pub mod grasp;
+mod limits;
 pub mod map;
 pub mod picture;
 pub mod setting;

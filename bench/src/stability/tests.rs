@@ -313,6 +313,16 @@ fn map_lists_each_trial_once_and_limits_are_last_good_stiffness() {
         ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
     });
     assert_eq!(begins, expected.concat());
+    let mut limits = Vec::new();
+    map.write_limits(&mut limits).expect("written");
+    let limits = String::from_utf8(limits).expect("text");
+    let [header, row] = ["tick_hz", "1000,1,"].map(|start| {
+        let line = limits.lines().find(|line| line.starts_with(start));
+        line.expect("a line").split(',').collect::<Vec<_>>()
+    });
+    let cell = |name| row[header.iter().position(|it| *it == name).expect("a column")];
+    let found = ["off_light_held", "off_firm_held", "on_firm_held"].map(cell);
+    assert_eq!(found, ["0.5", "6", ""], "{limits}");
     let limit = |grasp| {
         map.max_stiffness(
             (TickRate::DEFAULT, UNDAMPED, 1.0),
