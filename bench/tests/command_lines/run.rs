@@ -59,7 +59,12 @@ fn files(folder: &Path) {
     std::fs::write(folder.join("mine.toml"), "[default]\nfriction = 0.3\n").expect("written");
     std::fs::write(folder.join("scan.raw"), vec![0; 2 * 512 * 400]).expect("written");
     let rendered = [
-        "hapterra", "replay", "file.asc", "path.csv", "-o", "forces.csv",
+        "hapterra",
+        "replay",
+        "file.asc",
+        "path.csv",
+        "-o",
+        "forces.csv",
     ];
     run(folder, &rendered.map(str::to_owned)).expect("a recording");
 }
