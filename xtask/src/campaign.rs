@@ -8,8 +8,8 @@ use anyhow::{Context, Result};
 
 use crate::run::{cargo, output, root, run, timed};
 
-/// Runs the campaign with the user's arguments. Without a segment it writes the report `campaign.md`,
-/// or `link-campaign.md` with `--link`, into the folder of the month in `log/`.
+/// Runs the campaign with the user's arguments. Without a segment it writes the report
+/// `campaign.md`, or `link-campaign.md` with `--link`, into the folder of the month in `log/`.
 pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     let words: Vec<_> = words.collect();
     let page = match words.iter().any(|word| word == "--link") {
