@@ -52,6 +52,19 @@ pub fn repository() -> &'static Path {
         .expect("the tests package is inside the repository")
 }
 
+/// Returns the newest file of this name in `log/`, which has a folder for each month.
+///
+/// # Panics
+/// If there is none.
+pub fn newest_log(name: &str) -> PathBuf {
+    let months = repository().join("log").read_dir().expect("the log");
+    let files = months.map(|month| month.expect("readable").path().join(name));
+    files
+        .filter(|file| file.is_file())
+        .max()
+        .expect("a file of this name in the log")
+}
+
 /// Returns a file or folder of the shared data beside the repository (`../shared`), or `None` after
 /// a visible message if it is absent: the caller then returns.
 pub fn shared(path: &str) -> Option<PathBuf> {

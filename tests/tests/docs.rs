@@ -68,16 +68,18 @@ fn anchor(heading: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
+/// Returns the links of this prose to files and headings, without those to the web.
+fn local_links(prose: &str) -> impl Iterator<Item = &str> {
+    let links = prose.split("](").skip(1);
+    let links = links.filter_map(|rest| rest.split(')').next());
+    links.filter(|link| !link.contains("://") && !link.starts_with("mailto:"))
+}
+
 /// Returns a message for each link of a page to a file or a heading that does not exist.
 fn dead_links(page: &Path, text: &str) -> Vec<String> {
     let text = prose(text);
-    let links = text
-        .split("](")
-        .skip(1)
-        .filter_map(|rest| rest.split(')').next());
-    let is_local = |link: &&str| !link.contains("://") && !link.starts_with("mailto:");
     let mut dead = Vec::new();
-    for link in links.filter(is_local) {
+    for link in local_links(&text) {
         let (file, expected) = link.split_once('#').unwrap_or((link, ""));
         let folder = page.parent().expect("a folder");
         let target = if file.is_empty() {
@@ -100,14 +102,62 @@ fn dead_links(page: &Path, text: &str) -> Vec<String> {
     dead
 }
 
+/// Returns a message for each link of a page that leaves the folder of its book: mdBook copies only
+/// this folder.
+fn leaving_links(book: &Path, page: &Path, text: &str) -> Vec<String> {
+    let book = book.canonicalize().expect("a folder");
+    let text = prose(text);
+    let folder = page.parent().expect("a folder");
+    let leaves = |link: &&str| {
+        let file = link.split('#').next().unwrap_or_default();
+        let target = folder.join(file).canonicalize();
+        target.is_ok_and(|target| !target.starts_with(&book))
+    };
+    local_links(&text)
+        .filter(leaves)
+        .map(|link| format!("{}: {link}: outside the book", page.display()))
+        .collect()
+}
+
 #[test]
 fn links_of_the_pages_lead_somewhere() {
-    let pages = pages_and(&["README.md"]);
+    let pages = pages_and(&[
+        "README.md",
+        "core/README.md",
+        "page/README.md",
+        "python/README.md",
+        "touch/README.md",
+    ]);
     let dead: Vec<_> = pages
         .iter()
+        .chain(&pages_in(&repository().join("log")))
         .flat_map(|(page, text)| dead_links(page, text))
         .collect();
     assert!(dead.is_empty(), "{}", dead.join("\n"));
+}
+
+#[test]
+fn links_of_the_book_stay_in_it() {
+    let book = repository().join("docs");
+    let leaving: Vec<_> = pages_in(&book)
+        .iter()
+        .flat_map(|(page, text)| leaving_links(&book, page, text))
+        .collect();
+    assert!(leaving.is_empty(), "{}", leaving.join("\n"));
+}
+
+#[test]
+fn links_that_leave_a_book_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let book = folder.path().join("book");
+    std::fs::create_dir(&book).expect("a folder");
+    std::fs::write(folder.path().join("code.md"), "").expect("written");
+    let page = book.join("page.md");
+    let text = "[a](page.md) [b](#b) [c](../code.md#c) [d](../book/page.md) [e](https://e)\n";
+    std::fs::write(&page, text).expect("written");
+    let leaving = leaving_links(&book, &page, text);
+    assert_eq!(leaving.len(), 1, "{leaving:?}");
+    assert!(leaving[0].contains("../code.md#c: outside the book"));
 }
 
 #[test]

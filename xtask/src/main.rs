@@ -70,10 +70,10 @@ cargo xtask COMMAND
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
                          the closed loop with faults injected at random, 10,000 s of arm time
-                         by default; writes log/campaign.md
+                         by default; writes log/MONTH/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
-                         device time by default; writes log/link-campaign.md
+                         device time by default; writes log/MONTH/link-campaign.md
   fuzz TARGET MINUTES    run libFuzzer on `terrain` (files of every format), `text` (recordings,
                          calibrations, tables, commands), `tick`, `tile` or `wire`; installs
                          cargo-fuzz and a nightly compiler where they are missing

@@ -59,7 +59,12 @@ fn files(folder: &Path) {
     std::fs::write(folder.join("mine.toml"), "[default]\nfriction = 0.3\n").expect("written");
     std::fs::write(folder.join("scan.raw"), vec![0; 2 * 512 * 400]).expect("written");
     let rendered = [
-        "hapterra", "replay", "file.asc", "path.csv", "-o", "felt.csv",
+        "hapterra",
+        "replay",
+        "file.asc",
+        "path.csv",
+        "-o",
+        "forces.csv",
     ];
     run(folder, &rendered.map(str::to_owned)).expect("a recording");
 }
@@ -96,7 +101,7 @@ fn runnable(line: &Line) -> Option<Vec<String>> {
         *word = match word.as_str() {
             "FILE" | "TERRAIN" | "mountain.tif" | "dem.tif" => "file.asc".into(),
             "PATH.csv" => "path.csv".into(),
-            "FELT.csv" => "felt.csv".into(),
+            "FORCES.csv" => "forces.csv".into(),
             "tiles/**/*.tif" => "tiles/**/*.asc".into(),
             word => word.to_owned(),
         };

@@ -1,4 +1,4 @@
-//! The report of a campaign: `log/campaign.md`.
+//! The report of a campaign: `campaign.md` of a month in `log/`.
 
 use super::LinkStats;
 use super::fault_kind::{Kind, STALL_TICKS};
@@ -40,7 +40,7 @@ effects has up to 16 materials, of up to 1.7 times that stiffness. The amplifier
 - While force is on, it does not pull the HIP away from the proxy, except where both shading and texture turn it.
   It is at most what the stiffest material, the highest texture and all of the damping make of the depth.
 - With the controller on and no fault yet, a contact on one stiffness gives the tip at most 0.05 mJ, 2 k A times its
-  depth, and with shading 2 E ([effects](../docs/explanation/effects.md)). Energy of a stiffening spring is not counted.
+  depth, and with shading 2 E ([effects](../../docs/explanation/effects.md)). Energy of a stiffening spring is not counted.
 - With the controller on and no fault yet, the tip turns back by more than 0.3 mm at most {MAX_TURNS} times in 0.25 s.
   Tremor does so 6 times.
 - The device stores at most 2 mJ of energy to dissipate.

@@ -2,7 +2,6 @@
 //! and numbers. Each is named, and no joint moves faster than stated.
 
 use std::cell::RefCell;
-use std::path::Path;
 
 use hapterra::bringup::{
     Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, SequenceEnd,
@@ -14,6 +13,7 @@ use hapterra_core::guard::{Blockers, Jog, MAX_JOG_SPEED_RAD_S};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_firmware::native::StoppedClock;
+use hapterra_tests::newest_log;
 use hapterra_tests::timeouts::HANG;
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
@@ -72,10 +72,9 @@ fn run_once(
     run_sequence(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
-/// Returns the transcript for a user without mistakes, as in the documentation.
+/// Returns the transcript for a user without mistakes.
 fn transcript() -> String {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bring-up-transcript.txt");
-    std::fs::read_to_string(file).expect("a transcript")
+    std::fs::read_to_string(newest_log("bring-up-transcript.txt")).expect("a transcript")
 }
 
 /// Returns the step and the finding at which a walk with this bench and record ends.

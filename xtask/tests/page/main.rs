@@ -55,7 +55,7 @@ fn check_saved(site: &mut Site, folder: &str, min_touching: usize) -> Option<Str
     let line = site.text("command");
     let words: Vec<_> = line.split(' ').skip(1).collect();
     program("HAPTERRA", &saved, &words, &[])?;
-    let (rendered, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
+    let (rendered, replayed) = (forces(&files[0]), forces(&saved.join("forces.csv")));
     let touching = rendered.iter().filter(|force| **force != [0; 3]).count();
     println!("{} rows, {touching} with a force: {line}", rendered.len());
     assert!(touching > min_touching, "{touching} of {}", rendered.len());
