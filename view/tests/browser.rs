@@ -423,7 +423,7 @@ fn killed(who: Killed, says: &str) {
             "{reported}"
         );
         assert!(
-            reported.contains("were not shown: the viewer was slow, or gone"),
+            reported.contains("were not shown: the viewer was slow, or had ended"),
             "{reported}"
         );
     }

@@ -260,7 +260,7 @@ l2_mm = {l2:?}
 min_rad = {min}
 # Largest joint angles: {max_deg}.
 max_rad = {max}
-# What the parallel linkage allows between joints 2 and 3: {spread_deg}.
+# Limits of the parallel linkage between joints 2 and 3: {spread_deg}.
 q2_minus_q3_max_rad = {q23:?}
 q3_minus_q2_max_rad = {q32:?}
 
@@ -275,7 +275,7 @@ sign = {motor_sign}
 torque_constant_nm_per_a = {torque}
 # Largest current of a cool motor.
 peak_a = {peak}
-# Current that a motor bears for ever.
+# Current that a motor can carry continuously.
 continuous_a = {continuous}
 
 [thermal]
@@ -289,7 +289,7 @@ housing_s = {housing_s:?}
 [limits]
 # Largest force at the tip.
 max_force_n = {force:?}
-# Speed of the tip from which force is reduced; at twice this speed nothing is left.
+# Speed of the tip from which force is reduced; at twice this speed it is zero.
 max_speed_mm_s = {speed:?}
 ",
         program = env!("CARGO_PKG_VERSION"),

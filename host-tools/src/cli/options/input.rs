@@ -67,7 +67,7 @@ impl FromStr for InputSetting {
     fn from_str(text: &str) -> Result<Self, String> {
         let unknown = || {
             let keys: Vec<_> = KEYS.iter().map(|(key, it)| format!("{key}={it}")).collect();
-            format!("known are {}", keys.join(", "))
+            format!("supported are {}", keys.join(", "))
         };
         let (key, value) = text.split_once('=').ok_or_else(unknown)?;
         let key = match key {
@@ -154,7 +154,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
         }
     }
     if options.encoding.is_some() && options.png_channel.is_some() {
-        return Err("both encoding= and channel= say how colours are heights")
+        return Err("encoding= and channel= both define how colours are heights")
             .or_hint("leave one of them out");
     }
     Ok(options)

@@ -197,10 +197,6 @@ mod tests {
         assert_eq!(keyboard.pressed(), expected);
         keyboard.is_typed = false;
         typed.send("2".into()).expect("read");
-        assert_eq!(
-            keyboard.pressed(),
-            [],
-            "a pipe's lines are for somebody else"
-        );
+        assert_eq!(keyboard.pressed(), [], "a pipe's lines have another reader");
     }
 }
