@@ -63,7 +63,7 @@ pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
 
 fn header(area: &Area<'_>) -> Result<(), PictureError> {
     let (title, text) = (style::bold(32, &INK), style::text(20, &SOFT_INK));
-    let name = "How stiff a surface may be: energy that it gives to a tapping hand";
+    let name = "Stiffness limits of a surface: energy added to a tapping hand";
     axes::write(area, name, (0, px(34)), title, HPos::Left)?;
     let lines = format!(
         "taps at {} m/s; dot: a press with 1 N is still, ring: limit cycle, cross: unstable; grey: 2b/T (Colgate & Schenkel) and 2fc/Δ (Abbott & Okamura) of the arm alone",
@@ -101,7 +101,7 @@ fn chart(
     );
     let titles = Titles {
         x: &x,
-        y: "given in a tap (mJ)",
+        y: "added in a tap (mJ)",
     };
     let mut chart = axes::chart(
         area,
