@@ -408,7 +408,7 @@ fn killed(who: Killed, says: &str) {
         .as_str()
         .is_some_and(|text| text.contains(says))
     {
-        assert!(Instant::now() < until, "the page does not say so");
+        assert!(Instant::now() < until, "the page does not show it");
         std::thread::sleep(Duration::from_millis(200));
     }
     drop(browser);
@@ -438,7 +438,7 @@ fn killed(who: Killed, says: &str) {
 
 #[test]
 fn page_reports_hapterra_killed_and_viewer_exits() {
-    killed(Killed::Hapterra, "hapterra is gone");
+    killed(Killed::Hapterra, "hapterra ended unexpectedly");
 }
 
 #[test]
