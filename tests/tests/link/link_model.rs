@@ -399,7 +399,7 @@ fn random_faults_end_in_confirmed_disarm_or_a_report() {
             Err(wrong) => panic!("{wrong:?} in {plan:?}"),
         }
     }
-    eprintln!("{agreed} agreed, {reported} told");
+    eprintln!("{agreed} agreed, {reported} reported");
     assert!(agreed > 200, "hardly ever agreed: {agreed}");
 }
 

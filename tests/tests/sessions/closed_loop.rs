@@ -84,7 +84,7 @@ fn tip_rests_at_the_depth_of_two_newtons() {
     for stiffness in [0.5f32, 0.25, 1.0] {
         let (samples, lift, scale) = press(stiffness);
         let expected_mm = 2.0 / f64::from(stiffness);
-        // Friction holds 0.01 N·m on an arm of 0.21 m against the springs of wall and hand
+        // Friction carries 0.01 N·m on an arm of 0.21 m against the springs of wall and hand
         // together; two encoders are half a count off.
         let hand_n_per_mm = 1e-3 / HandModel::default().compliance_m_per_n();
         let bound_mm = 0.01 / 0.2095 / (f64::from(stiffness) + hand_n_per_mm) + 0.03;

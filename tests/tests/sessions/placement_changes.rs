@@ -153,7 +153,7 @@ impl Touching<'_> {
         if let Some(update) = self.steering.take_update() {
             self.session
                 .put_view(update.view, update.terrain)
-                .expect("said");
+                .expect("reported");
         }
         self.messages.extend(self.steering.lines());
     }
