@@ -149,7 +149,7 @@ impl Write for Output {
                 self.free_bytes = room;
                 self.writer.write(bytes)
             }
-            None => Err(io::Error::other("it has as many bytes as it may have")),
+            None => Err(io::Error::other("it has reached its maximum size")),
         };
         written.inspect_err(|_| self.keep_partial())
     }

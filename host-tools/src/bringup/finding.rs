@@ -207,7 +207,7 @@ impl Finding {
                 "hold the tip more loosely and as still as you can, and try again; if it stays so, a current may flow without a command: measure the command at the amplifier again (--again-from outputs)"
             }
             Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --measure zero,gravity",
-            Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not to be relied on",
+            Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not sufficient",
             Self::NoFloor => "report it with the log; do not continue with terrain",
         }
         .into()

@@ -56,7 +56,7 @@ enum Fault {
     Format(u32),
     #[error("no model is called {0}")]
     Model(String),
-    #[error("the calibration does not make sense: {0}")]
+    #[error("the calibration is not valid: {0}")]
     Invalid(CalibrationError),
     #[error("a binary record of an earlier version, but {0}")]
     Binary(RecordError),
@@ -369,10 +369,10 @@ mod tests {
         for (from, to, expected) in [
             ("calibration = 1", "calibration = 2", "format 2"),
             ("premium-1.5", "premium-9", "no model is called premium-9"),
-            ("l1_mm = 209.55", "l1_mm = 1.0", "does not make sense"),
+            ("l1_mm = 209.55", "l1_mm = 1.0", "is not valid"),
             ("l1_mm", "l1_inch", "l1_inch"),
             ("l1_mm = 209.55\n", "", "l1_mm"),
-            ("l1_mm = 209.55", "l1_mm = nan", "does not make sense"),
+            ("l1_mm = 209.55", "l1_mm = nan", "is not valid"),
             ("[links]", "[links", "no calibration file"),
         ] {
             let message = message(&good.replacen(from, to, 1));

@@ -267,7 +267,7 @@ impl Hint for UpdateError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::Nothing { .. } => {
-                "plug the board's own USB in; `hapterra list` shows what is seen; a board without working firmware shows its loader when BOOT0 is high at a reset"
+                "plug the board's own USB in; `hapterra list` shows the devices that are found; a board without working firmware shows its loader when BOOT0 is high at a reset"
             }
             Self::Several(_) => {
                 "name one: --device usb:SERIAL; if two have the same serial number, unplug one"
@@ -312,7 +312,7 @@ mod of_the_probe {
             let hint = match self {
                 Self::UnknownChip(..) | Self::Emulated(_) => super::REPORT,
                 Self::NoProbe => {
-                    "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows what is seen"
+                    "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows the devices that are found"
                 }
                 Self::NoSuchProbe { .. } | Self::ManyProbes(_) | Self::Selector(_) => {
                     "name one as --probe VID:PID:SERIAL"

@@ -160,7 +160,7 @@ mod tests {
         press.send(Pressed::Key(zoom)).expect("read");
         keyboard.forget_typed();
         assert!(!keyboard.was_pressed());
-        assert_eq!(keyboard.keys(), [zoom], "which answers nothing");
+        assert_eq!(keyboard.keys(), [zoom], "which answers no question");
         press.send(Pressed::Enter).expect("read");
         assert!(keyboard.was_pressed() && !keyboard.was_pressed());
         typed.send("y".into()).expect("read");
