@@ -97,7 +97,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     plan.arm_frictions.sort_by(f64::total_cmp);
     plan.arm_frictions.dedup();
     if args.out.is_some() && args.out == args.picture {
-        return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
+        return Err(
+            Failure::new("the table and the picture must be different files").hint(OTHER_FILE),
+        );
     }
     partial_files::report(
         { args.out.iter() }
