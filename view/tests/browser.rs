@@ -155,7 +155,7 @@ fn page_shows_live_scene_and_plots_without_foreign_requests() {
     while browser.number(&page, "performance.timeOrigin") == began {
         feed_samples();
         std::thread::sleep(Duration::from_millis(200));
-        assert!(Instant::now() < until, "it goes on with what it had");
+        assert!(Instant::now() < until, "the page does not reload");
     }
     shown(&mut browser, &page, &mut feed_samples, is_whole);
     browser.reload(&page);
@@ -303,7 +303,10 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
                 return picture;
             }
             before = picture;
-            assert!(Instant::now() < until, "it does not come to that");
+            assert!(
+                Instant::now() < until,
+                "the picture does not become correct"
+            );
         }
     };
     let first = settled(&|_, _| true);

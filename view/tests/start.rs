@@ -107,5 +107,5 @@ fn demo_page_receives_the_coarse_layer_first() {
         "terrain read after {read:?}; then the page's address after {elapsed:?}, and the coarse whole {after:?} after its request"
     );
     assert!(demo.end());
-    std::fs::remove_dir_all(folder).expect("it goes");
+    std::fs::remove_dir_all(folder).expect("it is removed");
 }
