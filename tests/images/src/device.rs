@@ -229,7 +229,7 @@ impl<'t> Device<'t> {
             };
             self.session
                 .poll(Duration::from_millis(1), &mut on_event)
-                .expect("goes on");
+                .expect("it continues");
         }
     }
 

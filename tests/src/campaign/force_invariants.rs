@@ -238,7 +238,7 @@ impl ForceChecks {
         match contact.gained_mj <= GAINED_MJ + shading + textures {
             true => Ok(()),
             false => Err(format!(
-                "the ground added energy in {contact:?}: {sample:?}"
+                "the contact added too much energy: {contact:?}: {sample:?}"
             )),
         }
     }

@@ -151,7 +151,7 @@ fn telemetry_that_is_lost_is_counted() {
                     last = sample.tick;
                 }
             })
-            .expect("goes on");
+            .expect("it continues");
     }
     session.close(&mut |_| {}).expect("confirmed");
     let stats = session.stats();
@@ -179,7 +179,7 @@ fn returning_host_resumes_the_session_of_its_device() {
                         last = *sample;
                     }
                 })
-                .expect("goes on");
+                .expect("it continues");
         }
         last
     };

@@ -194,7 +194,7 @@ fn device_packets_never_need_a_zero_length_packet() {
         if let Answer::Data(packet) = board.take_in(LINK) {
             assert!((1..PACKET).contains(&packet.len()), "{}", packet.len());
         }
-        board.wait().expect("goes on");
+        board.wait().expect("it continues");
     }
 }
 
@@ -264,7 +264,7 @@ fn ticks(session: &mut Session<'_>, polls: usize) -> Vec<u32> {
         };
         session
             .poll(Duration::from_millis(1), &mut take)
-            .expect("goes on");
+            .expect("it continues");
     }
     ticks
 }
@@ -321,7 +321,7 @@ fn unplugged_board_keeps_ticking_and_resumes_its_session() {
         let mut unplugged = board.borrow_mut();
         for ms in 0..2000 {
             for _ in 0..hapterra_tests::usb::MOMENTS_A_MS {
-                unplugged.wait().expect("goes on");
+                unplugged.wait().expect("it continues");
             }
             let alive = unplugged.is_alive();
             assert!(

@@ -40,7 +40,7 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
         };
         session
             .poll(Duration::ZERO, &mut on_event)
-            .expect("goes on");
+            .expect("it continues");
     }
     assert_eq!(session.stats().lost + session.stats().dropped, 0);
     assert!(samples.iter().all(|sample| sample.fault.is_none()));

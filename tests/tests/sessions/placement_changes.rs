@@ -146,7 +146,7 @@ impl Touching<'_> {
         };
         self.session
             .poll(Duration::ZERO, &mut on_event)
-            .expect("goes on");
+            .expect("it continues");
         for request in self.steering.requests() {
             self.session.enqueue(request);
         }

@@ -82,7 +82,7 @@ fn drain(machine: &mut Machine) {
             Answer::Data(_) => 0,
             _ => silent + 1,
         };
-        machine.wait().expect("goes on");
+        machine.wait().expect("it continues");
     }
 }
 

@@ -1,6 +1,6 @@
-//! A worker dies while the arm is armed: its guardian disarms the board, restores the terminal and
-//! names the recording. The run is in a terminal, armed by Enter and a dead-man press; the device
-//! reports the state of the amplifiers.
+//! A worker ends abruptly while the arm is armed: its guardian disarms the board, restores the
+//! terminal and names the recording. The run is in a terminal, armed by Enter and a dead-man press;
+//! the device reports the state of the amplifiers.
 
 use std::fs::File;
 use std::io::{Read, Write};
