@@ -184,7 +184,7 @@ fn command_line_is_that_of_the_programs() {
     let listed = help.lines().filter(is_listed).count();
     let mut page = format!(
         "# Command line\n\n{MARK}\n\n\
-         This page lists what `hapterra` and `hapterra-lab` take, as `-h` prints it. `--help` of a command explains\n\
+         This page lists the options of `hapterra` and `hapterra-lab`, as `-h` prints them. `--help` of a command explains\n\
          more. All commands take `-v` (up to `-vvv`) for more messages, `-h` and `--help`.\n\n\
          | size | |\n| --- | ---: |\n\
          | options of `hapterra` | {all} |\n\
@@ -221,7 +221,7 @@ fn command_line_is_that_of_the_programs() {
 fn faults_are_those_of_the_code() {
     let mut page = format!(
         "# Faults, blockers, limits and the LED\n\n{MARK}\n\n\
-         This page lists what a board reports, with the names of `hapterra status` and of recordings.\n\n\
+         This page lists the faults, blockers and limits of a board, with the names of `hapterra status` and of recordings.\n\n\
          ## Faults\n\n\
          A fault switches the amplifiers off. It stays until it is cleared: `hapterra status --clear`.\n\n"
     );
@@ -236,7 +236,8 @@ fn faults_are_those_of_the_code() {
     for (name, meaning) in Blockers::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }
-    page += "\n## Limits\n\nA limit says why the force differs from the surface's force.\n\n";
+    page +=
+        "\n## Limits\n\nA limit is a reason why the force differs from the surface's force.\n\n";
     for (name, meaning) in Limits::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }

@@ -648,7 +648,7 @@ def test_closed_stderr_and_half_a_line_keep_the_session(played, monkeypatch):
 @pytest.mark.parametrize("quiet", [False, True])
 def test_quiet_session_forwards_warnings(capsys, quiet):
     lines = ["view 1: friction 0.6", "mark           `a` at tick 7", "  12.0 s free",
-             "error: another host has taken the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
+             "error: another host controls the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
     session = fake_session(code=line_of("\n".join(lines)), is_quiet=quiet)
     session.end() if quiet else session._stderr.join()
     result = capsys.readouterr().err.splitlines()

@@ -98,7 +98,7 @@ def test_bad_words_have_the_text_of_the_command(tmp_path):
     for error, text, path, words in [
         (FileNotFoundError, "none.tif.*\nhint: check the path", tmp_path / "none.tif", {}),
         (ValueError, "there is no band 7.*\nhint: name one that is there", file, {"band": 7}),
-        (ValueError, "invalid value 'bnd=1' .*known are raw=", file, {"bnd": 1}),
+        (ValueError, "invalid value 'bnd=1' .*supported are raw=", file, {"bnd": 1}),
         (ValueError, "m, ft, us-ft", file, {"height_unit": "furlong"}),
         (ValueError, "cannot be used with", file, {"cell_mm": 1, "scale": 2}),
         (ValueError, 'give ground a millimetre, as "100 m/mm"', file, {"scale": "100"}),
@@ -248,7 +248,7 @@ def test_places_are_longitude_and_latitude_too(tmp_path):
     unplaced = np.save(tmp_path / "hills.npy", hills()) or Terrain.open(tmp_path / "hills.npy")
     assert unplaced.mm_at(3, 4) == (3, 4)
     for call in (lambda: unplaced.mm_at(7, 45, "lonlat"), lambda: unplaced.ground_at(7, 45, "lonlat")):
-        with pytest.raises(ValueError, match="hint: give the place in the file's own coordinates"):
+        with pytest.raises(ValueError, match="hint: state the place in the file's own coordinates"):
             call()
     with pytest.raises(ValueError, match="crs is 'EPSG:4326': give \"lonlat\""):
         terrain.mm_at(7, 45, "EPSG:4326")

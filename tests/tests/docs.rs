@@ -279,7 +279,7 @@ fn cells_of_a_table_are_compared() {
     assert_eq!(reported(&table(right)), (3, vec![]));
     let (count, wrong) = reported(&table("| sliding | 1,217 | 0.05 |\n| free | 1144 | 2e-6 |"));
     assert_eq!((count, wrong.len()), (4, 1), "{wrong:?}");
-    assert!(wrong[0].contains("the page says 1,217"), "{wrong:?}");
+    assert!(wrong[0].contains("1,217 on the page"), "{wrong:?}");
     let (_, wrong) = reported(&table("| sliding | 1,218 | 0.05 |"));
     assert!(wrong[0].contains("2 rows are named, 1 shown"), "{wrong:?}");
     let (_, wrong) = reported(&table("| sliding | 1,218 |\n| free | 1144 | |"));
@@ -307,10 +307,10 @@ fn figure_that_differs_from_the_table_is_detected() {
         (
             "sliding, median",
             "1217",
-            "the page says 1217, the table 1218",
+            "1217 on the page, 1218 in the table",
         ),
-        ("sliding, share", "0.04", "the page says 0.04"),
-        ("chain, free, share", "3e-6", "the page says 3e-6"),
+        ("sliding, share", "0.04", "0.04 on the page"),
+        ("chain, free, share", "3e-6", "3e-6 on the page"),
         ("sliding, median", "many", "no figure behind the comment"),
         ("gliding, median", "1218", "no such row"),
         ("sliding, mean", "1218", "no such column"),

@@ -110,7 +110,7 @@ fn stalled_and_disconnecting_pages_do_not_block_the_viewer() {
     assert!(viewer.send(&Message::End));
     let mut rest = Vec::new();
     last.read_to_end(&mut rest).expect("the stream ends");
-    assert!(rest.ends_with(&[0; 4]), "its end is said");
+    assert!(rest.ends_with(&[0; 4]), "its end is reported");
     assert!(rest.len() > 100_000, "{}", rest.len());
 }
 

@@ -60,7 +60,7 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
 fn emulation_or_report() -> Option<Emulation> {
     emulation()
         .inspect_err(|why| {
-            report(format!("the emulated board cannot be had: {why:#}"));
+            report(format!("the emulated board is not available: {why:#}"));
             report("so the same application runs compiled for this machine (--device native)");
         })
         .ok()

@@ -1,4 +1,4 @@
-//! `hapterra-lab stability`: how stiff a surface may be before it is unstable.
+//! `hapterra-lab stability`: the stiffness above which a surface is unstable.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -80,7 +80,7 @@ pub enum Passivity {
     On,
 }
 
-/// Tries all of it and says the limits.
+/// Runs all trials and prints the limits.
 ///
 /// # Errors
 /// When it is interrupted, or a file cannot be written.

@@ -1,4 +1,4 @@
-//! `hapterra-lab streaming`: what terrain larger than memory costs.
+//! `hapterra-lab streaming`: the cost of terrain larger than memory.
 
 use hapterra::cli::Failure;
 use hapterra::cli::options::quantity::TIME;
@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let room = "free some room where temporary files are, or name another place in TMPDIR";
     measured.map_err(|why| Failure::new(why).hint(room))?;
     if rows.is_empty() {
-        let hint = "the warnings above say why; name other files, or leave --files-only out";
+        let hint = "see the warnings above; name other files, or leave --files-only out";
         return Err(Failure::new("nothing was measured").hint(hint));
     }
     files::write(args.files.out.as_ref(), |file| {

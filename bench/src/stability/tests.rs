@@ -138,7 +138,7 @@ const LAG_S: f64 = 0.238e-3 / 2.18;
 #[test]
 fn tap_touches_the_surface_at_its_nominal_speed() {
     for grasp in Grasp::ALL {
-        // The arm's friction at rest holds a light grasp back by a varying amount.
+        // The arm's friction at rest reduces the motion of a light grasp by a varying amount.
         let tolerance = match grasp {
             Grasp::Light => 0.05,
             Grasp::Normal | Grasp::Firm => 0.015,
@@ -164,8 +164,8 @@ fn tap_touches_the_surface_at_its_nominal_speed() {
 #[test]
 fn tap_energy_is_proportional_to_age_of_the_force() {
     // The force of a tick is half a tick old on average, plus the delay to the amplifiers and the
-    // lag of the current loops. In proportion to this age it is too small on the way in and too
-    // large on the way out.
+    // lag of the current loops. In proportion to this age it is too small during the entry and too
+    // large during the exit.
     let gained = |hz: u32, delay_s| {
         let age_s = 0.5 / f64::from(hz) + delay_s + LAG_S;
         let gained_mj =

@@ -50,7 +50,7 @@ fn stability_prints_limits_and_writes_trials_and_picture() {
 fn invalid_options_and_unwritable_outputs_are_refused() {
     let twice = stability(&["-o", "both", "--picture", "both"]);
     assert!(
-        output_text(&twice).contains("cannot be one file"),
+        output_text(&twice).contains("must be different files"),
         "{}",
         output_text(&twice)
     );

@@ -245,7 +245,7 @@ impl FileReport {
             "lon/lat",
             match (&self.bounds_lonlat, self.projection_known) {
                 (None, false) => {
-                    "unknown: the projection of its reference system is not known here".into()
+                    "unknown: the projection of its reference system is not supported".into()
                 }
                 (bounds, _) => edges(bounds),
             },

@@ -141,7 +141,8 @@ impl<W: Write> Write for Line<W> {
                 line += &omitted_text(omitted);
             }
             line.push('\n');
-            // A write error is ignored: its report would go to standard error too, and would panic.
+            // A write error is ignored: its report on standard error would fail as well, and would
+            // panic.
             let _ = out.write_all(line.as_bytes());
         }
         Ok(bytes.len())

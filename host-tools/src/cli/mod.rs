@@ -4,8 +4,8 @@
 //! - [`options`]: options that several subcommands share;
 //! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: error messages and their remedies;
-//! - `guardian`: the process that disarms the arm if the serving process dies; `worker_pipe`: what
-//!   the serving process reports to it;
+//! - `guardian`: the process that disarms the arm if the serving process ends abruptly;
+//!   `worker_pipe`: the serving process's reports to it;
 //! - [`report`]: the result that a command prints;
 //! - `settings`: settings files and recordings in place of options;
 //! - `old_subcommands` and `old_options`: names of earlier versions, and their replacements;

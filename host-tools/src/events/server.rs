@@ -301,7 +301,7 @@ mod tests {
             let lines = rest.and_then(|rest| rest.strip_suffix('}')?.parse().ok());
             notice_of_thread.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
         });
-        wait_until("what it missed is said", || {
+        wait_until("its lost lines are reported", || {
             sender.offer("{}\n".to_owned());
             notice.load(Ordering::Acquire) > 0
         });
@@ -328,7 +328,7 @@ mod tests {
         let server = Server::listen(0).expect("listens");
         drop(connected(&server));
         let sender = server.sender();
-        wait_until("nobody reads", || {
+        wait_until("there is no reader", || {
             sender.offer("{}\n".to_owned());
             sender.readers_joined().is_none()
         });

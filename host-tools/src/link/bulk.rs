@@ -102,14 +102,14 @@ pub trait Pipes {
     /// packet ends it.
     ///
     /// # Errors
-    /// When the device is gone or does not accept the transfer.
+    /// When the device is disconnected or does not accept the transfer.
     fn send(&mut self, transfer: &[u8]) -> io::Result<()>;
 
     /// Receives the available bytes; waits at most `wait` for the first. A time-out may be zero
     /// bytes or an error that reports it.
     ///
     /// # Errors
-    /// When the device is gone.
+    /// When the device is disconnected.
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
 }
 

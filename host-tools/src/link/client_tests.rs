@@ -185,7 +185,7 @@ fn repeated_device_messages_open_one_session() {
 }
 
 #[test]
-fn hello_is_repeated_despite_noise_until_it_times_out() {
+fn opening_is_repeated_despite_noise_until_it_times_out() {
     on_bench(None, |bench| {
         let foreign = SessionNumber::new(7);
         let mut noise = 0;

@@ -42,7 +42,7 @@ struct Exchange<'t> {
     reader: Box<FrameReader<MAX_FRAME>>,
     /// True if the session has put a scene in force, or sent a request that drives the arm.
     has_driven: bool,
-    /// True if its end was sent, or the other end is gone.
+    /// True if its end was sent, or the other end is closed.
     is_over: bool,
 }
 
@@ -424,7 +424,7 @@ mod tests {
         drop(control);
         let host = ControlSession::open(Box::new(&mut device), TIMEOUT).expect("it answers");
         let before = host.device().last.end;
-        assert_eq!(before, SessionEnd::None, "nobody was its host before");
+        assert_eq!(before, SessionEnd::None, "it had no host before");
     }
 
     #[test]
@@ -509,7 +509,8 @@ mod tests {
             assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
             assert!(reading.status().is_ok());
         }
-        // A session that has requested arming, even in vain, closes, so the device records it.
+        // A session that has requested arming, even if it was refused, closes, so the device
+        // records it.
         let before = open(&mut device).device().last.session;
         let mut arming = open(&mut device);
         let blocked = arming.request(&Request::Arm).expect("it answers");

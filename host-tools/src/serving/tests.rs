@@ -241,7 +241,7 @@ fn panic_closes_the_session_or_warns_the_user() {
         let bench = Bench::new();
         let mut last = || {
             bench.deaf.set(deaf);
-            panic!("nobody reads what is written");
+            panic!("written bytes are not read");
         };
         let panicked = catch_unwind(AssertUnwindSafe(|| served(&bench, 5, &mut last)));
         assert!(panicked.is_err());
@@ -304,7 +304,7 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
     });
     assert!(end.result.is_ok() && end.disarmed.is_ok(), "{end:?}");
     let received = handler.received.join("\n");
-    assert!(received.contains("goes on where it was"), "{received}");
+    assert!(received.contains("continues where it was"), "{received}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
 }
 

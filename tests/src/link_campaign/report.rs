@@ -30,7 +30,7 @@ contact, or while the host closes. In one segment of four the device's clock sto
 
 - The checks of the closed-loop campaign on currents, force and its change in a tick hold.
 - The proxy in contact lies on the bilinear surface of the terrain that the host serves, by an oracle in f64.
-- The amplifiers go on only if a live host has asked for it.
+- The amplifiers are switched on only if a live host has requested it.
 - On a working line, the user sees whether the amplifiers are on.
 
 ## Checks at the end of each step of a run

@@ -100,7 +100,7 @@ fn emulated_image_cannot_access_host_files() {
     let (emulator, mut lines) = Emulator::start(&qemu, &path).expect("started");
     let mut reported = [0];
     let n = lines.link.receive(&mut reported, HANG).expect("stands");
-    assert_eq!(n, 1, "nothing came");
+    assert_eq!(n, 1, "no reply");
     assert!(!target.exists(), "the image made a file");
     assert_eq!(reported, *b"F", "the call was let through");
     drop(emulator);

@@ -1,6 +1,6 @@
 //! Every frame of a session lost, repeated, delayed and overtaken, either end killed at every
-//! moment: the end is confirmed or reported, no force acts that no host wanted, every sample is
-//! counted once.
+//! moment: the end is confirmed or reported, no force acts without a request of a host, every
+//! sample is counted once.
 
 use hapterra_tests::link_model::{
     Direction, End, FrameFault, Interruption, Plan, Report, check, frames,
@@ -399,7 +399,7 @@ fn random_faults_end_in_confirmed_disarm_or_a_report() {
             Err(wrong) => panic!("{wrong:?} in {plan:?}"),
         }
     }
-    eprintln!("{agreed} agreed, {reported} told");
+    eprintln!("{agreed} agreed, {reported} reported");
     assert!(agreed > 200, "hardly ever agreed: {agreed}");
 }
 

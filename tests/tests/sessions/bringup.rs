@@ -143,7 +143,7 @@ fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     record.motor_sign.y = -1.0;
     run_bringup(&mut user, record, &mut log).expect("to the end");
     let text = PRINTED.take();
-    assert!(text.starts_with("the calibration is another one"), "{text}");
+    assert!(text.starts_with("the calibration has changed"), "{text}");
     assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
 

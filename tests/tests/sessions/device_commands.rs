@@ -74,7 +74,7 @@ fn run_prints_the_rendering_of_an_emulated_board() {
 }
 
 #[test]
-fn status_of_the_device_in_memory_names_what_blocks_it() {
+fn status_of_the_native_device_lists_its_blockers() {
     let output = hapterra(&["status", "--device", "native"]);
     let text = output_text(&output);
     assert!(output.status.success(), "{text}");

@@ -146,14 +146,14 @@ impl Touching<'_> {
         };
         self.session
             .poll(Duration::ZERO, &mut on_event)
-            .expect("goes on");
+            .expect("it continues");
         for request in self.steering.requests() {
             self.session.enqueue(request);
         }
         if let Some(update) = self.steering.take_update() {
             self.session
                 .put_view(update.view, update.terrain)
-                .expect("said");
+                .expect("reported");
         }
         self.messages.extend(self.steering.lines());
     }

@@ -1,4 +1,4 @@
-//! Any file that is opened gives an error or a terrain: never a panic, never a hang, never more
+//! Any file results in an error or a terrain: never a panic, never a hang, never more
 //! memory than the file justifies.
 
 use std::path::{Path, PathBuf};
@@ -193,8 +193,8 @@ fn damage(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     damaged
 }
 
-/// Thousands of damaged copies of every kind of file, in this process: each gives an error or a
-/// terrain, and the error is rarely "the decoder failed".
+/// Thousands of damaged copies of every kind of file, in this process: each results in an error or
+/// a terrain, and the error is rarely "the decoder failed".
 #[test]
 fn damaged_copies_of_good_files_never_panic() {
     let Some(folder) = shared("dem") else {

@@ -1,6 +1,6 @@
 //! NetCDF files, through a libgdal of the machine: many ways to store a variable, written by
 //! NetCDF's and HDF5's libraries (`data/netcdf.py` has the command), and many attributes, written
-//! here. Reading on demand gives the same bits as reading the whole file.
+//! here. Reading on demand returns the same bits as reading the whole file.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -128,10 +128,10 @@ impl Hint for BringupError {
     fn hint(&self) -> String {
         match self {
             Self::Found { finding, .. } => {
-                format!("{}; then go on with hapterra bringup", finding.remedy())
+                format!("{}; then continue with hapterra bringup", finding.remedy())
             }
             Self::Halt(Halt::Link(error)) => error.hint(),
-            Self::Halt(_) => "go on with hapterra bringup when you are ready".into(),
+            Self::Halt(_) => "continue with hapterra bringup when you are ready".into(),
             Self::Log(error) => error.hint(),
         }
     }

@@ -298,7 +298,7 @@ pub(in crate::cli) fn mark_text(mark: &Mark) -> String {
     match mark.tick {
         Some(tick) => format!("mark           `{text}` at tick {tick}, {t_s:.3} s"),
         None => format!(
-            "mark           `{text}` at about {t_s:.3} s: the device has not said which tick, and may not have raised its pin"
+            "mark           `{text}` at about {t_s:.3} s: the device has not reported its tick, and may not have raised its pin"
         ),
     }
 }

@@ -163,7 +163,7 @@ impl ArmingPrompts {
             Event::Unanswered(request) => {
                 self.zeroing &= **request != HostRequest::Status;
                 self.push_line(format!(
-                    "the device does not answer: {request:?} was given up"
+                    "the device does not answer: {request:?} was abandoned"
                 ));
             }
             Event::Status(status) if self.zeroing => {
@@ -209,9 +209,9 @@ impl ArmingPrompts {
             }
             Mode::Confirming if report.blockers.contains(Blockers::FORCE_TOO_LARGE) => {
                 let what = Blockers::FORCE_TOO_LARGE.meaning();
-                self.push_line(format!("held back: {what}"));
+                self.push_line(format!("blocked: {what}"));
             }
-            Mode::Ramping => self.push_line("amplifiers on; force comes in"),
+            Mode::Ramping => self.push_line("amplifiers on; force ramps up"),
             Mode::Armed => self.push_line("armed"),
             Mode::Disarmed if before.is_some_and(|before| before.mode.is_driving()) => {
                 self.push_line("disarmed; amplifiers off");
@@ -244,7 +244,7 @@ impl ArmingPrompts {
         let press = &self.press_enter;
         let text = match (zeroes, fault.is_some()) {
             (true, _) => format!("put the arm into its zero pose, hold it there and {press}"),
-            (false, true) => format!("when that is seen to, {press} to clear it and arm"),
+            (false, true) => format!("when that is done, {press} to clear it and arm"),
             (false, false) => format!("when you are ready, {press} to arm"),
         };
         self.lines.push(Line {

@@ -160,7 +160,7 @@ mod tests {
         press.send(Pressed::Key(zoom)).expect("read");
         keyboard.forget_typed();
         assert!(!keyboard.was_pressed());
-        assert_eq!(keyboard.keys(), [zoom], "which answers nothing");
+        assert_eq!(keyboard.keys(), [zoom], "which answers no question");
         press.send(Pressed::Enter).expect("read");
         assert!(keyboard.was_pressed() && !keyboard.was_pressed());
         typed.send("y".into()).expect("read");
@@ -197,10 +197,6 @@ mod tests {
         assert_eq!(keyboard.pressed(), expected);
         keyboard.is_typed = false;
         typed.send("2".into()).expect("read");
-        assert_eq!(
-            keyboard.pressed(),
-            [],
-            "a pipe's lines are for somebody else"
-        );
+        assert_eq!(keyboard.pressed(), [], "a pipe's lines have another reader");
     }
 }

@@ -182,7 +182,7 @@ fn full_memory_is_erased_at_the_next_start() {
         device.run_ms(300);
         let full = device.machine.borrow().bytes(areas[0], PLACE);
         assert_eq!(full, record, "{board}: nothing was erased");
-        // The start takes as long as the erase, and succeeds.
+        // The start lasts as long as the erase, and succeeds.
         let mut restarted = Device::open(device.reset(), terrain, scene);
         let status = restarted.query_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");

@@ -82,7 +82,7 @@ fn drain(machine: &mut Machine) {
             Answer::Data(_) => 0,
             _ => silent + 1,
         };
-        machine.wait().expect("goes on");
+        machine.wait().expect("it continues");
     }
 }
 
@@ -186,7 +186,7 @@ fn clearing_halts_costs_a_frame_but_no_session() {
         let before = device.latest.expect("samples").tick;
         device.run_ms(50);
         let sample = device.latest.expect("samples");
-        assert!(sample.tick > before, "{board}: nothing comes any more");
+        assert!(sample.tick > before, "{board}: no packet arrives");
         assert_eq!(sample.fault, None, "{board}");
         assert!(device.machine.borrow().is_enabled(), "{board}: still on");
         assert_eq!(device.query_status().health.report.fault, None, "{board}");

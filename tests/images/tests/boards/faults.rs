@@ -214,7 +214,7 @@ fn hung_tick_is_reset_by_the_watchdog() {
         let mut machine = device.machine.borrow_mut();
         let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
         let (off, ms) = ms_until_reset(&mut machine, tick).expect("reset");
-        assert_eq!(off, None, "nobody is left to switch them off");
+        assert_eq!(off, None, "no code is left to switch them off");
         assert_in_time(&mut machine, ms);
     });
 }

@@ -148,7 +148,7 @@ fn unready_amplifier_trips_in_three_ticks() {
                 device.machine.borrow_mut().set_input(pin, true);
                 assert_eq!(ends(device, 9), (3, Some(Fault::AmplifierNotReady)));
                 device.run_ms(150);
-                let report = device.guard.expect("told");
+                let report = device.guard.expect("reported");
                 assert!(report.blockers.contains(Blockers::AMPLIFIER_NOT_READY));
             },
         );

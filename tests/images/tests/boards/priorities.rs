@@ -78,7 +78,7 @@ fn haptic_interrupt_outranks_maskable_ones_as_documented() {
         let rows = rows(&machine);
         assert!(
             PAGE.contains(&rows),
-            "docs/explanation/priorities.md has to say:\n{rows}"
+            "docs/explanation/priorities.md must contain:\n{rows}"
         );
     }
 }

@@ -384,7 +384,10 @@ fn panic_before_the_watchdog_runs_resets_the_chip() {
         let panic = machine.image.panicking();
         machine.call_instead(scan, panic);
         assert_eq!(machine.run_ms(100), Stop::Software, "{board}");
-        assert!(!machine.is_attached(), "{board}: it came before the link");
+        assert!(
+            !machine.is_attached(),
+            "{board}: it was set before the link"
+        );
         machine.restore(scan);
         machine.reset(Reset::Software);
         let mut device = Device::open(machine, terrain, scene);

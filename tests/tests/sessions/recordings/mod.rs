@@ -78,7 +78,7 @@ fn recording_of_another_terrain_is_refused() {
     for part in [
         "other.tif",
         "hills.tif",
-        "its heights are others",
+        "its heights differ",
         "--ignore-settings",
     ] {
         assert!(reported.contains(part), "{part} in {reported}");

@@ -217,7 +217,7 @@ fn commands_are_read_from_stdin_and_missing_file_is_an_error() {
     stdin
         .write_all(b"zoom 2\nnonsense\nzoom 1e9\n")
         .expect("written");
-    // It continues when the writer is gone.
+    // It continues after the writer has ended.
     drop(stdin);
     let run = child.wait_with_output().expect("it ends");
     assert!(run.status.success(), "{}", output_text(&run));

@@ -1,6 +1,6 @@
-//! A worker dies while the arm is armed: its guardian disarms the board, restores the terminal and
-//! names the recording. The run is in a terminal, armed by Enter and a dead-man press; the device
-//! reports the state of the amplifiers.
+//! A worker ends abruptly while the arm is armed: its guardian disarms the board, restores the
+//! terminal and names the recording. The run is in a terminal, armed by Enter and a dead-man press;
+//! the device reports the state of the amplifiers.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -60,7 +60,7 @@ impl Armed {
         window.write_all(b"\r").expect("typed");
         shows(&mut window, "waits for your hand");
         pressed.store(true, Ordering::Relaxed);
-        shows(&mut window, "amplifiers on; force comes in");
+        shows(&mut window, "amplifiers on; force ramps up");
         assert!(amplifiers.load(Ordering::Relaxed), "armed");
         assert_ne!(modes(&end), before, "keys come one by one");
         Self {
@@ -201,7 +201,7 @@ fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     std::fs::write(&crash, "now").expect("written");
     let mut keys = armed.window.try_clone().expect("a terminal");
     let zooming = std::thread::spawn(move || {
-        // Until the terminal is gone, or the placement is as large as possible.
+        // Until the terminal is closed, or the placement is as large as possible.
         for _ in 0..8 {
             let _ = keys.write_all(b"-");
             pass(Duration::from_secs(1));

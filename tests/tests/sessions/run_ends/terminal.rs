@@ -190,7 +190,7 @@ fn second_ctrl_c_and_signal_restore_the_terminal() {
     }
 }
 
-/// Enter and keys go only to the device whose number was pressed: neither user arms the other's
+/// Enter and keys reach only the device whose number was pressed: neither user arms the other's
 /// arm.
 #[test]
 fn enter_and_keys_affect_only_the_selected_device() {
@@ -217,7 +217,7 @@ fn enter_and_keys_affect_only_the_selected_device() {
     window.write_all(b"\r").expect("typed");
     shown = shows(&mut window, "Enter alone is for no device");
     window.write_all(b"2").expect("typed");
-    shown += &shows(&mut window, &format!("keys go to {}", name(2).trim_end()));
+    shown += &shows(&mut window, &format!("keys are for {}", name(2).trim_end()));
     window.write_all(b"\r").expect("typed");
     shown += &shows(&mut window, &format!("{}zeroed at", name(2)));
     window.write_all(b"+").expect("typed");

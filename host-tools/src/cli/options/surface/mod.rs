@@ -221,10 +221,10 @@ impl SurfaceOptions {
         };
         let place = format!("{}, line {line}:", file.display());
         Err(Failure::new(format!(
-            "a stiffness of {stiffness} N/mm: a table may ask for {max} N/mm at most"
+            "a stiffness of {stiffness} N/mm: a table may state {max} N/mm at most"
         ))
         .hint(format!(
-            "if you trust the table, say --stiffness {stiffness}"
+            "if you trust the table, add --stiffness {stiffness}"
         ))
         .about(Some(&place)))
     }

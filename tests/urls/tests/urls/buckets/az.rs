@@ -8,7 +8,7 @@ use crate::buckets::opened::{
 };
 
 /// The user's hint.
-const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
+const HINT: &str = "hint: set the server's variables: AZURE_STORAGE_ACCOUNT_NAME";
 /// Times before which a signature is valid.
 const ONE_DAY: &str = "2100-01-31T00:00:00Z";
 const EXPIRED: &str = "2020-01-31T00:00:00Z";

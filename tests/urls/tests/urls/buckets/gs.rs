@@ -8,7 +8,7 @@ use crate::buckets::opened::{
 };
 
 /// The user's hint.
-const HINT: &str = "hint: set what the server wants: GOOGLE_APPLICATION_CREDENTIALS";
+const HINT: &str = "hint: set the server's variables: GOOGLE_APPLICATION_CREDENTIALS";
 
 /// A server of buckets, and a file for a key.
 struct Google {
