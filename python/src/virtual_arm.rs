@@ -24,7 +24,7 @@ pub(crate) struct VirtualArm {
 
 #[pymethods]
 impl VirtualArm {
-    /// Takes the terrain point at the tip in the arm's home pose, mm, and the hand's `HandModel`:
+    /// Creates an arm from the terrain point at its tip in the home pose, mm, and a `HandModel`:
     /// kg, N/m and N·s/m towards the target, the same for the grip.
     #[new]
     fn new(home_mm: [f64; 3], hand: [f64; 5]) -> PyResult<Self> {

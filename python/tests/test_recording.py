@@ -123,5 +123,5 @@ def test_other_files_are_errors(tmp_path):
     path = read_recording(tmp_path / "path.csv")
     assert path.settings == {} and len(path.steps) == 2
     assert list(path.steps["trial"]) == [1, 2.5] and list(path.steps["note"]) == ["a", "b"]
-    with pytest.raises(ValueError, match="does not say on which terrain"):
+    with pytest.raises(ValueError, match="does not name its terrain"):
         path.replay()
