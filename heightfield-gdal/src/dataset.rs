@@ -62,7 +62,7 @@ impl Dataset {
             (functions.GDALOpenEx)(path.as_ptr(), OPEN_FLAGS, drivers, list.as_ptr(), siblings)
         };
         if handle.is_null() {
-            return Err(loaded.refused("no driver knows the file"));
+            return Err(loaded.refused("no driver supports the file"));
         }
         let dataset = Self {
             loaded,
@@ -183,8 +183,8 @@ impl Dataset {
         let no_such = || Error::NoSuchPart {
             requested: format!("band {number}"),
             available: match self.bands() {
-                0 => "the file holds no band of its own".to_owned(),
-                1 => "the file has band 1 alone".to_owned(),
+                0 => "the file contains no band of its own".to_owned(),
+                1 => "the file has only band 1".to_owned(),
                 bands => format!("the file has bands 1 to {bands}"),
             },
         };

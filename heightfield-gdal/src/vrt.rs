@@ -47,7 +47,7 @@ pub(crate) fn too_large() -> String {
 }
 
 pub(crate) fn too_deep(depth: u32) -> String {
-    format!("VRTs lie in each other {depth} deep")
+    format!("VRTs are nested {depth} deep")
 }
 
 /// Returns all texts in a VRT that may be file names, also in embedded VRTs. Most others are
@@ -126,7 +126,7 @@ impl Text {
         };
         if self.is_file_name() && !is_neighbour || self.parts().any(is_here) {
             return Err(format!(
-                "it names {} on this computer: name what lies beside it (relativeToVRT=\"1\")",
+                "it names {} on this computer: name files relative to it (relativeToVRT=\"1\")",
                 self.shown()
             ));
         }

@@ -125,7 +125,7 @@ fn by_extension(extension: &str) -> Result<&'static Format, RasterError> {
     match claims.next() {
         Some((format, Claim::Certain)) => Ok(format),
         Some((format, Claim::Expected)) => Err(RasterError::Unfamiliar(format!(
-            "its name says {}, its content does not begin like one",
+            "its name is that of {}, its content does not begin like one",
             format.name
         ))),
         _ if raw::EXTENSIONS.contains(&extension) => Err(RasterError::RawSizeMissing),

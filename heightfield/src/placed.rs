@@ -109,7 +109,7 @@ impl Decoded {
     /// Adds a remark on positions of single samples, which do not define a grid.
     pub(super) fn remark_control_points(&mut self, count: usize) {
         self.remarks.push(format!(
-            "it states the places of {count} samples (tie points, ground control points) and no cell size: they are not used; this brings it onto a map: gdalwarp -r bilinear IN OUT.tif"
+            "it states the places of {count} samples (tie points, ground control points) and no cell size: they are not used; georeference it: gdalwarp -r bilinear IN OUT.tif"
         ));
     }
 

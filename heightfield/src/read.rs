@@ -45,7 +45,7 @@ impl StoredType {
             |count| with_samples!(&mut samples, values => values.try_reserve_exact(count).ok()),
         );
         reserved.ok_or_else(|| {
-            RasterError::AbsurdSize(format!("{count} samples are more than memory can hold"))
+            RasterError::AbsurdSize(format!("{count} samples do not fit into memory"))
         })?;
         Ok(samples)
     }

@@ -114,7 +114,7 @@ impl Shared {
     fn warn_of_search(&self, count: usize, parts: usize) {
         let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
         tracing::warn!(
-            "{count} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
+            "{count} places of {name} have no height: all {parts} are searched until one has, which may take a while"
         );
     }
 

@@ -28,7 +28,7 @@ pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, RasterError> {
     };
     match files.len() {
         0 => Err(RasterError::NoTiles(match path.is_dir() {
-            true => "no file in this folder is known to hold a terrain and its place".into(),
+            true => "no file in this folder is a terrain file that states its place".into(),
             false => "no terrain file matches this pattern".into(),
         })),
         count if count > MAX_FILES => Err(RasterError::NoTiles(format!(

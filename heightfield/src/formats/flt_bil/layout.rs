@@ -59,12 +59,12 @@ impl Layout {
         let (columns, rows) = (self.columns, self.rows);
         let end = self.end(band).ok_or_else(|| {
             RasterError::AbsurdSize(format!(
-                "{header} beside it promises {columns} × {rows} samples"
+                "{header} beside it states {columns} × {rows} samples"
             ))
         })?;
         if end > bytes {
             return Err(RasterError::Truncated(format!(
-                "{header} beside it promises {columns} × {rows} samples of {} bytes, which end at \
+                "{header} beside it states {columns} × {rows} samples of {} bytes, which end at \
                  byte {end}; the file has {bytes}",
                 self.stored.bytes()
             )));
@@ -82,7 +82,7 @@ impl Layout {
         let padding = self.row_bytes.unwrap_or(0).saturating_add(self.band_gap);
         if bytes > end && bytes - end >= row.max(padding) {
             return Err(RasterError::damaged(format!(
-                "{header} beside it promises {columns} × {rows} samples of {} bytes in {bands} \
+                "{header} beside it states {columns} × {rows} samples of {} bytes in {bands} \
                  bands, which end at byte {end}; the file has {bytes}: correct the type or size \
                  in the header",
                 self.stored.bytes()

@@ -72,7 +72,7 @@ pub(super) fn check_places(
         let is_at_its_place = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
         if !(is_found && is_at_its_place) {
             let why = format!(
-                "the item {} does not lie where its file {file} does",
+                "the place of the item {} differs from that of its file {file}",
                 item.id
             );
             return Err(to_build(&why, &items)?);

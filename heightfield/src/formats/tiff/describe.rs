@@ -83,6 +83,6 @@ fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
         Some(_) => "rows and columns exchanged",
     };
     decoded.remarks.push(format!(
-        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is taken to be the northern one unless the file's place says otherwise"
+        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is read as the northern one unless the file's place states another"
     ));
 }

@@ -274,6 +274,6 @@ fn unpacking_by_rows_refuses_lerc() {
     let mut layout = Layout::read(&full, NumberKind::Heights(None)).expect("a layout");
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1);
-    let error = unpack::into_file(&mut layout, &disk).expect_err("it comes as a whole");
+    let error = unpack::into_file(&mut layout, &disk).expect_err("it is unpacked as a whole");
     assert!(error.to_string().contains("lerc"), "{error}");
 }
