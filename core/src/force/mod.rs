@@ -1,10 +1,11 @@
 //! From proxy and haptic interface point to newtons.
 //!
-//! - `material`, `active_material`: surface parameters, and the change from one material to another;
+//! - `material`, `active_material`: surface parameters, and the change from one material to
+//!   another;
 //! - `shading`, `slopes`: the force turned evenly from patch to patch;
 //! - `texture`, `texturer`, `relief`: grain and gratings: parameters, force and heights;
-//! - `damping`, `passivity`, `rate_limit_softening`, `depth`: damping along the force, the passivity
-//!   observer and controller, and the softening of a fast contact;
+//! - `damping`, `passivity`, `rate_limit_softening`, `depth`: damping along the force, the
+//!   passivity observer and controller, and the softening of a fast contact;
 //! - `effects`, `effect_context`: all of these for a scene.
 
 mod active_material;
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn non_finite_displacement_gives_no_force() {
+    fn non_finite_displacement_renders_no_force() {
         for bad in [f32::NAN, f32::INFINITY] {
             assert_eq!(
                 SurfaceParams::PREMIUM

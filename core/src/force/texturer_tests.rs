@@ -249,7 +249,7 @@ fn tangential_stiffness_stays_below_the_surface_stiffness() {
 }
 
 /// Up to the depth limit of the component along the surface, the force is that of a spring on the
-/// surface with its relief: a closed path gives no energy.
+/// surface with its relief: a closed path releases no energy.
 #[test]
 fn closed_loop_over_a_texture_releases_no_energy() {
     for texture in [GRATING, GRAIN] {

@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fast_paths_of_carry_give_the_same_bits() {
+    fn fast_paths_of_carry_return_the_same_bits() {
         let mut offsets = std::vec![
             0.0,
             1.0,

@@ -140,7 +140,7 @@ impl Calibration {
                 true => (CalibrationField::Ratio, Some(axis), self.ratio[axis]),
                 false => (CalibrationField::CountsPerTurn, None, self.counts_per_turn),
             };
-            // The number that would give the preset's counts, with the other number unchanged.
+            // The number that would result in the preset's counts, with the other number unchanged.
             let unit = value / (of_encoder * of_ratio);
             check(field, at, value, self.bound(min * unit, max * unit), good)?;
         }

@@ -99,7 +99,7 @@ impl NeighbourSearch {
         self.best = None;
     }
 
-    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best
+    /// Searches until the downhill direction is determined. Sets `patch` to the patch of a best
     /// candidate found in this call.
     #[inline]
     pub(super) fn advance<const D: usize>(
@@ -186,7 +186,7 @@ impl NeighbourSearch {
     /// Sets `next` to the unsearched neighbour with the steepest descent.
     ///
     /// # Errors
-    /// The reason why that neighbour is not known in this tick.
+    /// The reason why that neighbour is not available in this tick.
     // Not inlined, and fills `next` in place: otherwise its fields are copied back and forth.
     #[inline(never)]
     fn steepest<const D: usize>(

@@ -80,7 +80,7 @@ fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
 }
 
 #[test]
-fn whole_metres_take_half_a_byte_per_sample() {
+fn whole_metres_use_half_a_byte_per_sample() {
     for metres in [1.0, 10.0, 29.97, 91.3] {
         let base = (1450.0 / metres) as i32;
         let steps = [HeightStep::Cells(1.0 / metres)];
