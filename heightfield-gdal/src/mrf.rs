@@ -28,7 +28,7 @@ pub(crate) fn too_large() -> String {
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`]; as a text, the referenced file and a remedy.
 pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>, Error> {
-    // GDAL stops at a zero byte, too.
+    // GDAL also stops at a zero byte.
     let header = header.replace('\0', " ");
     for named in xml::texts(library, &header)? {
         let is_any_of = |names: &[&str]| {

@@ -56,7 +56,7 @@ pub(crate) fn too_deep(depth: u32) -> String {
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
 pub(crate) fn names(library: &Loaded, text: &str) -> Result<Vec<Text>, Error> {
-    // GDAL stops at a zero byte, too.
+    // GDAL also stops at a zero byte.
     let mut texts = vec![text.replace('\0', " ")];
     let mut names = Vec::new();
     while let Some(text) = texts.pop() {

@@ -74,7 +74,7 @@ pub enum RasterError {
     /// Neither heights nor data that can be converted into heights.
     #[error("not a height field: {0}")]
     NoNumbers(String),
-    /// Several parts could hold the heights; none was chosen.
+    /// Several parts could be the heights; none was chosen.
     #[error("several {kind}s may be the heights: {}", names.join(", "))]
     SeveralHeights {
         /// The file's word for a part, as `raster`.

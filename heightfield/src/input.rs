@@ -225,8 +225,8 @@ impl FileBytes {
         Ok(head)
     }
 
-    /// Checks, before memory is allocated, that the file's bytes can hold the samples at deflate's
-    /// max ratio.
+    /// Checks, before memory is allocated, that the file's bytes can contain the samples at
+    /// deflate's max ratio.
     ///
     /// # Errors
     /// [`RasterError::AbsurdSize`].

@@ -38,7 +38,7 @@ impl StoredType {
     }
 
     /// Returns an empty vector with capacity for `count` samples; the caller has checked that the
-    /// file holds them.
+    /// file contains them.
     pub(super) fn reserve(self, count: u64) -> Result<Samples, RasterError> {
         let mut samples = self.memory_type().none();
         let reserved = usize::try_from(count).ok().and_then(

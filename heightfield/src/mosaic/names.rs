@@ -74,7 +74,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     Ok(files)
 }
 
-/// Returns true for names of files that hold a terrain with its place, possibly compressed.
+/// Returns true for names of files that contain a terrain with its place, possibly compressed.
 /// Pictures seldom do: beside tiles, they are previews.
 pub(super) fn is_tile(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -209,7 +209,7 @@ fn no_raster(who: &str) -> RasterError {
     RasterError::ByGdal(Error::Refused(format!("{who} finds no raster in it")))
 }
 
-/// Returns the name of the chosen raster, if the file holds several.
+/// Returns the name of the chosen raster, if the file contains several.
 fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, RasterError> {
     // `depth` for `NETCDF:"ocean.nc":depth`.
     let short = |name: &str| {

@@ -18,7 +18,7 @@ use crate::{OpenOptions, RasterError, file_name};
 const MAX_BYTES: u64 = 4 << 20;
 /// Max difference of the places of a file and its item, in cells.
 const TOLERANCE: f64 = 0.05;
-/// Media types of files that may hold heights.
+/// Media types of files that may contain heights.
 const MEDIA: [&str; 3] = ["tif", "jp2", "netcdf"];
 
 /// An item, with those of its assets that may be heights.

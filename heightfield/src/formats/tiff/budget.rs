@@ -1,4 +1,4 @@
-//! Check that a file can hold the samples in its header, before memory is allocated.
+//! Check that a file can contain the samples in its header, before memory is allocated.
 
 use super::layout::Layout;
 use super::unpack;

@@ -72,7 +72,7 @@ pub(super) fn number_kind(options: &OpenOptions) -> Result<NumberKind, RasterErr
     }
 }
 
-/// Adds a remark on the tag for the position of the first row and column, which GDAL ignores, too.
+/// Adds a remark on the tag for the position of the first row and column, which GDAL also ignores.
 fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
     const ORIENTATION: u16 = 274;
     let first = match image.tag(ORIENTATION).and_then(|tag| tag.value.as_u32()) {

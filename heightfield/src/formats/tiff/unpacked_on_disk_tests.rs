@@ -151,7 +151,7 @@ fn two_tile_rows_stay_unpacked_at_any_limit_and_more_within_it() {
         check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
         assert_eq!(unpacked.max_bytes(), max_tiles * tile);
-        let file = unpacked.unnamed.file.metadata().expect("told");
+        let file = unpacked.unnamed.file.metadata().expect("metadata");
         assert!(file.len() <= max_tiles * tile, "{} {max_bytes}", file.len());
     }
 }
