@@ -14,7 +14,7 @@ use crate::{notes, refused};
 /// Bytes of a row: `ARM_STEP` of `package/hapterra/_virtual_arm.py`.
 const ROW: usize = 104;
 
-/// A Premium 1.5 and the hand that holds it.
+/// A Premium 1.5 and the hand.
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct VirtualArm {
     hand: HandModel,

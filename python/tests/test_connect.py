@@ -256,7 +256,7 @@ def ends_early(record):
     """Waits until the recording of a session is complete that ended before the end of its tour."""
     until = time.monotonic() + 120
     while not record.exists():
-        assert time.monotonic() < until, "the session goes on"
+        assert time.monotonic() < until, "the session continues"
         time.sleep(0.05)
     rows = rows_of(record)
     assert rows["mode"][-1] == "armed" and float(rows["t_s"][-1]) < TOUR_S
@@ -609,7 +609,7 @@ def test_ctrl_c_while_it_ends_does_not_lose_the_session(played, monkeypatch):
 
 
 @posix
-def test_mode_and_view_come_from_samples_too():
+def test_samples_update_mode_and_view():
     session = fake_session()
     session._handle_event({"event": "sample", "mode": "armed", "view": 3})
     assert (session.mode, session.view) == ("armed", 3)

@@ -86,7 +86,7 @@ def test_scale_is_ground_for_a_millimetre(tmp_path):
     assert 14 < relief < 16
 
 
-def test_what_the_file_states_is_reported(tmp_path):
+def test_metadata_of_the_file_is_reported(tmp_path):
     source = Terrain.open(written(tmp_path / "hills.tif")).source
     assert source["file"] == str(tmp_path / "hills.tif")
     assert source["crs"] == "EPSG:32633" and source["height_unit_m"] == "1"
@@ -237,7 +237,7 @@ def test_window_ends_with_the_terrain(tmp_path):
     assert whole.place(whole.ground_at(60, 40), size_mm=(1e9, 1e9)).shape == whole.shape
 
 
-def test_places_are_longitude_and_latitude_too(tmp_path):
+def test_places_are_also_longitude_and_latitude(tmp_path):
     terrain = Terrain.open(written(tmp_path / "hills.tif"), cell_mm=1)
     lonlat = terrain.ground_at(40, 30, crs="lonlat")
     assert lonlat == pytest.approx((15.0, 36.1), abs=0.1)

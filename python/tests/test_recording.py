@@ -47,7 +47,7 @@ def test_both_forms_have_the_same_columns(recorded):
     assert "touching" in set(csv.steps["state"])
 
 
-def test_settings_are_what_was_recorded(recorded):
+def test_settings_are_the_recorded_ones(recorded):
     for recording in map(read_recording, recorded):
         settings = recording.settings
         assert settings["terrain"]["file"].endswith("hills.tif")

@@ -32,7 +32,7 @@ def test_repr_makes_the_same_surface():
     assert "materials=[2 more]" in repr(Surface(materials=[surface, Surface()]))
 
 
-def test_static_friction_is_friction_unless_given():
+def test_static_friction_is_friction_unless_passed():
     assert Surface(friction=0.3) == Surface(friction=0.3, static_friction=0.3)
 
 

@@ -36,7 +36,7 @@ _CONFIRM_TIMEOUT_S = 20.0
 #: Time-out for the command's last lines after the board is disarmed, s: a viewer that still runs
 #: keeps standard error open.
 _STDERR_TIMEOUT_S = 1.0
-#: Interval of checks whether something has changed, s.
+#: Interval of checks for a change, s.
 _POLL_INTERVAL_S = 0.02
 #: Lines of the command that an error may quote.
 _MAX_LINES = 200
@@ -109,7 +109,7 @@ class Session:
     words : the subcommand and its arguments.
     on_event : called with each event by the thread that reads them, and at last with one of the
         kind "over".
-    is_quiet : pass on only what a person has to do or is warned of.
+    is_quiet : pass on only instructions and warnings.
     """
 
     def __init__(
