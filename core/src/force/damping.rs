@@ -117,7 +117,7 @@ impl Damper {
     }
 
     /// Resets the controller while no force, or less than the spring's force, is rendered: energy
-    /// created before is forgotten.
+    /// created before is discarded.
     pub(crate) fn reset(&mut self) {
         if let Some(controller) = &mut self.controller {
             controller.reset();

@@ -122,7 +122,7 @@ impl Spring {
     /// Returns the force in newtons for a proxy `displacement_mm` away from the HIP.
     ///
     /// It points along `displacement_mm`, is proportional to its length, and is clamped as a
-    /// vector. Always finite: a displacement that is not finite gives no force.
+    /// vector. Always finite: a displacement that is not finite results in no force.
     #[must_use]
     pub fn force_n(&self, displacement_mm: Vec3) -> Vec3 {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)

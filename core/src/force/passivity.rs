@@ -19,7 +19,7 @@ use super::rate_limit_softening::RateLimitSoftening;
 use super::{EffectContext, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
-/// Maximum recorded energy, mJ; more is forgotten.
+/// Maximum recorded energy, mJ; more is dropped.
 pub(super) const MAX_MJ: f32 = 2.0;
 /// Maximum damping, as ticks of the stiffness, in addition to the latency. The velocity has an
 /// error of some 0.1 count a tick, which causes a force of this many times the spring's force for

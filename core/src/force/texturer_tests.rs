@@ -99,7 +99,7 @@ fn grating_vibrates_only_at_speed_over_wavelength() {
     }
 }
 
-/// Grain has no waves shorter than its wavelength, except what its smooth rises need.
+/// Grain has no waves shorter than its wavelength, except those of its smooth rises.
 #[test]
 fn grain_reaches_the_frequency_of_its_wavelength() {
     let rendered = rendered(&GRAIN, 50.0, 1.0, cases(20_000, 400));
@@ -358,7 +358,7 @@ fn texture_output_is_finite_for_non_finite_input() {
                 .force_n(rendered);
             assert!(force.is_finite(), "{bad}: {force}");
         }
-        // And the speed is forgotten.
+        // And the speed is cleared.
         let rendered: Vec<_> = (0..100)
             .map(|_| texturer.add(Vec3::Z, &place(0.3, 0.3)))
             .collect();

@@ -312,7 +312,7 @@ impl Guard {
         }
     }
 
-    /// Requests arming. An earlier jog that has not driven a motor is forgotten; an active one
+    /// Requests arming. An earlier jog that has not driven a motor is cleared; an active one
     /// continues.
     pub fn arm(&mut self) {
         self.hold.end();

@@ -227,7 +227,7 @@ impl<const D: usize> TileRequester<D> {
         } else {
             0.0
         };
-        // The casts saturate, so any velocity gives a valid cell.
+        // The casts saturate, so any velocity results in a valid cell.
         let after = |from: Cell, ticks: f32| {
             let [east, north] = hint.velocity.map(|v| (v * ticks) as i32);
             from.offset(east, north)

@@ -1,7 +1,7 @@
 //! Continuation of the descent from a point of a patch's border.
 //!
 //! The distance to the HIP has a slope into each patch that meets there. The descent continues into
-//! the patch with the steepest slope, so that a mirrored scene gives the mirrored patch. The
+//! the patch with the steepest slope, so that a mirrored scene results in the mirrored patch. The
 //! neighbour's closest point is computed before the proxy enters it.
 
 use super::on_patch::{Nearest, finest_resolution, resolution, search};
@@ -92,7 +92,7 @@ impl NeighbourSearch {
         best: None,
     };
 
-    /// Forgets the searched neighbours.
+    /// Clears the searched neighbours.
     #[inline]
     pub(super) const fn restart(&mut self) {
         self.searched = 0;

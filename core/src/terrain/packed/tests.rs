@@ -85,7 +85,7 @@ fn whole_metres_use_half_a_byte_per_sample() {
         let base = (1450.0 / metres) as i32;
         let steps = [HeightStep::Cells(1.0 / metres)];
         let bytes = packed(&hills(metres, base), base, &steps).unwrap();
-        assert_eq!(bytes[0] & 7, 1, "one line, no holes");
+        assert_eq!(bytes[0] & 7, 1, "one line, without no-data");
         assert!(bytes.len() < 600, "{}", bytes.len());
     }
 }

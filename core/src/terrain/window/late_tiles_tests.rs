@@ -353,7 +353,7 @@ fn no_data_of_a_tile_takes_effect_without_blending() {
             heights: [height; 4],
         })
     };
-    assert_eq!(ground(&test, 135, 150), patch(1.25), "it settles");
+    assert_eq!(ground(&test, 135, 150), patch(1.25), "the blend ends");
     assert_eq!(
         ground(&test, 140, 140),
         patch(2.0),
