@@ -109,7 +109,7 @@ pub struct Link<'t, const D: usize> {
     materials: Option<LoopMaterials>,
     /// Number of the latest placement; samples with another number are older.
     view: u8,
-    /// True if the latest placement changes in contact: until its samples come, only its fallback
+    /// True if the latest placement changes in contact: until its samples arrive, only its fallback
     /// is requested.
     is_changing: bool,
     clutch: HostClutch,

@@ -320,7 +320,7 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
         rig.run(1);
         ticks += 1;
         on += u32::from(rig.report().is_some_and(|r| r.mode.is_driving()));
-        assert!(ticks < 400, "for ever");
+        assert!(ticks < 400, "time-out of the test");
     }
     assert!((90..=102).contains(&on), "{on}");
     assert!((on..on + 105).contains(&ticks), "{ticks}");
@@ -350,7 +350,7 @@ fn clock_keeps_running_while_force_fades_out() {
             break;
         }
         ticks += 1;
-        assert!(ticks < 200, "for ever");
+        assert!(ticks < 200, "time-out of the test");
     }
     assert!(ticks > 90, "{ticks}");
     rig.run(1);
