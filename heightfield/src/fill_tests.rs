@@ -1,4 +1,4 @@
-//! Filled heights against a simple reference over a whole array, for each way to read the file.
+//! Filled heights against a simple reference over a whole array, for each reader of the file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

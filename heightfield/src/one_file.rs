@@ -103,7 +103,7 @@ fn decode_as(
     guarded(format.name, || (format.decode)(input, options))
 }
 
-/// Checks that no open option is given for a file that is read without GDAL.
+/// Checks that no open option is set for a file that is read without GDAL.
 fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), RasterError> {
     match &options.open_options[..] {
         [] => Ok(()),
