@@ -36,7 +36,7 @@ pub(crate) fn install(loaded: &Loaded) -> Result<(), Error> {
     if *is_installed {
         return Ok(());
     }
-    let refused = || loaded.refused("it takes no files from its caller");
+    let refused = || loaded.refused("it accepts no files from its caller");
     let functions = &loaded.functions;
     // SAFETY: GDAL's own structure, whose fields set here are the same in all versions; GDAL copies
     // it. Prefix and functions exist as long as the process.

@@ -31,8 +31,8 @@ pub struct Dataset {
     files: Option<Arc<Mounted>>,
 }
 
-// SAFETY: a dataset may move to another thread if only one thread at a time uses it, which is what
-// `Send` without `Sync` means.
+// SAFETY: a dataset may move to another thread if only one thread at a time uses it, as `Send`
+// without `Sync` ensures.
 unsafe impl Send for Dataset {}
 
 /// One of several rasters in a file.
@@ -62,7 +62,7 @@ impl Dataset {
             (functions.GDALOpenEx)(path.as_ptr(), OPEN_FLAGS, drivers, list.as_ptr(), siblings)
         };
         if handle.is_null() {
-            return Err(loaded.refused("no driver knows the file"));
+            return Err(loaded.refused("no driver supports the file"));
         }
         let dataset = Self {
             loaded,
@@ -183,8 +183,8 @@ impl Dataset {
         let no_such = || Error::NoSuchPart {
             requested: format!("band {number}"),
             available: match self.bands() {
-                0 => "the file holds no band of its own".to_owned(),
-                1 => "the file has band 1 alone".to_owned(),
+                0 => "the file contains no band of its own".to_owned(),
+                1 => "the file has only band 1".to_owned(),
                 bands => format!("the file has bands 1 to {bands}"),
             },
         };
@@ -197,8 +197,9 @@ impl Dataset {
         Band::of(&self.loaded, handle).ok_or_else(no_such)
     }
 
-    /// Returns the map from columns and rows to coordinates: x = `[0]` + column · `[1]` + row · `[2]`,
-    /// y = `[3]` + column · `[4]` + row · `[5]`, from the outer corner of the first sample's cell.
+    /// Returns the map from columns and rows to coordinates: x = `[0]` + column · `[1]` + row ·
+    /// `[2]`, y = `[3]` + column · `[4]` + row · `[5]`, from the outer corner of the first sample's
+    /// cell.
     #[must_use]
     pub fn geo_transform(&self) -> Option<[f64; 6]> {
         let mut numbers = [0.0; 6];

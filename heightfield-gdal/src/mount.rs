@@ -198,7 +198,7 @@ impl Mounted {
         Ok(Text(text.into_bytes()))
     }
 
-    /// Returns the names of the files beside a file, if they are known.
+    /// Returns the names of the files beside a file, if they were listed.
     pub(crate) fn neighbours(&self, name: &str) -> Option<Vec<String>> {
         let name = plain(name)?;
         self.read(|| self.files.neighbours(&name))

@@ -28,7 +28,7 @@ pub(crate) fn too_large() -> String {
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`]; as a text, the referenced file and a remedy.
 pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>, Error> {
-    // GDAL stops at a zero byte, too.
+    // GDAL also stops at a zero byte.
     let header = header.replace('\0', " ");
     for named in xml::texts(library, &header)? {
         let is_any_of = |names: &[&str]| {
@@ -39,7 +39,7 @@ pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>
         let leaves_folder = is_any_of(&NEIGHBOUR_KEYS) && !is_neighbour(name);
         if leaves_folder || is_any_of(&[COPIED_KEY]) {
             return Ok(Err(format!(
-                "it names {name}, which need not lie beside it: get both files, and open the MRF here"
+                "it names {name}, which may be in another folder: get both files, and open the MRF here"
             )));
         }
     }

@@ -15,7 +15,7 @@ use crate::pending_calls::Call;
 /// Time limit for opening, without GDAL's waits for files from the caller. A VRT of 26,000 files
 /// opens within a second.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(6);
-/// Max time of waits that is not counted: a single request takes less.
+/// Max time of waits that is not counted: a single request is shorter.
 const MAX_SERVER_WAIT: Duration = Duration::from_secs(120);
 /// Interval between checks of the time.
 const MIN_POLL: Duration = Duration::from_millis(50);
@@ -37,7 +37,7 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     let open = move || {
         let _call = call;
         let options: Vec<&str> = options.iter().map(String::as_str).collect();
-        // The caller may have given up.
+        // The caller may no longer wait.
         let _ = send.send(Dataset::open(loaded, &own, &options));
     };
     let thread = Builder::new().name("GDAL opens a file".into());

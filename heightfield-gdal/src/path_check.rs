@@ -1,5 +1,5 @@
-//! Checks before GDAL opens a file: GDAL would wait for a pipe for ever, start a device, and open
-//! all files that a VRT references.
+//! Checks before GDAL opens a file: GDAL would wait for a pipe indefinitely, start a device, and
+//! open all files that a VRT references.
 
 use std::collections::HashSet;
 use std::fs::{self, File, FileType};

@@ -100,7 +100,7 @@ impl<'l> Owned<'l> {
         let handle = self.handle;
         let refused = || {
             self.loaded
-                .refused("PROJ does not know the reference system")
+                .refused("PROJ does not support the reference system")
         };
         // SAFETY: here and below, the system exists, and each function only reads it; null means an
         // unneeded name, and the pointers to numbers are valid.

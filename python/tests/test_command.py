@@ -1,4 +1,4 @@
-"""The command that comes with the package."""
+"""The command of the package."""
 
 import os
 import signal
@@ -31,7 +31,7 @@ def test_console_script_and_module_are_the_command(package_command):
     assert run("--version") == result.stdout
 
 
-def test_command_is_what_the_environment_names(monkeypatch, package_command):
+def test_command_is_named_by_the_environment(monkeypatch, package_command):
     assert command() == OWN
     monkeypatch.setenv("HAPTERRA", "/opt/hapterra")
     assert command() == ["/opt/hapterra"]

@@ -145,7 +145,7 @@ impl Arming {
         }
     }
 
-    /// Advances the confirmation; `small` is true if the wanted force is small.
+    /// Advances the confirmation; `small` is true if the commanded force is small.
     pub(super) fn confirm(&mut self, small: bool) {
         if !small {
             self.since = 0;

@@ -391,7 +391,7 @@ fn encoder_jump_of_a_zeroed_arm_faults_and_clears_the_zero() {
     bench.tick();
     bench.sense.counts = [0; 3];
     bench.tick();
-    assert_eq!(bench.guard.report().fault, None, "nothing is known yet");
+    assert_eq!(bench.guard.report().fault, None, "nothing is measured yet");
     bench.zeroed = true;
     bench.ticks(2);
     bench.sense.counts = [128, -128, 0];
@@ -493,7 +493,7 @@ fn winding_above_its_limit_is_a_fault() {
     assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
 }
 
-/// Joint 2 turns by `counts_a_tick` while 1 N is wanted.
+/// Joint 2 turns by `counts_a_tick` while 1 N is commanded.
 fn hurried(counts_a_tick: i32, ticks: u32) -> Bench {
     let mut bench = Bench::armed();
     bench.target_n = Vec3::Z;
@@ -539,7 +539,7 @@ fn host_disarm_fades_force_out_without_a_step() {
     bench.ticks(20);
     let full = bench.force_n;
     bench.guard.disarm();
-    // The wanted force no longer matters.
+    // The commanded force no longer matters.
     bench.target_n = Vec3::X * 8.0;
     let mut last = full;
     let mut ticks = 0;

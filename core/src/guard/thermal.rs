@@ -173,7 +173,8 @@ impl Motors {
         let mean = self.squares / self.ticks as f32;
         let toward = |from: Vec3, k_per_w: f32, time_s: f32| {
             let step_s = STEP_MS as f32 * 1e-3;
-            // K above the other node for A² flowing for ever; then the part of it in this update.
+            // K above the other node for A² flowing permanently; then the part of it in this
+            // update.
             let end = mean * (thermal.resistance_ohm * k_per_w);
             from + (end - from) * (step_s / time_s)
         };

@@ -1,10 +1,11 @@
 //! The device's part of the height field, and its requests for more.
 //!
-//! - `tile`, `coarse_tile`, `packed`: the samples of a tile, fine and coarse, and their packed form;
-//! - `window`: the stored tiles around the HIP, and the content of a cell; `window::late_tiles`: what
-//!   is rendered while a tile is late;
-//! - `fallback`, `tile_blend`: the coarse tiles below the window, and the speed at which the surface
-//!   moves from them to a tile that arrived;
+//! - `tile`, `coarse_tile`, `packed`: the samples of a tile, fine and coarse, and their packed
+//!   form;
+//! - `window`: the stored tiles around the HIP, and the content of a cell; `window::late_tiles`:
+//!   the surface while a tile is late;
+//! - `fallback`, `tile_blend`: the coarse tiles below the window, and the speed at which the
+//!   surface moves from them to a tile that arrived;
 //! - `max_pyramid`: the largest heights of squares of cells, for paths through the air;
 //! - `tile_requests`: the tile to request next;
 //! - `extent`, `index`, `storage`: sizes, numbers of tiles, and memory.

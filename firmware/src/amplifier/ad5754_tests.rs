@@ -156,7 +156,7 @@ fn lost_range_or_overload_is_reported_within_seven_ticks() {
         assert!(reported.is_some());
         assert!(!pin.is_high());
         (0..20).for_each(|_| off.set_held_outputs([0.0; 3]));
-        assert!(wires.0.borrow().as_set, "set up anew");
+        assert!(wires.0.borrow().as_set, "set up again");
         assert_eq!(wires.0.borrow().range, [4; 4]);
     }
 }

@@ -97,7 +97,7 @@ fn arm_is_monitored_in_every_tick_of_a_replay() {
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     let at = wave(&mut haptic_loop, at, 50);
-    assert!(haptic_loop.unsent.is_some(), "the case that is meant");
+    assert!(haptic_loop.unsent.is_some(), "the case under test");
     drain(&mut link_ends);
     let at = wave(&mut haptic_loop, at, 2);
     // And then the arm is rendered.
@@ -223,7 +223,7 @@ fn debounced_clutch_input_opens_the_clutch() {
     assert_eq!(limits(6, true), opening);
     let open = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN;
     for _ in 0..3 {
-        assert_eq!(limits(30, true), opening, "it takes 0.1 s");
+        assert_eq!(limits(30, true), opening, "the clutch opens in 0.1 s");
     }
     assert_eq!(limits(30, true), open);
     assert_eq!(limits(19, false), open);

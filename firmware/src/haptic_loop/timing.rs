@@ -124,7 +124,7 @@ mod tests {
         clock.now = 20;
         assert!(
             !timing.end(&clock, began),
-            "this tick's own event was taken"
+            "this tick's own event was consumed"
         );
         let began = timing.begin(&mut clock);
         clock.now = 21;

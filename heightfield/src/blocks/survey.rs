@@ -114,7 +114,7 @@ impl Shared {
     fn warn_of_search(&self, count: usize, parts: usize) {
         let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
         tracing::warn!(
-            "{count} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
+            "{count} places of {name} have no height: all {parts} are searched until one has, which may take a while"
         );
     }
 
@@ -156,7 +156,8 @@ impl Shared {
     }
 }
 
-/// Returns the blocks of an image that hold samples, or evenly spread ones if there are too many.
+/// Returns the blocks of an image that contain samples, or evenly spread ones if there are too
+/// many.
 pub(crate) fn stored_parts(of: &BlockImage, is_stored: impl Fn(&Part) -> bool) -> Vec<Part> {
     let [across, down] = of.counts();
     let every = || (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));

@@ -98,8 +98,8 @@ fn non_terrain_file_is_refused_with_its_specific_fault() {
         ("empty.tif", b"", "empty"),
         ("notes.txt", b"ncols of cabbage", "unknown file format"),
         ("song.mp3", b"ID3\x03 no terrain", "unknown file format"),
-        ("named.tif", b"hello, world", "its name says TIFF"),
-        ("samples.raw", &[0; 32], "no size was stated"),
+        ("named.tif", b"hello, world", "its name is that of TIFF"),
+        ("samples.raw", &[0; 32], "without a stated size"),
         ("odd.hgt", &[0; 31], "no square"),
         ("cut.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0", "truncated"),
         (

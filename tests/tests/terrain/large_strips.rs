@@ -185,7 +185,7 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     // Without a place on disk it needs memory, and there is too little.
     let (code, text) = info(&["--cache", "off"]);
     assert_eq!(code, Some(1), "{text}");
-    assert!(text.contains("more than memory can hold"), "{text}");
+    assert!(text.contains("do not fit into memory"), "{text}");
     // A truncated strip: the rows before the end are rendered.
     write(&packed[..packed.len() / 10 * 9]);
     let (code, text) = info(&["--cache", cache]);

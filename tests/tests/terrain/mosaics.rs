@@ -389,7 +389,7 @@ fn mismatched_file_is_refused_with_its_name_and_reason() {
         ),
         ("xllcorner 4\nyllcorner 0\ncellsize 2", "2 × 2 units"),
         ("xllcorner 4e12\nyllcorner 0\ncellsize 1", "too far away"),
-        ("cellsize 1", "does not say where it lies"),
+        ("cellsize 1", "does not state its place"),
     ] {
         two_tiles(at, 0);
         let text = format!("ncols 2\nnrows 2\n{other}\n1 2 3 4\n");

@@ -308,7 +308,7 @@ fn depth_sign_follows_positive_then_standard_name() {
     let raster = open(&file, &OpenOptions::default());
     assert_eq!(raster.height(3, 0), 12.0);
     let remarks = raster.remarks().join(" ");
-    assert!(remarks.contains("positive says up"), "{remarks}");
+    assert!(remarks.contains("positive is up"), "{remarks}");
 }
 
 #[test]

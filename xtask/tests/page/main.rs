@@ -155,7 +155,7 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
         assert!(difference.fold(0.0, f64::max) < 0.02);
     }
     site.drop_file("notes.txt", b"not a terrain");
-    site.wait("document.getElementById('said').textContent.startsWith('notes.txt: its kind is not known')");
+    site.wait("document.getElementById('said').textContent.startsWith('notes.txt: its format is not supported')");
     assert_eq!(site.value("hapterra.touch.terrain.nx"), 70);
     site.check_requests();
 }

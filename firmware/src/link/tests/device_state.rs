@@ -25,7 +25,7 @@ const TO_ARM: fn(&Request) -> bool = |r| matches!(r, Request::Arm);
 fn arming_reports_each_mode_from_disarmed_to_armed() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(10);
-    let report = rig.report().expect("told");
+    let report = rig.report().expect("reported");
     assert_eq!(report.mode, Mode::Disarmed);
     assert!(report.blockers.contains(Blockers::NOT_ZEROED));
     rig.arm();
@@ -76,7 +76,7 @@ fn fault_is_latched_reported_and_cleared_on_request() {
     assert_eq!(rig.report().and_then(|r| r.fault), Some(Fault::EncoderJump));
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
-    // Another fault, or none, was seen: this one stays.
+    // Another fault, or none, was reported: this one stays.
     for acknowledged in [None, Some(Fault::Hardware)] {
         rig.request(Request::ClearFault {
             fault: acknowledged,
@@ -164,7 +164,7 @@ fn calibration_store_times_out_without_deadman_press() {
         rig.run(1_100);
         rig.send_message(&ToDevice::Heartbeat);
     }
-    assert_eq!(rig.answers(TO_STORE), [], "it may take its time");
+    assert_eq!(rig.answers(TO_STORE), [], "it may be slow");
     rig.run(400);
     let refused = Err(Refusal::NotPressed);
     assert_eq!(rig.answers(TO_STORE), [refused]);
@@ -320,7 +320,7 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
         rig.run(1);
         ticks += 1;
         on += u32::from(rig.report().is_some_and(|r| r.mode.is_driving()));
-        assert!(ticks < 400, "for ever");
+        assert!(ticks < 400, "time-out of the test");
     }
     assert!((90..=102).contains(&on), "{on}");
     assert!((on..on + 105).contains(&ticks), "{ticks}");
@@ -335,7 +335,7 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
     let ToHost::Hello(hello) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
     };
-    assert_eq!(hello.epoch, None, "it holds nothing any more");
+    assert_eq!(hello.epoch, None, "it no longer stores a scene");
     assert_eq!(hello.last.end, SessionEnd::Goodbye);
 }
 
@@ -350,7 +350,7 @@ fn clock_keeps_running_while_force_fades_out() {
             break;
         }
         ticks += 1;
-        assert!(ticks < 200, "for ever");
+        assert!(ticks < 200, "time-out of the test");
     }
     assert!(ticks > 90, "{ticks}");
     rig.run(1);

@@ -181,7 +181,7 @@ fn impossible_times_are_errors() {
     for (rows, expected) in [
         (
             &[("0", 0.0), ("0.002", 1.0), ("0.001", 2.0)][..],
-            "line 4, column t_s: time goes back from 0.002 s to 0.001 s",
+            "line 4, column t_s: time decreases from 0.002 s to 0.001 s",
         ),
         (
             &[("0", 0.0), ("0.002", 1.0), ("0.002", 2.0)],
@@ -311,7 +311,7 @@ fn recording_rows_are_whole_ticks_apart() {
         (
             &[("0", 1.0), ("0.00025", 2.0)],
             1000,
-            "line 3, column t_s: 0.00025 s is 0.25 ticks after the row before, where the settings say 1000 ticks a second",
+            "line 3, column t_s: 0.00025 s is 0.25 ticks after the row before, but the settings state 1000 ticks a second",
         ),
         (&[("0", 1.0), ("0.0015", 2.0)], 1000, "1.5 ticks after"),
         (&[("0", 1.0), ("0.001", 2.0)], 3000, ""),

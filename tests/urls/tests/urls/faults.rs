@@ -54,7 +54,7 @@ fn permanent_server_error_names_file_and_reason() {
     assert!(reported.contains("valleys.tif"), "{reported}");
     server.fail(Fault::Forbidden, 1);
     let reported = open(&server, "hills.tif").expect_err("forbidden");
-    assert!(reported.contains("without a key"), "{reported}");
+    assert!(reported.contains("requires a key"), "{reported}");
     server.fail(Fault::Error500, usize::MAX);
     let reported = open(&server, "hills.tif").expect_err("broken");
     assert!(reported.contains("500"), "{reported}");
@@ -64,7 +64,7 @@ fn permanent_server_error_names_file_and_reason() {
     assert!(matches!(error.fault(), RasterError::Remote(_)), "{error}");
     for (url, why) in [
         ("ftp://h/hills.tif", "ftp://"),
-        ("https://h h/hills.tif", "cannot read what is there"),
+        ("https://h h/hills.tif", "cannot read the URL's content"),
         ("s3://", "no such file"),
     ] {
         let error = Raster::open(url, &OpenOptions::default()).expect_err(url);

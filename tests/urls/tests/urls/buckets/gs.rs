@@ -108,11 +108,11 @@ fn credential_environment_errors_include_a_hint() {
     for (reported, why) in [
         (
             none,
-            "the environment holds no key, and this computer has none of its own (gs://hills",
+            "the environment contains no key, and this computer has none of its own (gs://hills",
         ),
         (
             no_file,
-            "error: cannot read what is there: Unable to open service account file from /nowhere/key.json",
+            "error: cannot read the URL's content: Unable to open service account file from /nowhere/key.json",
         ),
         (no_key, "missing field `private_key`"),
     ] {
