@@ -20,6 +20,8 @@ use crate::terrain::{
 mod in_contact;
 #[path = "tick_tests/materials.rs"]
 mod materials;
+#[path = "tick_tests/pressed_arm.rs"]
+mod pressed_arm;
 #[path = "tick_tests/textured.rs"]
 mod textured;
 #[path = "tick_tests/views.rs"]

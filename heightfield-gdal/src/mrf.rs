@@ -1,7 +1,7 @@
 //! File names in an MRF's header: its samples and their index.
 
 use crate::error::Error;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::xml;
 
 /// GDAL recognises an MRF by its first bytes.
@@ -27,7 +27,7 @@ pub(crate) fn too_large() -> String {
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`]; as a text, the referenced file and a remedy.
-pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>, Error> {
+pub(crate) fn check(library: &Libgdal, header: &str) -> Result<Result<(), String>, Error> {
     // GDAL also stops at a zero byte.
     let header = header.replace('\0', " ");
     for named in xml::texts(library, &header)? {

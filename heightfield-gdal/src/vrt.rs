@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::file_system::PREFIX;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::settings;
 use crate::xml::{self, Text};
 
@@ -55,7 +55,7 @@ pub(crate) fn too_deep(depth: u32) -> String {
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
-pub(crate) fn names(library: &Loaded, text: &str) -> Result<Vec<Text>, Error> {
+pub(crate) fn names(library: &Libgdal, text: &str) -> Result<Vec<Text>, Error> {
     // GDAL also stops at a zero byte.
     let mut texts = vec![text.replace('\0', " ")];
     let mut names = Vec::new();

@@ -135,13 +135,13 @@ fn cargo(words: &[String]) -> Result<(), String> {
         };
     }
     for (option, value) in words.iter().zip(words.iter().skip(1)) {
-        let manifest = match *option {
-            "--path" => repository().join(value).join("Cargo.toml"),
-            "-p" | "--package" => manifest_of(value)?,
-            _ => continue,
-        };
-        if !manifest.is_file() && !value.starts_with("..") {
-            return Err(format!("there is no {}", manifest.display()));
+        let manifest = repository().join(value).join("Cargo.toml");
+        match *option {
+            "--path" if !manifest.is_file() && !value.starts_with("..") => {
+                return Err(format!("there is no {}", manifest.display()));
+            }
+            "-p" | "--package" => drop(manifest_of(value)?),
+            _ => {}
         }
     }
     Ok(())
@@ -155,13 +155,7 @@ fn chooses_program(words: &[&str]) -> Result<(), String> {
     let Some(package) = value("-p") else {
         return Ok(());
     };
-    let folders = repository().read_dir().expect("the repository").flatten();
-    let manifests = folders.map(|folder| folder.path().join("Cargo.toml"));
-    let named = format!("name = \"{package}\"\n");
-    let manifest = manifests
-        .filter_map(|path| std::fs::read_to_string(path).ok())
-        .find(|text| text.contains(&named))
-        .unwrap_or_default();
+    let manifest = manifest_of(package)?;
     let has_choice = manifest.matches("[[bin]]").count() > 1 && !manifest.contains("default-run");
     match has_choice && value("--bin").or(value("--example")).is_none() {
         true => Err(format!("cargo cannot choose a program of {package}")),
@@ -169,17 +163,19 @@ fn chooses_program(words: &[&str]) -> Result<(), String> {
     }
 }
 
-/// Returns the manifest of a package in the workspace.
+/// Returns the text of the manifest of a package in the workspace.
 ///
 /// # Errors
 /// If there is no such package.
-fn manifest_of(name: &str) -> Result<PathBuf, String> {
-    let locked = include_str!("../../../Cargo.lock");
-    let manifest = repository().join("Cargo.toml");
-    let known = locked.contains(&format!("name = \"{name}\"\nversion = \"0.1.0\"\ndep"));
-    known
-        .then_some(manifest)
-        .ok_or_else(|| format!("there is no package {name}"))
+fn manifest_of(package: &str) -> Result<String, String> {
+    let workspace = include_str!("../../../Cargo.toml");
+    let members = workspace.lines().find(|line| line.starts_with("members"));
+    let folders = members.unwrap_or_default().split('"').skip(1).step_by(2);
+    let named = format!("[package]\nname = \"{package}\"\n");
+    folders
+        .filter_map(|it| std::fs::read_to_string(repository().join(it).join("Cargo.toml")).ok())
+        .find(|manifest| manifest.contains(&named))
+        .ok_or_else(|| format!("there is no package {package}"))
 }
 
 fn check(line: &Line) -> Result<(), String> {

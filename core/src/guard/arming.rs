@@ -1,4 +1,4 @@
-//! The steps from off to on and back, and their time-outs.
+//! The conditions and times of each change of the mode, and the gain of the force's ramps.
 
 use serde::{Deserialize, Serialize};
 

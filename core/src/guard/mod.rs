@@ -5,8 +5,8 @@
 //! force; [`Guard::limit_currents`] limits the currents.
 //!
 //! [`Fault`]s are latched and switch the amplifiers off. [`Limits`] are the reasons for a reduced
-//! force. [`Blockers`] are the reasons why the arm cannot be armed. [`Mode`] has the steps from off
-//! to on and back.
+//! force. [`Blockers`] are the reasons why the arm cannot be armed. [`Mode`] is the progress of
+//! arming.
 
 mod arming;
 mod blockers;

@@ -2,12 +2,12 @@
 
 mod late_tiles;
 
+use super::blend_allowances::BlendAllowances;
 use super::extent::{CellBox, FieldSize};
 use super::fallback::FallbackSlots;
 use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
 use super::tile::Tile;
-use super::tile_blend::TileBlend;
 use crate::grid::{Altitude, Cell};
 
 /// Content of a cell.
@@ -87,7 +87,7 @@ pub struct Window<'t, const D: usize> {
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
     pub(super) fallback: FallbackSlots<'t>,
-    pub(super) tile_blend: TileBlend<D>,
+    pub(super) allowances: BlendAllowances<D>,
     /// The fallback of the next scene, and its level; it is not rendered.
     next: FallbackSlots<'t>,
     next_level: u8,
@@ -114,7 +114,7 @@ impl<'t, const D: usize> Window<'t, D> {
             fallback: FallbackSlots::EMPTY,
             next: FallbackSlots::EMPTY,
             next_level: 0,
-            tile_blend: TileBlend::NONE,
+            allowances: BlendAllowances::NONE,
         };
         for key in size.tiles() {
             window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].mark_as_surface();

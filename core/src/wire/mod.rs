@@ -1,6 +1,16 @@
 //! The link between device and host: one table of messages, one framing. This page is the
 //! specification of the protocol.
 //!
+//! - [`message`]: the table of messages of each end;
+//! - [`frame`]: encoding and reading of frames;
+//! - [`version`]: the frames with which two protocol versions detect each other;
+//! - [`session`]: the session of a frame, its end, and the number of its samples;
+//! - [`hello`]: the messages that open a session;
+//! - [`request`]: requests of a host, and their answers;
+//! - [`status`]: start, guard and measurements of a device;
+//! - [`tile`], [`materials`]: the heights of a tile; its materials, and the table of a scene;
+//! - [`plant`]: the emulated board's second line, to the virtual arm.
+//!
 //! # Frames
 //!
 //! Every frame is serialised with postcard, followed by its CRC-32 (ISO-HDLC,

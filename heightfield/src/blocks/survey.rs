@@ -131,7 +131,9 @@ impl Shared {
     /// Reads the samples of a part that is not a block: it is not cached, and nothing around it is
     /// read.
     fn add_part(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
-        let block = self.read(image, part).ok().and_then(|read| read.block);
+        let read = self.read(image, part);
+        self.state().lacked_block |= read.is_err();
+        let block = read.ok().and_then(|read| read.block);
         for index in 0..part.columns as usize * part.rows as usize {
             add(block.as_ref().and_then(|block| block.stored(index)));
         }

@@ -334,6 +334,20 @@ fn missing_block_is_reported_at_each_read() {
     assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
 }
 
+/// A read that does not wait is repeated until the block arrives: no result lacks its heights.
+#[test]
+fn only_waiting_reads_report_an_outage() {
+    let blocks = Blocks::new(Box::new(slow(true)));
+    let missing = |wait| assert_eq!(blocks.stored(0, BLOCK[0], 0, wait), Err(NotLoaded));
+    missing(Wait::Never);
+    while blocks.is_reading() {
+        std::thread::yield_now();
+    }
+    assert!(blocks.take_outage().is_none());
+    missing(Wait::UntilRead);
+    assert!(blocks.take_outage().is_some() && blocks.take_outage().is_none());
+}
+
 #[test]
 fn field_without_any_height_is_refused() {
     let (mut field, _) = Field::new();

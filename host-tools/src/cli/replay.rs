@@ -21,8 +21,8 @@ use crate::materials::Materials;
 use crate::output::{Output, check_distinct};
 use crate::replay::settings::{Device, PlacementSettings};
 use crate::replay::{
-    Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Ticks, Trajectory,
-    on_native_at, replay_trajectory,
+    Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Trajectory,
+    TrajectoryTicks, on_native_at, replay_trajectory,
 };
 use crate::stability;
 use crate::terrain::Terrain;
@@ -296,7 +296,7 @@ fn native(
     args: &Args,
     replayed: &Inputs<'_>,
     trajectory: Trajectory,
-) -> Result<(Summary, Ticks), Failure> {
+) -> Result<(Summary, TrajectoryTicks), Failure> {
     let (params, rule) = replayed.params;
     let rate = replayed.recorded_at.unwrap_or_default();
     let mut replayer = on_native_at(rate, replayed.terrain, params)?;
@@ -311,7 +311,7 @@ fn emulated(
     board: &EmulatedBoard,
     replayed: &Inputs<'_>,
     trajectory: Trajectory,
-) -> Result<(Summary, Ticks), Failure> {
+) -> Result<(Summary, TrajectoryTicks), Failure> {
     let (params, rule) = replayed.params;
     if rule == Rule::Paper {
         return Err("no device has the published contact rule of this recording")
@@ -336,7 +336,7 @@ fn ticks(
     replayed: &Inputs<'_>,
     trajectory: Trajectory,
     tick_hz: u32,
-) -> Result<Ticks, Failure> {
+) -> Result<TrajectoryTicks, Failure> {
     let recorded = replayed.recorded_at.map(TickRate::hz);
     if let Some(recorded_hz) = recorded.filter(|hz| *hz != tick_hz) {
         let why =
@@ -350,7 +350,7 @@ fn ticks(
         Some(_) => Pace::Recorded,
         None => Pace::ByTime,
     };
-    Ok(Ticks::new(trajectory, pace, tick_hz))
+    Ok(TrajectoryTicks::new(trajectory, pace, tick_hz))
 }
 
 fn replay<'t>(
@@ -358,7 +358,7 @@ fn replay<'t>(
     replayed: &Inputs<'t>,
     trajectory: Trajectory,
     replayer: &mut OfflineDevice<'t>,
-) -> Result<(Summary, Ticks), Failure> {
+) -> Result<(Summary, TrajectoryTicks), Failure> {
     let mut ticks = ticks(args, replayed, trajectory, replayer.device().tick_hz)?;
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();

@@ -77,6 +77,7 @@ fn server_outage_is_retried_and_is_not_no_data() {
     }
     server.fail(Fault::None, 0);
     wait_for_height(&terrain);
+    assert!(raster.check_complete().is_ok(), "the outage is over");
 }
 
 /// A block of many chunks in several places of the file.

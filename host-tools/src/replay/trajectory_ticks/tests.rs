@@ -3,12 +3,12 @@
 use super::*;
 
 /// Returns a folder, and the ticks of a path of (t_s, x_mm) in it.
-fn ticks_of(text: &str, pace: Pace, tick_hz: u32) -> (tempfile::TempDir, Ticks) {
+fn ticks_of(text: &str, pace: Pace, tick_hz: u32) -> (tempfile::TempDir, TrajectoryTicks) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");
     std::fs::write(&path, text).expect("written");
     let trajectory = Trajectory::open(&path).expect("a trajectory");
-    (folder, Ticks::new(trajectory, pace, tick_hz))
+    (folder, TrajectoryTicks::new(trajectory, pace, tick_hz))
 }
 
 /// Returns a path along x; the times are written unchanged.
@@ -18,7 +18,7 @@ fn path(rows: &[(&str, f64)]) -> String {
 }
 
 /// Returns time and x of each tick.
-fn read(ticks: &mut Ticks) -> Result<Vec<(f64, f64)>, String> {
+fn read(ticks: &mut TrajectoryTicks) -> Result<Vec<(f64, f64)>, String> {
     let mut all = Vec::new();
     while let Some(tick) = ticks.next_tick().map_err(|error| error.to_string())? {
         assert_eq!((tick.hip_mm[1], tick.hip_mm[2]), (7.0, -1.0));
