@@ -338,6 +338,7 @@ mod tests {
         assert_eq!(entries(), 1);
     }
 
+    /// Safety: 27.
     #[test]
     fn recording_that_cannot_grow_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -31,6 +31,7 @@ pub mod socket_device;
 mod terrain_file;
 pub mod tiffs;
 pub mod timeouts;
+pub mod traceability;
 pub mod usb;
 pub mod whole_field;
 

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use hapterra_tests::figures::{check, renewed};
-use hapterra_tests::repository;
+use hapterra_tests::{repository, traceability};
 
 /// Longest line of a page, characters.
 const MAX_LINE: usize = 120;
@@ -52,6 +52,19 @@ fn figures_on_the_pages_are_those_of_the_tables() {
     }
     let command = "to renew the figures: cargo xtask docs --write";
     assert!(stale.is_empty(), "{}\n{command}", stale.join("\n"));
+}
+
+#[test]
+fn page_of_the_evidence_lists_the_marked_tests() {
+    let path = repository().join("docs/contributing/traceability.md");
+    let marked = traceability::evidence(repository()).expect("marked tests");
+    let page = traceability::page(&marked);
+    if std::env::var("HAPTERRA_DOCS").is_ok_and(|mode| mode == "write") {
+        std::fs::write(&path, &page).expect("the page can be written");
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    let command = "to renew the page: cargo xtask docs --write";
+    assert!(written == page, "{} is old\n{command}", path.display());
 }
 
 /// Returns the text without its blocks of code.

@@ -365,6 +365,7 @@ fn check_entry_limits(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 
     }
 }
 
+/// Safety: 14.
 #[test]
 fn force_ramps_up_without_swing_or_energy_gain() {
     let all = |hz| (hz, 4.0, 4.0);
@@ -377,6 +378,7 @@ fn force_ramps_up_cleanly_with_one_millisecond_delay() {
     check_entry_limits(1.0, LONG_S, [1000, 2000, 4000, 10_000].map(all));
 }
 
+/// Safety: 14.
 #[test]
 fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
     let little = [

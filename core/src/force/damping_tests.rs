@@ -97,6 +97,7 @@ fn created_mj_with(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
     [at_rest.unwrap_or_default(), at(100, -1.5, 0.5)]
 }
 
+/// Safety: 14.
 #[test]
 fn ramp_and_clutch_record_only_energy_of_the_motion() {
     let share = |tick: u16| 0.01 * f32::from(tick.min(50) + 1);
@@ -127,6 +128,7 @@ fn ramp_and_clutch_record_only_energy_of_the_motion() {
     assert!((at_rest - 0.5 * 0.5 * 4.0).abs() < 1e-5, "{at_rest} mJ");
 }
 
+/// Safety: 14.
 #[test]
 fn damping_scales_with_the_rendered_share_of_the_spring() {
     // Energy created by half of a spring requires as much damping per newton as by all of one.

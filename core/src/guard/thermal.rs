@@ -265,6 +265,8 @@ mod tests {
 
     /// With any motion of a hand, no node exceeds the temperatures that are assumed without
     /// information.
+    ///
+    /// Safety: 12.
     #[test]
     fn derated_motor_never_exceeds_the_hot_start_temperatures() {
         let mut motors = Motors::new(khz(1));
@@ -301,6 +303,7 @@ mod tests {
         assert_eq!(start.housing_k, stored.housing_k);
     }
 
+    /// Safety: 12.
     #[test]
     fn reset_margin_covers_the_heat_of_the_unrecorded_time() {
         let mut motors = Motors::new(khz(1));

@@ -318,6 +318,7 @@ mod tests {
         ),
     ];
 
+    /// Safety: 18, images.
     #[test]
     fn record_beyond_any_model_limit_is_refused() {
         for model in MODELS {
@@ -346,6 +347,7 @@ mod tests {
         }
     }
 
+    /// Safety: 18.
     #[test]
     fn peak_current_above_board_limit_is_refused() {
         let record = Calibration::PREMIUM_1_5;

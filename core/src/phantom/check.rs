@@ -305,6 +305,7 @@ mod tests {
     /// A record with one fault, and the expected message.
     type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
+    /// Safety: 17.
     #[test]
     fn error_names_each_wrong_number() {
         let cases: [Case; 24] = [

@@ -147,6 +147,8 @@ mod tests {
     use super::*;
 
     /// Checks the tables here and in docs/reference/hardware.md.
+    ///
+    /// Safety: images.
     #[test]
     fn premium_1_0_resolution_matches_tables_for_both_ratios() {
         let counts_a_mm = |ratio: Vec3| {

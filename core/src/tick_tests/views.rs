@@ -85,6 +85,7 @@ fn held_clutch_has_no_force_and_shifts_the_terrain() {
     assert!(arm.tick().hip.to(&open.hip).z < -1.0);
 }
 
+/// Safety: 15.
 #[test]
 fn terrain_stays_while_held_for_another_placement() {
     let mut tiles = buffers::<4>();
@@ -120,6 +121,7 @@ fn terrain_stays_while_held_for_another_placement() {
     );
 }
 
+/// Safety: 15.
 #[test]
 fn far_hand_motion_shifts_terrain_in_place_mode() {
     let mut tiles = buffers::<4>();
@@ -233,6 +235,7 @@ fn clutch_released_early_opens_fully_then_closes() {
     assert!(arm.last.sample.force_n.z > 2.0);
 }
 
+/// Safety: 15.
 #[test]
 fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     let mut tiles = buffers::<4>();
@@ -304,6 +307,7 @@ fn eight_placements_in_a_row_make_no_force_step() {
     }
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_stays_open_until_a_placement_has_its_tiles() {
     let mut tiles = buffers::<4>();
@@ -347,6 +351,7 @@ fn placement_during_contact_disarms_as_another_scene_does() {
     assert!((now.sample.force_n - before).length() < 0.1);
 }
 
+/// Safety: 15.
 #[test]
 fn force_rise_rate_stays_bounded_under_random_commands() {
     let mut tiles = buffers::<4>();
@@ -379,6 +384,7 @@ fn force_rise_rate_stays_bounded_under_random_commands() {
     assert!(rise_n <= max, "{rise_n} N came in, {max} at most");
 }
 
+/// Safety: 15.
 #[test]
 fn held_clutch_does_not_allow_arming_inside_the_ground() {
     let mut tiles = buffers::<4>();

@@ -77,6 +77,7 @@ fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
     from + 100 * ticks
 }
 
+/// Safety: 35.
 #[test]
 fn arm_is_monitored_in_every_tick_of_a_replay() {
     let (mut haptic_loop, mut link_ends) = looped(Source::Encoders);
@@ -230,6 +231,7 @@ fn debounced_clutch_input_opens_the_clutch() {
     assert_eq!(limits(2, false), Limits::CLUTCH_MOVES);
 }
 
+/// Safety: 7.
 #[test]
 fn refused_scene_leaves_nothing_to_render() {
     for source in [Source::Encoders, Source::Points] {

@@ -147,6 +147,7 @@ mod tests {
         assert_eq!(timing.late, 2);
     }
 
+    /// Safety: 42.
     #[test]
     fn gap_is_detected_above_one_and_a_half_periods() {
         let mut timing = Timing::new::<Fake>();

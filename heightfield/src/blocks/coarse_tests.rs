@@ -256,6 +256,7 @@ fn same(one: &[f64], other: &[f64]) {
     assert_eq!(bits(one), bits(other));
 }
 
+/// Safety: 29.
 #[test]
 fn nonblocking_read_loads_coarse_level_in_background() {
     let reader_state = ReaderState::new("");
@@ -278,6 +279,7 @@ fn nonblocking_read_loads_coarse_level_in_background() {
     assert!(!threads.is_empty() && !threads.contains(&this));
 }
 
+/// Safety: 29.
 #[test]
 fn nonblocking_read_loads_fine_block_in_background() {
     let reader_state = ReaderState::new("");

@@ -275,6 +275,7 @@ mod tests {
         });
     }
 
+    /// Safety: 30.
     #[test]
     fn stuck_reader_delays_no_other_reader_and_gets_drop_count() {
         let server = Server::listen(0).expect("listens");
@@ -309,6 +310,7 @@ mod tests {
         assert!(server.end() >= notice.load(Ordering::Acquire));
     }
 
+    /// Safety: 30.
     #[test]
     fn full_queue_drops_and_counts_lines_without_blocking() {
         let (lines, _waiting) = sync_channel(2);

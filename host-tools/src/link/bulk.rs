@@ -148,6 +148,7 @@ mod tests {
         assert!(!is_hapterra(VENDOR_ID, 0x0002, Some(PRODUCT)));
     }
 
+    /// Safety: 34.
     #[test]
     fn selection_among_several_boards_needs_a_unique_serial() {
         let serials = ["0039001A", "0039001B"].map(|serial| Some(serial.to_owned()));

@@ -412,6 +412,7 @@ mod tests {
         assert_eq!(known, Some(Calibration::PREMIUM_1_5));
     }
 
+    /// Safety: 32.
     #[test]
     fn read_only_session_is_not_recorded_as_a_host() {
         let mut device = Native::for_replay().free_running();
@@ -468,6 +469,7 @@ mod tests {
         }
     }
 
+    /// Safety: 32.
     #[test]
     fn repeated_old_answers_are_not_mistaken_for_new_ones() {
         let device = Late(Native::for_replay().free_running(), vec![]);
@@ -561,6 +563,7 @@ mod tests {
         }
     }
 
+    /// Safety: 26.
     #[test]
     fn unconfirmed_close_is_an_error_within_bounded_time() {
         let timeout = Duration::from_millis(300);

@@ -235,6 +235,7 @@ fn finished_run_closes_the_session_or_reports_no_confirmation() {
     assert_eq!(bench.last_end(), SessionEnd::Replaced);
 }
 
+/// Safety: 26.
 #[test]
 fn panic_closes_the_session_or_warns_the_user() {
     for deaf in [false, true] {
@@ -251,6 +252,7 @@ fn panic_closes_the_session_or_warns_the_user() {
     }
 }
 
+/// Safety: 26.
 #[test]
 fn failed_start_closes_the_session_or_warns_the_user() {
     for deaf in [false, true] {
@@ -339,6 +341,7 @@ fn close_during_an_outage_is_sent_after_it() {
     }
 }
 
+/// Safety: 32.
 #[test]
 fn losing_the_device_warns_of_an_armed_arm() {
     let bench = Bench::new();

@@ -91,6 +91,7 @@ fn writes_a_file(path: &Path) -> Vec<u8> {
     image(&code(block), &reported(b'R'), &reported(b'F'), &data)
 }
 
+/// Safety: images.
 #[test]
 fn emulated_image_cannot_access_host_files() {
     let Some(qemu) = qemu() else { return };

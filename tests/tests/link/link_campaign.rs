@@ -4,6 +4,7 @@ use hapterra_tests::link_campaign::fault::Kind;
 use hapterra_tests::link_campaign::{SEED, report, run};
 use hapterra_tests::newest_log;
 
+/// Safety: 48.
 #[test]
 fn link_faults_change_no_force_never_hang_and_are_reported() {
     let stats = run(SEED, 60, &mut |_, _| {}).expect("no violation");

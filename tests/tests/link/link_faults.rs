@@ -125,6 +125,7 @@ impl Transport for Tap {
     }
 }
 
+/// Safety: images.
 #[test]
 fn telemetry_that_is_lost_is_counted() {
     let raster = fractal();

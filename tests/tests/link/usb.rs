@@ -116,6 +116,7 @@ fn invalid_control_request_stalls_and_next_one_is_answered() {
     }
 }
 
+/// Safety: 33.
 #[test]
 fn halting_a_missing_endpoint_has_no_effect() {
     let (mut board, _) = enumerated();

@@ -4,6 +4,7 @@ use hapterra_tests::campaign::fault_kind::Kind;
 use hapterra_tests::campaign::{SEED, report, run};
 use hapterra_tests::newest_log;
 
+/// Safety: 38, 48, response times.
 #[test]
 fn guard_bounds_hold_under_every_injected_fault() {
     let stats = run(SEED, 60, &mut |_, _| {}).expect("no violation");

@@ -219,6 +219,7 @@ fn found_of_the_board(mistakes: BenchMistakes) -> (Step, Finding) {
     found(wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
 }
 
+/// Safety: images, bring-up.
 #[test]
 fn wrong_tick_rate_of_the_board_is_named() {
     for clock_slow_by in [0.05, -0.05, 0.5, -1.0] {
@@ -243,6 +244,7 @@ fn wrong_tick_rate_of_the_board_is_named() {
     assert_eq!(step, Step::Outputs);
 }
 
+/// Safety: images, bring-up.
 #[test]
 fn unlocked_usb_clock_is_named() {
     let unlocked = BenchMistakes {
@@ -253,6 +255,7 @@ fn unlocked_usb_clock_is_named() {
     assert_eq!(found, (Step::Board, Finding::UsbClockUnlocked));
 }
 
+/// Safety: 16, bring-up.
 #[test]
 fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     // On an arm without weight, the other joints keep their positions.
@@ -284,6 +287,7 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn wrongly_scaled_amplifier_is_named() {
     for (gain, axis, step) in [(0.4, 0, Step::Motor1), (2.0, 1, Step::Motor2)] {
@@ -303,6 +307,7 @@ fn wrongly_scaled_amplifier_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn wrong_gravity_record_is_named() {
     // It is detected before the arm is as fast as in a jog: `run_bringup` checks that.
@@ -318,6 +323,7 @@ fn wrong_gravity_record_is_named() {
     }
 }
 
+/// Safety: 16, bring-up.
 #[test]
 fn swapped_motors_are_named() {
     let (step, finding) = found_from(Step::Motor1, wired(Wiring::RIGHT.swapped(1, 2)), RECORD);
@@ -325,6 +331,7 @@ fn swapped_motors_are_named() {
     assert_eq!(finding, Finding::SwappedMotors { motor: 2, joint: 3 });
 }
 
+/// Safety: 16, bring-up.
 #[test]
 fn inverted_motor_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
@@ -341,6 +348,7 @@ fn inverted_motor_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn dead_encoder_is_named() {
     for axis in 0..3 {
@@ -351,6 +359,7 @@ fn dead_encoder_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn wrong_ratio_is_named() {
     let mut model = PhantomModel::premium_1_5();
@@ -373,6 +382,7 @@ fn found_at(from: Step, mistakes: BenchMistakes) -> (Step, Finding) {
     found_from(from, wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
 }
 
+/// Safety: bring-up.
 #[test]
 fn miswired_emergency_stop_is_named() {
     let normally_open = BenchMistakes {
@@ -393,6 +403,7 @@ fn miswired_emergency_stop_is_named() {
     );
 }
 
+/// Safety: bring-up.
 #[test]
 fn enable_line_without_pull_down_is_named() {
     let floats = BenchMistakes {
@@ -406,6 +417,7 @@ fn enable_line_without_pull_down_is_named() {
     );
 }
 
+/// Safety: bring-up.
 #[test]
 fn grounded_ready_input_is_named() {
     for axis in 0..3 {
@@ -418,6 +430,7 @@ fn grounded_ready_input_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn output_offset_is_named_at_the_amplifier_input() {
     for axis in 0..3 {
@@ -441,6 +454,7 @@ fn output_offset_is_named_at_the_amplifier_input() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn missing_amplifier_is_named_before_any_motor() {
     for axis in 0..3 {
@@ -478,6 +492,7 @@ fn amplifiers_without_ready_lines_are_noted() {
     );
 }
 
+/// Safety: bring-up.
 #[test]
 fn motor_without_push_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]

@@ -114,6 +114,8 @@ fn calibration_record_round_trips_through_a_file() {
 }
 
 /// A Premium 1.0's ratios have no source: a record without measured ratios needs explicit consent.
+///
+/// Safety: images.
 #[test]
 fn guessed_ratios_need_measurement_or_explicit_consent() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];

@@ -377,6 +377,8 @@ fn demo_emits_samples_marks_and_refusals() {
 }
 
 /// The program that sends commands has ended, with more commands than the device can still execute.
+///
+/// Safety: 28.
 #[test]
 fn run_ends_disarmed_when_its_input_ends() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -422,6 +424,8 @@ fn run_ends_disarmed_when_its_input_ends() {
 }
 
 /// A real arm is zeroed only by the answer to the right question.
+///
+/// Safety: 28.
 #[test]
 fn enter_answers_the_question_of_its_number() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -252,6 +252,7 @@ fn remaining_press_share() -> f32 {
     (1.0 / STIFFNESS) / (compliance_mm_per_n + 1.0 / STIFFNESS)
 }
 
+/// Safety: 15.
 #[test]
 fn force_makes_no_step_while_zooming_through_eight_levels() {
     let raster = hills();
@@ -277,6 +278,7 @@ fn force_makes_no_step_while_zooming_through_eight_levels() {
     });
 }
 
+/// Safety: 15.
 #[test]
 fn force_makes_no_step_while_panning_and_scaling() {
     let raster = hills();
@@ -424,6 +426,7 @@ fn tip_command_during_contact_causes_no_force_step() {
     });
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_carries_the_terrain_with_the_hand() {
     let raster = hills();

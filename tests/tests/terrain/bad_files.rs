@@ -238,6 +238,8 @@ fn damaged_copies_of_good_files_never_panic() {
 }
 
 /// Opening a pipe waits for a writer, so it must be refused by its type before.
+///
+/// Safety: 29.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_unopened() {

@@ -66,6 +66,7 @@ fn impossible_arm_request_is_refused_with_its_reason() {
     assert_eq!(rig.answers(|r| matches!(r, Request::DropScene)), [Ok(())]);
 }
 
+/// Safety: 5.
 #[test]
 fn fault_is_latched_reported_and_cleared_on_request() {
     let mut rig = Rig::armed();
@@ -97,6 +98,7 @@ fn fault_is_latched_reported_and_cleared_on_request() {
     rig.arm();
 }
 
+/// Safety: 33.
 #[test]
 fn settings_do_not_change_while_armed() {
     let mut rig = Rig::armed();
@@ -154,6 +156,7 @@ fn calibration_is_checked_applied_and_stored() {
     }
 }
 
+/// Safety: 18, images.
 #[test]
 fn calibration_store_times_out_without_deadman_press() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -182,6 +185,7 @@ fn calibration_change_is_refused_while_store_awaits_press() {
     assert_eq!(rig.answers(TO_SET), [Err(Refusal::Busy)]);
 }
 
+/// Safety: 18.
 #[test]
 fn press_for_another_host_or_to_arm_stores_nothing() {
     let before = Stored::Found(Calibration::PREMIUM_1_5);
@@ -217,6 +221,8 @@ fn clock_does_not_stop_while_a_press_is_awaited() {
 
 /// A record's limits do not justify its own values: each value is refused by name when the record
 /// is set and when it is found at the start.
+///
+/// Safety: 18.
 #[test]
 fn record_above_absolute_limit_is_refused_and_raises_fault() {
     type Case = (fn(&mut Calibration), CalibrationField);
@@ -357,6 +363,7 @@ fn clock_keeps_running_while_force_fades_out() {
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
 }
 
+/// Safety: 39.
 #[test]
 fn stalled_link_task_disables_output_within_forty_ms() {
     let mut rig = Rig::armed();

@@ -57,6 +57,7 @@ fn host_of_another_protocol_does_not_end_a_session() {
     assert_eq!(rig.refused.len(), 1);
 }
 
+/// Safety: 32.
 #[test]
 fn messages_of_another_session_are_ignored() {
     let mut rig = Rig::armed();
@@ -104,6 +105,7 @@ fn repeated_hello_changes_nothing() {
     assert_eq!(rig.answers(|r| matches!(r, Request::Disarm)), [Ok(()); 2]);
 }
 
+/// Safety: 32.
 #[test]
 fn open_of_previous_session_is_answered_as_replaced() {
     let mut rig = Rig::armed();
@@ -137,6 +139,7 @@ fn open_of_previous_session_is_answered_as_replaced() {
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
 }
 
+/// Safety: 25.
 #[test]
 fn session_closed_answers_silent_host_but_not_departed_host() {
     let mut rig = Rig::armed();
@@ -168,6 +171,7 @@ fn session_closed_answers_silent_host_but_not_departed_host() {
     assert_eq!(closed(&mut rig, 7), []);
 }
 
+/// Safety: 32.
 #[test]
 fn duplicate_request_is_executed_once() {
     let mut rig = Rig::armed();
@@ -203,6 +207,7 @@ fn numbers_of_requests_wrap_around() {
     assert_eq!(rig.received.iter().filter(answers).count(), 600);
 }
 
+/// Safety: 25, response times.
 #[test]
 fn host_silence_disarms_after_host_time_out() {
     let mut rig = Rig::armed();
@@ -235,6 +240,7 @@ fn host_silence_disarms_after_host_time_out() {
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
 }
 
+/// Safety: 32.
 #[test]
 fn read_only_host_opens_no_session_and_keeps_none_armed() {
     let mut rig = Rig::armed();
@@ -341,6 +347,7 @@ fn open_and_detach(rig: &mut Rig, silence_s: u16) {
     }
 }
 
+/// Safety: 25.
 #[test]
 fn detached_sessions_keep_arm_armed_and_last_report_intact() {
     let mut rig = Rig::armed();
@@ -371,6 +378,7 @@ fn detached_sessions_keep_arm_armed_and_last_report_intact() {
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
 }
 
+/// Safety: 25.
 #[test]
 fn silence_after_detach_disarms_after_time_out() {
     let mut rig = Rig::armed();
@@ -407,6 +415,7 @@ fn detached_host_arms_nothing_and_later_close_disarms() {
     assert_eq!(opened_by_new_host(&mut rig).last.end, SessionEnd::Goodbye);
 }
 
+/// Safety: 32.
 #[test]
 fn pending_arm_request_ends_with_its_session() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -466,6 +475,7 @@ fn repeated_close_gets_same_answer_and_ends_requests() {
     assert_eq!(rig.answers(|r| matches!(r, Request::Arm)).len(), 1);
 }
 
+/// Safety: images.
 #[test]
 fn damaged_frames_trigger_no_repeated_tile_requests() {
     let mut rig = Rig::with_unanswered_tiles(scene(Source::Encoders));
@@ -610,6 +620,7 @@ fn zero_byte_before_hello_ends_an_unfinished_frame() {
     assert!(matches!(rig.received[0], ToHost::Hello(_)));
 }
 
+/// Safety: 33.
 #[test]
 fn session_continues_after_garbage() {
     let mut rig = Rig::in_scene(scene(Source::Points));
@@ -753,6 +764,7 @@ fn missing_tile_is_requested_again_after_two_heartbeats() {
     assert!(!rig.device.link.may_stop_clock(), "time continues");
 }
 
+/// Safety: 33.
 #[test]
 fn flooding_host_is_throttled_without_loss() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -769,6 +781,7 @@ fn flooding_host_is_throttled_without_loss() {
     assert_eq!(rig.received.iter().filter(accepted).count(), 501);
 }
 
+/// Safety: 25.
 #[test]
 fn dead_man_press_without_live_host_neither_arms_nor_stores() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));

@@ -98,6 +98,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     );
 }
 
+/// Safety: 15.
 #[test]
 fn placement_during_contact_is_refused() {
     let mut rig = Rig::armed();
@@ -142,6 +143,7 @@ fn placement_during_contact_is_refused() {
     assert_eq!(latest(&rig).mode, Mode::Armed);
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_hold_ends_with_the_session_of_its_host() {
     let closed = |rig: &mut Rig| {

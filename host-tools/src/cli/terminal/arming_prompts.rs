@@ -350,6 +350,7 @@ mod tests {
         result: Err(Refusal::Blocked(Blockers::NOT_ZEROED)),
     };
 
+    /// Safety: 6.
     #[test]
     fn enter_before_the_question_is_no_answer() {
         let (press, mut prompts) = with_user();
@@ -368,6 +369,7 @@ mod tests {
         assert_eq!(prompts.requests(), []);
     }
 
+    /// Safety: 28.
     #[test]
     fn answer_counts_for_the_question_it_names() {
         let mut prompts = ArmingPrompts::listening(NoEnter);
@@ -385,6 +387,7 @@ mod tests {
         assert_eq!(prompts.requests(), [HostRequest::Status]);
     }
 
+    /// Safety: 6.
     #[test]
     fn enter_pressed_before_a_fault_is_shown_does_not_clear_it() {
         let (press, mut prompts) = with_user();
@@ -406,6 +409,7 @@ mod tests {
         assert_eq!(prompts.requests(), expected);
     }
 
+    /// Safety: 6.
     #[test]
     fn enter_arms_a_device_that_resumes_disarmed() {
         let (press, mut prompts) = with_user();

@@ -144,6 +144,7 @@ fn read(typed: &SyncSender<String>, is_typed: bool) {
 mod tests {
     use super::*;
 
+    /// Safety: 6.
     #[test]
     fn forget_typed_drops_typed_answers_but_not_piped_lines() {
         let (typed, lines) = sync_channel(MAX_WAITING);

@@ -213,6 +213,7 @@ mod tests {
         Pressed::Key(Key::Char(key))
     }
 
+    /// Safety: 34.
     #[test]
     fn enter_reaches_only_the_device_named_right_before() {
         let device_keys = two();

@@ -86,6 +86,7 @@ fn drain(machine: &mut Machine) {
     }
 }
 
+/// Safety: 33, images.
 #[test]
 fn clearing_no_halt_only_resets_the_toggle() {
     for mut machine in machines() {
@@ -109,6 +110,7 @@ fn clearing_no_halt_only_resets_the_toggle() {
     }
 }
 
+/// Safety: 33.
 #[test]
 fn halted_endpoint_refuses_until_the_halt_is_cleared() {
     for mut machine in machines() {
@@ -169,6 +171,7 @@ fn second_configuration_resets_the_toggles() {
     }
 }
 
+/// Safety: 33, images.
 #[test]
 fn clearing_halts_costs_a_frame_but_no_session() {
     let (raster, home_mm) = rough_ground();

@@ -131,6 +131,7 @@ fn only_known_functions_mask_all_interrupts() {
     }
 }
 
+/// Safety: 38.
 #[test]
 fn tick_is_not_delayed_by_critical_sections_or_interrupts() {
     let (raster, home_mm) = rough_ground();

@@ -17,6 +17,7 @@ fn max_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
     steps.fold(0.0, f32::max)
 }
 
+/// Safety: 25, response times.
 #[test]
 fn force_fades_at_edge_of_stored_tiles_after_host_leaves() {
     // Cells of a quarter of a millimetre: a tile is 8 mm, so the hand leaves the stored tiles.
@@ -71,6 +72,7 @@ fn force_fades_at_edge_of_stored_tiles_after_host_leaves() {
     eprintln!("limits: {why:?}");
 }
 
+/// Safety: 25, response times.
 #[test]
 fn closing_ramps_the_force_down_and_disarms() {
     let raster = plane();

@@ -72,6 +72,7 @@ fn permanent_server_error_names_file_and_reason() {
     }
 }
 
+/// Safety: 29.
 #[test]
 fn long_error_page_is_not_read_to_its_end() {
     let (_folder, server) = hills();
