@@ -13,6 +13,9 @@ use super::trial::{Trial, Verdict};
 
 /// Controllers, with their names in the header.
 const CONTROLLERS: [(Controller, &str); 2] = [(Controller::Off, "off"), (Controller::On, "on")];
+/// Softest surface whose ramps count, N/mm: on a softer one a good press also settles by more than
+/// the permitted swing.
+const SOFTEST_RAMP_N_PER_MM: f64 = 0.5;
 /// Surface and grasp of the taps without the controller, N/mm.
 const TAPPED_N_PER_MM: f64 = 1.0;
 /// Stiffnesses up to which the largest energy of a tap with the controller is listed, N/mm.
@@ -21,8 +24,8 @@ const TAPPED_UP_TO_N_PER_MM: [f64; 2] = [2.0, 6.0];
 impl Map {
     /// Writes the limits as CSV, with a header. Stiffnesses in N/mm: up to which a press is still
     /// and up to which it has at most a limit cycle, by controller and grasp; up to which a ramp of
-    /// the force is good in a light grasp with the controller, after arming and as the clutch
-    /// closes. Energies in mJ: of a tap at 1 N/mm in a normal grasp without the controller, by
+    /// the force is good in a light grasp with the controller, from 0.5 N/mm, after arming and as
+    /// the clutch closes. Energies in mJ: of a tap at 1 N/mm in a normal grasp without the controller, by
     /// speed; the largest of all taps up to 2 and 6 N/mm with it.
     ///
     /// # Errors
@@ -76,7 +79,8 @@ impl Map {
             }
         }
         for entry in [Entry::Ramp, Entry::Clutch] {
-            let trials = of(Controller::On, Some(Grasp::Light));
+            let trials = of(Controller::On, Some(Grasp::Light))
+                .filter(|it| it.setting.stiffness_n_per_mm >= SOFTEST_RAMP_N_PER_MM);
             let is_good =
                 |trial: &Trial| trial.entries[entry as usize].is_some_and(|it| it.is_good());
             cells.push(stiffness_while(trials, is_good));
