@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use hapterra::cli::options::quantity::{DAMPING, FREQUENCY, STIFFNESS, TIME};
 use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
 use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, OrHint as _, report};
 use hapterra::output::{Output, OutputError};
+use hapterra::quantity::{DAMPING, FREQUENCY, STIFFNESS, TIME};
 use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 

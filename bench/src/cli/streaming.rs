@@ -1,7 +1,7 @@
 //! `hapterra-lab streaming`: what terrain larger than memory costs.
 
 use hapterra::cli::Failure;
-use hapterra::cli::options::quantity::TIME;
+use hapterra::quantity::TIME;
 
 use super::files::{self, Files, spinner};
 use crate::report;
