@@ -429,7 +429,7 @@ fn calibration_file_is_text_and_printed_by_show() {
         "none",
         "--no-store",
     ];
-    let set = ["--set", "l1-mm=215", "-o", &arm];
+    let set = ["--set", "l1=215mm", "-o", &arm];
     folder.runs(&[&native[..], &set].concat());
     let text = folder.read("arm.toml");
     assert!(text.contains("l1_mm = 215.0"), "{text}");
