@@ -401,7 +401,7 @@ fn commands_refuse_to_overwrite_sidecars_of_their_input() {
         for arguments in [
             &["replay", &terrain, &input, "-o", &output][..],
             &[&["run", &terrain, "--out", &output], &native[..]].concat(),
-            &["view", &input, &terrain, "--rrd", &output],
+            &["view", &input, &terrain, "-o", &output],
         ] {
             let reported = folder.fails(arguments);
             assert!(reported.contains("it is the input"), "{beside}: {reported}");
