@@ -136,15 +136,19 @@ fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTre
     }
 }
 
-/// Returns the texts of all arguments, each with the names of the commands that have it.
-fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, Vec<&'c str>> {
+/// Returns the texts of all arguments of the programs, each with the names of the commands that
+/// have it; a command of another program than the first has the program's name before its own.
+fn texts(programs: &[Command]) -> BTreeMap<String, Vec<String>> {
     let mut texts = BTreeMap::<_, Vec<_>>::new();
-    for command in commands {
-        for arg in own(command) {
-            texts
-                .entry(about(arg))
-                .or_default()
-                .push(command.get_name());
+    for (number, program) in programs.iter().enumerate() {
+        for command in program.get_subcommands() {
+            let name = match number {
+                0 => command.get_name().to_owned(),
+                _ => format!("{} {}", program.get_name(), command.get_name()),
+            };
+            for arg in own(command) {
+                texts.entry(about(arg)).or_default().push(name.clone());
+            }
         }
     }
     texts
@@ -170,10 +174,7 @@ fn command_line_is_that_of_the_programs() {
     ];
     let is_option = |text: &&String| text.starts_with("`-");
     // Besides them --verbose, --help and --version.
-    let all = 3 + texts(programs[0].get_subcommands())
-        .keys()
-        .filter(is_option)
-        .count();
+    let all = 3 + texts(&programs[..1]).keys().filter(is_option).count();
     let mut run = programs[0]
         .find_subcommand("run")
         .expect("a command")
@@ -191,7 +192,7 @@ fn command_line_is_that_of_the_programs() {
          | options in `hapterra run -h` | {listed} |\n\
          | lines of `hapterra run -h` | {lines} |\n"
     );
-    let mut shared = texts(programs.iter().flat_map(Command::get_subcommands));
+    let mut shared = texts(&programs);
     shared.retain(|_, commands| commands.len() > 1);
     page += "\n## Options of several commands\n\n";
     for (text, commands) in &shared {

@@ -134,7 +134,7 @@ fn page_shows_live_scene_and_plots_without_foreign_requests() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, address) = Session::start("--linger 0");
+    let (mut session, address) = Session::start("--linger 0s");
     let page = browser.open(&address);
     let mut feed_samples = || session.feed_samples(200);
     let (terrain, plots) = shown(&mut browser, &page, &mut feed_samples, is_whole);
@@ -182,7 +182,7 @@ fn oversized_page_reloads_and_continues() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, address) = Session::start("--linger 0 --page-mb 64");
+    let (mut session, address) = Session::start("--linger 0s --page 64MB");
     let page = browser.open(&address);
     let mut until = |condition: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + HANG;
@@ -230,7 +230,7 @@ fn page_shows_live_contact_on_the_emulated_board() {
         .arg(format!("--device=emulated:{}", image.display()))
         .arg("--out")
         .arg(&folder);
-    let mut demo = Running::start_with_viewer(&mut demo, &format!("--rrd {}", live.display()));
+    let mut demo = Running::start_with_viewer(&mut demo, &format!("-o {}", live.display()));
     let address = demo.address();
     let page = browser.open(&address);
     let mut is_touched = || {
@@ -272,7 +272,7 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let mut viewer = Viewer::start("--linger 0");
+    let mut viewer = Viewer::start("--linger 0s");
     let begin = [greeting(), scene(true), layer()];
     for message in begin.iter().chain(&tiles_around([2, 2])) {
         assert!(viewer.send(message));

@@ -20,7 +20,7 @@ fn synth(file: &Path, size: &str) {
 
 /// Returns the option that also writes the display to a file.
 fn rrd(into: &Path) -> String {
-    format!("--rrd {}", into.display())
+    format!("-o {}", into.display())
 }
 
 #[test]

@@ -19,6 +19,8 @@ struct Line {
     text: String,
     /// True in a block: a whole line, to be typed unchanged.
     is_block: bool,
+    /// Text that `printf` before it writes to its standard input.
+    input: Option<String>,
 }
 
 fn pages() -> Vec<PathBuf> {
@@ -44,13 +46,21 @@ fn lines(page: &Path, text: &str) -> Vec<Line> {
         page: page.to_owned(),
         text: text.trim().trim_start_matches("$ ").to_owned(),
         is_block,
+        input: None,
+    };
+    let piped = |printf: &str, text: &str| Line {
+        input: shlex::split(printf).and_then(|words| Some(words.get(1)?.replace("\\n", "\n"))),
+        ..line(text, true)
     };
     let (mut found, mut is_code) = (vec![], false);
     for written in text.replace("\\\n", " ").lines() {
         if written.starts_with("```") {
             is_code = !is_code;
         } else if is_code || written.starts_with("    ") {
-            found.push(line(written, true));
+            found.push(match written.trim().split_once(" | ") {
+                Some((printf, text)) if printf.starts_with("printf ") => piped(printf, text),
+                _ => line(written, true),
+            });
         } else {
             found.extend(
                 written
@@ -217,7 +227,8 @@ fn wrong_lines_are_found() {
                 cargo xtask view --tset\ncargo install --locked --path no/where\n```\n\
                 Text with `hapterra stability`, `cargo run -p nothing` and `cargo run -r -p hapterra-tests`.\n";
     let right = "```sh\nhapterra info FILE --json  # a comment\nhapterra run FILE --device \\\n  native\n\
-                 cargo xtask test -- --test link\ncargo install --locked --path host-tools\n```\n\
+                 cargo xtask test -- --test link\ncargo install --locked --path host-tools\n\
+                 printf 'mark a\\n' | hapterra run FILE --commands -\n```\n\
                  Text with `hapterra run`, `hapterra.read()` and `cargo run -r -p hapterra-lab -- synth`.\n";
     let found = |text: &str| {
         let lines = lines(Path::new("page.md"), text);
@@ -227,5 +238,7 @@ fn wrong_lines_are_found() {
         )
     };
     assert_eq!(found(page), (8, 8));
-    assert_eq!(found(right), (6, 0));
+    assert_eq!(found(right), (7, 0));
+    let piped = lines(Path::new("page.md"), right).remove(4);
+    assert_eq!(piped.input.as_deref(), Some("mark a\n"));
 }

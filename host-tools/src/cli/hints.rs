@@ -222,7 +222,7 @@ impl Hint for ProcedureError<LinkError> {
                 "move the tip by 80 mm or so in each direction; if you did, check that joint's encoder cable"
             }
             Self::Fit(FitError::NoRatios { .. }) => {
-                "measure again, along the ruler and in the requested direction; check the link lengths with --set l1-mm=… and --set l2-mm=…"
+                "measure again, along the ruler and in the requested direction; check the link lengths with --set l1=… and --set l2=…"
             }
             Self::Fit(FitError::NoWeight { .. }) => {
                 "hold the arm in more different poses, or leave gravity out with --measure zero,ratios"

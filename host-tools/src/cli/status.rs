@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long)]
     pub clear: bool,
 
-    /// Disarm: force goes out within a tenth of a second
+    /// Disarm: the force falls to zero within a tenth of a second
     #[arg(long)]
     pub disarm: bool,
 

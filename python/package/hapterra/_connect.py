@@ -355,7 +355,7 @@ class Device:
 
     def command(self, line: str) -> None:
         """Sends a command of ``hapterra run`` that changes the placement, such as "zoom 2" or
-        "pan 5 0", and waits until it is done. Raises DeviceError if it is refused. "reset" sets
+        "pan 5mm 0mm", and waits until it is done. Raises DeviceError if it is refused. "reset" sets
         ``params`` to the loaded values; commands of the surface are refused."""
         first = [*line.partition("#")[0].split(), ""][0]
         if first in _REPLACEMENTS:

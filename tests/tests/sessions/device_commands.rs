@@ -152,9 +152,9 @@ fn record_above_absolute_limit_is_refused_before_sending() {
         "--set",
     ];
     for (setting, part) in [
-        ("peak-a-1=20", "5.5 A"),
-        ("max-force-n=20", "8.5 N"),
-        ("torque-constant-2=0.005", "check the ratio"),
+        ("peak-current-1=20A", "5.5 A"),
+        ("max-force=20N", "8.5 N"),
+        ("torque-constant-2=5mNm/A", "check the ratio"),
     ] {
         fails(&[&base[..], &[setting]].concat(), 1, &[part, "hint:"]);
     }
@@ -195,9 +195,10 @@ fn wrong_arguments_have_an_error_with_a_remedy() {
             set,
         ]
     };
-    fails(&calibrate("l1-mm=3"), 1, &["30 to 1000 mm", "hint:"]);
-    fails(&calibrate("length=3"), 2, &["l1-mm"]);
-    fails(&calibrate("l1-mm=long"), 2, &["no number"]);
+    fails(&calibrate("l1=3mm"), 1, &["30 to 1000 mm", "hint:"]);
+    fails(&calibrate("length=3"), 2, &["l1, l2"]);
+    fails(&calibrate("l1=long"), 2, &["a number in mm"]);
+    fails(&calibrate("l1-mm=3"), 2, &["l1=215mm"]);
     fails(
         &["calibrate", "--device", "native", "--from", "/no/such"],
         1,

@@ -50,7 +50,7 @@ impl Running {
 
     /// Starts `hapterra` with a viewer that ends with it.
     pub fn start_with_viewer(command: &mut Command, options: &str) -> Self {
-        Self::start(command, &format!("--linger 0 {options}"))
+        Self::start(command, &format!("--linger 0s {options}"))
     }
 
     /// Runs `hapterra` with such a viewer to its end and returns the output of both.

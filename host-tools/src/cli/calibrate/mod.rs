@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub measure: Measure,
 
-    /// File for the record, too, as TOML
+    /// Also write the record to this file, as TOML
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
 

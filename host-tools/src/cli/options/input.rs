@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use super::quantity::{GROUND, MEMORY};
 use crate::cli::failure::{Failure, OrHint};
+use crate::quantity::{GROUND, MEMORY};
 use crate::terrain::HapticCells;
 use heightfield::{
     Encoding, Endian, Fill, OpenOptions, PngChannel, RawLayout, SampleType, metres_in,

@@ -6,7 +6,6 @@ pub mod events;
 pub mod exaggeration;
 pub mod input;
 pub mod placing;
-pub mod quantity;
 pub mod recording;
 pub mod rendering;
 pub mod scale;

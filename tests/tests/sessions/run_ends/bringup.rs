@@ -52,7 +52,7 @@ fn armed(served: &SocketDevice, bench: &Sender<Task>, folder: &Path) -> Child {
     log(served, &file);
     let mut child = Command::new(hapterra_binary())
         .args(["bringup", "--device", &format!("tcp:{}", served.address)])
-        .arg("--log")
+        .arg("-o")
         .arg(file)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
