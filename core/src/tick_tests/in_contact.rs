@@ -1,9 +1,12 @@
 //! Changes of the placement under a pressing hand.
 
+use core::cmp::Ordering;
+
 use super::pressed_arm::{DEEP, PressedArm};
 use super::*;
 use crate::clutch::ClutchMode;
 use crate::contact::Friction;
+use crate::contact::surface::patch::Patch;
 use crate::scene::{ContactMap, SceneChange};
 
 /// Slopes of all directions, up to 20 degrees, with detail of 3 cells.
@@ -119,31 +122,193 @@ fn stays(arm: &mut PressedArm<'_>, view: u8, ticks: usize) {
     }
 }
 
-#[test]
-fn eight_levels_out_and_in_keep_the_force() {
-    fn plane_and_detail(x: i32, y: i32) -> f32 {
-        let (x, y) = (f64::from(x), f64::from(y));
-        (5.5 + 0.2 * (x * 0.7).sin() * (y * 0.6).cos()) as f32
-    }
-    let mut tiles = buffers::<4>();
-    let mut arm = pressed(&mut tiles, plane_and_detail);
-    let mut min = f32::MAX;
-    for (number, level) in (1..=8)
-        .chain((0..8).rev())
-        .enumerate()
-        .map(|(n, l)| (n as u8 + 1, l))
-    {
-        // The same detail in cells at every level: the ground is as rough at each scale.
-        let mut change = arm.zoom(number, level, 0);
-        change.scene.top = 7;
-        arm.change(change, plane_and_detail);
-        for _ in 0..300 {
-            min = min.min(arm.tick().force_n.length());
+/// The coarsest level of [`hills_of_level`].
+const COARSEST: u8 = 8;
+
+/// Hills of every size from 20 cells, in cells of level `L`; level 8 is a field of [`SIZE`] cells.
+fn hills_of_level<const L: u8>(x: i32, y: i32) -> f32 {
+    // Cells of level 8, from the middle of the field.
+    let cell = (f64::from(L) - f64::from(COARSEST)).exp2();
+    let [x, y] = [x, y].map(|at| f64::from(at) * cell - 320.0);
+    let wave = |k: u8| {
+        let long = 20.0 * (f64::from(k) - f64::from(COARSEST)).exp2();
+        0.02 * long * ((x / long).sin() + (y / long).sin())
+    };
+    ((5.5 + (0..=COARSEST).map(wave).sum::<f64>()) / cell) as f32
+}
+
+const HILLS: [fn(i32, i32) -> f32; COARSEST as usize + 1] = [
+    hills_of_level::<0>,
+    hills_of_level::<1>,
+    hills_of_level::<2>,
+    hills_of_level::<3>,
+    hills_of_level::<4>,
+    hills_of_level::<5>,
+    hills_of_level::<6>,
+    hills_of_level::<7>,
+    hills_of_level::<8>,
+];
+
+/// Returns the change between two levels of [`HILLS`], to cells of `cell_mm`: the touched place
+/// stays, and the heights scale with the ground.
+fn rescaled(arm: &PressedArm<'_>, number: u8, [from, level]: [u8; 2], cell_mm: f32) -> SceneChange {
+    let before = arm.device.haptics.scene.expect("a scene");
+    let proxy = arm.last.sample.proxy;
+    // Exact also at 80,000 cells from the origin.
+    let (cell, frac) = (proxy.cell(), proxy.frac());
+    let to = match level.cmp(&from) {
+        Ordering::Less => GridPoint::new(cell.map(|at| 2 * at), 2.0 * frac),
+        Ordering::Equal => proxy,
+        Ordering::Greater => {
+            let odd = Vec3::from_array(cell.map(|at| (at & 1) as f32));
+            GridPoint::new(cell.map(|at| at >> 1), 0.5 * (frac + odd))
         }
-        assert_eq!(arm.last.sample.view, number);
-        assert_eq!(arm.last.sample.limits, Limits::empty());
     }
-    assert!(min > 1.0, "{min} N");
+    .normalised();
+    let size = SIZE << (COARSEST - level);
+    let part = |cells: i32, shift| CoarseTile {
+        first: Cell::new(to.cell()[0] - cells, to.cell()[1] - cells),
+        shift,
+    };
+    SceneChange {
+        number,
+        scene: Scene {
+            epoch: 100 + u32::from(number),
+            level,
+            size: FieldSize::new(size, size),
+            fallback: Some(Fallback {
+                wide: part(512, 5),
+                near: Some(part(64, 2)),
+            }),
+            cell_mm,
+            ..before
+        },
+        hip: to,
+        keeps_tiles: false,
+        in_contact: Some(ContactMap {
+            from: proxy,
+            to,
+            scale: Vec3::splat((f32::from(from) - f32::from(level)).exp2()),
+        }),
+    }
+}
+
+/// Minimum force of a press of some 2.5 N during zooms, N.
+const MIN_HELD_N: f32 = 1.0;
+
+/// Zooms by eight steps in, and by eight out. By factors of 2, the cells under the hand are as
+/// large as before, and each is replaced by four; by factors of 1.5, also the size of a cell in the
+/// hand changes, by 1.5 or 0.75.
+#[test]
+fn zooms_by_eight_steps_in_and_out_keep_the_force() {
+    for factor in [2.0, 1.5] {
+        let mut tiles = buffers::<4>();
+        let mut arm = pressed(&mut tiles, HILLS[usize::from(COARSEST)]);
+        arm.tremor = 2;
+        let first_n = arm.last.sample.force_n.length();
+        // Cells of at least 0.75 mm, as fine as possible.
+        let zoomed = |(level, cell_mm): (u8, f32)| match cell_mm * factor >= 1.5 {
+            true => (level.saturating_sub(1), 0.5 * factor * cell_mm),
+            false => (level, factor * cell_mm),
+        };
+        let zooms = core::iter::successors(Some((COARSEST, 1.0)), |last| Some(zoomed(*last)));
+        let steps: Vec<_> = zooms.take(9).collect();
+        assert_eq!(steps[8].0, if factor == 2.0 { 0 } else { 3 });
+        let (mut least, mut most, mut from) = (f32::MAX, 0.0_f32, COARSEST);
+        let in_and_out = steps[1..].iter().chain(steps[..8].iter().rev());
+        for (n, (level, cell_mm)) in in_and_out.copied().enumerate() {
+            let number = n as u8 + 1;
+            let change = rescaled(&arm, number, [from, level], cell_mm);
+            from = level;
+            arm.change(change, HILLS[usize::from(level)]);
+            for tick in 0..400 {
+                let before_n = arm.last.sample.force_n;
+                let sample = arm.tick();
+                let step = std::format!("zooms by {factor}: step {number}, tick {tick}");
+                let force_n = sample.force_n.length();
+                assert!(force_n > MIN_HELD_N, "{step}: {force_n} N");
+                let slew_n = (sample.force_n - before_n).length();
+                assert!(slew_n <= MAX_SLEW_N, "{step}: {slew_n} N");
+                let never = Limits::CLUTCH_OPEN | Limits::SLEW_LIMITED | Limits::TERRAIN_MISSING;
+                assert!(!sample.limits.intersects(never), "{step}: {sample:?}");
+                (least, most) = (least.min(force_n), most.max(slew_n));
+            }
+            let after = arm.last.sample;
+            assert_eq!((after.view, after.limits), (number, Limits::empty()));
+            let share = after.force_n.length() / first_n;
+            assert!(
+                (share - 1.0).abs() < 0.05,
+                "step {number}: {share} of the press"
+            );
+            let scene = arm.device.haptics.scene.expect("a scene");
+            assert_eq!((scene.level, scene.cell_mm), (level, cell_mm));
+        }
+        std::println!("zooms by {factor}: at least {least} N, at most {most} N in a tick");
+    }
+}
+
+/// Maximum change of the force in a tick that the guard allows, N: 1,000 N/s.
+const MAX_SLEW_N: f32 = 1.0;
+
+/// Documented speed at which the surface blends to tiles that arrive, mm/s
+/// (`docs/how-to/place-and-scale.md`). Not the product's constant, which this value checks.
+const DOCUMENTED_BLEND_MM_S: f32 = 50.0;
+
+/// The height of the rendered surface at a place, mm.
+fn surface_mm(arm: &PressedArm<'_>, at: &GridPoint) -> f32 {
+    let corners = arm.device.haptics.window.corners(at.column());
+    let corners = corners.expect("rendered");
+    let height = Patch::new(corners.heights).height(at.frac().x, at.frac().y);
+    (corners.base as f32 + height) * arm.device.haptics.scene.expect("a scene").cell_mm
+}
+
+/// A zoom to a fallback that is 2 mm too high, or 1 mm too low: the surface under the hand moves by
+/// that distance as its tiles arrive.
+#[test]
+fn surface_under_the_hand_blends_at_the_documented_speed() {
+    let max_mm = DOCUMENTED_BLEND_MM_S / 1_000.0;
+    // Cells of the new placement: of the same ground, finer and of 1 mm, or the same and larger.
+    let zooms: [(i32, f32, fn(i32, i32) -> f32); 4] = [
+        (1, 1.0, finer),
+        (-1, 1.0, coarser),
+        (0, 2.0, ground),
+        (0, 0.5, ground),
+    ];
+    for ((zoom, cell_mm, height), rise_mm) in zooms
+        .into_iter()
+        .flat_map(|zoom| [2.0, -1.0].map(|rise_mm| (zoom, rise_mm)))
+    {
+        let what = std::format!("2^{zoom} cells of {cell_mm} mm, {rise_mm} mm high");
+        let mut tiles = buffers::<4>();
+        let mut arm = pressed(&mut tiles, ground);
+        arm.device.fallback_rise = rise_mm / cell_mm;
+        let mut change = arm.zoom(1, u8::from(zoom < 0), zoom);
+        change.scene.cell_mm = cell_mm;
+        arm.change(change, height);
+        while arm.tick().view == 0 {}
+        let (at, force_n) = (arm.last.sample.proxy, arm.last.sample.force_n.length());
+        let first = surface_mm(&arm, &at);
+        let (mut before, mut fastest) = (first, 0.0_f32);
+        for tick in 0..400 {
+            let sample = arm.tick();
+            assert!(!sample.limits.contains(Limits::CLUTCH_OPEN), "{what}");
+            assert!(
+                sample.force_n.length() > 0.5 * force_n,
+                "{what}: {sample:?}"
+            );
+            let now = surface_mm(&arm, &at);
+            let moved = (now - before).abs();
+            // Heights are rounded in `f32`.
+            assert!(moved <= 1.001 * max_mm, "{what}, tick {tick}: {moved} mm");
+            (before, fastest) = (now, fastest.max(moved));
+        }
+        assert_eq!(arm.last.sample.limits, Limits::empty(), "{what}");
+        let all_mm = first - before;
+        std::println!("{what}: {all_mm} mm, by up to {fastest} mm a tick");
+        // It moves by the error of the fallback, at the full speed.
+        assert!((all_mm - rise_mm).abs() < 0.6, "{what}: {all_mm} mm");
+        assert!(fastest > 0.99 * max_mm, "{what}: {fastest} mm");
+    }
 }
 
 #[test]

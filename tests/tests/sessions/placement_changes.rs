@@ -29,21 +29,31 @@ const SIZE: u32 = 4097;
 const RESOLUTION_MM: f64 = 0.5;
 /// Press of the hand, N: the motors can hold it permanently, as this hand has no tremor.
 const PUSH_N: f64 = 1.2;
+/// Default ball of a hand, mm.
+const TIP_MM: f64 = 7.0;
 /// Stiffness of the spring, N/mm.
 const STIFFNESS: f32 = SurfaceParams::PREMIUM.stiffness_n_per_mm;
 /// Largest change of the force in a tick, N: it fades within 100 ticks, and the hand moves about
 /// 0.1 mm.
 const GENTLE_N: f32 = 0.12;
 
+/// Minimum force of the hand's press while the placement changes, N.
+const MIN_HELD_N: f32 = 0.95 * PUSH_N as f32;
+
 /// Returns hills of every size, so that all levels look alike.
 fn hills() -> Raster {
+    hills_from(0, 0.02)
+}
+
+/// Returns hills from the size of 20 · 2^`first` samples, of this height as a share of their size.
+fn hills_from(first: i32, height: f64) -> Raster {
     let raster = Raster::from_fn(SIZE, SIZE, |x, y| {
         let (x, y) = (f64::from(x), f64::from(y));
         let wave = |k: i32| {
             let long = 20.0 * 2f64.powi(k);
-            0.02 * long * ((x / long).sin() + (y / long + 1.0).cos())
+            height * long * ((x / long).sin() + (y / long + 1.0).cos())
         };
-        (0..8).map(wave).sum::<f64>() as f32
+        (first..8).map(wave).sum::<f64>() as f32
     });
     raster.expect("a raster")
 }
@@ -93,12 +103,24 @@ fn pressed_at<T>(
     seconds: f64,
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
+    let by_point = (SurfaceParams::PREMIUM, 0.0);
+    pressed_on(model, raster, options, by_point, seconds, play)
+}
+
+/// As [`pressed_at`], on this surface, with a ball of this radius in mm; 0 for a point.
+fn pressed_on<T>(
+    model: PhantomModel,
+    raster: &Raster,
+    options: &PlacementOptions,
+    (params, tip_mm): (SurfaceParams, f64),
+    seconds: f64,
+    play: impl FnOnce(&mut Touching<'_>) -> T,
+) -> T {
     let grid = options.target.grid(raster, HapticCells::default());
-    let grid = grid.expect("a grid");
+    let grid = grid.expect("a grid").with_tip(tip_mm);
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = Placement::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let params = SurfaceParams::PREMIUM;
     let scene = view.scene(&terrain, params).expect("a scene");
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
@@ -117,7 +139,7 @@ fn pressed_at<T>(
         first: PlacedSurface { view, params },
         resolution_mm: RESOLUTION_MM,
         level: None,
-        tip_mm: 0.0,
+        tip_mm,
     };
     let mut touching = Touching {
         session: opened.expect("opened").0,
@@ -225,6 +247,18 @@ fn check_press(samples: &[TickRecord], max_n: f32, max_ratio: f32) {
     );
 }
 
+/// Checks that the hand presses in every sample: the clutch never opens, and the force exceeds
+/// `min_n`.
+fn check_held(samples: &[TickRecord], min_n: f32) {
+    let forces = samples.iter().map(|sample| sample.force_n.length());
+    let least = forces.fold(f32::MAX, f32::min);
+    eprintln!("at least {least:.4} N");
+    assert!(least > min_n, "{least} N");
+    let is_open = |sample: &&TickRecord| sample.limits.contains(Limits::CLUTCH_OPEN);
+    let opened = samples.iter().find(is_open).map(|sample| sample.tick);
+    assert_eq!(opened, None, "tick with an open clutch");
+}
+
 /// Checks that the ground is rendered again as before, with the same press.
 fn assert_pressed(sample: &TickRecord, before: &TickRecord, what: &str) {
     assert_rendered(sample, what);
@@ -275,6 +309,53 @@ fn force_makes_no_step_while_zooming_through_eight_levels() {
         assert_eq!(touching.samples.last().map(|last| last.view), Some(16));
         assert_eq!(touching.messages, [""; 0]);
         check_samples(&touching.samples[began..], GENTLE_N);
+        check_held(&touching.samples[began..], MIN_HELD_N);
+    });
+}
+
+/// With the default ball of a hand, and on ground with friction.
+///
+/// Safety: 15.
+#[test]
+fn ball_with_friction_keeps_its_press_while_zooming() {
+    // With detail between the samples of the fallback.
+    let raster = hills_from(-4, 0.1);
+    // A ball's radius is at most 8 cells.
+    let options = PlacementOptions {
+        target: Target::Whole,
+        sizing: Sizing::CellMm(1.05 * TIP_MM / 8.0 / 256.0),
+        level: Some(8),
+        ..PlacementOptions::default()
+    };
+    let params = SurfaceParams {
+        friction: Friction::coulomb(0.4),
+        ..SurfaceParams::PREMIUM
+    };
+    let arm = PhantomModel::premium_1_5();
+    pressed_on(arm, &raster, &options, (params, TIP_MM), 60.0, |touching| {
+        // Friction holds the proxy in the middle of the terrain, where the fallback has a sample at
+        // every level: elsewhere its height is another one than the tile's.
+        let before = touching.change(PlacementChange::Pan {
+            east_mm: 1.3,
+            north_mm: -0.9,
+        });
+        assert_rendered(&before, "at the beginning");
+        let began = touching.samples.len();
+        let zooms_in = (0..8).rev().map(|level| (2.0, level));
+        for (factor, level) in zooms_in.chain((1..=8).map(|level| (0.5, level))) {
+            let sample = touching.change(PlacementChange::Zoom(factor));
+            assert_rendered(&sample, &format!("zoomed to level {level}"));
+            // The slope under the ball is another one at each level.
+            let share = sample.force_n.length() / before.force_n.length();
+            assert!((0.9..1.1).contains(&share), "level {level}: {share}");
+            assert_eq!(touching.level(), level, "{:?}", touching.messages);
+            let terrain = touching.steering.terrain();
+            assert!(terrain.grid().tip_mm() == TIP_MM && terrain.tip_cells() > 0.0);
+        }
+        assert_eq!(touching.samples.last().map(|last| last.view), Some(17));
+        assert_eq!(touching.messages, [""; 0]);
+        check_press(&touching.samples[began..], GENTLE_N, 1.1);
+        check_held(&touching.samples[began..], 0.9 * PUSH_N as f32);
     });
 }
 
@@ -323,6 +404,11 @@ fn force_makes_no_step_while_panning_and_scaling() {
         assert_eq!(touching.level(), 8);
         assert_eq!(touching.messages, [""; 0]);
         check_samples(&touching.samples[began..], GENTLE_N);
+        // With half the stiffness.
+        check_held(
+            &touching.samples[began..],
+            in_series(soft, hard) * MIN_HELD_N,
+        );
     });
 }
 
@@ -370,6 +456,7 @@ fn surface_command_during_contact_causes_no_force_step() {
             ..SurfaceParams::PREMIUM
         };
         assert_eq!(params, expected);
+        check_held(&touching.samples[began..], MIN_HELD_N);
         let friction = SurfaceChange::Friction {
             dynamic_mu: 11.0,
             static_mu: 11.0,
@@ -385,10 +472,12 @@ fn surface_command_during_contact_causes_no_force_step() {
             expected,
             "it stays as it was"
         );
+        let refused = touching.samples.len();
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.steering.now().params, SurfaceParams::PREMIUM);
         check_samples(&touching.samples[began..], GENTLE_N);
+        check_held(&touching.samples[refused..], MIN_HELD_N);
     });
 }
 
@@ -416,13 +505,16 @@ fn tip_command_during_contact_causes_no_force_step() {
             );
         }
         assert_eq!(touching.messages, [""; 0]);
+        check_held(&touching.samples[began..], MIN_HELD_N);
         touching.change(PlacementChange::Tip(-1.0));
         assert!(touching.messages[0].contains("a tip of -1 mm: from 0 to 100 mm"));
         assert_eq!(tip(touching), (1.0, true), "it stays as it was");
+        let refused = touching.samples.len();
         let reset = touching.change(PlacementChange::Reset);
         assert_rendered(&reset, "by a point again");
         assert_eq!(tip(touching), (0.0, false));
         check_samples(&touching.samples[began..], GENTLE_N);
+        check_held(&touching.samples[refused..], MIN_HELD_N);
     });
 }
 
@@ -626,6 +718,8 @@ fn check_far_pan(axis: usize) {
             assert!(touching.steering.terrain().has_tiles_of(&cells));
             assert_eq!(touching.messages, [""; 0]);
             check_press(&touching.samples[began..], GENTLE_N, max + 0.01);
+            // The last change makes the spring softer by a tenth.
+            check_held(&touching.samples[began..], 0.88 * first.force_n.length());
         },
     );
 }
