@@ -346,8 +346,14 @@ impl<'r> Steering<'r> {
             Ok(Some(update)) => {
                 self.apply(update, None);
             }
-            Err(why) => self.lines.push(format!("the view stays as it was: {why}")),
+            Err(why) => self.refuse(&why),
         }
+    }
+
+    /// Prints the reason why the changes are not made.
+    fn refuse(&mut self, why: &str) {
+        self.lines
+            .push(format!("the placement stays as it was: {why}"));
     }
 
     /// Sends a placement; with its changes if it changes in contact.
@@ -360,7 +366,7 @@ impl<'r> Steering<'r> {
     }
 
     /// Sends the changes that wait, if they can be made under the pressing hand, or waits for its
-    /// new ground. Returns false if the clutch has to be opened for them.
+    /// new ground. Impossible changes are refused. Returns false if the clutch has to be opened for them.
     fn changes_in_contact(&mut self, sample: &TickRecord) -> bool {
         let is_free = !self.held && !self.must_measure && !self.waiting.is_empty();
         let is_current = sample.view == self.number && !sample.limits.intersects(NOT_IN_CONTACT);
@@ -376,7 +382,12 @@ impl<'r> Steering<'r> {
         let mut update = match self.next_view(&self.waiting, sample, true) {
             Ok(Some(update)) => update,
             Ok(None) => return waits,
-            Err(_) => return false,
+            Err(why) => {
+                self.waiting.clear();
+                self.without_ground = 0;
+                self.refuse(&why);
+                return true;
+            }
         };
         let Some(in_contact) = self.contact_map(&update, sample) else {
             return false;

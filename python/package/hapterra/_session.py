@@ -43,7 +43,7 @@ _MAX_LINES = 200
 #: Lines that are never passed on, and those that a quiet session does not pass on. A recording that
 #: was cut is reported.
 _FIGURE_LINE = re.compile(r"\s*\d")
-_STATUS_LINE = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
+_STATUS_LINE = re.compile(r"view \d|the placement stays as it was|(?!recording)[a-z]+  ")
 
 
 class DeviceError(CommandError):

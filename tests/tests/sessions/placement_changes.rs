@@ -608,7 +608,9 @@ fn impossible_change_is_reported_and_changes_nothing() {
         );
         assert_eq!(touching.messages.len(), 2);
         assert_eq!(touching.samples.last().map(|last| last.view), Some(0));
-        check_samples(&touching.samples[began..], GENTLE_N);
+        let samples = &touching.samples[began..];
+        check_samples(samples, GENTLE_N);
+        check_held(samples, 0.9 * before.force_n.length());
     });
 }
 
