@@ -356,6 +356,18 @@ fn refused_change_under_a_pressing_hand_opens_the_clutch() {
 
 /// The hand lifts off while the device waits for the terrain, or the terrain does not arrive.
 #[test]
+fn impossible_change_under_a_pressing_hand_opens_no_clutch() {
+    with(|steering| {
+        steering.steer(Steer::Change(PlacementChange::Stiffness(50.0)));
+        press(steering, Limits::empty(), 1);
+        assert_eq!(requested_hold(steering), None);
+        assert!(steering.take_update().is_none() && steering.is_settled());
+        let lines = steering.lines();
+        assert!(lines.len() == 1 && lines[0].contains("N/mm"), "{lines:?}");
+    });
+}
+
+#[test]
 fn change_that_is_not_made_in_contact_opens_the_clutch() {
     for lifts in [true, false] {
         with(|steering| {
