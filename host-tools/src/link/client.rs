@@ -55,6 +55,9 @@ pub enum Event<'e> {
         /// True if it is in force.
         accepted: bool,
     },
+    /// The latest scene change was cancelled ([`Request::CancelChange`]): the scene before it stays
+    /// in force.
+    ChangeCancelled,
     /// The answer to a status query.
     Status(&'e Status),
     /// The calibration in force.
@@ -114,6 +117,8 @@ pub struct Client<'t> {
     terrain: ServedTerrain<'t>,
     /// The terrain of a scene change that is not in force yet.
     next: Option<(SceneChange, Terrain<'t>)>,
+    /// The scene before a change in contact, and its terrain, until the next change.
+    before: Option<(Scene, ServedTerrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
     protocol: HostProtocol,
@@ -185,6 +190,7 @@ impl<'t> Client<'t> {
         Self {
             terrain: ServedTerrain::Borrowed(terrain),
             next: None,
+            before: None,
             scene,
             arming,
             protocol: HostProtocol::new(Some(scene), timeouts, fastrand::Rng::with_seed(seed))
@@ -285,15 +291,34 @@ impl<'t> Client<'t> {
         if let Some((view, terrain)) = settled {
             let accepted = accepted(&view);
             if accepted {
-                self.scene = view.scene;
-                self.awaited.clear();
-                self.prefetch.forget();
-                self.terrain = ServedTerrain::Changed(Box::new(terrain));
+                let terrain = ServedTerrain::Changed(Box::new(terrain));
+                let before = self.serve(view.scene, terrain);
+                self.before = view.in_contact.is_some().then_some(before);
             }
             on(Event::SceneChangeResult {
                 view: &view,
                 accepted,
             });
+        }
+    }
+
+    /// Serves another scene, and returns the one before.
+    fn serve(&mut self, scene: Scene, terrain: ServedTerrain<'t>) -> (Scene, ServedTerrain<'t>) {
+        self.awaited.clear();
+        self.sent.clear();
+        self.prefetch.forget();
+        let scene = std::mem::replace(&mut self.scene, scene);
+        (scene, std::mem::replace(&mut self.terrain, terrain))
+    }
+
+    /// Serves the scene before the latest change if the protocol reports that the change was
+    /// cancelled.
+    fn restore_view(&mut self, on: &mut dyn FnMut(Event<'_>)) {
+        let epoch = self.protocol.scene().map(|scene| scene.epoch);
+        let is_restored = |(before, _): &mut (Scene, _)| epoch == Some(before.epoch);
+        if let Some((scene, terrain)) = self.before.take_if(is_restored) {
+            self.serve(scene, terrain);
+            on(Event::ChangeCancelled);
         }
     }
 
@@ -387,6 +412,7 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
+        self.restore_view(on);
         match event {
             ProtocolEvent::HelloReceived { device, restarted } => {
                 self.on_hello(device, restarted);

@@ -8,7 +8,7 @@ use hapterra_core::scene::{Scene, SceneChange};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::materials::{MAX_TABLE_BYTES, MaterialScene, table_bytes};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::request::Answer;
+use hapterra_core::wire::request::{Answer, Request};
 use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -71,6 +71,8 @@ pub(super) struct HostProtocol {
     materials: Option<MaterialTable>,
     /// The unanswered scene change, and the times when it was first and last sent.
     view: Option<(SceneChange, Duration, Duration)>,
+    /// The scene before a change in contact, which the device has again after a cancel.
+    before: Option<Scene>,
     timeouts: Timeouts,
     state: State,
     /// The time when the state began, and when its message was last sent.
@@ -104,6 +106,7 @@ impl HostProtocol {
             scene,
             materials: None,
             view: None,
+            before: None,
             timeouts,
             state: State::Closed,
             since: Duration::ZERO,
@@ -225,7 +228,20 @@ impl HostProtocol {
         if let Some((view, _, _)) = self.view.take()
             && epoch == Some(view.scene.epoch)
         {
-            self.scene = Some(view.scene);
+            self.accept_view(&view);
+        }
+    }
+
+    fn accept_view(&mut self, view: &SceneChange) {
+        let before = self.scene.replace(view.scene);
+        self.before = before.filter(|_| view.in_contact.is_some());
+    }
+
+    /// Returns to the scene before the latest change if the device reports that scene's epoch.
+    fn restore_scene(&mut self, epoch: Option<u32>) {
+        let is_restored = |before: &mut Scene| epoch == Some(before.epoch);
+        if let Some(before) = self.before.take_if(is_restored) {
+            self.scene = Some(before);
         }
     }
 
@@ -516,6 +532,7 @@ impl HostProtocol {
         // A new session, or a restarted device: the epoch of its scene shows whether the scene
         // change is in force.
         self.resolve_view(device.epoch);
+        self.restore_scene(device.epoch);
         let restarted = !is_first;
         if self.is_ending() {
             return Ok(Some(ProtocolEvent::HelloReceived { device, restarted }));
@@ -553,7 +570,7 @@ impl HostProtocol {
         {
             self.received = now;
             if accepted {
-                self.scene = Some(view.scene);
+                self.accept_view(&view);
             }
             return Ok(Some(ProtocolEvent::SceneChange));
         }
@@ -571,6 +588,12 @@ impl HostProtocol {
     fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<ProtocolEvent> {
         let request = self.requests.request_answered(number)?;
         self.received = now;
+        if let (HostRequest::Request(Request::CancelChange { .. }), ToHost::Answer(answer)) =
+            (&request, &message)
+            && answer.result.is_ok()
+        {
+            self.restore_scene(self.before.map(|before| before.epoch));
+        }
         Some(ProtocolEvent::Answered(request, message))
     }
 
@@ -587,6 +610,9 @@ impl HostProtocol {
 
     fn on_heartbeat(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
         self.received = now;
+        if let ToHost::Heartbeat { epoch, .. } = message {
+            self.restore_scene(*epoch);
+        }
         if let ToHost::Heartbeat { epoch, .. } = message
             && self.state == State::Open
             && self.lacks_scene(*epoch)

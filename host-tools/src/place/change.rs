@@ -3,7 +3,7 @@
 
 use hapterra_core::force::SurfaceParams;
 
-use super::placement::{Placement, finest_level};
+use super::placement::{Placement, coarsest_level, finest_level};
 use super::surface_change::{SurfaceChange, SurfaceError};
 use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 
@@ -120,6 +120,8 @@ pub struct Bounds {
     pub level: Option<u8>,
     /// Initial radius of the ball at the tip, device millimetres; 0 for a point.
     pub tip_mm: f64,
+    /// Levels above the finest one, without a stated level.
+    pub coarser: u8,
 }
 
 /// The HIP and the proxy, device millimetres of the current placement. The placement changes about
@@ -196,7 +198,11 @@ impl Bounds {
         }
         placed_surface.view.level = match self.level {
             Some(level) => level,
-            None => finest_level(&grid, self.resolution_mm, &placed_surface.view.scale),
+            None => {
+                let finest = self.finest_level(&grid, &placed_surface.view);
+                let last = coarsest_level(&grid).max(finest);
+                finest.saturating_add(self.coarser).min(last)
+            }
         };
         let terrain_after =
             terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
@@ -213,6 +219,12 @@ impl Bounds {
             terrain: terrain_after,
             hip_mm,
         })
+    }
+
+    /// Returns the finest level of a placement that the encoders resolve.
+    #[must_use]
+    pub fn finest_level(&self, grid: &HapticGrid<'_>, view: &Placement) -> u8 {
+        finest_level(grid, self.resolution_mm, &view.scale)
     }
 
     /// Applies one change, at a place in haptic cells of level 0.

@@ -47,6 +47,7 @@ impl Bench {
             resolution_mm: reach.resolution_mm(),
             level: self.level,
             tip_mm: 0.0,
+            coarser: 0,
         };
         check(&terrain, bounds)
     }

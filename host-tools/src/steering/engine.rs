@@ -1,5 +1,7 @@
 //! Changes of the placement by the user, applied to a device.
 
+mod automatic_level;
+
 use std::time::{Duration, Instant};
 
 use hapterra_core::clutch::ClutchMode;
@@ -10,6 +12,7 @@ use hapterra_core::scene::{ContactMap, SceneChange, Source, TickRecord};
 use hapterra_core::terrain::TileIndex;
 use hapterra_core::wire::request::Request;
 
+use self::automatic_level::AutomaticLevel;
 use super::Steer;
 use crate::link::{Event, HostRequest};
 use crate::place::{Bounds, Changed, Hand, PlacedSurface, PlacementChange};
@@ -101,6 +104,8 @@ pub struct Steering<'r> {
     /// Samples since the force began to turn to that of the current placement.
     turning: u32,
     stage: Stage<'r>,
+    /// Changes of the level by the hand's speed, if the user has chosen them.
+    automatic: Option<AutomaticLevel<'r>>,
     requests: Vec<HostRequest>,
     update: Option<PlacementUpdate<'r>>,
     lines: Vec<String>,
@@ -124,6 +129,7 @@ impl<'r> Steering<'r> {
             without_ground: 0,
             turning: 0,
             stage: Stage::Idle,
+            automatic: None,
             requests: vec![],
             update: None,
             lines: vec![],
@@ -147,6 +153,7 @@ impl<'r> Steering<'r> {
     pub const fn is_settled(&self) -> bool {
         let is_at_rest = match self.stage {
             Stage::Idle => !self.held,
+            Stage::Applying { .. } | Stage::InContact { .. } if self.changes_level() => !self.held,
             Stage::Open => self.held,
             _ => false,
         };
@@ -188,7 +195,9 @@ impl<'r> Steering<'r> {
             Event::SceneChangeResult { view, accepted } => {
                 self.on_scene_change_result(view, *accepted);
             }
-            Event::Opened { resumed, .. } => {
+            Event::ChangeCancelled => self.on_change_cancelled(),
+            Event::Opened { resumed, device } => {
+                self.on_level_session(*resumed, device.tick_hz);
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
                 self.requested_hold = ClutchMode::Released;
@@ -210,6 +219,9 @@ impl<'r> Steering<'r> {
                 if let Stage::Opening { answered, .. } = &mut self.stage {
                     *answered = true;
                 }
+            }
+            Event::Unanswered(HostRequest::Request(Request::CancelChange { .. })) => {
+                self.on_unanswered_cancel();
             }
             Event::Unanswered(HostRequest::Request(Request::Clutch { .. })) => {
                 self.give_up("the device does not answer: no further change is made");
@@ -257,6 +269,7 @@ impl<'r> Steering<'r> {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
         let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
         let is_held_by_input = by_input && is_open;
+        self.follow_hand(sample);
         if matches!(self.stage, Stage::InContact { .. }) && sample.view == self.number {
             self.stage = Stage::Idle;
         }
@@ -283,9 +296,13 @@ impl<'r> Steering<'r> {
             Stage::Idle if self.held || self.must_measure || !self.waiting.is_empty() => {
                 self.open_clutch();
             }
+            Stage::Idle => self.change_level(sample),
             Stage::InContact { samples } => {
                 *samples += 1;
-                if self.held || !presses(sample) || *samples > MAX_SAMPLES_IN_CONTACT {
+                let samples = *samples;
+                if self.changes_level() {
+                    self.wait_for_level(sample, samples);
+                } else if self.held || !presses(sample) || samples > MAX_SAMPLES_IN_CONTACT {
                     self.open_clutch();
                 }
             }
@@ -335,7 +352,7 @@ impl<'r> Steering<'r> {
             .waiting_since
             .get_or_insert_with(Instant::now)
             .elapsed();
-        let next = self.next_view(&changes, sample, waited < MAX_GROUND_WAIT);
+        let next = self.next_view(&self.bounds, &changes, (sample, waited < MAX_GROUND_WAIT));
         if let Ok(None) = next {
             (self.waiting, self.must_measure) = (changes, must_measure);
             return;
@@ -363,8 +380,7 @@ impl<'r> Steering<'r> {
     /// new ground. Returns false if the clutch has to be opened for them.
     fn changes_in_contact(&mut self, sample: &TickRecord) -> bool {
         let is_free = !self.held && !self.must_measure && !self.waiting.is_empty();
-        let is_current = sample.view == self.number && !sample.limits.intersects(NOT_IN_CONTACT);
-        if !is_free || !is_current || !presses(sample) {
+        if !is_free || !self.may_change_in_contact(sample) {
             return false;
         }
         self.without_ground += 1;
@@ -373,14 +389,37 @@ impl<'r> Steering<'r> {
             // The proxy is on another surface than the ground that the change is computed from.
             return waits;
         }
-        let mut update = match self.next_view(&self.waiting, sample, true) {
-            Ok(Some(update)) => update,
-            Ok(None) => return waits,
-            Err(_) => return false,
+        match self.update_in_contact(&self.bounds, &self.waiting, sample) {
+            Some(Some(update)) => {
+                let changes = std::mem::take(&mut self.waiting);
+                self.without_ground = 0;
+                self.apply(update, Some(changes));
+                true
+            }
+            Some(None) => waits,
+            None => false,
+        }
+    }
+
+    /// Returns true if the hand presses on the current placement with the full force.
+    fn may_change_in_contact(&self, sample: &TickRecord) -> bool {
+        let is_current = sample.view == self.number && !sample.limits.intersects(NOT_IN_CONTACT);
+        is_current && presses(sample)
+    }
+
+    /// Returns the changed placement for the pressing hand; `None` inside if its ground has not
+    /// been read yet, and outside if it cannot change in contact.
+    #[allow(clippy::option_option)] // A wait and a refusal.
+    fn update_in_contact(
+        &self,
+        bounds: &Bounds,
+        changes: &[PlacementChange],
+        sample: &TickRecord,
+    ) -> Option<Option<PlacementUpdate<'r>>> {
+        let Some(mut update) = self.next_view(bounds, changes, (sample, true)).ok()? else {
+            return Some(None);
         };
-        let Some(in_contact) = self.contact_map(&update, sample) else {
-            return false;
-        };
+        let in_contact = self.contact_map(&update, sample)?;
         let (view, reach_mm) = (&mut update.view, update.placed_surface.view.reach_mm);
         let touched = in_contact.to.column();
         // The window has the tiles around the proxy; those elsewhere may have no room beside them.
@@ -391,13 +430,10 @@ impl<'r> Steering<'r> {
             .with_fallback_around(view.scene, reach_mm, touched);
         let may_turn = view.may_turn_from(&self.now.params);
         if !may_turn || view.scene.fallback.is_none() || view.scene.materials.is_some() {
-            return false;
+            return None;
         }
         view.in_contact = Some(in_contact);
-        let changes = std::mem::take(&mut self.waiting);
-        self.without_ground = 0;
-        self.apply(update, Some(changes));
-        true
+        Some(Some(update))
     }
 
     /// Returns the map of the proxy to the new placement.
@@ -433,12 +469,12 @@ impl<'r> Steering<'r> {
     /// `waits` is true.
     fn next_view(
         &self,
+        bounds: &Bounds,
         changes: &[PlacementChange],
-        sample: &TickRecord,
-        waits: bool,
+        (sample, waits): (&TickRecord, bool),
     ) -> Result<Option<PlacementUpdate<'r>>, String> {
         let hand = self.hand(sample);
-        let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
+        let changed = bounds.apply(&self.terrain, &self.now, changes, &hand);
         let Changed {
             placed_surface,
             terrain,
@@ -478,11 +514,16 @@ impl<'r> Steering<'r> {
         };
         match in_contact {
             _ if accepted => {
+                self.on_level_result(true);
                 self.number = view.number;
                 (self.now, self.terrain) = *next;
                 if in_contact.is_some() {
                     self.stage = Stage::InContact { samples: 0 };
                 }
+            }
+            Some(_) if self.changes_level() => {
+                self.stage = Stage::Idle;
+                self.on_level_result(false);
             }
             Some(changes) => {
                 self.waiting.splice(..0, changes);

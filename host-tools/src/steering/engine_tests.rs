@@ -34,6 +34,7 @@ fn with_raster<T>(raster: &Raster, test: impl FnOnce(&mut Steering<'_>) -> T) ->
         resolution_mm: reach.resolution_mm(),
         level: None,
         tip_mm: 0.0,
+        coarser: 0,
     };
     test(&mut Steering::new(bounds, terrain.clone()))
 }

@@ -118,6 +118,7 @@ fn pressed_at<T>(
         resolution_mm: RESOLUTION_MM,
         level: None,
         tip_mm: 0.0,
+        coarser: 0,
     };
     let mut touching = Touching {
         session: opened.expect("opened").0,

@@ -150,6 +150,7 @@ impl<'t> PlacementControl<'t> {
             resolution_mm: Reach::of(arm).resolution_mm(),
             level,
             tip_mm: terrain.grid().tip_mm(),
+            coarser: 0,
         };
         Self {
             steering: Steering::new(bounds, terrain.clone()),

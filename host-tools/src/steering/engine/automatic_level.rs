@@ -1,0 +1,193 @@
+//! Changes of the level by the hand's speed, under a pressing hand.
+//!
+//! They never open the clutch. If the device cannot make one soon, or the user requests a change,
+//! it is cancelled. The device may make it before the cancel arrives; it is then in force.
+
+use hapterra_core::guard::Limits;
+use hapterra_core::scene::TickRecord;
+use hapterra_core::wire::request::Request;
+
+use super::{MAX_SAMPLES_IN_CONTACT, Stage, Steering, presses};
+use crate::link::HostRequest;
+use crate::place::{Bounds, PlacedSurface};
+use crate::steering::level_by_speed::LevelBySpeed;
+use crate::terrain::Terrain;
+
+/// Samples after which a change that was sent is cancelled; a sample is a millisecond.
+const MAX_SAMPLES_SENT: u32 = 100;
+/// Samples between two attempts.
+const PAUSE_SAMPLES: u32 = 200;
+
+/// The rule, and the change that was sent, if any.
+pub(super) struct AutomaticLevel<'r> {
+    rule: LevelBySpeed,
+    ticks_per_ms: u32,
+    /// The last sample of the current placement.
+    last: Option<TickRecord>,
+    /// Samples until the next attempt.
+    pause: u32,
+    sent: Option<SentLevel<'r>>,
+}
+
+/// A change that the device has not made yet, as far as is known.
+struct SentLevel<'r> {
+    /// The placement before, and its number.
+    before: (PlacedSurface, Terrain<'r>, u8),
+    /// Levels above the finest one, of the new placement; once it is accepted, of the one before.
+    other_coarser: u8,
+    /// True if its cancel was requested.
+    is_cancelled: bool,
+}
+
+impl<'r> Steering<'r> {
+    /// Returns the same engine, which also changes the level by the hand's speed, on a device with
+    /// this tick rate.
+    #[must_use]
+    pub fn with_level_by_speed(self, tick_hz: u32) -> Self {
+        let automatic = AutomaticLevel {
+            rule: LevelBySpeed::default(),
+            ticks_per_ms: (tick_hz / 1_000).max(1),
+            last: None,
+            pause: 0,
+            sent: None,
+        };
+        Self {
+            automatic: Some(automatic),
+            ..self
+        }
+    }
+
+    /// Returns true if a change of the level was sent and is not in force yet.
+    pub(super) const fn changes_level(&self) -> bool {
+        matches!(&self.automatic, Some(AutomaticLevel { sent: Some(_), .. }))
+    }
+
+    /// Takes the hand's motion from a sample, and notes that a change is in force.
+    pub(super) fn follow_hand(&mut self, sample: &TickRecord) {
+        let Some(automatic) = &mut self.automatic else {
+            return;
+        };
+        automatic.pause = automatic.pause.saturating_sub(1);
+        if sample.view != self.number {
+            automatic.last = None;
+            return;
+        }
+        if !matches!(self.stage, Stage::Applying { .. }) {
+            automatic.sent = None;
+        }
+        // The HIP of an open clutch does not follow the hand.
+        let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
+        let last = automatic.last.replace(*sample).filter(|_| !is_open);
+        let Some(last) = last else {
+            return;
+        };
+        let ms = sample.tick.wrapping_sub(last.tick) / automatic.ticks_per_ms;
+        let moved_mm = last.hip.to(&sample.hip) * self.terrain.scale().cell_mm() as f32;
+        let finest = self
+            .bounds
+            .finest_level(self.terrain.grid(), &self.now.view);
+        let cell_mm = self.now.view.scale.at_level(finest).cell_mm();
+        let moved_mm = [moved_mm.x, moved_mm.y].map(f64::from);
+        automatic.rule.take_motion(moved_mm, ms, cell_mm);
+    }
+
+    /// Sends another level, if the hand's speed requires one and the hand presses.
+    pub(super) fn change_level(&mut self, sample: &TickRecord) {
+        let Some(automatic) = &self.automatic else {
+            return;
+        };
+        let coarser = automatic.rule.coarser();
+        let is_due = automatic.pause == 0 && coarser != self.bounds.coarser;
+        let is_on_ground = !sample.limits.contains(Limits::TERRAIN_COARSE);
+        if !is_due || !is_on_ground || !self.may_change_in_contact(sample) {
+            return;
+        }
+        let bounds = Bounds {
+            coarser,
+            ..self.bounds
+        };
+        let update = self.update_in_contact(&bounds, &[], sample).flatten();
+        let has_other_level = |level: u8| level != self.now.view.level;
+        let update = update.filter(|update| has_other_level(update.placed_surface.view.level));
+        if let Some(automatic) = &mut self.automatic {
+            automatic.pause = PAUSE_SAMPLES;
+            automatic.sent = update.is_some().then(|| SentLevel {
+                before: (self.now, self.terrain.clone(), self.number),
+                other_coarser: coarser,
+                is_cancelled: false,
+            });
+        }
+        if let Some(update) = update {
+            self.apply(update, Some(vec![]));
+        }
+    }
+
+    fn sent_level(&mut self) -> Option<&mut SentLevel<'r>> {
+        self.automatic.as_mut()?.sent.as_mut()
+    }
+
+    /// Applies the device's answer to a change: it was accepted, or is dropped.
+    pub(super) fn on_level_result(&mut self, accepted: bool) {
+        let Some(automatic) = &mut self.automatic else {
+            return;
+        };
+        match &mut automatic.sent {
+            Some(sent) if accepted => {
+                std::mem::swap(&mut self.bounds.coarser, &mut sent.other_coarser);
+            }
+            _ => automatic.sent = None,
+        }
+    }
+
+    /// Waits until the device renders the level that was sent, or cancels it. The user's requests
+    /// are first.
+    pub(super) fn wait_for_level(&mut self, sample: &TickRecord, samples: u32) {
+        let user_waits = self.must_measure || !self.waiting.is_empty();
+        // A clutch that opens makes the change.
+        if self.held || (user_waits && samples > MAX_SAMPLES_IN_CONTACT) {
+            return self.open_clutch();
+        }
+        let number = self.number;
+        let is_late = samples > MAX_SAMPLES_SENT || !presses(sample);
+        let sent = self.sent_level();
+        if let Some(sent) = sent.filter(|sent| !sent.is_cancelled && (user_waits || is_late)) {
+            sent.is_cancelled = true;
+            let cancel = Request::CancelChange { number };
+            self.requests.push(HostRequest::Request(cancel));
+        }
+    }
+
+    /// Returns to the level before: the device has cancelled the change.
+    pub(super) fn on_change_cancelled(&mut self) {
+        let Some(automatic) = &mut self.automatic else {
+            return;
+        };
+        let Some(sent) = automatic.sent.take() else {
+            return;
+        };
+        automatic.pause = PAUSE_SAMPLES;
+        (self.now, self.terrain, self.number) = sent.before;
+        self.bounds.coarser = sent.other_coarser;
+        if let Stage::InContact { .. } = self.stage {
+            self.stage = Stage::Idle;
+        }
+    }
+
+    /// Prepares another request of a cancel that the device has not answered.
+    pub(super) fn on_unanswered_cancel(&mut self) {
+        if let Some(sent) = self.sent_level() {
+            sent.is_cancelled = false;
+        }
+    }
+
+    /// Begins a session. A restarted device has the latest placement; a resumed one may still wait
+    /// for its terrain.
+    pub(super) fn on_level_session(&mut self, resumed: bool, tick_hz: u32) {
+        self.on_unanswered_cancel();
+        if let Some(automatic) = &mut self.automatic {
+            automatic.ticks_per_ms = (tick_hz / 1_000).max(1);
+            automatic.last = None;
+            automatic.sent = automatic.sent.take().filter(|_| resumed);
+        }
+    }
+}
