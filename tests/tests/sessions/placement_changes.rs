@@ -1,6 +1,8 @@
 //! A change of the placement while a hand presses: the device's own application, a virtual Phantom,
 //! and the engine behind keys and commands.
 
+mod level_by_speed;
+
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
@@ -93,6 +95,19 @@ fn pressed_at<T>(
     seconds: f64,
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
+    let press = |touch: Touch<'_>, _| touch.press(PUSH_N, seconds).finish();
+    touched_at((model, RESOLUTION_MM), raster, options, press, play)
+}
+
+/// As [`pressed_at`], with another hand and encoders' resolution, mm: `touch` continues the plan of
+/// a hand over the home position, given in device millimetres.
+fn touched_at<T>(
+    (model, resolution_mm): (PhantomModel, f64),
+    raster: &Raster,
+    options: &PlacementOptions,
+    touch: impl FnOnce(Touch<'_>, [f64; 2]) -> Script,
+    play: impl FnOnce(&mut Touching<'_>) -> T,
+) -> T {
     let grid = options.target.grid(raster, HapticCells::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
@@ -103,8 +118,8 @@ fn pressed_at<T>(
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
     let (hand, wall) = (HandModel::default(), f64::from(params.stiffness_n_per_mm));
-    let touch = Touch::start(&surface, &hand, wall, [east, north], 10.0);
-    let script: Script = touch.press(PUSH_N, seconds).finish();
+    let start = Touch::start(&surface, &hand, wall, [east, north], 10.0);
+    let script = touch(start, [east, north]);
     let home_mm = view.home_mm;
     let arm = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let pedal = Rc::new(Cell::new(false));
@@ -115,7 +130,7 @@ fn pressed_at<T>(
     let opened = Session::open(&terrain, scene, arming, Box::new(device), timeout);
     let bounds = Bounds {
         first: PlacedSurface { view, params },
-        resolution_mm: RESOLUTION_MM,
+        resolution_mm,
         level: None,
         tip_mm: 0.0,
         coarser: 0,

@@ -163,6 +163,11 @@ impl<'t> PlacementControl<'t> {
         }
     }
 
+    /// Changes the level by the hand's speed from now on, on a device with this tick rate.
+    pub(in crate::cli) fn follow_speed(&mut self, tick_hz: u32) {
+        self.steering.follow_speed(tick_hz);
+    }
+
     /// Returns the number of the question that a command answered since the last call.
     pub(in crate::cli) fn entered(&mut self) -> Option<u32> {
         self.entered.take()

@@ -40,21 +40,15 @@ struct SentLevel<'r> {
 }
 
 impl<'r> Steering<'r> {
-    /// Returns the same engine, which also changes the level by the hand's speed, on a device with
-    /// this tick rate.
-    #[must_use]
-    pub fn with_level_by_speed(self, tick_hz: u32) -> Self {
-        let automatic = AutomaticLevel {
+    /// Changes the level by the hand's speed from now on, on a device with this tick rate.
+    pub fn follow_speed(&mut self, tick_hz: u32) {
+        self.automatic = Some(AutomaticLevel {
             rule: LevelBySpeed::default(),
             ticks_per_ms: (tick_hz / 1_000).max(1),
             last: None,
             pause: 0,
             sent: None,
-        };
-        Self {
-            automatic: Some(automatic),
-            ..self
-        }
+        });
     }
 
     /// Returns true if a change of the level was sent and is not in force yet.
