@@ -1,5 +1,8 @@
 //! Changes of the placement under a pressing hand.
 
+#[path = "in_contact_cancelled.rs"]
+mod cancelled;
+
 use super::*;
 use crate::clutch::ClutchMode;
 use crate::contact::Friction;

@@ -1,8 +1,10 @@
+use hapterra_core::Vec3;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::Source;
+use hapterra_core::scene::{ContactMap, Source};
 use hapterra_core::wire::frame::{decode, encode};
 use hapterra_core::wire::hello::{PROTOCOL, SerialNumber};
+use hapterra_core::wire::request::Answer;
 use hapterra_core::wire::session::{InSession, SampleCount, SessionEnd};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -39,6 +41,8 @@ struct Bench<'t> {
     reported: Vec<Option<Calibration>>,
     /// Scene changes, and whether they were accepted.
     viewed: Vec<(u8, bool)>,
+    /// Number of cancelled scene changes.
+    cancelled: u32,
 }
 
 const fn ms(ms: u64) -> Duration {
@@ -59,6 +63,7 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
         unanswered: vec![],
         reported: vec![],
         viewed: vec![],
+        cancelled: 0,
     };
     bench.client.greet(bench.now, &mut bench.out);
     test(&mut bench);
@@ -69,10 +74,12 @@ impl Bench<'_> {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
         let (opened, reported, viewed) = (&mut self.opened, &mut self.reported, &mut self.viewed);
+        let cancelled = &mut self.cancelled;
         let mut on = |event: Event<'_>| match event {
             Event::Opened { .. } => *opened += 1,
             Event::Calibration(calibration) => reported.push(calibration.copied()),
             Event::SceneChangeResult { view, accepted } => viewed.push((view.number, accepted)),
+            Event::ChangeCancelled => *cancelled += 1,
             _ => {}
         };
         self.client.receive(self.now, bytes, &mut self.out, &mut on)
@@ -106,6 +113,27 @@ impl Bench<'_> {
 
     /// Sends a scene change and returns the epoch of its scene.
     fn put_view(&mut self, number: u8) -> u32 {
+        self.put_change(number, None)
+    }
+
+    /// Sends a scene change in contact, which the device accepts, and requests its cancel.
+    fn cancel_change(&mut self, number: u8) {
+        let map = ContactMap {
+            from: GridPoint::default(),
+            to: GridPoint::default(),
+            scale: Vec3::ONE,
+        };
+        let epoch = self.put_change(number, Some(map));
+        let accepted = true;
+        self.deliver(&ToHost::SceneAck { epoch, accepted });
+        assert_eq!(self.client.scene().epoch, epoch);
+        let cancel = Request::CancelChange { number };
+        self.client.enqueue(HostRequest::Request(cancel));
+        self.advance(ms(10)).expect("in time");
+        self.out.clear();
+    }
+
+    fn put_change(&mut self, number: u8, in_contact: Option<ContactMap>) -> u32 {
         let terrain = (*self.client.terrain).clone();
         let scene = Scene {
             epoch: 5_000 + u32::from(number),
@@ -116,7 +144,7 @@ impl Bench<'_> {
             scene,
             hip: GridPoint::default(),
             keeps_tiles: true,
-            in_contact: None,
+            in_contact,
         };
         self.client.put_view(self.now, view, terrain, &mut self.out);
         scene.epoch
@@ -744,4 +772,65 @@ fn epoch_after_reconnect_resolves_pending_placement() {
             assert_eq!(bench.client.scene().epoch, held);
         });
     }
+}
+
+/// The device reports the scene before the change in an answer, a heartbeat or after a reconnection.
+#[test]
+fn cancelled_placement_restores_the_scene_before() {
+    for reported_by in 0..3 {
+        on_bench(None, |bench| {
+            bench.open();
+            let before = bench.client.scene().epoch;
+            bench.cancel_change(1);
+            let (number, result) = (1, Ok(()));
+            let epoch = Some(before);
+            match reported_by {
+                0 => bench.deliver(&ToHost::Answer(Answer { number, result })),
+                1 => bench.deliver(&ToHost::Heartbeat {
+                    count: SampleCount::default(),
+                    epoch,
+                    report: Report::default(),
+                }),
+                _ => {
+                    bench.client.greet(bench.now, &mut bench.out);
+                    bench.deliver(&ToHost::Hello(DeviceHello {
+                        number: 2,
+                        epoch,
+                        ..hello()
+                    }));
+                    bench.deliver(&ToHost::SceneAck {
+                        epoch: before,
+                        accepted: true,
+                    });
+                }
+            }
+            assert_eq!((bench.cancelled, bench.client.scene().epoch), (1, before));
+            assert_eq!(bench.client.state(), State::Open);
+            bench.out.clear();
+            // The device gets no scene again, and the tiles of the one before.
+            bench.deliver(&bench.heartbeat());
+            bench.deliver(&ToHost::TileRequest {
+                epoch: before,
+                key: TileKey::new(0, 0, 0),
+            });
+            bench.advance(ms(600)).expect("in time");
+            let sent = bench.drain_sent();
+            let counts = ["Scene", "Tile"].map(|what| count_of(&sent, what));
+            assert_eq!(counts, [0, 1], "{sent:?}");
+            assert_eq!(bench.cancelled, 1);
+        });
+    }
+}
+
+#[test]
+fn refused_cancel_keeps_the_placement() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.cancel_change(1);
+        let epoch = bench.client.scene().epoch;
+        let (number, result) = (1, Err(Refusal::NoSuchChange));
+        bench.deliver(&ToHost::Answer(Answer { number, result }));
+        bench.deliver(&bench.heartbeat());
+        assert_eq!((bench.cancelled, bench.client.scene().epoch), (0, epoch));
+    });
 }

@@ -1,5 +1,8 @@
 //! Tests of the engine with devices that misbehave or restart.
 
+#[path = "engine/automatic_level_tests.rs"]
+mod automatic_level;
+
 use super::*;
 use crate::link::hello;
 use crate::place::{Placement, PlacementOptions, Reach, Sizing};

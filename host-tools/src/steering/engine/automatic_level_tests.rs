@@ -1,0 +1,254 @@
+//! Changes of the level by the hand's speed, with devices that refuse, wait or restart.
+
+use super::*;
+use hapterra_core::wire::request::Refusal;
+
+/// Samples in which a slow hand is certain to get a finer level.
+const SLOW_SAMPLES: u32 = 1_000;
+
+/// A hand that presses on the plane, and moves east and west.
+struct Sliding<'s, 't> {
+    steering: &'s mut Steering<'t>,
+    tick: u32,
+    east_mm: f64,
+    /// The placement that the device renders.
+    view: u8,
+    limits: Limits,
+    state: ContactState,
+}
+
+impl Sliding<'_, '_> {
+    /// Moves at a speed, mm a sample, and stops at the first change that is sent.
+    fn slide(&mut self, mm: f64, samples: u32) -> Option<SceneChange> {
+        for _ in 0..samples {
+            self.tick += 1;
+            self.east_mm = (self.east_mm + mm).clamp(2.0, 62.0);
+            let scale = self.steering.terrain.scale();
+            let [proxy, hip] = [0.0, -2.0].map(|dz| {
+                let ground = scale.height_mm_per_unit() * self.east_mm;
+                scale
+                    .to_grid([self.east_mm, 32.0, ground + dz])
+                    .expect("on the grid")
+            });
+            let sample = TickRecord {
+                tick: self.tick,
+                view: self.view,
+                mode: Mode::Armed,
+                state: self.state,
+                limits: self.limits,
+                hip,
+                proxy,
+                ..TickRecord::default()
+            };
+            self.steering.on_event(&Event::Sample(&sample));
+            if let Some(update) = self.steering.take_update() {
+                return Some(update.view);
+            }
+        }
+        None
+    }
+
+    /// Moves fast from west to east.
+    fn slide_fast(&mut self) -> Option<SceneChange> {
+        self.slide(5.0, 12)
+    }
+
+    fn level(&self) -> u8 {
+        self.steering.now().view.level
+    }
+
+    /// Moves fast until a coarser level is sent, which the device accepts.
+    fn send_coarser(&mut self) -> SceneChange {
+        let view = self.slide_fast().expect("a coarser level");
+        assert!(view.in_contact.is_some() && view.scene.level > 0);
+        report_result(self.steering, &view, true);
+        assert!(self.steering.is_settled(), "the user waits for nothing");
+        view
+    }
+
+    /// Returns true if a cancel of this change was requested, and nothing else.
+    fn cancels(&mut self, number: u8) -> bool {
+        let requests = self.steering.requests();
+        let cancel = HostRequest::Request(Request::CancelChange { number });
+        assert!(requests.is_empty() || requests == [cancel], "{requests:?}");
+        !requests.is_empty()
+    }
+}
+
+fn sliding<T>(test: impl FnOnce(&mut Sliding<'_, '_>) -> T) -> T {
+    with(|steering| {
+        steering.follow_speed(1_000);
+        let mut sliding = Sliding {
+            steering,
+            tick: 0,
+            east_mm: 2.0,
+            view: 0,
+            limits: Limits::empty(),
+            state: ContactState::Touching,
+        };
+        let tested = test(&mut sliding);
+        assert_eq!(sliding.steering.lines(), [""; 0]);
+        tested
+    })
+}
+
+#[test]
+fn level_follows_the_speed_only_if_chosen() {
+    with(|steering| {
+        let mut sliding = Sliding {
+            steering,
+            tick: 0,
+            east_mm: 2.0,
+            view: 0,
+            limits: Limits::empty(),
+            state: ContactState::Touching,
+        };
+        assert!(sliding.slide_fast().is_none());
+    });
+    sliding(|hand| {
+        let view = hand.send_coarser();
+        assert_eq!(hand.slide(0.1, 20), None, "it waits for the coarse tiles");
+        assert!(!hand.cancels(1));
+        hand.view = 1;
+        hand.slide(0.0, 1);
+        assert_eq!((hand.level(), hand.steering.number), (view.scene.level, 1));
+        // While the force turns, nothing is sent.
+        hand.limits = Limits::CLUTCH_MOVES;
+        assert_eq!(hand.slide(0.0, SLOW_SAMPLES), None);
+        hand.limits = Limits::empty();
+        let finer = hand.slide(0.0, SLOW_SAMPLES).expect("a finer level");
+        assert_eq!((finer.number, finer.scene.level), (2, 0));
+        assert!(!hand.cancels(1));
+    });
+}
+
+#[test]
+fn hand_that_does_not_press_changes_no_level() {
+    let states = [ContactState::Free, ContactState::Touching];
+    for (state, limits) in states
+        .into_iter()
+        .zip([Limits::empty(), Limits::TERRAIN_COARSE])
+    {
+        sliding(|hand| {
+            (hand.state, hand.limits) = (state, limits);
+            assert_eq!(hand.slide_fast(), None);
+            assert!(!hand.cancels(0));
+            // At once when it presses.
+            (hand.state, hand.limits) = (ContactState::Touching, Limits::empty());
+            assert!(hand.slide(-5.0, 1).is_some());
+        });
+    }
+}
+
+/// The hand lifts off, or the coarse tiles are late.
+#[test]
+fn level_that_cannot_be_made_is_cancelled_and_sent_later() {
+    for lifts in [true, false] {
+        sliding(|hand| {
+            hand.send_coarser();
+            if lifts {
+                hand.state = ContactState::Free;
+            } else {
+                hand.slide(0.0, 100);
+                assert!(!hand.cancels(1));
+            }
+            hand.slide(0.0, 1);
+            assert!(hand.cancels(1), "lifts: {lifts}");
+            // Only once, and again if the device does not answer.
+            hand.slide(0.0, 20);
+            assert!(!hand.cancels(1) && hand.steering.is_settled());
+            let request = HostRequest::Request(Request::CancelChange { number: 1 });
+            hand.steering.on_event(&Event::Unanswered(&request));
+            hand.slide(0.0, 1);
+            assert!(hand.cancels(1));
+            hand.steering.on_event(&Event::ChangeCancelled);
+            assert_eq!((hand.level(), hand.steering.number), (0, 0));
+            hand.state = ContactState::Touching;
+            hand.east_mm = 2.0;
+            assert_eq!(hand.slide_fast(), None, "after a pause");
+            hand.slide(0.0, 190);
+            hand.east_mm = 2.0;
+            hand.slide(0.0, 1);
+            assert_eq!(hand.slide_fast().expect("a level").number, 1);
+            assert!(!hand.cancels(1));
+        });
+    }
+}
+
+#[test]
+fn change_that_was_made_before_its_cancel_is_in_force() {
+    sliding(|hand| {
+        let level = hand.send_coarser().scene.level;
+        hand.slide(0.0, 101);
+        assert!(hand.cancels(1));
+        let (request, result) = (
+            &Request::CancelChange { number: 1 },
+            Err(Refusal::NoSuchChange),
+        );
+        hand.steering.on_event(&Event::Answered { request, result });
+        hand.slide(0.0, 3);
+        hand.view = 1;
+        hand.slide(0.0, 1);
+        assert_eq!(hand.level(), level);
+        assert!(!hand.cancels(1) && hand.steering.is_settled());
+    });
+}
+
+#[test]
+fn refused_level_opens_no_clutch() {
+    sliding(|hand| {
+        let view = hand.slide_fast().expect("a level");
+        report_result(hand.steering, &view, false);
+        hand.slide(0.0, 20);
+        assert!(!hand.cancels(1) && hand.steering.is_settled());
+        assert_eq!(hand.level(), 0);
+    });
+}
+
+#[test]
+fn change_of_the_user_cancels_that_of_the_level() {
+    sliding(|hand| {
+        hand.send_coarser();
+        hand.steering.steer(ZOOM);
+        assert_eq!(hand.slide(0.0, 1), None);
+        assert!(hand.cancels(1));
+        hand.steering.on_event(&Event::ChangeCancelled);
+        let zoom = hand.slide(0.0, 1).expect("the user's change");
+        assert_eq!((zoom.number, zoom.scene.level), (1, 0));
+        report_result(hand.steering, &zoom, true);
+        assert!(!hand.steering.is_settled());
+    });
+    // The clutch opens at once; the change is then made with it.
+    sliding(|hand| {
+        hand.send_coarser();
+        hand.steering.steer(Steer::Clutch(true));
+        hand.slide(0.0, 1);
+        assert_eq!(requested_hold(hand.steering), Some(ClutchMode::WithHand));
+    });
+    // A device that does not answer a cancel holds up no user.
+    sliding(|hand| {
+        hand.send_coarser();
+        hand.steering.steer(ZOOM);
+        hand.slide(0.0, MAX_SAMPLES_IN_CONTACT);
+        assert!(hand.cancels(1));
+        hand.slide(0.0, 1);
+        assert_eq!(requested_hold(hand.steering), Some(ClutchMode::InPlace));
+    });
+}
+
+#[test]
+fn resumed_session_cancels_again_and_a_restarted_device_has_the_level() {
+    for resumed in [true, false] {
+        sliding(|hand| {
+            let level = hand.send_coarser().scene.level;
+            hand.slide(0.0, 101);
+            assert!(hand.cancels(1));
+            let device = &hello();
+            hand.steering.on_event(&Event::Opened { device, resumed });
+            hand.slide(0.0, 102);
+            assert_eq!(hand.cancels(1), resumed);
+            assert_eq!(hand.level(), level);
+            assert!(hand.steering.is_settled());
+        });
+    }
+}
