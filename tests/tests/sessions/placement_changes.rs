@@ -56,6 +56,8 @@ struct Touching<'t> {
     steering: Steering<'t>,
     samples: Vec<TickRecord>,
     messages: Vec<String>,
+    /// Ticks after which a change was cancelled.
+    cancelled: Vec<u32>,
     /// True if the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
 }
@@ -96,13 +98,19 @@ fn pressed_at<T>(
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
     let press = |touch: Touch<'_>, _| touch.press(PUSH_N, seconds).finish();
-    touched_at((model, RESOLUTION_MM), raster, options, press, play)
+    touched_at(
+        (model, RESOLUTION_MM, SurfaceParams::PREMIUM),
+        raster,
+        options,
+        press,
+        play,
+    )
 }
 
-/// As [`pressed_at`], with another hand and encoders' resolution, mm: `touch` continues the plan of
+/// As [`pressed_at`], with another hand, encoders' resolution, mm, and surface: `touch` continues the plan of
 /// a hand over the home position, given in device millimetres.
 fn touched_at<T>(
-    (model, resolution_mm): (PhantomModel, f64),
+    (model, resolution_mm, params): (PhantomModel, f64, SurfaceParams),
     raster: &Raster,
     options: &PlacementOptions,
     touch: impl FnOnce(Touch<'_>, [f64; 2]) -> Script,
@@ -113,7 +121,6 @@ fn touched_at<T>(
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = Placement::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let params = SurfaceParams::PREMIUM;
     let scene = view.scene(&terrain, params).expect("a scene");
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
@@ -140,6 +147,7 @@ fn touched_at<T>(
         steering: Steering::new(bounds, terrain.clone()),
         samples: vec![],
         messages: vec![],
+        cancelled: vec![],
         pedal,
     };
     // Armed, lowered, and at rest.
@@ -154,10 +162,15 @@ fn touched_at<T>(
 impl Touching<'_> {
     fn poll(&mut self) {
         let (samples, steering) = (&mut self.samples, &mut self.steering);
+        let cancelled = &mut self.cancelled;
         let mut on_event = |event: Event<'_>| {
             steering.on_event(&event);
-            if let Event::Sample(sample) = event {
-                samples.push(*sample);
+            match event {
+                Event::Sample(sample) => samples.push(*sample),
+                Event::ChangeCancelled => {
+                    cancelled.push(samples.last().map_or(0, |last| last.tick));
+                }
+                _ => {}
             }
         };
         self.session

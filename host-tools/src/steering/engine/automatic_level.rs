@@ -69,10 +69,10 @@ impl<'r> Steering<'r> {
         if !matches!(self.stage, Stage::Applying { .. }) {
             automatic.sent = None;
         }
-        // The HIP of an open clutch does not follow the hand.
+        // Another placement has other cells, and the HIP of an open clutch does not follow the hand.
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
-        let last = automatic.last.replace(*sample).filter(|_| !is_open);
-        let Some(last) = last else {
+        let follows = |last: &TickRecord| last.view == sample.view && !is_open;
+        let Some(last) = automatic.last.replace(*sample).filter(follows) else {
             return;
         };
         let ms = sample.tick.wrapping_sub(last.tick) / automatic.ticks_per_ms;

@@ -122,6 +122,18 @@ fn level_follows_the_speed_only_if_chosen() {
     });
 }
 
+/// No sample of the placement before arrives after the answer: the HIP of the new one is in other
+/// cells.
+#[test]
+fn change_of_placement_is_no_motion_of_the_hand() {
+    sliding(|hand| {
+        hand.send_coarser();
+        hand.view = 1;
+        let finer = hand.slide(0.0, SLOW_SAMPLES).expect("a finer level");
+        assert_eq!(finer.scene.level, 0);
+    });
+}
+
 #[test]
 fn hand_that_does_not_press_changes_no_level() {
     let states = [ContactState::Free, ContactState::Touching];
@@ -166,10 +178,8 @@ fn level_that_cannot_be_made_is_cancelled_and_sent_later() {
             hand.state = ContactState::Touching;
             hand.east_mm = 2.0;
             assert_eq!(hand.slide_fast(), None, "after a pause");
-            hand.slide(0.0, 190);
-            hand.east_mm = 2.0;
-            hand.slide(0.0, 1);
-            assert_eq!(hand.slide_fast().expect("a level").number, 1);
+            assert_eq!(hand.slide(0.0, 180), None);
+            assert_eq!(hand.slide(0.0, 10).expect("a level").number, 1);
             assert!(!hand.cancels(1));
         });
     }

@@ -25,6 +25,7 @@ fn rough() -> Raster {
 
 /// Plays with a hand on rough ground, whose level follows its speed.
 fn touched<T>(
+    params: SurfaceParams,
     touch: impl FnOnce(Touch<'_>, [f64; 2]) -> Script,
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
@@ -33,7 +34,7 @@ fn touched<T>(
         heights: Heights::MmPerUnit(1.0),
         ..PlacementOptions::default()
     };
-    let arm = (PhantomModel::premium_1_5(), FINE_MM);
+    let arm = (PhantomModel::premium_1_5(), FINE_MM, params);
     touched_at(arm, &rough(), &options, touch, |touching| {
         touching.steering.follow_speed(1_000);
         play(touching)
@@ -57,7 +58,7 @@ impl Touching<'_> {
 
 /// Checks that the clutch stays closed, and the force makes no step.
 fn check_closed(samples: &[TickRecord]) {
-    let mut worst = 0.0_f32;
+    let (mut worst, mut worst_at_change, mut changed_at) = (0.0_f32, 0.0_f32, 0);
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         assert_eq!(
@@ -73,6 +74,12 @@ fn check_closed(samples: &[TickRecord]) {
         );
         let change = (after.force_n - before.force_n).length();
         worst = worst.max(change);
+        if after.view != before.view {
+            changed_at = after.tick;
+        }
+        if after.tick - changed_at < 20 && changed_at > 0 {
+            worst_at_change = worst_at_change.max(change);
+        }
         assert!(
             change <= MAX_SLEW_N_PER_S / 1_000.0,
             "tick {}: {change} N",
@@ -80,7 +87,7 @@ fn check_closed(samples: &[TickRecord]) {
         );
     }
     eprintln!(
-        "{} ticks, at most {worst:.4} N from one to the next",
+        "{} ticks, at most {worst:.4} N from one to the next, {worst_at_change:.4} N at a change",
         samples.len()
     );
 }
@@ -102,12 +109,70 @@ fn level_follows_a_hand_that_slides_slowly_and_fast() {
             .slide(&fast, PUSH_N, 150.0);
         touch.press(PUSH_N, 5.0).finish()
     };
-    touched(slides, |touching| {
+    touched(SurfaceParams::PREMIUM, slides, |touching| {
         let began = touching.samples.len();
-        let levels = touching.levels_to(14_000);
-        eprintln!("{levels:?}");
-        assert!(levels.len() >= 3, "{levels:?}");
+        let levels = touching.levels_to(20_000);
+        eprintln!("{levels:?}, cancelled after {:?}", touching.cancelled);
+        let coarsest = levels.iter().max();
+        assert!(levels.len() >= 3 && coarsest > Some(&0), "{levels:?}");
+        assert_eq!(touching.level(), 0, "at rest");
         assert_eq!(touching.messages, [""; 0]);
         check_closed(&touching.samples[began..]);
+        assert_eq!(touching.last().state, ContactState::Touching);
+    });
+}
+
+/// The force limit is below the press of the hand at rest: the device then does not change the
+/// level, and the host cancels it, or the hand lifts off before.
+#[test]
+fn hand_that_taps_stays_armed_and_keeps_its_tiles() {
+    let taps = |touch: Touch<'_>, [x, y]: [f64; 2]| {
+        let mut touch = touch.press(PUSH_N, 6.0);
+        for round in 0..12 {
+            let [east, north] = [
+                f64::from(round % 2) * 60.0 - 30.0,
+                f64::from(round) * 3.0 - 18.0,
+            ];
+            touch = touch.slide(&[[x + east, y + north]], PUSH_N, 150.0);
+            for _ in 0..6 {
+                touch = touch.lift(4.0).press(PUSH_N, 0.02);
+            }
+        }
+        touch
+            .slide(&[[x, y]], PUSH_N, 8.0)
+            .press(PUSH_N, 3.0)
+            .finish()
+    };
+    let params = SurfaceParams {
+        max_force_n: 0.95 * PUSH_N as f32,
+        ..SurfaceParams::PREMIUM
+    };
+    touched(params, taps, |touching| {
+        let began = touching.samples.len();
+        let levels = touching.levels_to(36_000);
+        eprintln!("{levels:?}, cancelled after {:?}", touching.cancelled);
+        assert!(levels.len() > 2 && touching.cancelled.len() > 2);
+        assert_eq!(touching.messages, [""; 0]);
+        let samples = &touching.samples[began..];
+        check_closed(samples);
+        let mut lifted = 0;
+        for tick in &touching.cancelled {
+            let from = samples.partition_point(|sample| sample.tick < *tick);
+            lifted += u32::from(samples[from].state == ContactState::Free);
+            // The tiles of the placement that stays arrive.
+            let is_late = |sample: &TickRecord| {
+                let late = Limits::TERRAIN_COARSE | Limits::TERRAIN_MISSING;
+                sample.limits.intersects(late)
+            };
+            let after = &samples[from..samples.len().min(from + 100)];
+            assert!(!after.iter().all(is_late), "after tick {tick}");
+        }
+        assert!(lifted > 0, "cancelled in the air");
+        let last = touching.last();
+        let [touches, is_whole] = [
+            last.state == ContactState::Touching,
+            last.missing_tile.is_none(),
+        ];
+        assert!(touches && is_whole, "{last:?}");
     });
 }
