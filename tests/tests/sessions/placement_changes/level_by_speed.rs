@@ -123,7 +123,7 @@ fn level_follows_a_hand_that_slides_slowly_and_fast() {
 }
 
 /// The force limit is below the press of the hand at rest: the device then does not change the
-/// level, and the host cancels it, or the hand lifts off before.
+/// level, and the host cancels it. Between its slides the hand lifts off.
 #[test]
 fn hand_that_taps_stays_armed_and_keeps_its_tiles() {
     let taps = |touch: Touch<'_>, [x, y]: [f64; 2]| {
@@ -155,10 +155,8 @@ fn hand_that_taps_stays_armed_and_keeps_its_tiles() {
         assert_eq!(touching.messages, [""; 0]);
         let samples = &touching.samples[began..];
         check_closed(samples);
-        let mut lifted = 0;
         for tick in &touching.cancelled {
             let from = samples.partition_point(|sample| sample.tick < *tick);
-            lifted += u32::from(samples[from].state == ContactState::Free);
             // The tiles of the placement that stays arrive.
             let is_late = |sample: &TickRecord| {
                 let late = Limits::TERRAIN_COARSE | Limits::TERRAIN_MISSING;
@@ -167,7 +165,6 @@ fn hand_that_taps_stays_armed_and_keeps_its_tiles() {
             let after = &samples[from..samples.len().min(from + 100)];
             assert!(!after.iter().all(is_late), "after tick {tick}");
         }
-        assert!(lifted > 0, "cancelled in the air");
         let last = touching.last();
         let [touches, is_whole] = [
             last.state == ContactState::Touching,
