@@ -7,12 +7,12 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::{ContactMap, Scene, SceneChange, Source};
-use hapterra_core::terrain::{CoarseTile, Fallback};
+use hapterra_core::terrain::{CoarseTile, Fallback, TileKey};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::SessionNumber;
 
-use super::rig::{HELLO, Rig, framed, scene};
+use super::rig::{HELLO, Rig, frame, framed, scene, tile};
 
 const TO_CANCEL: fn(&Request) -> bool = |r| matches!(r, Request::CancelChange { .. });
 /// Counts of the second axis for a tip above the plane and below it.
@@ -54,12 +54,13 @@ fn reach(rig: &mut Rig, to: i32) {
     rig.run(20);
 }
 
-fn epochs_of_requests(rig: &Rig) -> Vec<u32> {
-    let epoch = |message: &ToHost| match message {
-        ToHost::TileRequest { epoch, .. } => Some(*epoch),
+/// Returns the requested tiles with the epochs of their scenes.
+fn requests(rig: &Rig) -> Vec<(u32, TileKey)> {
+    let request = |message: &ToHost| match message {
+        ToHost::TileRequest { epoch, key } => Some((*epoch, *key)),
         _ => None,
     };
-    rig.received.iter().filter_map(epoch).collect()
+    rig.received.iter().filter_map(request).collect()
 }
 
 #[test]
@@ -85,8 +86,12 @@ fn cancelled_change_restores_the_scene_and_its_tiles() {
     rig.request(Request::CancelChange { number: 1 });
     rig.run(10);
     assert_eq!(rig.answers(TO_CANCEL), [Ok(())]);
-    let requests = epochs_of_requests(&rig);
-    assert!(!requests.is_empty() && requests.iter().all(|epoch| *epoch == 7));
+    let requests = requests(&rig);
+    let is_before = |(epoch, key): &(u32, TileKey)| *epoch == 7 && key.level == 0;
+    assert!(
+        !requests.is_empty() && requests.iter().all(is_before),
+        "{requests:?}"
+    );
     reach(&mut rig, BELOW);
     let sample = rig.latest();
     assert_eq!((sample.view, sample.mode), (0, Mode::Armed));
@@ -110,12 +115,16 @@ fn cancelled_change_restores_the_scene_and_its_tiles() {
 #[test]
 fn cancel_and_change_agree_on_the_placement() {
     let mut outcomes = [0, 0];
-    for delay in 0..8 {
+    for (delay, unread) in (0..8).flat_map(|delay| [(delay, 0), (delay, 2), (delay, 4)]) {
         let mut rig = Rig::armed();
         reach(&mut rig, BELOW);
         let change = change(&rig, 1, 1_001);
         rig.send_message(&ToDevice::SceneChange(change));
         rig.run(delay);
+        // Records that the link has not read yet.
+        for _ in 0..unread {
+            let _ = rig.device.tick_alone(rig.sense);
+        }
         rig.request(Request::CancelChange { number: 1 });
         rig.run(300);
         let answers = rig.answers(TO_CANCEL);
@@ -125,11 +134,11 @@ fn cancel_and_change_agree_on_the_placement() {
             true => (Err(Refusal::NoSuchChange), 1_001),
             false => (Ok(()), 7),
         };
-        assert_eq!(answers, [answer], "after {delay} ticks");
+        assert_eq!(answers, [answer], "after {delay} and {unread} ticks");
         assert_eq!(
             rig.status().device.epoch,
             Some(epoch),
-            "after {delay} ticks"
+            "after {delay} and {unread} ticks"
         );
         reach(&mut rig, ABOVE);
         reach(&mut rig, BELOW);
@@ -138,6 +147,49 @@ fn cancel_and_change_agree_on_the_placement() {
         assert_eq!(usize::from(rig.latest().view), usize::from(is_made));
     }
     assert!(outcomes[0] > 0 && outcomes[1] > 0, "{outcomes:?}");
+}
+
+/// The loop's report of the scene before arrives at every time of a cancel.
+#[test]
+fn repeated_cancels_keep_the_arm_armed() {
+    let mut rig = Rig::armed();
+    for n in 0..200 {
+        let change = change(&rig, 1, 2_000 + n);
+        rig.send_message(&ToDevice::SceneChange(change));
+        rig.run(2 + n % 3);
+        rig.request(Request::CancelChange { number: 1 });
+        rig.run(4);
+        assert_eq!(rig.answers(TO_CANCEL).pop(), Some(Ok(())), "{n}");
+        assert_eq!(rig.latest().mode, Mode::Armed, "{n}");
+        rig.received
+            .retain(|message| matches!(message, ToHost::Telemetry(_)));
+        let old = rig.received.len().saturating_sub(2);
+        rig.received.drain(..old);
+    }
+    assert_eq!(rig.status().device.epoch, Some(7));
+}
+
+/// The loop would store them in the placement before.
+#[test]
+fn tiles_of_a_cancelled_change_are_dropped() {
+    let mut rig = Rig::armed();
+    rig.answers_tiles = false;
+    let change = change(&rig, 1, 1_001);
+    rig.received.clear();
+    rig.send_message(&ToDevice::SceneChange(change));
+    rig.run(20);
+    let (epoch, key) = *requests(&rig).last().expect("the fallback");
+    assert_eq!(epoch, 1_001);
+    let number = rig.number + 1;
+    let request = Request::CancelChange { number: 1 };
+    let cancel = frame(&ToDevice::Request { number, request });
+    let bytes = [cancel, tile(1_001, key)].concat();
+    assert_eq!(rig.device.receive(&bytes), bytes.len());
+    let link = &rig.device.link;
+    assert_eq!(
+        (link.ends.commands.len(), link.requester.in_flight()),
+        (1, 0)
+    );
 }
 
 /// The open message of a host that returns is answered with the scene that stays.
