@@ -59,7 +59,7 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Reports the guard's state and the outcomes of requests.
-    fn report_state(&mut self) {
+    pub(super) fn report_state(&mut self) {
         // Later reports are after every command, if the loop had taken all commands before the
         // reports up to now were read.
         let follows = self.commands_drained;
