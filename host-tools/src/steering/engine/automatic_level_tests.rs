@@ -122,18 +122,6 @@ fn level_follows_the_speed_only_if_chosen() {
     });
 }
 
-/// No sample of the placement before arrives after the answer: the HIP of the new one is in other
-/// cells.
-#[test]
-fn change_of_placement_is_no_motion_of_the_hand() {
-    sliding(|hand| {
-        hand.send_coarser();
-        hand.view = 1;
-        let finer = hand.slide(0.0, SLOW_SAMPLES).expect("a finer level");
-        assert_eq!(finer.scene.level, 0);
-    });
-}
-
 #[test]
 fn hand_that_does_not_press_changes_no_level() {
     let states = [ContactState::Free, ContactState::Touching];
