@@ -156,11 +156,13 @@ fn change_in_an_unread_record_is_made() {
     rig.send_message(&ToDevice::SceneChange(change));
     rig.run(20);
     let (_, key) = *requests(&rig).last().expect("the fallback");
-    let tick = |rig: &mut Rig| drop(rig.device.tick_alone(rig.sense));
-    tick(&mut rig);
+    let tick = |rig: &mut Rig| rig.device.tick_alone(rig.sense);
+    let _ = tick(&mut rig);
     let tile = tile(1_001, key);
     assert_eq!(rig.device.link.receive(&tile), tile.len());
-    (0..3).for_each(|_| tick(&mut rig));
+    for _ in 0..3 {
+        let _ = tick(&mut rig);
+    }
     rig.request(Request::CancelChange { number: 1 });
     rig.run(20);
     let refused = Err(Refusal::NoSuchChange);
